@@ -1,0 +1,1 @@
+"""Trees over primitives: builders, wide layouts, statistics."""

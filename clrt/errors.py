@@ -1,0 +1,53 @@
+"""What can go wrong because of the user's input or machine.
+
+    ClrtError
+    ├── UsageError    a wrong option or combination of options        exit code 2
+    ├── SceneError    a scene, model or picture file, or its content  exit code 3
+    ├── DeviceError   no such device, or the device failed            exit code 4
+    ├── KernelError   the device's compiler refused the program       exit code 5
+    └── OutputError   a picture or report could not be written        exit code 6
+
+Everything public raises only these for users' mistakes; any other exception is a defect of clrt.
+"""
+
+from __future__ import annotations
+
+
+class ClrtError(Exception):
+    """Base of all errors that clrt raises on purpose; `exit_code` is what the command line returns."""
+
+    exit_code = 1
+
+
+class UsageError(ClrtError):
+    """An option has a wrong value, or options contradict each other."""
+
+    exit_code = 2
+
+
+class SceneError(ClrtError):
+    """A scene cannot be used. `problems` lists every mistake found, one sentence each."""
+
+    exit_code = 3
+
+    def __init__(self, problems: str | list[str]) -> None:
+        self.problems = [problems] if isinstance(problems, str) else list(problems)
+        super().__init__("\n".join(self.problems))
+
+
+class DeviceError(ClrtError):
+    """A device cannot be found, chosen or used."""
+
+    exit_code = 4
+
+
+class KernelError(ClrtError):
+    """A kernel does not compile on the chosen device; the message holds the build log."""
+
+    exit_code = 5
+
+
+class OutputError(ClrtError):
+    """A result cannot be written."""
+
+    exit_code = 6

@@ -1,0 +1,1 @@
+"""Pictures and numbers that leave the program: image files, view transforms, comparison, reports."""

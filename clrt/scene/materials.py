@@ -1,0 +1,107 @@
+"""Materials: plain data, one dataclass each. A material's behaviour is `kernels/bsdf/<kernel>.cl`.
+
+To add one: write its kernel file, write its dataclass here and list it in MATERIALS. The scene file, the validation,
+the packing and the tests of every BSDF find it in that list. Field types carry their limits (annotated-types), which
+`validate` checks for scenes from files and from Python alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Annotated, ClassVar, Literal
+
+from annotated_types import Ge, Le
+
+Unit = Annotated[float, Ge(0), Le(1)]
+Albedo = tuple[Unit, Unit, Unit]
+NonNegative = Annotated[float, Ge(0)]
+Radiance = tuple[NonNegative, NonNegative, NonNegative]
+Parameter = float | tuple[float, float, float]
+
+#: Specular reflectance at normal incidence, linear: (F0, metallic). Suchiński 2022, table 6.1.
+F0_PRESETS: dict[str, tuple[tuple[float, float, float], float]] = {
+    "water": ((0.02, 0.02, 0.02), 0.0),
+    "plastic_low": ((0.03, 0.03, 0.03), 0.0),
+    "plastic_high": ((0.05, 0.05, 0.05), 0.0),
+    "glass_low": ((0.03, 0.03, 0.03), 0.0),
+    "glass_high": ((0.08, 0.08, 0.08), 0.0),
+    "ruby": ((0.08, 0.08, 0.08), 0.0),
+    "diamond": ((0.17, 0.17, 0.17), 0.0),
+    "iron": ((0.56, 0.57, 0.58), 1.0),
+    "copper": ((0.95, 0.64, 0.54), 1.0),
+    "gold": ((1.00, 0.71, 0.29), 1.0),
+    "aluminium": ((0.91, 0.92, 0.92), 1.0),
+    "silver": ((0.95, 0.93, 0.88), 1.0),
+}
+Preset = Literal["water", "plastic_low", "plastic_high", "glass_low", "glass_high", "ruby", "diamond",
+                 "iron", "copper", "gold", "aluminium", "silver"]
+Smith = Literal["height_correlated", "separable", "schlick", "schlick_ibl"]
+
+#: GGX below this alpha is beyond float32 (D ~ 1/(pi alpha²)); use `Mirror` for a perfect one.
+ALPHA_MIN = 1e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """What every material has. `emission`: radiance in W·sr⁻¹·m⁻² that its front side sends out."""
+
+    kernel: ClassVar[str]
+    emission: Radiance = (0.0, 0.0, 0.0)
+
+    def parameters(self) -> dict[str, Parameter]:
+        """The values its kernel reads, in the order of the kernel's record."""
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "emission"}
+
+    def features(self) -> frozenset[str]:
+        """Names to define while compiling, for parts of the kernel that only some materials of this type need."""
+        return frozenset()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diffuse(Material):
+    """Lambert: f = color/π."""
+
+    kernel: ClassVar[str] = "diffuse"
+    color: Albedo = (0.8, 0.8, 0.8)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MetallicRoughness(Material):
+    """Cook–Torrance with GGX over Lambert (glTF's base material; Suchiński 6.5–6.15, Nadolny 3.5–3.13).
+
+    alpha = roughness². `preset` takes F0 (and for metals the color) from the table. `smith` chooses the
+    shadowing–masking term: height-correlated (glTF), separable G1·G1, or Schlick-GGX with k = (r+1)²/8 ("schlick")
+    or k = r²/2 ("schlick_ibl").
+    """
+
+    kernel: ClassVar[str] = "metallic_roughness"
+    color: Albedo = (0.8, 0.8, 0.8)
+    metallic: Unit = 0.0
+    roughness: Unit = 0.5
+    preset: Preset | None = None
+    smith: Smith = "height_correlated"
+
+    def parameters(self) -> dict[str, Parameter]:
+        color, specular, metallic = self.color, (0.04, 0.04, 0.04), self.metallic
+        if self.preset is not None:
+            specular, metallic = F0_PRESETS[self.preset]
+            color = specular if metallic else color
+        f0 = tuple(s + metallic * (c - s) for s, c in zip(specular, color))
+        albedo = tuple((1 - metallic) * c for c in color)
+        forms = ("height_correlated", "separable", "schlick", "schlick_ibl")
+        return {"albedo": (albedo[0], albedo[1], albedo[2]), "alpha": max(self.roughness**2, ALPHA_MIN),
+                "f0": (f0[0], f0[1], f0[2]), "smith": float(forms.index(self.smith))}
+
+    def features(self) -> frozenset[str]:
+        return frozenset({f"SMITH_{self.smith.upper()}"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mirror(Material):
+    """A perfect mirror that reflects `color` of the light at every angle."""
+
+    kernel: ClassVar[str] = "mirror"
+    color: Albedo = (1.0, 1.0, 1.0)
+
+
+MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror)

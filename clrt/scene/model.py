@@ -1,0 +1,94 @@
+"""What is drawn: plain dataclasses, numpy only. Lengths in scene units, right-handed, +Y up, linear Rec. 709."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt, Le, Lt
+from numpy.typing import NDArray
+
+from .lights import Light
+from .materials import Diffuse, Material, NonNegative
+
+Vector = tuple[float, float, float]
+FloatArray = NDArray[np.float32]
+IntArray = NDArray[np.int32]
+Pixels = Annotated[int, Ge(1), Le(65536)]
+Integrator = Literal["path", "direct", "normals", "albedo", "depth"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Camera:
+    """A pinhole. `fov_degrees`: vertical, full angle. The picture's right is cross(forward, up)."""
+
+    position: Vector = (0.0, 0.0, 5.0)
+    look_at: Vector = (0.0, 0.0, 0.0)
+    up: Vector = (0.0, 1.0, 0.0)
+    fov_degrees: Annotated[float, Gt(0), Lt(180)] = 40.0
+
+
+@dataclass(eq=False)
+class Mesh:
+    """Triangles of one material.
+
+    vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front; normals: (n, 3) float32,
+    interpolated over each face, or None for flat shading.
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    material: Material = field(default_factory=Diffuse)
+    normals: FloatArray | None = None
+    name: str = "mesh"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sphere:
+    """A sphere seen from outside (or from inside, which is its back side)."""
+
+    center: Vector = (0.0, 0.0, 0.0)
+    radius: Annotated[float, Gt(0)] = 1.0
+    material: Material = field(default_factory=Diffuse)
+    name: str = "sphere"
+
+
+@dataclass(eq=False, kw_only=True)
+class Environment:
+    """Light from infinitely far away: a constant `color`, or an `image` (h, w, 3) float32 in latitude–longitude form.
+
+    Direction to texel: u = atan2(x, −z)/2π mod 1, v = acos(y)/π, row 0 on top; `rotation_degrees` turns the
+    environment about +Y, counter-clockwise seen from above. Radiance = strength · (color or texel).
+    """
+
+    color: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    image: FloatArray | None = None
+    strength: NonNegative = 1.0
+    rotation_degrees: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class RenderSettings:
+    """How to render unless told otherwise. `size`: (width, height). `max_depth` counts path edges:
+    1 = only what glows, 2 = + direct light, 3 = + one bounce."""
+
+    size: tuple[Pixels, Pixels] = (512, 512)
+    spp: Annotated[int, Ge(1)] = 64
+    max_depth: Annotated[int, Ge(1), Le(1024)] = 8
+    seed: Annotated[int, Ge(0), Lt(2**32)] = 0
+    integrator: Integrator = "path"
+    filter: Literal["box"] = "box"
+
+
+@dataclass(eq=False, kw_only=True)
+class Scene:
+    """Everything that one picture needs."""
+
+    meshes: list[Mesh] = field(default_factory=list)
+    spheres: list[Sphere] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)
+    camera: Camera = field(default_factory=Camera)
+    environment: Environment = field(default_factory=Environment)
+    render: RenderSettings = field(default_factory=RenderSettings)
+    name: str = "scene"
