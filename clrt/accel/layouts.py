@@ -1,0 +1,170 @@
+"""Trees as the device reads them. The dtypes here define the records; the C typedefs are generated from them.
+
+Records are rows of three floats and a four-byte scalar, or of eight lanes, without OpenCL vector types, so that host
+and device agree on every offset. Triangles have the primitives 0 … m − 1, spheres m … m + s − 1. Triangles without
+area stay in; they are never hit. A scene without triangles, or without spheres, has no buffer for them.
+
+- list: no tree; leaf_triangles and leaf_spheres in the order of the scene.
+- bvh2: nodes (BVH2_NODE), leaf_triangles and leaf_spheres in the order of the tree.
+- bvh8: nodes (BVH8_NODE), packs (one a triangle leaf), leaf_spheres in the order of the tree.
+
+A scene without any primitive has, in a tree layout, a root that no ray gets past: its children's boxes are inverted.
+See Wide for what that asks of the slab test.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError
+from .builders import BUILDERS
+from .tree import FloatArray, IntArray, Tree, join
+from .wide import collapse, leaf_fields, leaf_reference
+
+Records = NDArray[np.void]
+
+#: Children of a wide node, and triangles of a pack.
+LANES = 8
+
+#: `count`: 0 in an interior node, n in a leaf of n triangles, −n in a leaf of n spheres. `left_first`: the leaf's first
+#: record, or the left child: always even, so that two siblings share 64 bytes (node 1, beside the root, is unused).
+BVH2_NODE = np.dtype([("aabb_min", "f4", 3), ("left_first", "i4"), ("aabb_max", "f4", 3), ("count", "i4")])
+#: `child` as in Wide, but the `first` of a triangle leaf is its pack.
+BVH8_NODE = np.dtype([("lo", "f4", (3, LANES)), ("hi", "f4", (3, LANES)), ("child", "i4", LANES), ("pad", "i4", LANES)])
+LEAF_TRIANGLE = np.dtype([("p0", "f4", 3), ("primitive", "i4"), ("p1", "f4", 3), ("pad1", "i4"),
+                          ("p2", "f4", 3), ("pad2", "i4")])
+#: Unused lanes have NaN vertices and primitive −1.
+TRIANGLE_PACK = np.dtype([("p0", "f4", (3, LANES)), ("p1", "f4", (3, LANES)), ("p2", "f4", (3, LANES)),
+                          ("primitive", "i4", LANES)])
+LEAF_SPHERE = np.dtype([("center", "f4", 3), ("radius", "f4"), ("primitive", "i4"), ("pad", "i4", 3)])
+
+#: Primitives of a leaf whose primitives are intersected one by one; Nadolny 2026, 5.4.4 for the midpoint.
+LEAF_SIZES = {"sah": 4, "midpoint": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """A scene's primitives and the tree over them, ready to be copied to a device.
+
+    buffers: records by name. stack: entries that a traversal's stack needs (see Tree.stack_bound), 0 without a tree.
+    depth and sah_cost are those of the tree that is traversed; build_seconds includes the packing.
+    """
+
+    name: str
+    buffers: dict[str, Records]
+    stack: int
+    nodes: int
+    depth: int
+    sah_cost: float
+    build_seconds: float = 0.0
+
+    @property
+    def bytes(self) -> int:
+        """Size of all buffers."""
+        return sum(records.nbytes for records in self.buffers.values())
+
+
+def pack(layout: str, builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
+    """Build a tree and pack it.
+
+    layout: a name in LAYOUTS; builder: a name in BUILDERS (which a list does not use). triangles: (m, 3, 3) float32
+    corners; spheres: (s, 4) float32 centre and radius; all finite. Raises UsageError for an unknown name, and
+    SceneError for more primitives than the layout can count.
+    """
+    for kind, name, known in (("tree layout", layout, LAYOUTS), ("tree builder", builder, BUILDERS)):
+        if name not in known:
+            raise UsageError(f"there is no {kind} {name!r}: take one of {', '.join(known)}")
+    started = time.perf_counter()
+    packed = LAYOUTS[layout](builder, triangles, spheres)
+    return replace(packed, build_seconds=time.perf_counter() - started)
+
+
+def _list(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
+    buffers = _filled(leaf_triangles=_leaf_triangles(triangles, np.arange(len(triangles), dtype=np.int32)),
+                      leaf_spheres=_leaf_spheres(spheres, np.arange(len(spheres), dtype=np.int32), len(triangles)))
+    return Layout("list", buffers, stack=0, nodes=0, depth=0, sah_cost=float(len(triangles) + len(spheres)))
+
+
+def _bvh2(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
+    tree = _tree(builder, triangles, spheres, LEAF_SIZES[builder], 1)
+    links = np.where(tree.leaf, tree.left_first, tree.left_first + (tree.left_first > 0))
+    nodes = np.zeros(1 + len(tree.count), BVH2_NODE)
+    for name, values in (("aabb_min", tree.aabb_min), ("aabb_max", tree.aabb_max), ("left_first", links),
+                         ("count", np.where(tree.spheres, -tree.count, tree.count))):
+        nodes[name][0], nodes[name][2:] = values[0], values[1:]
+    nodes[1]["aabb_min"], nodes[1]["aabb_max"] = np.inf, -np.inf
+    buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
+                      leaf_spheres=_leaf_spheres(spheres, tree.sphere_order, len(triangles)))
+    return Layout("bvh2", {"nodes": nodes} | buffers, stack=tree.stack_bound, nodes=len(tree.count),
+                  depth=tree.depth, sah_cost=tree.sah_cost())
+
+
+def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
+    wide = collapse(_tree(builder, triangles, spheres, LANES, LANES), LANES)
+    leaf = wide.child < 0
+    first, sphere, count = leaf_fields(wide.child[leaf])
+    packs = _packs(triangles, wide.order, first[~sphere], count[~sphere])
+    first[~sphere] = np.arange(len(packs))
+    nodes = np.zeros(len(wide.child), BVH8_NODE)
+    nodes["lo"], nodes["hi"] = wide.aabb_min.transpose(0, 2, 1), wide.aabb_max.transpose(0, 2, 1)
+    nodes["child"] = wide.child
+    nodes["child"][leaf] = leaf_reference(first, sphere, count)
+    buffers = _filled(packs=packs, leaf_spheres=_leaf_spheres(spheres, wide.sphere_order, len(triangles)))
+    return Layout("bvh8", {"nodes": nodes} | buffers, stack=wide.stack_bound, nodes=len(nodes),
+                  depth=wide.depth, sah_cost=wide.sah_cost(LANES))
+
+
+LAYOUTS: dict[str, Callable[[str, FloatArray, FloatArray], Layout]] = {"list": _list, "bvh2": _bvh2, "bvh8": _bvh8}
+
+
+def _tree(builder: str, triangles: FloatArray, spheres: FloatArray, leaf_size: int, lanes: int) -> Tree:
+    """One tree over both kinds; triangles are intersected `lanes` at a time, spheres one by one."""
+    p0, p1, p2 = triangles.transpose(1, 0, 2)
+    build = BUILDERS[builder]
+    return join(build(np.minimum(np.minimum(p0, p1), p2), np.maximum(np.maximum(p0, p1), p2), leaf_size, lanes),
+                build(*sphere_boxes(spheres), LEAF_SIZES[builder], 1))
+
+
+def sphere_boxes(spheres: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """aabb_min, aabb_max (s, 3) float32, finite, that contain the spheres (s, 4): rounded outward."""
+    center, radius = spheres[:, :3].astype(np.float64), spheres[:, 3:].astype(np.float64)
+    far = np.finfo(np.float32).max
+    inside = np.nextafter(far, np.float32(0))
+    low, high = (np.clip(edge, -inside, inside).astype(np.float32) for edge in (center - radius, center + radius))
+    return np.nextafter(low, -far), np.nextafter(high, far)
+
+
+def _filled(**buffers: Records) -> dict[str, Records]:
+    return {name: records for name, records in buffers.items() if len(records)}
+
+
+def _leaf_triangles(triangles: FloatArray, order: IntArray) -> Records:
+    records = np.zeros(len(order), LEAF_TRIANGLE)
+    for corner, name in enumerate(("p0", "p1", "p2")):
+        records[name] = triangles[order, corner]
+    records["primitive"] = order
+    return records
+
+
+def _leaf_spheres(spheres: FloatArray, order: IntArray, first_primitive: int) -> Records:
+    records = np.zeros(len(order), LEAF_SPHERE)
+    records["center"], records["radius"] = spheres[order, :3], spheres[order, 3]
+    records["primitive"] = first_primitive + order
+    return records
+
+
+def _packs(triangles: FloatArray, order: IntArray, first: IntArray, count: IntArray) -> Records:
+    """Triangles order[first:first + count] of each leaf as a pack."""
+    lane = np.arange(LANES, dtype=np.int32)
+    live = lane < count[:, None]
+    primitive = np.where(live, order[np.where(live, first[:, None] + lane, 0)], -1)
+    packs = np.zeros(len(first), TRIANGLE_PACK)
+    for corner, name in enumerate(("p0", "p1", "p2")):
+        packs[name] = np.where(live[..., None], triangles[primitive, corner], np.nan).transpose(0, 2, 1)
+    packs["primitive"] = primitive
+    return packs

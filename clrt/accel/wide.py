@@ -1,0 +1,136 @@
+"""Wide trees: each node holds the boxes of up to eight children, to be met by a ray together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from .tree import BoolArray, FloatArray, IntArray, Tree, expected_work, half_area, intersections
+
+#: The child of an unused slot; used slots come first.
+EMPTY = 0x7FFFFFFF
+#: A leaf reference has 27 bits for the first primitive, 1 for its kind, 3 for the count.
+MAX_PRIMITIVES = 1 << 27
+MAX_LEAF = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Wide:
+    """A wide BVH of k nodes in breadth-first order, the root first.
+
+    aabb_min, aabb_max: (k, width, 3) float32, the children's boxes; inverted (min +inf, max −inf) in unused slots.
+    Such a box is never hit if near and far planes are chosen by the signs of the ray's direction; the min and max of
+    the distances to both would take it for all of space.
+    child: (k, width) int32: a node's index, ~(first << 4 | sphere << 3 | count − 1) for a leaf, EMPTY if unused.
+    order, sphere_order: what the `first` of a leaf counts in, as in the binary tree.
+    """
+
+    aabb_min: FloatArray
+    aabb_max: FloatArray
+    child: IntArray
+    order: IntArray
+    sphere_order: IntArray
+
+    @property
+    def interior(self) -> BoolArray:
+        """(k, width) bool, slots that hold a node."""
+        used: BoolArray = (self.child >= 0) & (self.child != EMPTY)
+        return used
+
+    def levels(self) -> Iterator[IntArray]:
+        """Node indices, level by level from the root."""
+        nodes = np.zeros(1, np.int32)
+        while nodes.size:
+            yield nodes
+            nodes = self.child[nodes][self.interior[nodes]]
+
+    @property
+    def depth(self) -> int:
+        """Edges from the root to the deepest leaf; leaves are below a node, never the root."""
+        return sum(1 for _ in self.levels()) if self.order.size + self.sphere_order.size else 0
+
+    @property
+    def stack_bound(self) -> int:
+        """The most entries on the stack of a traversal that pushes all children of a node and then pops the next one.
+
+        One fewer if it keeps the next one in a register. Exact: a node is popped with at most the sum of (children − 1)
+        over its ancestors left, and there is an order in which it is; then it pushes its own children.
+        """
+        children = np.count_nonzero(self.child != EMPTY, axis=1)
+        bound, left = 1, np.zeros(len(self.child), np.intp)
+        for nodes in self.levels():
+            full = left[nodes] + children[nodes]
+            bound = max(bound, int(full.max()))
+            inner = self.interior[nodes]
+            left[self.child[nodes][inner]] = np.repeat(full - 1, np.count_nonzero(inner, axis=1))
+        return bound
+
+    def sah_cost(self, pack: int = 1) -> float:
+        """As Tree.sah_cost: a wide node costs 1, like an intersection of `pack` triangles or of one sphere."""
+        nodes = half_area(self.aabb_min.min(axis=1), self.aabb_max.max(axis=1))
+        leaf = self.child < 0
+        _, sphere, count = leaf_fields(self.child[leaf])
+        leaves = half_area(self.aabb_min[leaf], self.aabb_max[leaf])
+        visits = np.any(self.child != EMPTY, axis=1)
+        return expected_work(np.concatenate([nodes, leaves]),
+                             np.concatenate([visits, intersections(count, sphere, pack)]))
+
+
+def leaf_reference(first: IntArray, sphere: BoolArray, count: IntArray) -> IntArray:
+    """What stands in `child` for a leaf."""
+    return ~(first << 4 | sphere.astype(np.int32) << 3 | count - 1)
+
+
+def leaf_fields(reference: IntArray) -> tuple[IntArray, BoolArray, IntArray]:
+    """first, sphere, count of leaf references."""
+    bits = ~reference
+    return bits >> 4, (bits >> 3 & 1).astype(bool), (bits & 7) + 1
+
+
+def collapse(tree: Tree, width: int = 8) -> Wide:
+    """Open the child with the largest area until a node has `width` children or all of them are leaves.
+
+    (Wald, Benthin, Boulos 2008, "Getting rid of packets".) All nodes of a level at once. The tree's leaves stay as they
+    are and must hold at most MAX_LEAF primitives. Raises SceneError for more than MAX_PRIMITIVES triangles or spheres.
+    """
+    largest = max(tree.order.size, tree.sphere_order.size)
+    if largest > MAX_PRIMITIVES:
+        raise SceneError(f"{largest} primitives of one kind, but the layout bvh8 holds {MAX_PRIMITIVES}: use bvh2")
+    if tree.count.max() > MAX_LEAF:
+        raise ValueError(f"a leaf of {tree.count.max()} primitives; a leaf reference holds {MAX_LEAF}")
+    # Slots without a node hold -1, which finds the extra last entry here and in _wide.
+    area = np.append(np.where(tree.leaf, -1.0, half_area(tree.aabb_min, tree.aabb_max)), -1.0)
+    slots, tops = [], np.zeros(1, np.int32)
+    while tops.size and not tree.empty:
+        slots.append(_open(tree, tops, area, width))
+        tops = slots[-1][area[slots[-1]] >= 0]
+    return _wide(tree, np.concatenate(slots) if slots else np.full((1, width), -1, np.int32))
+
+
+def _open(tree: Tree, tops: IntArray, area: NDArray[np.float64], width: int) -> IntArray:
+    """The binary nodes, (k, width), that become the children of the wide nodes in place of `tops` (k,)."""
+    slots = np.full((len(tops), width), -1, np.int32)
+    slots[:, 0] = tops
+    for used in range(1, width):
+        pick = np.argmax(area[slots], axis=1)
+        row = np.flatnonzero(area[slots[np.arange(len(tops)), pick]] >= 0)
+        left = tree.left_first[slots[row, pick[row]]]
+        slots[row, pick[row]], slots[row, used] = left, left + 1
+    return slots
+
+
+def _wide(tree: Tree, slots: IntArray) -> Wide:
+    """Boxes and references for slots (k, width) of binary nodes, whose rows are in breadth-first order."""
+    nowhere = np.full((1, 3), np.inf, np.float32)
+    leaf = np.append(tree.leaf, False)[slots]
+    interior = (slots >= 0) & ~leaf
+    nodes = slots[leaf]
+    child = np.full(slots.shape, EMPTY, np.int32)
+    child[leaf] = leaf_reference(tree.left_first[nodes], tree.spheres[nodes], tree.count[nodes])
+    child[interior] = np.arange(1, 1 + np.count_nonzero(interior))
+    return Wide(np.concatenate([tree.aabb_min, nowhere])[slots], np.concatenate([tree.aabb_max, -nowhere])[slots],
+                child, tree.order, tree.sphere_order)

@@ -1,0 +1,1 @@
+"""Where it runs: devices, programs, bounded launches. The only room, with accel and render, that imports pyopencl."""

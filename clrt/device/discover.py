@@ -1,0 +1,132 @@
+"""Which OpenCL devices there are, which can be used, and which one is meant.
+
+The best comes first: GPUs, then other accelerators, then CPUs, the larger before the smaller. A device that cannot
+run clrt is listed with the reason, last.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import pyopencl as cl
+
+from ..errors import DeviceError
+
+MINIMUM_ALLOCATION = 16 << 20
+
+
+@dataclass(frozen=True)
+class DeviceInfo:
+    """One OpenCL device. `id` stays the same until the platform or driver changes; `why` says what `usable` means."""
+
+    index: int
+    id: str
+    name: str
+    platform: str
+    platform_version: str
+    driver: str
+    type: str
+    compute_units: int
+    global_bytes: int
+    max_alloc_bytes: int
+    usable: bool
+    why: str
+    chosen: bool
+
+
+def find_devices() -> list[tuple[DeviceInfo, cl.Device]]:
+    """Every device of every platform, best first. `chosen` marks the one that is used when none is named."""
+    found = sorted(_every_device(), key=_rank)
+    chosen = next((i for i, device in enumerate(found) if not _unusable(device)), None)
+    return [(_describe(device, i, i == chosen), device) for i, device in enumerate(found)]
+
+
+def devices() -> list[dict[str, Any]]:
+    """What `clrt devices --json` prints: a dict for each device, best first."""
+    return [asdict(info) for info, _ in find_devices()]
+
+
+def choose(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
+    """The device that `selector` names: a number, an id, "cpu", "gpu" or a unique part of a name.
+
+    Without one, $CLRT_DEVICE, else the best. Raises DeviceError, listing the candidates, where none or several match.
+    """
+    found = find_devices()
+    if not found:
+        raise DeviceError('no OpenCL device: install one with `pip install "pyopencl[pocl]"` or a GPU driver')
+    if selector is None:
+        selector = os.environ.get("CLRT_DEVICE") or None
+    matches = [pair for pair in found if _matches(pair[0], selector)]
+    if str(selector).lower() in ("cpu", "gpu", "none"):
+        matches = [pair for pair in matches if pair[0].usable][:1]
+    listing = "\n".join(f"  {info.index}  {info.id}  {info.name} ({info.platform})" for info, _ in found)
+    if not matches:
+        raise DeviceError(f"no usable device matches {selector!r}; there are:\n{listing}")
+    if len(matches) > 1:
+        raise DeviceError(f"{len(matches)} devices match {selector!r}; name one by number or id:\n{listing}")
+    if not matches[0][0].usable:
+        raise DeviceError(f"{matches[0][0].name} cannot be used: {matches[0][0].why}")
+    return matches[0]
+
+
+def _every_device() -> Iterator[cl.Device]:
+    try:
+        platforms = cl.get_platforms()
+    except cl.Error:
+        return
+    for platform in platforms:
+        try:
+            yield from platform.get_devices()
+        except cl.Error:
+            continue  # a platform without devices must not hide the others
+
+
+def _rank(device: cl.Device) -> tuple[bool, int, int]:
+    order = {"gpu": 0, "accelerator": 1, "cpu": 2}
+    return bool(_unusable(device)), order[_type(device)], -device.max_compute_units * device.max_clock_frequency
+
+
+def _type(device: cl.Device) -> str:
+    if device.type & cl.device_type.GPU:
+        return "gpu"
+    return "cpu" if device.type & cl.device_type.CPU else "accelerator"
+
+
+def _unusable(device: cl.Device) -> str:
+    """Why the device cannot run clrt; empty where it can."""
+    if not device.available:
+        return "the driver says that it is not available"
+    if not device.compiler_available:
+        return "its driver has no compiler"
+    if not device.endian_little:
+        return "it is big-endian"
+    if device.max_mem_alloc_size < MINIMUM_ALLOCATION:
+        return f"its largest buffer is {device.max_mem_alloc_size} bytes; {MINIMUM_ALLOCATION} are needed"
+    if "Oclgrind" in device.platform.name:
+        return "it is a simulator for finding errors; name it to use it"
+    return ""
+
+
+def _describe(device: cl.Device, index: int, chosen: bool) -> DeviceInfo:
+    platform = device.platform
+    identity = "|".join([platform.name, platform.version, device.vendor, device.name, device.driver_version])
+    reason = _unusable(device)
+    return DeviceInfo(
+        index=index, id=hashlib.sha256(identity.encode()).hexdigest()[:8], name=device.name.strip(),
+        platform=platform.name.strip(), platform_version=platform.version.strip(), driver=device.driver_version.strip(),
+        type=_type(device), compute_units=device.max_compute_units, global_bytes=device.global_mem_size,
+        max_alloc_bytes=device.max_mem_alloc_size, usable=not reason, why=reason or f"a {_type(device)} with OpenCL C 1.2",
+        chosen=chosen)
+
+
+def _matches(info: DeviceInfo, selector: str | int | None) -> bool:
+    if selector is None:
+        return info.chosen
+    text = str(selector).strip().lower()
+    if text in ("cpu", "gpu"):
+        return info.type == text
+    return text in (str(info.index), info.id) or (not text.isdigit() and text in info.name.lower())

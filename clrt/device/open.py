@@ -1,0 +1,43 @@
+"""A device opened for work: its context, queue and the choices that follow from its kind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pyopencl as cl
+
+from ..errors import DeviceError
+from . import pocl
+from .discover import DeviceInfo, choose
+
+
+@dataclass(frozen=True)
+class Device:
+    """An opened device. Its queue runs in order."""
+
+    info: DeviceInfo
+    cl: cl.Device
+    context: cl.Context
+    queue: cl.CommandQueue
+
+    @property
+    def lanes(self) -> int:
+        """Paths a work-item follows: one on a GPU, whose hardware joins work-items; a vector of them on a CPU."""
+        return 8 if self.info.type == "cpu" else 1
+
+    @property
+    def layout(self) -> str:
+        """The tree layout that suits the device: eight boxes at a time where there are vectors, else two."""
+        return "bvh8" if self.info.type == "cpu" else "bvh2"
+
+
+def open_device(selector: str | int | None = None) -> Device:
+    """Opens the device that `selector` names (see `choose`); DeviceError where that fails."""
+    info, device = choose(selector)
+    if info.platform == "Portable Computing Language":
+        pocl.name_processor(device)
+    try:
+        context = cl.Context([device])
+        return Device(info, device, context, cl.CommandQueue(context))
+    except cl.Error as error:
+        raise DeviceError(f"{info.name} ({info.platform}) cannot be opened: {error}") from error

@@ -1,0 +1,69 @@
+"""Lets PoCL 3.0, the one that pip installs, run on processors newer than its compiler.
+
+Its LLVM 14 knows no processor after AMD's Zen 4 and calls those "generic", a name that its own front end then
+refuses: every program fails with "unknown target CPU 'generic'". The name is a pointer in PoCL's device structure,
+beside the target triple; `name_processor` points it at the best processor that LLVM 14 knows and this machine can
+run. It touches nothing unless exactly one such pair is found.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import struct
+from pathlib import Path
+
+import pyopencl as cl
+
+#: LLVM name → the /proc/cpuinfo flags of the instructions that its code generator may choose, best first.
+PROCESSORS = {
+    "icelake-server": {"avx512f", "avx512dq", "avx512bw", "avx512vl", "avx512cd", "avx512vbmi", "avx512_vbmi2",
+                       "avx512_vnni", "avx512_bitalg", "avx512_vpopcntdq", "avx512ifma", "gfni", "fma", "bmi2", "movbe"},
+    "skylake-avx512": {"avx512f", "avx512dq", "avx512bw", "avx512vl", "avx512cd", "fma", "bmi2", "movbe"},
+    "haswell": {"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe"},
+    "nehalem": {"sse4_2", "popcnt"},
+}
+SEARCHED_BYTES = 1024
+_names: list[ctypes.Array[ctypes.c_char]] = []  # PoCL keeps the pointer, so the strings must live as long as it
+
+
+def best_processor(flags: set[str]) -> str:
+    """The best of PROCESSORS whose needs `flags` meet, else the plain "x86-64"."""
+    return next((name for name, needs in PROCESSORS.items() if needs <= flags), "x86-64")
+
+
+def name_processor(device: cl.Device) -> bool:
+    """Gives the PoCL device a processor name its compiler knows; True where the name was "generic" and is replaced."""
+    if "LLVM 14" not in device.platform.version or not Path("/proc/self/mem").exists():
+        return False
+    found = [offset for offset, text, neighbour in _strings(device.int_ptr)
+             if text == "generic" and neighbour.startswith("x86_64")]
+    if len(found) != 1:
+        return False
+    flags = next((set(line.split(":")[1].split()) for line in Path("/proc/cpuinfo").read_text().splitlines()
+                  if line.startswith("flags")), set())
+    _names.append(ctypes.create_string_buffer(best_processor(flags).encode()))
+    ctypes.c_uint64.from_address(device.int_ptr + found[0]).value = ctypes.addressof(_names[-1])
+    return True
+
+
+def _strings(address: int) -> list[tuple[int, str, str]]:
+    """(offset, string, string of the neighbouring pointer) of every pointer to text in the structure at `address`.
+
+    Reads through /proc/self/mem, where a word that is no pointer gives an error instead of a crash.
+    """
+    with open("/proc/self/mem", "rb", buffering=0) as memory:
+        memory.seek(address)
+        words = struct.unpack(f"<{SEARCHED_BYTES // 8}Q", memory.read(SEARCHED_BYTES))
+
+        def text(pointer: int) -> str:
+            if not 4096 <= pointer < 1 << 47:
+                return ""
+            try:
+                memory.seek(pointer)
+                return memory.read(32).split(b"\0")[0].decode("ascii")
+            except (OSError, UnicodeDecodeError):
+                return ""
+
+        texts = [text(word) for word in words]
+    return [(8 * i, texts[i], texts[i - 1] if texts[i - 1].startswith("x86_64") else texts[i + 1])
+            for i in range(1, len(texts) - 1) if texts[i]]

@@ -1,0 +1,100 @@
+"""From kernel files to a built program: composition, build, cache.
+
+A program's text is a preamble (records, choices, features) followed by whole kernel files. `#include "file.cl"` is
+resolved here, each file once, and `#include NAME` stands for the files that the scene chose for NAME, possibly none.
+So the text holds what the scene needs and nothing else; `--print-kernel` shows exactly what is compiled; and the
+known troubles with -I (spaces in paths, driver caches that ignore included files) cannot arise.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import time
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+
+import pyopencl as cl
+
+from ..errors import KernelError
+from .cache import read_binary, write_binary
+from .open import Device
+
+OPTIONS = ["-cl-std=CL1.2"]
+_INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|(\w+))\s*$')
+_built: dict[str, cl.Program] = {}
+
+
+@dataclass(frozen=True)
+class BuiltProgram:
+    """A program ready to run. `cached`: it was not compiled from source; `build_seconds`: what getting it took."""
+
+    program: cl.Program
+    build_seconds: float
+    cached: bool
+
+
+def compose(preamble: str, entry: str, choices: Mapping[str, Sequence[str]], folder: Traversable | None = None) -> str:
+    """The text of a program: `preamble`, then the file `entry` with all that it includes.
+
+    choices: for each NAME in `#include NAME` the files to put there. folder: where kernel files lie (clrt.kernels).
+    """
+    folder = folder or files("clrt.kernels")
+    seen: set[str] = set()
+    lines = [preamble]
+
+    def include(name: str) -> None:
+        if name in seen:
+            return
+        seen.add(name)
+        lines.append(f'#line 1 "{name}"')
+        for number, line in enumerate(folder.joinpath(name).read_text().splitlines(), start=1):
+            match = _INCLUDE.match(line)
+            if not match:
+                lines.append(line)
+                continue
+            for chosen in [match[1]] if match[1] else choices[match[2]]:
+                include(chosen)
+            lines.append(f'#line {number + 1} "{name}"')
+
+    include(entry)
+    return "\n".join(lines) + "\n"
+
+
+def build(device: Device, source: str) -> BuiltProgram:
+    """Builds `source` for the device, or takes it from this process or the cache; KernelError with the log if refused."""
+    start = time.perf_counter()
+    identity = "\n".join([source, *OPTIONS, device.info.id, device.info.platform_version, device.info.driver])
+    key = hashlib.sha256(identity.encode()).hexdigest()
+    context_key = f"{key}-{device.context.int_ptr}"
+    cached = context_key in _built
+    if not cached:
+        program = _from_binary(device, read_binary(key))
+        cached = program is not None
+        if program is None:
+            program = _compile(device, source)
+            write_binary(key, program.get_info(cl.program_info.BINARIES)[0])
+        _built[context_key] = program
+    return BuiltProgram(_built[context_key], time.perf_counter() - start, cached)
+
+
+def _from_binary(device: Device, binary: bytes | None) -> cl.Program | None:
+    if binary is None:
+        return None
+    try:
+        return cl.Program(device.context, [device.cl], [binary]).build()
+    except (cl.Error, ValueError):
+        return None  # a driver may refuse an old or damaged binary: compile again
+
+
+def _compile(device: Device, source: str) -> cl.Program:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", cl.CompilerWarning)
+            return cl.Program(device.context, source).build(options=OPTIONS, cache_dir=False)
+    except cl.Error as error:
+        log = str(error).strip()
+        raise KernelError(f"{device.info.name} ({device.info.platform}) cannot build the kernel:\n{log}") from error

@@ -1,0 +1,86 @@
+"""How far a picture is from its reference."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..scene.pictures import read_picture
+
+FloatArray = NDArray[np.float32]
+#: Keeps relMSE finite where the reference is dark.
+RELMSE_FLOOR = 0.01
+#: HDR-FLIP sees values up to the largest of float16: the brighter the reference, the more exposures it tries.
+FLIP_MAX = 65504.0
+#: Below this HDR-FLIP finds no exposure that shows the reference, and ends the whole process.
+FLIP_MIN = 1e-5
+
+
+def compare_files(image: Path, reference: Path) -> dict[str, Any]:
+    """`compare` for two picture files; FLIP is HDR-FLIP when either is .exr or .hdr. SceneError names the files."""
+    pixels, truth = read_picture(image), read_picture(reference)
+    _check_sizes(pixels, truth, str(image), str(reference))
+    return compare(pixels, truth, hdr=bool({image.suffix.lower(), reference.suffix.lower()} & {".exr", ".hdr"}))
+
+
+def compare(image: FloatArray, reference: FloatArray, *, hdr: bool = True) -> dict[str, Any]:
+    """Measures of the image x against the reference r, both (h, w, 3) float32 linear, computed in float64.
+
+    - relmse: mean((x − r)² / (r² + 0.01)); rmse: √mean((x − r)²); max_abs: max |x − r|
+    - mean_ratio: mean(x) / mean(r) of each channel; None where mean(r) is 0
+    - flip: mean HDR-FLIP (if `hdr`) or LDR-FLIP; None if flip-evaluator is not installed or HDR-FLIP's reference black
+    - nonfinite, nonfinite_reference: how many values of x and of r are NaN or Inf. Where either is, the value is left
+      out of all the measures above (for FLIP it is 0 in both); a measure without any value left is None.
+
+    Raises SceneError if the sizes differ.
+    """
+    _check_sizes(image, reference, "the image", "the reference")
+    valid = np.isfinite(image) & np.isfinite(reference)
+    x, r = image[valid].astype(np.float64), reference[valid].astype(np.float64)
+    return {
+        "relmse": relmse(image, reference),
+        "rmse": float(np.sqrt(np.mean((x - r) ** 2))) if x.size else None,
+        "mean_ratio": [_mean_ratio(image[..., channel], reference[..., channel], valid[..., channel])
+                       for channel in range(3)],
+        "flip": _flip(np.where(valid, image, 0), np.where(valid, reference, 0), hdr),
+        "max_abs": float(np.abs(x - r).max()) if x.size else None,
+        "nonfinite": int(np.count_nonzero(~np.isfinite(image))),
+        "nonfinite_reference": int(np.count_nonzero(~np.isfinite(reference))),
+    }
+
+
+def relmse(image: FloatArray, reference: FloatArray) -> float | None:
+    """`compare`'s relmse alone, fast enough to follow a render; both arrays of one shape."""
+    valid = np.isfinite(image) & np.isfinite(reference)
+    x, r = image[valid].astype(np.float64), reference[valid].astype(np.float64)
+    return float(np.mean((x - r) ** 2 / (r**2 + RELMSE_FLOOR))) if x.size else None
+
+
+def _mean_ratio(image: FloatArray, reference: FloatArray, valid: NDArray[np.bool_]) -> float | None:
+    total = float(reference[valid].sum(dtype=np.float64))
+    return float(image[valid].sum(dtype=np.float64)) / total if total else None
+
+
+def _flip(image: FloatArray, reference: FloatArray, hdr: bool) -> float | None:
+    """Mean FLIP at 67 pixels a degree (Andersson et al. 2020, 2021); negative values count as 0."""
+    try:
+        import flip_evaluator
+    except ImportError:
+        return None
+    if hdr and reference.max(initial=0.0) < FLIP_MIN:
+        return None
+    bound = FLIP_MAX if hdr else 1.0
+    x, r = (np.ascontiguousarray(picture.clip(0, bound), np.float32) for picture in (image, reference))
+    _, mean, _ = flip_evaluator.evaluate(r, x, "HDR" if hdr else "LDR", inputsRGB=False, applyMagma=False)
+    return float(mean) if np.isfinite(mean) else None
+
+
+def _check_sizes(image: FloatArray, reference: FloatArray, image_name: str, reference_name: str) -> None:
+    if image.shape != reference.shape:
+        (h, w), (height, width) = image.shape[:2], reference.shape[:2]
+        raise SceneError(f"sizes differ: {image_name} has {w}x{h} pixels, {reference_name} {width}x{height}; "
+                         "only pictures of one size can be compared")

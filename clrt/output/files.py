@@ -1,0 +1,44 @@
+"""Write files so that a reader sees the old one or the new one, never half of one."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..errors import OutputError
+
+
+def check_target(path: Path) -> None:
+    """Raise OutputError unless a file can be written at `path`; for use before the work that fills it."""
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder; name a file in it, such as {path / 'picture.png'}")
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: the folder {path.parent} does not exist; create it first")
+    try:
+        tempfile.TemporaryFile(dir=path.parent).close()
+    except OSError as error:
+        raise OutputError(f"{path}: no file can be written in the folder {path.parent} ({error.strerror}); "
+                          "change its permissions or choose another folder") from error
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Lend a path beside `path`, with its extension, to write to; then move that file onto `path` in one step.
+
+    If the block fails, `path` is as it was and nothing is left beside it; an OSError comes out as OutputError.
+    A link stays a link: the file it points to is replaced.
+    """
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".clrt-{secrets.token_hex(8)}{path.suffix.lower()}")
+    try:
+        yield temporary
+        os.replace(temporary, target)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error}); "
+                          "free some space there or choose another path") from error
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,90 @@
+"""Write pictures: .exr (float32, linear), .hdr (Radiance RGBE, linear) and .png (8 bits through a view transform)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import OutputError
+from ..scene.pictures import read_picture
+from .files import check_target, replacing
+from .view import check_view, to_display
+
+FloatArray = NDArray[np.float32]
+
+EXTENSIONS = (".png", ".exr", ".hdr")
+#: The largest value that RGBE can hold: mantissa 255 of 256, exponent 127.
+RGBE_MAX = 255 / 256 * 2.0**127
+
+#: A picture that was written is read like any other.
+read_image = read_picture
+
+
+def check_writable(path: Path) -> None:
+    """Raise OutputError unless a picture can be written at `path`; ask before rendering, not after."""
+    check_target(path)
+    extension = path.suffix.lower()
+    if extension not in EXTENSIONS:
+        meant = "".join(f"; did you mean {path.with_suffix(match)}?"
+                        for match in get_close_matches(extension, EXTENSIONS, 1))
+        problem = f"unknown picture format {extension}" if extension else "the name has no extension"
+        raise OutputError(f"{path}: {problem}; use {', '.join(EXTENSIONS[:-1])} or {EXTENSIONS[-1]}{meant}")
+
+
+def write_image(path: Path, pixels: FloatArray, *, metadata: Mapping[str, str] | None = None,
+                exposure: float = 0.0, view: str = "srgb") -> None:
+    """Write (h, w, 3) float32 linear pixels in the format that the extension names, in one step (see `replacing`).
+
+    `exposure` (stops) and `view` apply to .png alone. An .exr keeps every bit; an .hdr is rounded to RGBE, with
+    NaN and negative values as 0. `metadata` is kept in .exr and .png; names with a colon, such as "clrt:spp", meet
+    none of the formats' own. Raises OutputError, and UsageError for an unknown view.
+    """
+    check_writable(path)
+    check_view(view)
+    match path.suffix.lower():
+        case ".png":
+            # Level 3 writes a noisy 512² picture in 40 ms, level 6 in 52 ms and 2 % smaller.
+            options: dict[str, str | int] = {"oiio:ColorSpace": "sRGB", "png:compressionLevel": 3}
+            samples: NDArray[Any] = to_display(pixels, view, exposure)
+        case ".hdr":
+            options, samples = {}, rgbe_rounded(pixels)
+        case _:
+            options, samples = {"compression": "zip"}, pixels
+    with replacing(path) as temporary:
+        _write(temporary, samples, {**(metadata or {}), **options})
+
+
+def rgbe_rounded(pixels: FloatArray) -> FloatArray:
+    """The nearest colours that RGBE can hold: 8 bits a channel at the scale of the brightest one (Ward 1991).
+
+    The file writer cuts off what lies below the last bit, which would darken every picture by 0.3 % on average.
+    """
+    bounded = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=RGBE_MAX), 0, RGBE_MAX).astype(np.float64)
+    # A mantissa of 255.5 rounds up to 256, which belongs to the next exponent.
+    _, exponent = np.frexp(bounded.max(axis=-1, keepdims=True) * (256 / 255.5))
+    quantum = np.ldexp(1.0, exponent - 8)
+    rounded: NDArray[np.float64] = np.floor(bounded / quantum + 0.5) * quantum
+    return rounded.astype(np.float32)
+
+
+def _write(path: Path, samples: NDArray[Any], attributes: Mapping[str, str | int]) -> None:
+    """Write uint8 or float32 samples as they are; OSError with the writer's reason if that fails."""
+    import OpenImageIO as oiio
+
+    height, width, channels = samples.shape
+    spec = oiio.ImageSpec(width, height, channels, samples.dtype.name if samples.dtype == np.uint8 else "float")
+    for name, value in attributes.items():
+        spec.attribute(name, value)
+    output = oiio.ImageOutput.create(str(path))
+    done = (output is not None and output.open(str(path), spec)
+            # OpenImageIO misreads strides: it gets rows that follow each other.
+            and output.write_image(np.ascontiguousarray(samples)) and output.close())
+    # A full disk shows in some formats only as a message after a "successful" close.
+    complaint = (output or oiio).geterror()
+    if complaint or not done:
+        raise OSError(complaint.splitlines()[0] if complaint else "the writer gave no reason")

@@ -1,0 +1,186 @@
+"""Scene → buffers, features and program text. The only code that packs a scene for the device."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..accel.layouts import Layout, pack
+from ..device.program import compose
+from ..scene.materials import MATERIALS, Material
+from ..scene.model import Scene
+from ..scene.validate import validate
+from .emitters import SURFACES, TYPES, Emitters, pack_emitters
+from .environment import Sky, pack_sky
+from .preamble import Buffers, defines, scene_struct, type_list, typedefs
+from .records import COUNTS, LAUNCH, NORMALS, PIXEL, SPHERE, TRIANGLE, material_record
+
+#: Files and record names of the tree layouts; `width` primitives of a leaf are tested at a time.
+TREES = {"bvh8": ("traverse/bvh8.cl", 8), "bvh2": ("traverse/bvh2.cl", 1), "list": ("traverse/list.cl", 1)}
+TRIANGLE_TESTS = {"watertight": "geometry/triangle_watertight.cl",
+                  "moller_trumbore": "geometry/triangle_moller_trumbore.cl"}
+TREE_RECORDS = {"nodes": "Node", "packs": "Triangles", "leaf_triangles": "Triangles", "leaf_spheres": "LeafSphere"}
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What a device or a user chooses about the program. `lanes`: paths a work-item (1, 8 or 16)."""
+
+    lanes: int = 8
+    layout: str = "bvh8"
+    builder: str = "sah"
+    triangle: str = "watertight"
+
+
+@dataclass(frozen=True)
+class CompiledScene:
+    """What a device needs to render a scene. The buffers' order is the order of the kernel's arguments."""
+
+    buffers: Buffers
+    counts: NDArray[Any]
+    features: list[str]
+    source: str
+    tree: Layout
+    choices: Choices
+
+    @property
+    def bytes(self) -> int:
+        """Device memory of the scene."""
+        return sum(array.nbytes for _, array in self.buffers.values())
+
+
+def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl") -> CompiledScene:
+    """Validates and packs `scene` for the kernel file `entry`; SceneError lists all that is wrong with it."""
+    validate(scene)
+    triangles, normals = _geometry(scene)
+    spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
+    tree = pack(choices.layout, choices.builder, triangles, spheres)
+    sky = pack_sky(scene.environment)
+    emitters = pack_emitters(scene, triangles, sky, _radius(triangles, spheres))
+    users: list[Material] = [x.material for x in [*scene.meshes, *scene.spheres]]
+    codes, material_buffers = _materials(users)
+    if sky.sampled:
+        sky.buffers["environment"][1]["probability"] = emitters.sky_probability
+
+    buffers: dict[str, tuple[str, NDArray[Any]]] = {name: (TREE_RECORDS[name], a) for name, a in tree.buffers.items()}
+    if len(triangles):
+        per_mesh = np.repeat(np.arange(len(scene.meshes)), [len(mesh.faces) for mesh in scene.meshes])
+        buffers["triangles"] = ("Triangle", _triangle_records(triangles, codes[per_mesh], emitters.triangle, normals))
+    if len(normals):
+        buffers["normals"] = ("Normals", _normal_records(normals))
+    if len(spheres):
+        buffers["spheres"] = ("Sphere", _sphere_records(spheres, codes[len(scene.meshes):], emitters.sphere))
+    buffers |= material_buffers | emitters.buffers | sky.buffers
+    counts = np.zeros(1, COUNTS)
+    counts["triangles"], counts["spheres"], counts["lights"] = len(triangles), len(spheres), emitters.count
+
+    used = [m for m in MATERIALS if m.kernel in material_buffers]
+    features = _features(scene, used, users, emitters, sky, choices)
+    text = compose(_preamble(buffers, features, used, emitters, choices, tree.stack), entry,
+                   _files(used, emitters, sky, choices, bool(len(triangles)), bool(len(spheres))))
+    return CompiledScene(buffers, counts, sorted(features), text, tree, choices)
+
+
+def _geometry(scene: Scene) -> tuple[NDArray[np.float32], dict[int, NDArray[np.float32]]]:
+    """(m, 3, 3) corners of all meshes' triangles, and for smooth meshes by first triangle their (k, 3, 3) normals."""
+    corners, normals, first = [np.zeros((0, 3, 3), np.float32)], {}, 0
+    for mesh in scene.meshes:
+        corners.append(mesh.vertices[mesh.faces])
+        if mesh.normals is not None:
+            normals[first] = mesh.normals[mesh.faces]
+        first += len(mesh.faces)
+    return np.concatenate(corners), normals
+
+
+def _radius(triangles: NDArray[np.float32], spheres: NDArray[np.float32]) -> float:
+    """Half the diagonal of the box around everything."""
+    points = np.concatenate([triangles.reshape(-1, 3), spheres[:, :3] - spheres[:, 3:], spheres[:, :3] + spheres[:, 3:]])
+    return float(np.linalg.norm(np.ptp(points.astype(np.float64), axis=0)) / 2) if len(points) else 1.0
+
+
+def _materials(users: list[Material]) -> tuple[NDArray[np.int32], dict[str, tuple[str, NDArray[Any]]]]:
+    """Each user's material code (type | index << 4), and a buffer of records for every type in use."""
+    distinct: dict[type[Material], dict[Material, int]] = {}
+    codes = []
+    for material in users:
+        indices = distinct.setdefault(type(material), {})
+        codes.append(MATERIALS.index(type(material)) | indices.setdefault(material, len(indices)) << 4)
+    buffers: dict[str, tuple[str, NDArray[Any]]] = {}
+    for kind in MATERIALS:
+        if kind in distinct:
+            records = np.zeros(len(distinct[kind]), material_record(kind))
+            for material, index in distinct[kind].items():
+                for name, value in material.parameters().items():
+                    records[name][index] = value
+            buffers[kind.kernel] = (kind.__name__, records)
+    return np.array(codes, np.int32), buffers
+
+
+def _triangle_records(triangles: NDArray[np.float32], materials: NDArray[np.int32], lights: NDArray[np.int32],
+                      normals: dict[int, NDArray[np.float32]]) -> NDArray[Any]:
+    records = np.zeros(len(triangles), TRIANGLE)
+    records["p0"], records["p1"], records["p2"] = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    records["material"], records["light"], records["normals"] = materials, lights, -1
+    stored = 0
+    for first, smooth in normals.items():
+        records["normals"][first:first + len(smooth)] = np.arange(stored, stored + len(smooth))
+        stored += len(smooth)
+    return records
+
+
+def _normal_records(normals: dict[int, NDArray[np.float32]]) -> NDArray[Any]:
+    smooth = np.concatenate(list(normals.values()))
+    records = np.zeros(len(smooth), NORMALS)
+    records["n0"], records["n1"], records["n2"] = smooth[:, 0], smooth[:, 1], smooth[:, 2]
+    return records
+
+
+def _sphere_records(spheres: NDArray[np.float32], materials: NDArray[np.int32], lights: NDArray[np.int32]) -> NDArray[Any]:
+    records = np.zeros(len(spheres), SPHERE)
+    records["center"], records["radius"] = spheres[:, :3], spheres[:, 3]
+    records["material"], records["light"] = materials, lights
+    return records
+
+
+def _features(scene: Scene, used: Iterable[type[Material]], users: Iterable[Material], emitters: Emitters, sky: Sky,
+              choices: Choices) -> set[str]:
+    """The names that are defined while compiling: what the scene has, and the parts of materials that it uses."""
+    features = {f"MATERIAL_{kind.kernel.upper()}" for kind in used} | {f"LIGHT_{t.upper()}" for t in emitters.types}
+    features |= set().union(*(material.features() for material in users))
+    has = {"TRIANGLES": bool(scene.meshes), "SPHERES": bool(scene.spheres), "SKY": sky.kernel is not None,
+           "PRIMITIVES": bool(scene.meshes or scene.spheres), "LIGHTS": emitters.count > 0,
+           "EMITTERS": any(t in SURFACES for t in emitters.types),
+           "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes)}
+    return features | {name for name, present in has.items() if present}
+
+
+def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], emitters: Emitters, choices: Choices,
+              stack: int) -> str:
+    surfaces = [t for t in emitters.types if t in SURFACES]
+    return "\n".join([
+        defines({"LANES": choices.lanes, "WIDTH": TREES[choices.layout][1], "STACK_SIZE": _rounded_stack(stack)}),
+        defines({feature: 1 for feature in sorted(features)}),
+        typedefs({"Counts": COUNTS, "Pixel": PIXEL, "Launch": LAUNCH}),
+        scene_struct(buffers),
+        type_list("MATERIAL_TYPES", [(kind.kernel, MATERIALS.index(kind)) for kind in used]),
+        type_list("LIGHT_TYPES", [(t, TYPES.index(t)) for t in emitters.types]),
+        type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces])])
+
+
+def _rounded_stack(bound: int) -> int:
+    """Rounded up to steps of 32 entries, so that trees of similar depth share a program."""
+    return max(32, -(-bound // 32) * 32)
+
+
+def _files(used: list[type[Material]], emitters: Emitters, sky: Sky, choices: Choices, triangles: bool,
+           spheres: bool) -> dict[str, list[str]]:
+    lights = [f"light/{t}.cl" for t in emitters.types if t != "sky"]
+    return {"TREE": [TREES[choices.layout][0]] if triangles or spheres else [],
+            "TRIANGLE_TEST": [TRIANGLE_TESTS[choices.triangle]] if triangles else [],
+            "SPHERE_TEST": ["geometry/sphere.cl"] if spheres else [],
+            "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in used],
+            "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else [])}

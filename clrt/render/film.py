@@ -1,0 +1,48 @@
+"""The accumulated picture on the host: mean, noise estimate and counts from the device's sums (kernels/film.cl)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Added to the squared reference in relMSE, so that black pixels do not divide by zero.
+RELATIVE_FLOOR = 0.01
+
+
+class Film:
+    """A copy of the device's film. pixels: (height, width) PIXEL records."""
+
+    def __init__(self, pixels: NDArray[Any]) -> None:
+        self.pixels = pixels
+
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        """(height, width, 3): mean of the samples kept; 0 where there are none."""
+        total = self.pixels["sum"].astype(np.float64) + self.pixels["sum_error"]
+        return np.asarray(total / np.maximum(self.pixels["count"], 1)[..., None])
+
+    @property
+    def noise(self) -> float | None:
+        """Estimate of √relMSE: sqrt(mean(Var[mean] / (mean² + 0.01))) over pixels and channels.
+
+        Var[mean] is the sample variance over n; samples are independent. None before every pixel has two samples.
+        """
+        count = self.pixels["count"].astype(np.float64)[..., None]
+        if not count.size or count.min() < 2:
+            return None
+        mean = self.mean
+        squares = (self.pixels["square"].astype(np.float64) + self.pixels["square_error"]) / count
+        variance = np.maximum(squares - mean**2, 0) / (count - 1)
+        return float(np.sqrt(np.mean(variance / (mean**2 + RELATIVE_FLOOR))))
+
+    @property
+    def nonfinite_samples(self) -> int:
+        """How many samples were dropped because they were NaN or infinite."""
+        return int(self.pixels["dropped"].sum(dtype=np.int64))
+
+    @property
+    def rays(self) -> int:
+        """Rays traced; each pixel's counter wraps at 2³², long after its picture has converged."""
+        return int(self.pixels["rays"].sum(dtype=np.int64))

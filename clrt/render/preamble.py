@@ -1,0 +1,43 @@
+"""The C text that opens a program: records, the scene's buffers as one struct, the types and features in use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.records import c_typedef
+
+Buffers = Mapping[str, tuple[str, NDArray[Any]]]
+
+
+def scene_struct(buffers: Buffers) -> str:
+    """`Scene`, the kernel parameters that fill it (SCENE_PARAMETERS) and its initialiser (SCENE_ARGUMENTS).
+
+    The order of `buffers` is the order of the kernel's arguments; the counts come last.
+    """
+    members = [f"global const {c_type} *{name}" for name, (c_type, _) in buffers.items()]
+    parameters = [f"global const {c_type} *restrict {name}" for name, (c_type, _) in buffers.items()]
+    typedefs = {c_type: c_typedef(c_type, array.dtype) for c_type, array in buffers.values()}
+    return "\n".join([
+        *typedefs.values(),
+        f"typedef struct {{ {' '.join(member + ';' for member in [*members, 'Counts counts'])} }} Scene;",
+        f"#define SCENE_PARAMETERS {', '.join([*parameters, 'const Counts counts'])}",
+        f"#define SCENE_ARGUMENTS {{{', '.join([*buffers, 'counts'])}}}"])
+
+
+def type_list(macro: str, types: Iterable[tuple[str, int]]) -> str:
+    """An X-macro: `#define MACRO(X) X(name, number) …`."""
+    return f"#define {macro}(X) {' '.join(f'X({name}, {number})' for name, number in types)}"
+
+
+def defines(values: Mapping[str, int]) -> str:
+    """`#define NAME number` for each."""
+    return "\n".join(f"#define {name} {value}" for name, value in values.items())
+
+
+def typedefs(records: Mapping[str, np.dtype[Any]]) -> str:
+    """The typedefs of records that are no scene buffers."""
+    return "\n".join(c_typedef(name, dtype) for name, dtype in records.items())

@@ -1,0 +1,92 @@
+"""A scene on a device: program built, buffers uploaded, samples rendered on demand into the film."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pyopencl as cl
+
+from ..device.launch import Launches, wait_for
+from ..device.open import Device
+from ..device.program import BuiltProgram, build
+from ..errors import DeviceError
+from ..scene.model import Camera
+from .compile import CompiledScene
+from .film import Film
+from .records import LAUNCH, PIXEL
+
+LOCAL_SIZE = 16
+FIRST_LAUNCH_SAMPLES = 1 << 15
+
+
+class Session:
+    """Renders ranges of samples of one compiled scene at one size. Nothing depends on how the ranges are cut."""
+
+    def __init__(self, device: Device, compiled: CompiledScene, camera: Camera, size: tuple[int, int], max_depth: int,
+                 seed: int) -> None:
+        self.device, self.compiled, self.size = device, compiled, size
+        self.program: BuiltProgram = build(device, compiled.source)
+        self.launch = _launch_record(camera, size, max_depth, seed)
+        self.samples_done = 0
+        self._launches = Launches(FIRST_LAUNCH_SAMPLES)
+        width, height = size
+        flags = cl.mem_flags
+        try:
+            self._scene = [cl.Buffer(device.context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=array)
+                           for _, array in compiled.buffers.values()]
+            self._film = cl.Buffer(device.context, flags.READ_WRITE, width * height * PIXEL.itemsize)
+            wait_for(cl.enqueue_fill_buffer(device.queue, self._film, np.uint8(0), 0, self._film.size))
+        except cl.Error as error:
+            raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes of buffers do not fit: {error}") from error
+        self._kernel = self.program.program.path
+        self._kernel.set_args(*self._scene, compiled.counts[0], self._film, self.launch[0])
+
+    @property
+    def device_bytes(self) -> int:
+        """Memory of all buffers on the device."""
+        return self.compiled.bytes + self.size[0] * self.size[1] * PIXEL.itemsize
+
+    def render(self, samples: int) -> Iterator[None]:
+        """Adds the next `samples` samples to every pixel, in bounded launches; yields after each."""
+        pixels = self.size[0] * self.size[1]
+        first = 0
+        while first < pixels:
+            count = min(pixels - first, max(LOCAL_SIZE * 64, self._launches.size // samples))
+            self.launch["first_pixel"], self.launch["pixel_count"] = first, count
+            self.launch["first_sample"], self.launch["sample_count"] = self.samples_done, samples
+            self._kernel.set_arg(len(self._scene) + 2, self.launch[0])
+            groups = -(-count // (self.compiled.choices.lanes * LOCAL_SIZE))
+            event = cl.enqueue_nd_range_kernel(self.device.queue, self._kernel, (groups * LOCAL_SIZE,), (LOCAL_SIZE,))
+            self.device.queue.flush()
+            self._launches.add(event, count * samples)
+            first += count
+            yield
+        self.samples_done += samples
+
+    def pass_limit(self) -> int:
+        """The most samples a pixel that one pass should add: a pass of one launch per 1024 pixels at least."""
+        return max(1, self._launches.size // (LOCAL_SIZE * 64))
+
+    def film(self) -> Film:
+        """The film so far; waits for the launches in flight."""
+        self._launches.wait()
+        pixels = np.empty((self.size[1], self.size[0]), PIXEL)
+        wait_for(cl.enqueue_copy(self.device.queue, pixels, self._film, is_blocking=False))
+        return Film(pixels)
+
+
+def _launch_record(camera: Camera, size: tuple[int, int], max_depth: int, seed: int) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+    """The LAUNCH record with its camera: right and up carry the picture's half extents (kernels/camera.cl)."""
+    width, height = size
+    forward = np.subtract(camera.look_at, camera.position, dtype=np.float64)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, np.asarray(camera.up, np.float64))
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    extent = np.tan(np.radians(camera.fov_degrees) / 2)
+    record = np.zeros(1, LAUNCH)
+    record["position"], record["forward"] = camera.position, forward
+    record["right"], record["up"] = right * extent * width / height, up * extent
+    record["width"], record["height"], record["max_depth"], record["seed"] = width, height, max_depth, seed
+    return record

@@ -1,0 +1,193 @@
+"""Read glTF 2.0 (.glb, .gltf): every triangle of its scene, its metallic-roughness materials and its first camera.
+
+What is left out (skins, morph targets, textures but for their mean colour, ...) is named in one warning in the log.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from . import gltf_document as gltf
+from .framing import bounds
+from .gltf_data import GltfData
+from .gltf_material import Materials
+from .model import Camera, Mesh
+from .normals import Normals, choose_normals
+from .transform import Matrix, quaternion, scaling, transform_mesh, translation, unit
+from .validate import index_problems, mesh_problems
+
+log = logging.getLogger(__name__)
+TRIANGLES, STRIP, FAN = 4, 5, 6
+Placed = tuple[gltf.Node, Matrix]
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a glTF file holds: at least one mesh, and the camera that its scene names first."""
+
+    meshes: list[Mesh]
+    camera: Camera | None
+
+
+def read_gltf(path: Path, normals: Normals = "file") -> Model:
+    """The scene of a glTF file, one Mesh for each primitive of each node, in world coordinates.
+
+    Raises SceneError naming the file and the accessor, node or mesh that is wrong.
+    """
+    try:
+        data = GltfData(path)
+        nodes = list(_nodes(data.document))
+        meshes = _place(data, nodes, normals)
+        problems = [problem for mesh in meshes for problem in mesh_problems(mesh, "mesh")]
+        if problems:
+            raise SceneError(problems)
+        _warn_of_left_out(path, data.document)
+        return Model(meshes, _camera(data.document, nodes, meshes))
+    except SceneError as error:
+        raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+
+
+def _nodes(document: gltf.Document) -> Iterator[Placed]:
+    """Each node of the scene with its matrix to the world. Files without nodes show each mesh as it is."""
+    if not document.nodes:
+        yield from ((gltf.Node(mesh=index), np.eye(4)) for index in range(len(document.meshes)))
+        return
+    if document.scenes:
+        roots = gltf.entry(document.scenes, document.scene or 0, "scene", "the file").nodes
+    else:
+        children = {child for node in document.nodes for child in node.children}
+        roots = [index for index in range(len(document.nodes)) if index not in children]
+    waiting = [(index, np.eye(4)) for index in reversed(roots)]
+    seen = set()
+    while waiting:
+        index, parent = waiting.pop()
+        if index in seen:
+            raise SceneError(f"node {index}: has two parents or is its own ancestor; export the file again")
+        seen.add(index)
+        node = gltf.entry(document.nodes, index, "node", "the scene")
+        matrix = parent @ _local(node, index)
+        yield node, matrix
+        waiting += [(child, matrix) for child in reversed(node.children)]
+
+
+def _local(node: gltf.Node, index: int) -> Matrix:
+    """The node's matrix to its parent."""
+    if node.matrix is not None:
+        return np.array(node.matrix).reshape(4, 4).T
+    if not any(node.rotation):
+        raise SceneError(f"node {index}: its rotation is [0, 0, 0, 0]; write [0, 0, 0, 1] for none")
+    return translation(node.translation) @ quaternion(*node.rotation) @ scaling(node.scale)
+
+
+def _place(data: GltfData, nodes: list[Placed], normals: Normals) -> list[Mesh]:
+    """The meshes of all nodes in world coordinates; each mesh is read once, however many nodes show it."""
+    materials = Materials(data)
+    read: dict[int, list[Mesh]] = {}
+    meshes = []
+    for node, matrix in nodes:
+        if node.mesh is not None:
+            if node.mesh not in read:
+                read[node.mesh] = list(_primitives(data, materials, node.mesh, normals))
+            meshes += [transform_mesh(mesh, matrix) for mesh in read[node.mesh]]
+    if not meshes:
+        raise SceneError("its scene holds no triangles; export a model with triangle meshes")
+    return meshes
+
+
+def _primitives(data: GltfData, materials: Materials, index: int, normals: Normals) -> Iterator[Mesh]:
+    """The primitives of a mesh that have triangles, in the mesh's own coordinates."""
+    source = gltf.entry(data.document.meshes, index, "mesh", "a node")
+    for number, primitive in enumerate(source.primitives):
+        name = source.name or f"mesh {index}"
+        if len(source.primitives) > 1:
+            name += f" part {number}"
+        where = f'mesh "{name}"'
+        if primitive.mode < TRIANGLES or "POSITION" not in primitive.attributes:
+            continue
+        vertices = _vectors(data, primitive.attributes["POSITION"], where)
+        corners = _corners(data, primitive, len(vertices), where)
+        if len(corners) == 0:
+            continue
+        problems = index_problems(corners, len(vertices), where)
+        if problems:
+            raise SceneError(problems)
+        stored = None
+        if "NORMAL" in primitive.attributes:
+            stored = _vectors(data, primitive.attributes["NORMAL"], where)
+            if len(stored) != len(vertices):
+                raise SceneError(f"{where}: has {len(stored)} normals for {len(vertices)} vertices; export it again")
+        faces = corners.astype(np.int32)
+        yield Mesh(vertices, faces, materials.material(primitive, where),
+                   choose_normals(normals, vertices, faces, stored), name)
+
+
+def _vectors(data: GltfData, accessor: int, user: str) -> NDArray[np.float32]:
+    return np.ascontiguousarray(data.array(accessor, "VEC3", user), np.float32)
+
+
+def _corners(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> NDArray[np.int64]:
+    """The triangles, (m, 3), of a primitive with `n` vertices (specification 3.7.2.1)."""
+    if primitive.indices is None:
+        order = np.arange(n)
+    else:
+        indices = data.array(primitive.indices, "SCALAR", user)
+        if not np.issubdtype(indices.dtype, np.unsignedinteger):
+            raise SceneError(f"{user}: its indices, accessor {primitive.indices}, are {indices.dtype}; "
+                             "they must be unsigned integers")
+        order = indices[:, 0].astype(np.int64)
+    if primitive.mode == TRIANGLES:
+        if len(order) % 3:
+            raise SceneError(f"{user}: has {len(order)} corners, which is no multiple of 3; export it again")
+        return order.reshape(-1, 3)
+    first = np.arange(max(len(order) - 2, 0))
+    if primitive.mode == FAN:
+        corners = np.stack([first + 1, first + 2, np.zeros_like(first)], axis=1)
+    else:
+        odd = first % 2
+        corners = np.stack([first, first + 1 + odd, first + 2 - odd], axis=1)
+    return order[corners]
+
+
+def _camera(document: gltf.Document, nodes: list[Placed], meshes: list[Mesh]) -> Camera | None:
+    """The first perspective camera in the scene; it looks at the depth of the model's middle."""
+    for node, matrix in nodes:
+        if node.camera is None:
+            continue
+        lens = gltf.entry(document.cameras, node.camera, "camera", "a node").perspective
+        position = matrix[:3, 3]
+        forward, up = unit(-matrix[:3, 2]), unit(matrix[:3, 1])
+        if lens is None or not np.cross(forward, up).any():
+            continue
+        distance = np.linalg.norm(np.mean(bounds(meshes), axis=0) - position) or 1.0
+        x, y, z = position.tolist()
+        at_x, at_y, at_z = (position + distance * forward).tolist()
+        up_x, up_y, up_z = up.tolist()
+        return Camera(position=(x, y, z), look_at=(at_x, at_y, at_z), up=(up_x, up_y, up_z),
+                      fov_degrees=math.degrees(lens.yfov))
+    return None
+
+
+def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
+    """One warning that names what the picture will lack."""
+    primitives = [primitive for mesh in document.meshes for primitive in mesh.primitives]
+    materials = document.materials
+    left_out = {
+        "skins": any(node.skin is not None for node in document.nodes),
+        "morph targets": any(primitive.targets for primitive in primitives),
+        "points and lines": any(primitive.mode < TRIANGLES for primitive in primitives),
+        "vertex colours": any("COLOR_0" in primitive.attributes for primitive in primitives),
+        "textures (their mean colour counts)": bool(document.textures),
+        "normal maps": any(material.normalTexture for material in materials),
+        "transparency": any(material.alphaMode != "OPAQUE" for material in materials),
+    }
+    names = [name for name, present in left_out.items() if present]
+    if names:
+        log.warning("%s: left out: %s", path, ", ".join(names))

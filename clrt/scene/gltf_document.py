@@ -1,0 +1,197 @@
+"""The parts of a glTF 2.0 document that are read, by the names of the specification (Khronos 2021, section 5).
+
+Imported only when a glTF file is read, since it needs pydantic. Unknown properties are passed over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ..errors import SceneError
+
+Item = TypeVar("Item")
+Index = Annotated[int, Field(ge=0)]
+Count = Annotated[int, Field(ge=1)]
+Vec3 = tuple[float, float, float]
+Vec4 = tuple[float, float, float, float]
+ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
+
+#: Required extensions that this reader follows.
+EXTENSIONS = frozenset({"KHR_mesh_quantization", "KHR_materials_emissive_strength"})
+
+
+class Part(BaseModel):
+    """Any object of the document: numbers are finite."""
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
+
+class Asset(Part):
+    version: str
+    minVersion: str | None = None
+
+
+class Buffer(Part):
+    byteLength: Count
+    uri: str | None = None
+
+
+class BufferView(Part):
+    buffer: Index
+    byteLength: Count
+    byteOffset: Index = 0
+    byteStride: Annotated[int, Field(ge=4, le=252)] | None = None
+
+
+class SparseIndices(Part):
+    bufferView: Index
+    byteOffset: Index = 0
+    componentType: Literal[5121, 5123, 5125]
+
+
+class SparseValues(Part):
+    bufferView: Index
+    byteOffset: Index = 0
+
+
+class Sparse(Part):
+    count: Count
+    indices: SparseIndices
+    values: SparseValues
+
+
+class Accessor(Part):
+    componentType: ComponentType
+    count: Count
+    type: Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"]
+    bufferView: Index | None = None
+    byteOffset: Index = 0
+    normalized: bool = False
+    sparse: Sparse | None = None
+
+
+class Image(Part):
+    uri: str | None = None
+    bufferView: Index | None = None
+
+
+class Texture(Part):
+    source: Index | None = None
+
+
+class TextureInfo(Part):
+    index: Index
+    texCoord: Index = 0
+
+
+class Pbr(Part):
+    baseColorFactor: Vec4 = (1.0, 1.0, 1.0, 1.0)
+    metallicFactor: float = 1.0
+    roughnessFactor: float = 1.0
+    baseColorTexture: TextureInfo | None = None
+    metallicRoughnessTexture: TextureInfo | None = None
+
+
+class EmissiveStrength(Part):
+    emissiveStrength: float = 1.0
+
+
+class MaterialExtensions(Part):
+    KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
+
+
+class Material(Part):
+    name: str | None = None
+    pbrMetallicRoughness: Pbr = Pbr()
+    emissiveFactor: Vec3 = (0.0, 0.0, 0.0)
+    emissiveTexture: TextureInfo | None = None
+    normalTexture: Any = None
+    alphaMode: str = "OPAQUE"
+    extensions: MaterialExtensions = MaterialExtensions()
+
+
+class Primitive(Part):
+    attributes: dict[str, Index]
+    indices: Index | None = None
+    material: Index | None = None
+    mode: Annotated[int, Field(ge=0, le=6)] = 4
+    targets: list[Any] = []
+
+
+class Mesh(Part):
+    primitives: list[Primitive]
+    name: str | None = None
+
+
+class Perspective(Part):
+    yfov: Annotated[float, Field(gt=0, lt=3.14159)]
+
+
+class Camera(Part):
+    perspective: Perspective | None = None
+
+
+class Node(Part):
+    children: list[Index] = []
+    mesh: Index | None = None
+    camera: Index | None = None
+    skin: Index | None = None
+    matrix: Annotated[list[float], Field(min_length=16, max_length=16)] | None = None
+    translation: Vec3 = (0.0, 0.0, 0.0)
+    rotation: Vec4 = (0.0, 0.0, 0.0, 1.0)
+    scale: Vec3 = (1.0, 1.0, 1.0)
+
+
+class Scene(Part):
+    nodes: list[Index] = []
+
+
+class Document(Part):
+    """A whole document."""
+
+    asset: Asset
+    extensionsRequired: list[str] = []
+    accessors: list[Accessor] = []
+    buffers: list[Buffer] = []
+    bufferViews: list[BufferView] = []
+    cameras: list[Camera] = []
+    images: list[Image] = []
+    materials: list[Material] = []
+    meshes: list[Mesh] = []
+    nodes: list[Node] = []
+    scene: Index | None = None
+    scenes: list[Scene] = []
+    textures: list[Texture] = []
+
+
+def parse_document(text: bytes) -> Document:
+    """The document in a JSON text. Raises SceneError with every property that the specification does not allow, for
+    a version other than 2, and for a required extension that is not in EXTENSIONS."""
+    try:
+        document = Document.model_validate_json(text)
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+        raise SceneError([f"{_path(detail['loc'])}: {detail['msg']}; export the file again" for detail in details[:12]]
+                         ) from None
+    if not document.asset.version.startswith("2."):
+        raise SceneError(f'asset.version is "{document.asset.version}"; only glTF 2 is supported, export it as 2.0')
+    missing = sorted(set(document.extensionsRequired) - EXTENSIONS)
+    if missing:
+        raise SceneError(f"needs the extension {', '.join(missing)}, which is not supported; export without it")
+    return document
+
+
+def entry(items: Sequence[Item], index: int, name: str, user: str) -> Item:
+    """items[index]; raises SceneError if the document has no such entry. `name`: one of the items, as "accessor"."""
+    if index >= len(items):
+        raise SceneError(f"{user} uses {name} {index}, but the file has {len(items)}; export the file again")
+    return items[index]
+
+
+def _path(location: tuple[int | str, ...]) -> str:
+    """A place in the document, such as accessors[3].count."""
+    words = [f"[{part}]" if isinstance(part, int) else f".{part}" for part in location]
+    return "".join(words).removeprefix(".") or "the document"

@@ -1,0 +1,109 @@
+"""Read model files as meshes. OBJ, PLY, STL and OFF go through trimesh's parsers; glTF has its own reader.
+
+The parsers are called directly, since a trimesh.Trimesh no longer tells whether the file had normals. They hand on NaN
+and wrong indices and raise whatever Python raises, so all they return is checked here.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from .model import Mesh
+from .normals import Normals, choose_normals
+from .obj import obj_material, parse_obj
+from .validate import index_problems, mesh_problems
+
+SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
+
+
+def read_mesh(path: Path, normals: Normals = "file") -> list[Mesh]:
+    """The meshes of a model file, one per material, each with at least one triangle and valid arrays.
+
+    Polygons are cut into fans. An OBJ file's materials are Diffuse with the color Kd and the emission Ke. `normals`:
+    see `choose_normals`. Raises SceneError naming the file, the mesh, and the index or vertex that is wrong.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise SceneError(f"{path}: a model must be one of {', '.join(SUFFIXES)}; convert it")
+    if not path.is_file():
+        raise SceneError(f"{path}: {'is a folder, not a model' if path.is_dir() else 'no such model file'}")
+    if suffix in (".glb", ".gltf"):
+        from .gltf import read_gltf
+        return read_gltf(path, normals).meshes
+    try:
+        return _meshes(_parse(path, suffix), path.stem, normals)
+    except SceneError as error:
+        raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+
+
+def _parse(path: Path, suffix: str) -> dict[str, Any]:
+    """What trimesh reads from the file, as the keyword arguments of its own classes."""
+    try:
+        with np.errstate(all="ignore"), path.open("rb") as file:
+            parts: dict[str, Any]
+            if suffix == ".obj":
+                parts = parse_obj(path)
+            elif suffix == ".ply":
+                from trimesh.exchange.ply import load_ply
+                parts = load_ply(file, skip_materials=True)
+            elif suffix == ".stl":
+                from trimesh.exchange.stl import load_stl
+                parts = load_stl(file)
+            else:
+                from trimesh.exchange.off import load_off
+                parts = load_off(file)
+            return parts
+    except SceneError:
+        raise
+    except Exception as error:  # trimesh's parsers raise whatever the damage leads to
+        raise SceneError(f"cannot be read as {suffix[1:].upper()} ({type(error).__name__}: {error}); "
+                         "export the model again") from error
+
+
+def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:
+    """The meshes in trimesh's keyword arguments, of one mesh or of several."""
+    several = parts.get("geometry", {stem: parts})
+    pieces = {name: piece for name, piece in several.items() if _size(piece.get("faces"))}
+    if not pieces:
+        raise SceneError("holds no triangles (points, lines and PLY strips are not drawn); export a triangle mesh")
+    meshes, problems = [], []
+    for name, piece in pieces.items():
+        try:
+            meshes.append(_mesh(str(name), piece, normals))
+        except SceneError as error:
+            problems += error.problems
+    if problems:
+        raise SceneError(problems)
+    return meshes
+
+
+def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
+    """One mesh from trimesh's arrays, checked before anything follows their indices."""
+    with np.errstate(over="ignore"):
+        vertices = np.ascontiguousarray(piece["vertices"], np.float32)
+        stored = piece.get("vertex_normals")
+        stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
+    faces = _triangles(np.asarray(piece["faces"], np.int64), name)
+    mesh = Mesh(vertices, faces.astype(np.int32), obj_material(piece.get("visual")), name=name)
+    problems = index_problems(faces, len(vertices), f'mesh "{name}"') or mesh_problems(mesh, "mesh")
+    if problems:
+        raise SceneError(problems)
+    mesh.normals = choose_normals(normals, vertices, mesh.faces, stored)
+    return mesh
+
+
+def _triangles(polygons: NDArray[np.int64], name: str) -> NDArray[np.int64]:
+    """Polygons of k corners, (m, k), as fans of k − 2 triangles."""
+    if polygons.ndim != 2 or polygons.shape[1] < 3:
+        raise SceneError(f'mesh "{name}": its faces have fewer than 3 corners; export triangles')
+    fans = [polygons[:, [0, corner, corner + 1]] for corner in range(1, polygons.shape[1] - 1)]
+    return np.stack(fans, axis=1).reshape(-1, 3)
+
+
+def _size(array: Any) -> int:
+    return 0 if array is None else len(array)

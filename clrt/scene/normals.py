@@ -1,0 +1,74 @@
+"""Vertex normals: from the file, or computed so that the surface looks smooth."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import FloatArray, IntArray
+from .transform import unit
+
+Normals = Literal["file", "smooth", "flat"]
+
+
+def choose_normals(wanted: Normals, vertices: FloatArray, faces: IntArray, stored: FloatArray | None,
+                   ) -> FloatArray | None:
+    """The normals that `wanted` asks for: (n, 3) float32 of unit length, or None for flat shading.
+
+    "file" takes the `stored` ones, and is flat where the file has none. Stored normals that are zero or not finite,
+    as exporters write for triangles of no area, are replaced by smooth ones.
+    """
+    if wanted == "smooth":
+        return smooth_normals(vertices, faces)
+    if wanted == "flat" or stored is None:
+        return None
+    normals = unit(stored)
+    useless = ~normals.any(axis=1)
+    if useless.any():
+        normals[useless] = smooth_normals(vertices, faces)[useless]
+    return normals.astype(np.float32)
+
+
+def smooth_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Unit normals, (n, 3) float32: the faces' normals weighted by their angle at each point.
+
+    The angle keeps the result free of how a surface was cut into triangles (Thürmer and Wüthrich 1998). Vertices at
+    the same place share one normal, since many files store every triangle's corners apart. Where the faces cancel
+    (a sheet with two sides), one face's normal serves; +Y where no face has an area.
+    """
+    points, count = weld(vertices)
+    corners = points[faces]
+    positions = [vertices[faces[:, corner]].astype(np.float64) for corner in range(3)]
+    edges = [positions[(corner + 1) % 3] - positions[corner] for corner in range(3)]
+    areas = np.cross(edges[0], edges[1])
+    doubled_area = np.linalg.norm(areas, axis=1)
+    face_normals = unit(areas)
+    sums = np.zeros((count, 3))
+    for corner in range(3):
+        # atan2 is exact for needles too, unlike the arc cosine; |a x b| is the same at all three corners.
+        angles = np.arctan2(doubled_area, -np.einsum("ij,ij->i", edges[corner], edges[corner - 1]))
+        for axis in range(3):
+            sums[:, axis] += np.bincount(corners[:, corner], angles * face_normals[:, axis], count)
+    cancelled = np.linalg.norm(sums, axis=1) < 1e-9
+    if cancelled.any():
+        sums[cancelled] = _some_normal(corners, face_normals, count)[cancelled]
+    return unit(sums).astype(np.float32)[points]
+
+
+def weld(vertices: FloatArray) -> tuple[NDArray[np.int64], int]:
+    """Number the distinct positions: each vertex's number (n,), and how many there are. −0 equals 0."""
+    bits = (np.asarray(vertices, np.float32) + np.float32(0)).view(np.uint32).astype(np.uint64)
+    pairs = np.unique(bits[:, 0] << 32 | bits[:, 1], return_inverse=True)[1].astype(np.uint64)
+    points = np.unique(pairs << 32 | bits[:, 2], return_inverse=True)[1]
+    return points, int(points.max(initial=-1)) + 1
+
+
+def _some_normal(corners: NDArray[np.int64], face_normals: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """For each of `count` points the normal of one face with an area there; +Y where there is none."""
+    normals = np.tile([0.0, 1.0, 0.0], (count, 1))
+    real = face_normals.any(axis=1)
+    for corner in range(3):
+        normals[corners[real, corner]] = face_normals[real]
+    return normals

@@ -1,0 +1,145 @@
+"""Turn a TOML document into a scene, collecting every mistake in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ..errors import SceneError
+from .fields import field_problems, show, unknown
+from .lights import LIGHTS, Light
+from .materials import MATERIALS, Diffuse, Material
+from .mesh_table import MeshTable
+from .model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from .pictures import read_picture
+from .transform import transform_mesh
+
+Kind = TypeVar("Kind")
+Table = Mapping[str, Any]
+SECTIONS = ("camera", "render", "environment", "materials", "mesh", "sphere", "light")
+
+
+class SceneReader:
+    """Reads one document. `problems` holds its mistakes; what they touch is left out of the scene or at its default."""
+
+    def __init__(self, path: Path, document: Table) -> None:
+        """`path`: where the document is from; the files that it names are relative to that folder."""
+        self._path = path
+        self._document: Table = _frozen(document)
+        self._materials: dict[str, Material] = {}
+        self.problems = [f'key "{key}" {unknown(key, SECTIONS)}' for key in document if key not in SECTIONS]
+
+    def scene(self) -> Scene:
+        camera = self._build(Camera, self._table("camera"), "camera")
+        render = self._build(RenderSettings, self._table("render"), "render")
+        environment = self._environment(self._table("environment"))
+        for name, values in self._table("materials").items():
+            where = f"materials.{name}"
+            self._materials[name] = self._typed(MATERIALS, values, where) or Diffuse()
+        spheres = [self._sphere(values, f"sphere[{i}]") for i, values in enumerate(self._tables("sphere"))]
+        lights: list[Light | None] = [self._typed(LIGHTS, values, f"light[{i}]")
+                                      for i, values in enumerate(self._tables("light"))]
+        meshes = [mesh for i, values in enumerate(self._tables("mesh")) for mesh in self._mesh(values, f"mesh[{i}]")]
+        return Scene(meshes=meshes, spheres=[sphere for sphere in spheres if sphere],
+                     lights=[light for light in lights if light], camera=camera or Camera(),
+                     environment=environment or Environment(), render=render or RenderSettings(), name=self._path.stem)
+
+    def _table(self, name: str) -> Table:
+        """The section [name], empty if there is none."""
+        table = self._document.get(name, {})
+        if isinstance(table, dict):
+            return table
+        self.problems.append(f"{name}: {show(table)} is not a table; write [{name}]")
+        return {}
+
+    def _tables(self, name: str) -> Sequence[Any]:
+        """The sections [[name]]."""
+        tables = self._document.get(name, ())
+        if isinstance(tables, tuple):
+            return tables
+        self.problems.append(f"{name}: is not a list of tables; write [[{name}]] in double brackets")
+        return ()
+
+    def _build(self, kind: type[Kind], values: Table, where: str) -> Kind | None:
+        """kind(**values), or None if they are wrong."""
+        problems = field_problems(kind, values, where)
+        self.problems += problems
+        return None if problems else kind(**values)
+
+    def _typed(self, kinds: Sequence[type[Kind]], values: Any, where: str) -> Kind | None:
+        """A material or light of the class whose `kernel` is the table's `type`."""
+        known = {kind.kernel: kind for kind in kinds}  # type: ignore[attr-defined]
+        if not isinstance(values, dict):
+            self.problems.append(f"{where}: {show(values)} is not a table; write its keys below [{where}]")
+        elif "type" not in values:
+            self.problems.append(f"{where}: type is missing; write one of {', '.join(known)}")
+        elif str(values["type"]) not in known:
+            self.problems.append(f"{where}.type: {show(values['type'])} {unknown(values['type'], known)}")
+        else:
+            rest = {key: value for key, value in values.items() if key != "type"}
+            return self._build(known[str(values["type"])], rest, where)
+        return None
+
+    def _environment(self, values: Table) -> Environment | None:
+        image = None
+        if "image" in values:
+            image = self._picture(values["image"])
+            if "color" in values:
+                self.problems.append("environment: has a color and an image; keep one of them")
+        return self._build(Environment, {**values, "image": image}, "environment")
+
+    def _picture(self, name: Any) -> Any:
+        if not isinstance(name, str):
+            self.problems.append(f"environment.image: {show(name)} is not a text; write a file name in quotes")
+            return None
+        try:
+            return read_picture(self._path.parent / name)
+        except SceneError as error:
+            self.problems += [f"environment.image: {problem}" for problem in error.problems]
+            return None
+
+    def _material(self, values: Table, where: str) -> Material | None:
+        """The material that the table names, or None if it names none."""
+        if "material" not in values:
+            return None
+        name = values["material"]
+        if str(name) not in self._materials:
+            self.problems.append(f"{where}.material: {show(name)} {unknown(name, self._materials)}")
+        return self._materials.get(str(name), Diffuse())
+
+    def _sphere(self, values: Any, where: str) -> Sphere | None:
+        if not isinstance(values, dict):
+            self.problems.append(f"{where}: {show(values)} is not a table; write [[sphere]]")
+            return None
+        material = self._material(values, where) or Diffuse()
+        return self._build(Sphere, {**values, "material": material}, where)
+
+    def _mesh(self, values: Any, where: str) -> list[Mesh]:
+        """The meshes of one table, in world coordinates."""
+        if not isinstance(values, dict):
+            self.problems.append(f"{where}: {show(values)} is not a table; write [[mesh]]")
+            return []
+        if isinstance(scale := values.get("scale"), (int, float)):
+            values = {**values, "scale": (scale, scale, scale)}
+        material = self._material(values, where)
+        table = self._build(MeshTable, values, where)
+        geometry = {key: values[key] for key in ("file", "vertices", "faces") if key in values}
+        if table is None and field_problems(MeshTable, geometry, where):
+            return []
+        meshes: list[Mesh] = []
+        try:
+            meshes = (table or MeshTable(**geometry)).read(self._path.parent, where)
+            matrix = (table or MeshTable()).to_world(where)
+        except SceneError as error:
+            self.problems += error.problems
+            return []
+        return [transform_mesh(replace(mesh, material=material or mesh.material), matrix) for mesh in meshes]
+
+
+def _frozen(value: Any) -> Any:
+    """TOML's arrays as tuples, all the way down."""
+    if isinstance(value, list):
+        return tuple(map(_frozen, value))
+    return {key: _frozen(entry) for key, entry in value.items()} if isinstance(value, dict) else value

@@ -1,0 +1,81 @@
+"""4x4 float64 matrices that act on column vectors: p' = M p. `A @ B` does B first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import Mesh, Vector
+
+Matrix = NDArray[np.float64]
+
+
+def translation(offset: Vector) -> Matrix:
+    """Move by `offset`."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset
+    return matrix
+
+
+def scaling(factors: Vector) -> Matrix:
+    """Scale each axis by its factor; negative factors mirror."""
+    return np.diag([*factors, 1.0])
+
+
+def rotation(degrees: Vector) -> Matrix:
+    """Turn about the fixed x axis, then the fixed y axis, then the fixed z axis (extrinsic XYZ): Rz Ry Rx.
+
+    Positive angles turn counter-clockwise for someone whom the axis points at.
+    """
+    matrix = np.eye(4)
+    for axis, angle in enumerate(np.radians(degrees)):
+        turn = np.eye(4)
+        first, second = (axis + 1) % 3, (axis + 2) % 3
+        turn[[first, second], [first, second]] = np.cos(angle)
+        turn[second, first] = np.sin(angle)
+        turn[first, second] = -np.sin(angle)
+        matrix = turn @ matrix
+    return matrix
+
+
+def quaternion(x: float, y: float, z: float, w: float) -> Matrix:
+    """The rotation of a quaternion (x, y, z, w) of any length but zero."""
+    x, y, z, w = np.array([x, y, z, w]) / np.linalg.norm([x, y, z, w])
+    matrix = np.eye(4)
+    matrix[:3, :3] = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+    return matrix
+
+
+def transform_mesh(mesh: Mesh, matrix: Matrix) -> Mesh:
+    """The mesh under an affine `matrix`; computed in float64, stored in float32.
+
+    Normals go by the inverse transpose (its cofactors, which flat scalings have too). A mirroring matrix would turn
+    the surface inside out, so the faces are wound the other way. What leaves float32's range becomes Inf, which
+    `validate` refuses.
+    """
+    if np.array_equal(matrix, np.eye(4)):
+        return mesh
+    linear = matrix[:3, :3]
+    mirrored = np.linalg.det(linear) < 0
+    with np.errstate(over="ignore", invalid="ignore"):
+        vertices = (mesh.vertices @ linear.T + matrix[:3, 3]).astype(np.float32)
+    normals = mesh.normals
+    if normals is not None:
+        cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]) * (-1 if mirrored else 1)
+        normals = unit(normals @ cofactors.T).astype(np.float32)
+    faces = np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrored else mesh.faces
+    return replace(mesh, vertices=vertices, faces=faces, normals=normals)
+
+
+def unit(vectors: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Each row divided by its length, safe from overflow; rows that are zero or not finite become zero."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        largest = np.abs(vectors).max(axis=-1, keepdims=True, initial=0.0).astype(np.float64)
+        scaled = vectors / largest
+        rows = scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
+    usable = (largest > 0) & np.isfinite(largest)
+    return np.where(usable, rows, 0.0)

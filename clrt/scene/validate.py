@@ -1,0 +1,175 @@
+"""Find everything that is wrong with a scene, whether it was read from a file or built in Python."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from .fields import field_problems, show
+from .lights import LIGHTS, DirectionalLight
+from .materials import Diffuse, Material
+from .model import Camera, Environment, FloatArray, Mesh, RenderSettings, Scene, Sphere
+
+
+def validate(scene: Scene) -> None:
+    """Raise one SceneError with all problems of the scene; does nothing if there are none.
+
+    Checks the limits in the field types, the meshes' arrays (`mesh_problems`), the camera's frame, the environment's
+    image and the lights' directions.
+    """
+    problems = scene_problems(scene)
+    if problems:
+        raise SceneError(problems)
+
+
+def scene_problems(scene: Scene) -> list[str]:
+    """One sentence a problem, empty if the scene can be rendered."""
+    problems = _camera_problems(scene.camera) + _environment_problems(scene.environment)
+    problems += _object_problems(scene.render, RenderSettings, "render")
+    users: list[tuple[str, Mesh | Sphere]] = []
+    for i, mesh in enumerate(scene.meshes):
+        problems += mesh_problems(mesh, f"mesh[{i}]")
+        users.append((f"mesh[{i}].material", mesh))
+    for i, sphere in enumerate(scene.spheres):
+        problems += _object_problems(sphere, Sphere, f"sphere[{i}]")
+        users.append((f"sphere[{i}].material", sphere))
+    problems += _material_problems(users)
+    for i, light in enumerate(scene.lights):
+        problems += _light_problems(light, f"light[{i}]")
+    return problems
+
+
+def mesh_problems(mesh: object, where: str) -> list[str]:
+    """What is wrong with a mesh's arrays.
+
+    Refused: other shapes or dtypes than `Mesh` names, no triangles, vertices or normals that are not finite (used by a
+    face or not), indices outside the vertices, and normals of length zero, which point nowhere.
+    """
+    if not isinstance(mesh, Mesh):
+        return [f"{where}: {show(mesh)} is no Mesh; write a clrt.Mesh"]
+    where += f" {show(mesh.name)}"
+    n = len(mesh.vertices) if isinstance(mesh.vertices, np.ndarray) else 0
+    arrays = [("vertices", mesh.vertices, np.float32, "n"), ("faces", mesh.faces, np.int32, "m")]
+    if mesh.normals is not None:
+        arrays.append(("normals", mesh.normals, np.float32, str(n)))
+    problems = [problem for name, array, dtype, rows in arrays
+                if (problem := _array_problem(array, dtype, rows, f"{where}: {name}"))]
+    if problems:
+        return problems
+    if len(mesh.faces) == 0:
+        problems.append(f"{where}: has no triangles; add some or leave the mesh out")
+    problems += index_problems(mesh.faces, n, where)
+    problems += _row_problems(_not_finite(mesh.vertices), mesh.vertices, f"{where}: vertices", "is not finite")
+    if mesh.normals is not None:
+        nowhere = _not_finite(mesh.normals) | ~np.any(mesh.normals, axis=1)
+        problems += _row_problems(nowhere, mesh.normals, f"{where}: normals", "points nowhere")
+    return problems
+
+
+def index_problems(faces: NDArray[np.integer], n: int, where: str) -> list[str]:
+    """Indices of any integer dtype that are outside 0 … n − 1: the first one, and how many."""
+    if len(faces) == 0 or (faces.min() >= 0 and faces.max() < n):
+        return []
+    bad = np.asarray(((faces < 0) | (faces >= n)).any(axis=1))
+    face = int(bad.argmax())
+    vertex = next(index for index in faces[face].tolist() if not 0 <= index < n)
+    valid = f"valid are 0 to {n - 1}" if n else "the mesh has no vertices"
+    return [f"{where}: faces[{face}] uses vertex {vertex}, but {valid}{_others(bad)}; repair the mesh"]
+
+
+def _array_problem(array: object, dtype: type, rows: str, where: str) -> str | None:
+    """Whether `array` is no (rows, 3) array of `dtype`."""
+    name = np.dtype(dtype).name
+    if not isinstance(array, np.ndarray):
+        return f"{where} is a {type(array).__name__}; write a numpy array of {name}, shape ({rows}, 3)"
+    if array.dtype != dtype:
+        return f"{where} has dtype {array.dtype}; convert it with .astype(np.{name})"
+    if array.ndim != 2 or array.shape[1] != 3 or (rows.isdigit() and len(array) != int(rows)):
+        return f"{where} has shape {array.shape}; it must be ({rows}, 3)"
+    return None
+
+
+def _row_problems(bad: NDArray[np.bool_], array: FloatArray, where: str, fault: str) -> list[str]:
+    """The first bad row, and how many there are."""
+    if not bad.any():
+        return []
+    row = int(bad.argmax())
+    return [f"{where}[{row}] = {_row(array[row])} {fault}{_others(bad)}; repair the mesh"]
+
+
+def _not_finite(rows: FloatArray) -> NDArray[np.bool_]:
+    return np.asarray(~np.isfinite(rows).all(axis=1))
+
+
+def _row(values: FloatArray) -> str:
+    return show(tuple(float(f"{value:.6g}") for value in values))
+
+
+def _others(rows: NDArray[np.bool_]) -> str:
+    count = int(rows.sum()) - 1
+    return f" (and {count} more)" if count else ""
+
+
+def _object_problems(value: object, kind: type, where: str) -> list[str]:
+    """Whether `value` is a `kind` whose fields keep their limits."""
+    if not isinstance(value, kind):
+        return [f"{where}: {show(value)} is no {kind.__name__}; write a clrt.{kind.__name__}"]
+    values = {field.name: getattr(value, field.name) for field in fields(type(value))}  # type: ignore[arg-type]
+    return field_problems(type(value), values, where)
+
+
+def _material_problems(users: list[tuple[str, Mesh | Sphere]]) -> list[str]:
+    """The problems of each material, where it is first used."""
+    first: dict[int, tuple[str, object]] = {}
+    for where, user in users:
+        material = getattr(user, "material", Diffuse())
+        first.setdefault(id(material), (where, material))
+    return [problem for where, material in first.values() for problem in _object_problems(material, Material, where)]
+
+
+def _camera_problems(camera: Camera) -> list[str]:
+    """The camera's fields, and whether they span a frame."""
+    problems = _object_problems(camera, Camera, "camera")
+    if problems:
+        return problems
+    forward, up = np.subtract(camera.look_at, camera.position), np.array(camera.up, np.float64)
+    if not forward.any():
+        return [f"camera.look_at: {show(camera.look_at)} is the camera's own position; move one of them"]
+    if not up.any():
+        return ["camera.up: [0, 0, 0] is no direction; write one, such as [0, 1, 0]"]
+    right = np.cross(forward / np.abs(forward).max(), up / np.abs(up).max())
+    if np.linalg.norm(right) < 1e-6:
+        return [f"camera.up: {show(camera.up)} is parallel to the view; write another direction, such as [0, 0, -1]"]
+    return []
+
+
+def _environment_problems(environment: Environment) -> list[str]:
+    problems = _object_problems(environment, Environment, "environment")
+    if problems or environment.image is None:
+        return problems
+    image = environment.image
+    where = "environment.image"
+    if not isinstance(image, np.ndarray) or image.dtype != np.float32:
+        kind = image.dtype if isinstance(image, np.ndarray) else type(image).__name__
+        return [f"{where}: is {kind}; write a numpy array of float32"]
+    if image.ndim != 3 or image.shape[2] != 3 or 0 in image.shape:
+        return [f"{where}: has shape {image.shape}; it must be (height, width, 3) with at least one pixel"]
+    for bad, fault in ((~np.isfinite(image), "not finite"), (image < 0, "negative")):
+        pixels = bad.any(axis=2)
+        if pixels.any():
+            row, column = np.argwhere(pixels)[0]
+            problems.append(f"{where}: {np.count_nonzero(pixels)} pixels are {fault}, the first in row {row}, "
+                            f"column {column}: {_row(image[row, column])}; repair the picture")
+    return problems
+
+
+def _light_problems(light: object, where: str) -> list[str]:
+    if not isinstance(light, LIGHTS):
+        return [f"{where}: {show(light)} is no light; write a {' or '.join(kind.__name__ for kind in LIGHTS)}"]
+    problems = _object_problems(light, type(light), where)
+    if not problems and isinstance(light, DirectionalLight) and not any(light.direction):
+        problems.append(f"{where}.direction: [0, 0, 0] is no direction; write the one the light travels in")
+    return problems

@@ -1,0 +1,42 @@
+// The materials of the scene by type. MATERIAL_TYPES lists those in use and the host includes their files; a scene
+// with one material compiles to that material alone.
+#include "bsdf/interface.cl"
+#include MATERIAL_FILES
+
+static inline ireal material_index(ireal material, ireal is_type) { return is_type ? material >> 4 : (ireal)(0); }
+
+static inline real3 bsdf_eval(const Scene *scene, ireal material, real3 wo, real3 wi) {
+    real3 value = splat(ZERO);
+#define EVAL(name, type) { \
+        ireal is_type = (material & 15) == type; \
+        if (ANY(is_type)) value = choose(is_type, name##_eval(scene, material_index(material, is_type), wo, wi), value); \
+    }
+    MATERIAL_TYPES(EVAL)
+    return value;
+}
+
+static inline real bsdf_pdf(const Scene *scene, ireal material, real3 wo, real3 wi) {
+    real pdf = ZERO;
+#define PDF(name, type) { \
+        ireal is_type = (material & 15) == type; \
+        if (ANY(is_type)) pdf = is_type ? name##_pdf(scene, material_index(material, is_type), wo, wi) : pdf; \
+    }
+    MATERIAL_TYPES(PDF)
+    return pdf;
+}
+
+static inline BsdfSample bsdf_sample(const Scene *scene, ireal material, real3 wo, real2 u, real lobe) {
+    BsdfSample sample = {splat(ZERO), vector(ZERO, ZERO, ONE), ZERO, NO_LANES};
+#define SAMPLE(name, type) { \
+        ireal is_type = (material & 15) == type; \
+        if (ANY(is_type)) { \
+            BsdfSample s = name##_sample(scene, material_index(material, is_type), wo, u, lobe); \
+            sample.weight = choose(is_type, s.weight, sample.weight); \
+            sample.wi = choose(is_type, s.wi, sample.wi); \
+            sample.pdf = is_type ? s.pdf : sample.pdf; \
+            sample.specular = is_type ? s.specular : sample.specular; \
+        } \
+    }
+    MATERIAL_TYPES(SAMPLE)
+    return sample;
+}

@@ -1,0 +1,18 @@
+// Lambert: f = color/pi, the same towards every direction of the upper half. Source: Suchiński 6.2.
+#include "sampling.cl"
+#include "bsdf/interface.cl"
+
+static inline real3 diffuse_eval(const Scene *scene, ireal index, real3 wo, real3 wi) {
+    return scale(GATHER3(scene->diffuse, index, .color), wo.z > 0.0f ? cosine_pdf(wi.z) : ZERO);
+}
+
+static inline real diffuse_pdf(const Scene *scene, ireal index, real3 wo, real3 wi) { return cosine_pdf(wi.z); }
+
+static inline BsdfSample diffuse_sample(const Scene *scene, ireal index, real3 wo, real2 u, real lobe) {
+    BsdfSample sample;
+    sample.wi = sample_cosine(u);
+    sample.pdf = cosine_pdf(sample.wi.z);
+    sample.weight = GATHER3(scene->diffuse, index, .color);
+    sample.specular = NO_LANES;
+    return sample;
+}

@@ -1,0 +1,58 @@
+// The accumulated picture: for each pixel the sum of its samples and of their squares, each as a float pair.
+//
+// A plain float sum of n samples stops growing near n = 2^24; here the rounding error of every addition is kept in a
+// second float (Knuth's two-sum), so the mean stays right to a few units in the last place for any n. The two-sum
+// has no products, hence nothing to contract. Non-finite samples are dropped and counted.
+#include "vector.cl"
+
+typedef struct {
+    real3 sum, sum_error, square, square_error;
+    ureal count, dropped;
+} Accumulator;
+
+static inline void two_sum(real *sum, real *error, real x) {
+    real s = *sum + x;
+    real b = s - *sum;
+    *error += (*sum - (s - b)) + (x - b);
+    *sum = s;
+}
+
+static inline void accumulate(Accumulator *a, real3 L, ireal counted) {
+    ireal finite = (absolute(L.x) <= 3.4e38f) & (absolute(L.y) <= 3.4e38f) & (absolute(L.z) <= 3.4e38f);
+    ireal kept = counted & finite;
+    L = choose(kept, L, splat(ZERO));
+    a->count += kept ? (ureal)(1) : (ureal)(0);
+    a->dropped += (counted & !finite) ? (ureal)(1) : (ureal)(0);
+    two_sum(&a->sum.x, &a->sum_error.x, L.x);
+    two_sum(&a->sum.y, &a->sum_error.y, L.y);
+    two_sum(&a->sum.z, &a->sum_error.z, L.z);
+    // Squares above 1e34 would overflow their sum: such a pixel's variance is reported as at least that.
+    two_sum(&a->square.x, &a->square_error.x, minimum(L.x * L.x, (real)(1e34f)));
+    two_sum(&a->square.y, &a->square_error.y, minimum(L.y * L.y, (real)(1e34f)));
+    two_sum(&a->square.z, &a->square_error.z, minimum(L.z * L.z, (real)(1e34f)));
+}
+
+static inline Accumulator load_pixels(global const Pixel *film, ireal pixel) {
+    return (Accumulator){GATHER3(film, pixel, .sum), GATHER3(film, pixel, .sum_error), GATHER3(film, pixel, .square),
+                         GATHER3(film, pixel, .square_error), GATHER(ureal, film, pixel, .count),
+                         GATHER(ureal, film, pixel, .dropped)};
+}
+
+static inline void store_rows(global float *row, const real3 *value, int lane) {
+    const float *lanes = (const float *)value;
+    row[0] = lanes[lane];
+    row[1] = lanes[lane + LANES];
+    row[2] = lanes[lane + 2 * LANES];
+}
+
+static inline void store_pixels(global Pixel *film, uint first, uint end, const Accumulator *a) {
+    for (uint lane = 0; lane < LANES && first + lane < end; ++lane) {
+        global Pixel *pixel = film + first + lane;
+        store_rows(pixel->sum, &a->sum, lane);
+        store_rows(pixel->sum_error, &a->sum_error, lane);
+        store_rows(pixel->square, &a->square, lane);
+        store_rows(pixel->square_error, &a->square_error, lane);
+        pixel->count = ((const uint *)&a->count)[lane];
+        pixel->dropped = ((const uint *)&a->dropped)[lane];
+    }
+}

@@ -1,0 +1,72 @@
+// Ray against triangles without cracks (Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection", JCGT 2(1)).
+//
+// The ray is sheared onto the z axis; a vertex's sheared coordinates depend on the vertex and the ray alone, so both
+// triangles at an edge see the same ones. The side of an edge is found by comparing its two products instead of
+// subtracting them: both triangles form the same two products, and no compiler can contract a comparison. Equal
+// products mean that the ray meets the edge, and count as inside on both sides, so no double precision is needed.
+// A hit closer than the rounding error of t is dropped (pbrt, 4th ed., 6.8.8): rays that leave a surface never meet it.
+#include "geometry/wide.cl"
+#include "vector.cl"
+
+typedef struct {
+    int kx, ky, kz;       // kz: the direction's largest component
+    float sx, sy, sz;     // shear and scale
+    float ox, oy, oz;     // the origin, permuted
+} TriangleRay;
+
+static inline TriangleRay triangle_ray(const Ray *ray) {
+    const float *d = ray->direction;
+    float ax = fabs(d[0]), ay = fabs(d[1]), az = fabs(d[2]);
+    TriangleRay r;
+    r.kz = az >= ax && az >= ay ? 2 : ay >= ax ? 1 : 0;
+    r.kx = r.kz == 2 ? 0 : r.kz + 1;
+    r.ky = r.kx == 2 ? 0 : r.kx + 1;
+    r.sz = 1.0f / d[r.kz];
+    r.sx = d[r.kx] * r.sz;
+    r.sy = d[r.ky] * r.sz;
+    r.ox = ray->origin[r.kx];
+    r.oy = ray->origin[r.ky];
+    r.oz = ray->origin[r.kz];
+    return r;
+}
+
+static inline WideHit intersect_triangles(const TriangleRay *ray, global const Triangles *leaf, float t_max) {
+    wide az = LOAD_WIDE(leaf->p0[ray->kz]) - ray->oz;
+    wide bz = LOAD_WIDE(leaf->p1[ray->kz]) - ray->oz;
+    wide cz = LOAD_WIDE(leaf->p2[ray->kz]) - ray->oz;
+    wide ax = fma((wide)(-ray->sx), az, LOAD_WIDE(leaf->p0[ray->kx]) - ray->ox);
+    wide ay = fma((wide)(-ray->sy), az, LOAD_WIDE(leaf->p0[ray->ky]) - ray->oy);
+    wide bx = fma((wide)(-ray->sx), bz, LOAD_WIDE(leaf->p1[ray->kx]) - ray->ox);
+    wide by = fma((wide)(-ray->sy), bz, LOAD_WIDE(leaf->p1[ray->ky]) - ray->oy);
+    wide cx = fma((wide)(-ray->sx), cz, LOAD_WIDE(leaf->p2[ray->kx]) - ray->ox);
+    wide cy = fma((wide)(-ray->sy), cz, LOAD_WIDE(leaf->p2[ray->ky]) - ray->oy);
+
+    wide u1 = cx * by, u2 = cy * bx;
+    wide v1 = ax * cy, v2 = ay * cx;
+    wide w1 = bx * ay, w2 = by * ax;
+    wide_mask front = (u1 >= u2) & (v1 >= v2) & (w1 >= w2);
+    wide_mask back = (u1 <= u2) & (v1 <= v2) & (w1 <= w2);
+    WideHit result;
+    result.hit = front | back;
+    if (!WIDE_ANY(result.hit)) return result;
+
+    wide u = u1 - u2, v = v1 - v2, w = w1 - w2;
+    wide det = u + v + w;
+    wide inverse = 1.0f / det;
+    az *= ray->sz;
+    bz *= ray->sz;
+    cz *= ray->sz;
+    result.t = (u * az + v * bz + w * cz) * inverse;
+    result.u = v * inverse;
+    result.v = w * inverse;
+
+    wide max_z = wide_max3(WIDE_ABS(az), WIDE_ABS(bz), WIDE_ABS(cz));
+    wide max_x = wide_max3(WIDE_ABS(ax), WIDE_ABS(bx), WIDE_ABS(cx));
+    wide max_y = wide_max3(WIDE_ABS(ay), WIDE_ABS(by), WIDE_ABS(cy));
+    wide max_e = wide_max3(WIDE_ABS(u), WIDE_ABS(v), WIDE_ABS(w));
+    wide delta_x = GAMMA(5) * (max_x + max_z), delta_y = GAMMA(5) * (max_y + max_z);
+    wide delta_e = 2.0f * (GAMMA(2) * max_x * max_y + delta_y * max_x + delta_x * max_y);
+    wide t_min = 3.0f * (GAMMA(3) * max_e * max_z + delta_e * max_z + GAMMA(3) * max_z * max_e) * WIDE_ABS(inverse);
+    result.hit = result.hit & (det != 0.0f) & (result.t > t_min) & (result.t <= t_max);
+    return result;
+}

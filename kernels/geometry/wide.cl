@@ -1,0 +1,25 @@
+// The primitives of a leaf are tested WIDTH at a time: 1 where a leaf is a list, 8 where it is a pack.
+// `wide` holds one float of each; load_wide reads a row of a record, whatever the width.
+
+#if WIDTH == 1
+typedef float wide;
+typedef int wide_mask;
+#define LOAD_WIDE(row) (row)
+#define WIDE_ANY(mask) (mask)
+#define WIDE_ABS(x) fabs(x)
+#else
+typedef float8 wide;
+typedef int8 wide_mask;
+#define LOAD_WIDE(row) vload8(0, row)
+#define WIDE_ANY(mask) any(mask)
+#define WIDE_ABS(x) as_float8(as_int8(x) & 0x7fffffff)
+#endif
+
+typedef struct { float origin[3], direction[3], t_max; } Ray;      // t counts lengths of `direction`
+typedef struct { float t, u, v; int primitive; } Hit;              // primitive < 0: nothing was hit
+typedef struct { wide t, u, v; wide_mask hit; } WideHit;
+
+static inline wide wide_max3(wide a, wide b, wide c) {
+    wide ab = a > b ? a : b;
+    return ab > c ? ab : c;
+}

@@ -1,0 +1,59 @@
+// Lane types: the shading code is written once over them and compiled for 1, 8 or 16 paths a work-item.
+//
+// real, ireal, ureal   a float, int, uint of every path          real3   a vector of three reals
+// A mask is an ireal: a comparison's result. Scalars are 0/1 and vectors 0/-1, so a mask is only ever used in
+// `m ? a : b`, `a & b`, `a | b`, `!m` and ANY(m), which mean the same for both.
+// GATHER(type, array, index, .member) reads one record per lane; the index of an idle lane must be valid, too.
+
+#define PASTE_(a, b) a##b
+#define PASTE(a, b) PASTE_(a, b)
+
+#if LANES == 1
+typedef float real;
+typedef int ireal;
+typedef uint ureal;
+#define ANY(mask) (mask)
+#define GATHER(type, array, index, member) ((type)((array)[index] member))
+#define TO_REAL(x) ((float)(x))
+#define TO_INT(x) ((int)(x))
+#define TO_UINT(x) ((uint)(x))
+#define AS_INT(x) as_int(x)
+#define AS_REAL(x) as_float(x)
+#define LANE_INDEX ((uint)0)
+#else
+typedef PASTE(float, LANES) real;
+typedef PASTE(int, LANES) ireal;
+typedef PASTE(uint, LANES) ureal;
+#define ANY(mask) any(mask)
+#define TO_REAL(x) PASTE(convert_float, LANES)(x)
+#define TO_INT(x) PASTE(convert_int, LANES)(x)
+#define TO_UINT(x) PASTE(convert_uint, LANES)(x)
+#define AS_INT(x) PASTE(as_int, LANES)(x)
+#define AS_REAL(x) PASTE(as_float, LANES)(x)
+#define GATHER8_(a, i, m) (a)[(i).s0] m, (a)[(i).s1] m, (a)[(i).s2] m, (a)[(i).s3] m, \
+                          (a)[(i).s4] m, (a)[(i).s5] m, (a)[(i).s6] m, (a)[(i).s7] m
+#if LANES == 8
+#define GATHER(type, array, index, member) ((type)(GATHER8_(array, index, member)))
+#define LANE_INDEX ((ureal)(0, 1, 2, 3, 4, 5, 6, 7))
+#elif LANES == 16
+#define GATHER(type, array, index, member) ((type)(GATHER8_(array, (index).lo, member), GATHER8_(array, (index).hi, member)))
+#define LANE_INDEX ((ureal)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
+#endif
+#endif
+
+typedef struct { real x, y; } real2;
+typedef struct { ureal x, y; } ureal2;
+typedef struct { real x, y, z; } real3;
+
+#define GATHER3(array, index, member) ((real3){GATHER(real, array, index, member[0]), \
+                                               GATHER(real, array, index, member[1]), \
+                                               GATHER(real, array, index, member[2])})
+
+// One lane at a time, for the code that handles single rays.
+typedef union { real all; float lane[LANES]; } RealLanes;
+typedef union { ireal all; int lane[LANES]; } IntLanes;
+
+#define ZERO ((real)(0.0f))
+#define ONE ((real)(1.0f))
+#define ALL_LANES ((real)(0.0f) == (real)(0.0f))
+#define NO_LANES ((real)(0.0f) != (real)(0.0f))

@@ -1,0 +1,10 @@
+// The same radiance from every direction. A ray that escapes brings it; it is not sampled as a light, since directions
+// chosen by the surface are never worse for it.
+#include "light/interface.cl"
+
+static inline real3 sky_radiance(const Scene *scene, real3 wi) {
+    return (real3){(real)(scene->environment->color[0]), (real)(scene->environment->color[1]),
+                   (real)(scene->environment->color[2])};
+}
+
+static inline real sky_pdf(const Scene *scene, real3 wi) { return ZERO; }

@@ -1,0 +1,70 @@
+// Light from a latitude–longitude picture, sampled by its brightness. World frame.
+//
+// u = atan2(x, −z)/2·pi mod 1, v = acos(y)/pi, row 0 on top; bilinear between texel centres, u wraps, v clamps. A
+// texel is drawn with the mean bilinear luminance over its area times its solid angle, the place inside it uniformly
+// in (u, v): density(u, v) per texel is constant, so pdf = density/(2·pi²·sin(pi·v)) (pbrt, 4th ed., 12.5.2).
+#include "light/interface.cl"
+
+static inline real2 sky_uv(const Scene *scene, real3 wi) {
+    real c = (real)(scene->environment->rotation_cos), s = (real)(scene->environment->rotation_sin);
+    real x = c * wi.x - s * wi.z, z = s * wi.x + c * wi.z;
+    real u = atan2(x, -z) * (0.5f / PI);
+    // Near a pole acos(y) loses half its digits and the arc's sine does not.
+    real v = atan2(sqrt(x * x + z * z), wi.y) * (1.0f / PI);
+    return (real2){u < 0.0f ? u + 1.0f : u, v};
+}
+
+static inline ireal clamp_index(ireal i, int size) { return i < 0 ? (ireal)(0) : i >= size ? (ireal)(size - 1) : i; }
+
+static inline ireal sky_texel(const Scene *scene, real2 uv) {
+    int width = scene->environment->width, height = scene->environment->height;
+    return clamp_index(TO_INT(uv.y * (float)height), height) * width + clamp_index(TO_INT(uv.x * (float)width), width);
+}
+
+static inline real3 sky_radiance_uv(const Scene *scene, real2 uv) {
+    int width = scene->environment->width, height = scene->environment->height;
+    real x = uv.x * (float)width - 0.5f, y = uv.y * (float)height - 0.5f;
+    ireal column = TO_INT(floor(x)), row = TO_INT(floor(y));
+    real fx = x - TO_REAL(column), fy = y - TO_REAL(row);
+    ireal left = column < 0 ? column + width : column;
+    ireal right = column + 1 >= width ? column + 1 - width : column + 1;
+    ireal top = clamp_index(row, height) * width, bottom = clamp_index(row + 1, height) * width;
+    real3 upper = mad3(GATHER3(scene->sky_texels, top + left, .radiance), 1.0f - fx,
+                       scale(GATHER3(scene->sky_texels, top + right, .radiance), fx));
+    real3 lower = mad3(GATHER3(scene->sky_texels, bottom + left, .radiance), 1.0f - fx,
+                       scale(GATHER3(scene->sky_texels, bottom + right, .radiance), fx));
+    return mad3(upper, 1.0f - fy, scale(lower, fy));
+}
+
+static inline real3 sky_radiance(const Scene *scene, real3 wi) { return sky_radiance_uv(scene, sky_uv(scene, wi)); }
+
+static inline real sky_pdf_at(const Scene *scene, ireal texel, real sin_theta) {
+    real pdf = GATHER(real, scene->sky_texels, texel, .density) / (2.0f * PI * PI * sin_theta);
+    return sin_theta > 0.0f ? pdf : ZERO;
+}
+
+static inline real sky_pdf(const Scene *scene, real3 wi) {
+    return scene->environment->probability
+         * sky_pdf_at(scene, sky_texel(scene, sky_uv(scene, wi)), sqrt(wi.x * wi.x + wi.z * wi.z));
+}
+
+static inline LightSample sky_light_sample(const Scene *scene, ireal index, real3 p, real2 u, Sampler *sampler) {
+    int width = scene->environment->width, height = scene->environment->height;
+    ureal2 bits = next_bits(sampler);
+    ALIAS_PICK(scene->sky_aliases, width * height, bits, texel)
+    ireal row = texel / width, column = texel - row * width;
+    real2 uv = {(TO_REAL(column) + u.x) / (float)width, (TO_REAL(row) + u.y) / (float)height};
+    real sin_phi, cos_phi, sin_theta, cos_theta;
+    sincos_turns(uv.x, &sin_phi, &cos_phi);
+    sincos_turns(0.5f * uv.y, &sin_theta, &cos_theta);
+    real x = sin_theta * sin_phi, z = -sin_theta * cos_phi;
+    real c = (real)(scene->environment->rotation_cos), s = (real)(scene->environment->rotation_sin);
+    LightSample sample;
+    sample.wi = vector(c * x + s * z, cos_theta, c * z - s * x);
+    sample.radiance = sky_radiance_uv(scene, uv);
+    sample.pdf = sky_pdf_at(scene, texel, sin_theta);
+    sample.target = sample.wi;
+    sample.infinite = ALL_LANES;
+    sample.delta = NO_LANES;
+    return sample;
+}

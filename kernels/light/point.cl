@@ -1,0 +1,15 @@
+// A point that shines alike in all directions: intensity/d² (Suchiński 7.4.1). World frame.
+#include "light/interface.cl"
+
+static inline LightSample point_light_sample(const Scene *scene, ireal index, real3 p, real2 u, Sampler *sampler) {
+    LightSample s;
+    s.target = GATHER3(scene->point_lights, index, .position);
+    real3 d = sub(s.target, p);
+    real inverse = rsqrt(dot3(d, d));
+    s.wi = scale(d, inverse);
+    s.radiance = scale(GATHER3(scene->point_lights, index, .intensity), inverse * inverse);
+    s.pdf = ONE;
+    s.infinite = NO_LANES;
+    s.delta = ALL_LANES;
+    return s;
+}

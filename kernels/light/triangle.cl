@@ -1,0 +1,28 @@
+// A triangle that shines from its front side: a point uniform over its area. World frame.
+#include "light/interface.cl"
+
+static inline LightSample triangle_light_sample(const Scene *scene, ireal index, real3 p, real2 u, Sampler *sampler) {
+    real2 b = sample_triangle(u);
+    real3 q = mad3(GATHER3(scene->triangle_lights, index, .e1), b.x,
+              mad3(GATHER3(scene->triangle_lights, index, .e2), b.y, GATHER3(scene->triangle_lights, index, .p0)));
+    real3 n = GATHER3(scene->triangle_lights, index, .normal);
+    real3 d = sub(q, p);
+    real d2 = dot3(d, d);
+    LightSample s;
+    s.wi = scale(d, rsqrt(d2));
+    real cosine = -dot3(s.wi, n);
+    ireal front = (cosine > 0.0f) & (d2 > 0.0f);
+    s.radiance = choose(front, GATHER3(scene->triangle_lights, index, .radiance), splat(ZERO));
+    s.pdf = front ? d2 / (cosine * GATHER(real, scene->triangle_lights, index, .area)) : ONE;
+    s.target = shadow_target(p, q, n);
+    s.infinite = s.delta = NO_LANES;
+    return s;
+}
+
+static inline real triangle_light_pdf(const Scene *scene, ireal index, real3 p, real3 wi, real t, const Surface *surface) {
+    return t * t / (absolute(dot3(wi, surface->ng)) * GATHER(real, scene->triangle_lights, index, .area));
+}
+
+static inline real3 triangle_light_radiance(const Scene *scene, ireal index, real3 wi, const Surface *surface) {
+    return choose(dot3(wi, surface->ng) < 0.0f, GATHER3(scene->triangle_lights, index, .radiance), splat(ZERO));
+}

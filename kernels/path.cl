@@ -1,0 +1,126 @@
+// Path tracing with light samples and multiple importance sampling (Kajiya 1986; Veach 1997, ch. 9 and 10).
+//
+// One work-item follows LANES pixels, one path each, through `sample_count` samples. World frame; L and Le in
+// W·sr⁻¹·m⁻², beta the path's throughput.
+#include "camera.cl"
+#include "film.cl"
+#include "bsdf.cl"
+#include "light.cl"
+
+#define ROULETTE_DEPTH 4   // edges before Russian roulette may end a path
+
+// Where the last direction came from: its density, and whether only it could have found what lies there.
+typedef struct {
+    real3 p, wi;
+    real pdf;
+    ireal specular;
+} Step;
+
+// 1. What glows where the ray ended, weighted against the light sample that could have found it.
+static inline real3 found_light(const Scene *scene, const Step *step, const Surface *surface, real t, ireal hit,
+                                ireal escaped) {
+    real3 L = splat(ZERO);
+#if EMITTERS
+    real emitter_pdf;
+    real3 emitted = emitter_radiance(scene, step->p, step->wi, t, surface, hit, &emitter_pdf);
+    real emitter_weight = step->specular ? ONE : power_heuristic(step->pdf, emitter_pdf);
+    L = choose(hit, scale(emitted, emitter_weight), L);
+#endif
+#if SKY
+    if (ANY(escaped)) {
+        real weight = step->specular ? ONE : power_heuristic(step->pdf, sky_pdf(scene, step->wi));
+        L = choose(escaped, scale(sky_radiance(scene, step->wi), weight), L);
+    }
+#endif
+    return L;
+}
+
+#if LIGHTS
+// 2. Light that arrives by a shadow ray towards a sampled point of a light.
+static inline real3 sampled_light(const Scene *scene, const Surface *surface, Frame shading, real3 ng, real3 wo,
+                                  ireal active, Sampler *sampler) {
+    LightSample light = light_sample(scene, surface->p, sampler);
+    real3 wi = to_local(shading, light.wi);
+    ireal above = dot3(light.wi, ng) > 0.0f;
+    real3 f = bsdf_eval(scene, surface->material, wo, wi);
+    real3 contribution = mul(f, light.radiance);
+    ireal useful = active & above & (light.pdf > 0.0f) & is_positive3(contribution);
+    if (!ANY(useful)) return splat(ZERO);
+    real3 origin = offset_origin(surface->p, surface->p_error, ng, light.wi);
+    real3 direction = choose(light.infinite, light.wi, sub(light.target, origin));
+    real t_max = light.infinite ? (real)(INFINITY) : ONE;
+    ireal blocked = any_hit(scene, origin, direction, t_max, useful);
+    real pdf = bsdf_pdf(scene, surface->material, wo, wi);
+    real weight = (light.delta ? ONE : power_heuristic(light.pdf, pdf)) / light.pdf;
+    return choose(useful & !blocked, scale(contribution, weight), splat(ZERO));
+}
+#endif
+
+static inline real3 radiance(const Scene *scene, real3 origin, real3 direction, ireal active, int max_depth,
+                             Sampler *sampler) {
+    real3 L = splat(ZERO), beta = splat(ONE);
+    Step step = {origin, direction, ONE, ALL_LANES};
+    for (int depth = 1;; ++depth) {
+        Hits hits = closest_hit(scene, origin, step.wi, active);
+        ireal hit = active & (hits.primitive >= 0);
+        Surface surface;
+#if PRIMITIVES
+        surface = surface_at(scene, origin, step.wi, &hits);
+#endif
+        real3 found = found_light(scene, &step, &surface, hits.t, hit, active & !hit);
+        L = add(L, choose(active, mul(beta, found), splat(ZERO)));
+        active = hit;
+        if (depth >= max_depth || !ANY(active)) return L;
+
+#if PRIMITIVES
+        // Both normals on the side the path came from; a shading normal that faces away is replaced.
+        real3 towards = negate(step.wi);
+        real3 ng = choose(dot3(surface.ng, towards) < 0.0f, negate(surface.ng), surface.ng);
+        real3 ns = choose(dot3(surface.ns, ng) < 0.0f, negate(surface.ns), surface.ns);
+        ns = choose(dot3(ns, towards) > 0.0f, ns, ng);
+        Frame shading = frame_around(ns);
+        real3 wo = to_local(shading, towards);
+#if LIGHTS
+        real3 direct = sampled_light(scene, &surface, shading, ng, wo, active, sampler);
+        L = add(L, mul(beta, direct));
+#endif
+        // 3. Go on in a direction drawn from the material.
+        real2 u = next_2d(sampler), choice = next_2d(sampler);
+        BsdfSample sample = bsdf_sample(scene, surface.material, wo, u, choice.x);
+        step.p = surface.p;
+        step.wi = to_world(shading, sample.wi);
+        step.pdf = sample.pdf;
+        step.specular = sample.specular;
+        active = active & (sample.pdf > 0.0f) & is_positive3(sample.weight) & (dot3(step.wi, ng) > 0.0f);
+        beta = choose(active, mul(beta, sample.weight), beta);
+        origin = offset_origin(surface.p, surface.p_error, ng, step.wi);
+
+        // 4. Russian roulette: end weak paths, keep the mean (Arvo and Kirk 1990).
+        if (depth >= ROULETTE_DEPTH) {
+            real survival = minimum(largest(beta), (real)(0.95f));
+            active = active & (choice.y < survival);
+            beta = choose(active, scale(beta, 1.0f / survival), beta);
+        }
+#endif
+    }
+}
+
+__attribute__((vec_type_hint(real)))
+kernel void path(SCENE_PARAMETERS, global Pixel *film, const Launch launch) {
+    Scene scene = SCENE_ARGUMENTS;
+    uint first = launch.first_pixel + (uint)get_global_id(0) * LANES;
+    uint end = launch.first_pixel + launch.pixel_count;
+    if (first >= end) return;
+    ureal index = (ureal)(first) + LANE_INDEX;
+    ireal inside = index < end;
+    index = inside ? index : (ureal)(first);
+    ureal y = index / launch.width, x = index - y * launch.width;
+    real3 position = broadcast(launch.position);
+    Accumulator pixels = load_pixels(film, AS_INT(index));
+    for (uint s = 0; s < launch.sample_count; ++s) {
+        Sampler sampler = {index, (ureal)(launch.first_sample + s), launch.seed, 0};
+        real3 direction = camera_direction(&launch, x, y, next_2d(&sampler));
+        accumulate(&pixels, radiance(&scene, position, direction, inside, launch.max_depth, &sampler), inside);
+    }
+    store_pixels(film, first, end, &pixels);
+}

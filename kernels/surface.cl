@@ -1,0 +1,86 @@
+// What a ray hit: position with its error bound, normals, material and emitter. World frame.
+//
+// The position is rebuilt from the primitive, not from origin + t·direction: its error is a few roundings of the
+// primitive's own coordinates, however far the ray came. New rays start at the edge of that error, on the side they
+// leave to, so no scene-size epsilon exists (pbrt, 4th ed., 6.8).
+#include "traverse/trace.cl"
+
+typedef struct {
+    real3 p, p_error;     // |p − exact| <= p_error by component
+    real3 ng, ns;         // geometric and shading normal, both on the front side
+    ireal material;       // type | index << 4
+    ireal light;          // entry of the light table, or -1
+} Surface;
+
+#if TRIANGLES
+static inline void triangle_surface(const Scene *scene, const Hits *hits, ireal primitive, Surface *surface) {
+    real3 p0 = GATHER3(scene->triangles, primitive, .p0);
+    real3 p1 = GATHER3(scene->triangles, primitive, .p1);
+    real3 p2 = GATHER3(scene->triangles, primitive, .p2);
+    real b1 = hits->u, b2 = hits->v, b0 = 1.0f - b1 - b2;
+    surface->p = mad3(p0, b0, mad3(p1, b1, scale(p2, b2)));
+    real3 size = mad3(absolute3(p0), absolute(b0), mad3(absolute3(p1), b1, scale(absolute3(p2), b2)));
+    surface->p_error = scale(size, (real)(GAMMA(9)));
+    surface->ng = normalize3(cross3(sub(p1, p0), sub(p2, p0)));
+    surface->ns = surface->ng;
+    surface->material = GATHER(ireal, scene->triangles, primitive, .material);
+    surface->light = GATHER(ireal, scene->triangles, primitive, .light);
+#if SMOOTH_NORMALS
+    ireal normals = GATHER(ireal, scene->triangles, primitive, .normals);
+    ireal smooth = normals >= 0;
+    if (ANY(smooth)) {
+        normals = smooth ? normals : (ireal)(0);
+        real3 ns = mad3(GATHER3(scene->normals, normals, .n0), b0,
+                   mad3(GATHER3(scene->normals, normals, .n1), b1, scale(GATHER3(scene->normals, normals, .n2), b2)));
+        real norm2 = dot3(ns, ns);
+        surface->ns = choose(smooth & (norm2 > 0.0f), scale(ns, rsqrt(norm2)), surface->ns);
+    }
+#endif
+}
+#endif
+
+#if SPHERES
+static inline void sphere_surface(const Scene *scene, real3 origin, real3 direction, const Hits *hits, ireal sphere,
+                                  Surface *surface) {
+    real3 center = GATHER3(scene->spheres, sphere, .center);
+    real radius = GATHER(real, scene->spheres, sphere, .radius);
+    real3 n = normalize3(sub(mad3(direction, hits->t, origin), center));
+    surface->p = mad3(n, radius, center);
+    real3 size = add(absolute3(center), splat(radius));
+    surface->p_error = scale(size, (real)(GAMMA(9)));
+    surface->ng = surface->ns = n;
+    surface->material = GATHER(ireal, scene->spheres, sphere, .material);
+    surface->light = GATHER(ireal, scene->spheres, sphere, .light);
+}
+#endif
+
+// The surface at the hits; lanes that hit nothing get the surface of primitive 0.
+static inline Surface surface_at(const Scene *scene, real3 origin, real3 direction, const Hits *hits) {
+    Surface surface;
+    ireal primitive = hits->primitive < 0 ? (ireal)(0) : hits->primitive;
+#if TRIANGLES && SPHERES
+    ireal is_sphere = primitive >= scene->counts.triangles;
+    triangle_surface(scene, hits, is_sphere ? (ireal)(0) : primitive, &surface);
+    if (ANY(is_sphere)) {
+        Surface other;
+        sphere_surface(scene, origin, direction, hits, is_sphere ? primitive - scene->counts.triangles : (ireal)(0), &other);
+        surface.p = choose(is_sphere, other.p, surface.p);
+        surface.p_error = choose(is_sphere, other.p_error, surface.p_error);
+        surface.ng = choose(is_sphere, other.ng, surface.ng);
+        surface.ns = choose(is_sphere, other.ns, surface.ns);
+        surface.material = is_sphere ? other.material : surface.material;
+        surface.light = is_sphere ? other.light : surface.light;
+    }
+#elif TRIANGLES
+    triangle_surface(scene, hits, primitive, &surface);
+#elif SPHERES
+    sphere_surface(scene, origin, direction, hits, primitive, &surface);
+#endif
+    return surface;
+}
+
+// p moved out of its error box along the normal, to the side that `direction` leaves to.
+static inline real3 offset_origin(real3 p, real3 p_error, real3 ng, real3 direction) {
+    real distance = dot3(absolute3(ng), p_error);
+    return mad3(ng, dot3(direction, ng) < 0.0f ? -distance : distance, p);
+}

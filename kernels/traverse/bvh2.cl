@@ -1,0 +1,65 @@
+// A binary tree (Nadolny 5.4.4–5.4.5): 32-byte nodes, children side by side, one triangle at a time.
+//
+// Both children are tested at their parent; the nearer is entered, the farther waits with its distance on a stack
+// whose size the host computed for this very tree, so that it cannot overflow. count = 0 is an interior node,
+// count > 0 a leaf of triangles, count < 0 of spheres; first is the left child or the leaf's first primitive.
+#include "geometry/box.cl"
+#include "traverse/leaf.cl"
+
+static inline float enter_box(const SlabRay *ray, global const Node *node, float t_max) {
+    float t_near = 0.0f, t_far = t_max;
+    for (int axis = 0; axis < 3; ++axis) {
+        float low = node->aabb_min[axis], high = node->aabb_max[axis];
+        float near = ((ray->backward[axis] ? high : low) - ray->origin[axis]) * ray->near[axis];
+        float far = ((ray->backward[axis] ? low : high) - ray->origin[axis]) * ray->far[axis];
+        t_near = near > t_near ? near : t_near;
+        t_far = far < t_far ? far : t_far;
+    }
+    return t_near <= t_far ? t_near : INFINITY;
+}
+
+static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int first, int count, const bool stop_at_first, Hit *hit) {
+#if SPHERES
+    if (count < 0) {
+        hit_spheres(ray, scene->leaf_spheres + first, -count, hit);
+        return;
+    }
+#endif
+#if TRIANGLES
+    for (int i = first; i < first + count; ++i) hit_triangles(ray, scene->leaf_triangles + i, stop_at_first, hit);
+#endif
+}
+
+static inline Hit traverse(const Scene *scene, const Ray *ray, const bool stop_at_first) {
+    LeafRay leaf = leaf_ray(ray);
+    SlabRay slabs = slab_ray(ray);
+    Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
+    int waiting[STACK_SIZE];
+    float distance[STACK_SIZE];
+    int top = 0, node = 0;
+    if (enter_box(&slabs, scene->nodes, hit.t) == INFINITY) return hit;
+    for (;;) {
+        int count = scene->nodes[node].count, first = scene->nodes[node].left_first;
+        if (count == 0) {
+            float left = enter_box(&slabs, scene->nodes + first, hit.t);
+            float right = enter_box(&slabs, scene->nodes + first + 1, hit.t);
+            bool left_first = left <= right;
+            float near = left_first ? left : right, far = left_first ? right : left;
+            if (far < INFINITY) {
+                waiting[top] = left_first ? first + 1 : first;
+                distance[top++] = far;
+            }
+            if (near < INFINITY) {
+                node = left_first ? first : first + 1;
+                continue;
+            }
+        } else {
+            hit_leaf(scene, &leaf, first, count, stop_at_first, &hit);
+            if (stop_at_first && hit.primitive >= 0) return hit;
+        }
+        do {
+            if (top == 0) return hit;
+            node = waiting[--top];
+        } while (distance[top] > hit.t);
+    }
+}

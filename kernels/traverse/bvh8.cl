@@ -1,0 +1,82 @@
+// An 8-wide tree for processors with vectors: a ray meets a node's eight boxes, or a pack of eight triangles, at once.
+//
+// The nearest child is entered, the others wait unsorted with their distances: as fast as a full sort (measured). The
+// host computed the stack's size for this very tree, so that it cannot overflow. A child reference >= 0 is a node,
+// < 0 is ~(first << 4 | sphere << 3 | count − 1), a pack of triangles or `count` spheres; empty slots have boxes
+// turned inside out.
+#include "geometry/box.cl"
+#include "traverse/leaf.cl"
+
+static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int reference, const bool stop_at_first, Hit *hit) {
+    int leaf = ~reference;
+#if SPHERES
+#if TRIANGLES
+    if (leaf & 8)
+#endif
+    {
+        hit_spheres(ray, scene->leaf_spheres + (leaf >> 4), (leaf & 7) + 1, hit);
+        return;
+    }
+#endif
+#if TRIANGLES
+    hit_triangles(ray, scene->packs + (leaf >> 4), stop_at_first, hit);
+#endif
+}
+
+// Bit i is set where lane i of the mask is.
+static inline uint mask_bits(int8 mask) {
+    ulong bytes = as_ulong(convert_char8(mask));
+    return (uint)(((bytes & 0x8040201008040201UL) * 0x0101010101010101UL) >> 56);
+}
+
+// Tests the eight boxes of a node; returns the bits of those entered and where.
+static inline uint enter_boxes(const SlabRay *ray, global const Node *node, float t_max, float *entry) {
+    float8 t_near = 0.0f, t_far = t_max;
+    global const float *low = node->lo[0], *high = node->hi[0];
+    for (int axis = 0; axis < 3; ++axis) {
+        float8 near = (vload8(axis, ray->backward[axis] ? high : low) - ray->origin[axis]) * ray->near[axis];
+        float8 far = (vload8(axis, ray->backward[axis] ? low : high) - ray->origin[axis]) * ray->far[axis];
+        t_near = near > t_near ? near : t_near;
+        t_far = far < t_far ? far : t_far;
+    }
+    vstore8(t_near, 0, entry);
+    return mask_bits(t_near <= t_far);
+}
+
+static inline Hit traverse(const Scene *scene, const Ray *ray, const bool stop_at_first) {
+    LeafRay leaf = leaf_ray(ray);
+    SlabRay slabs = slab_ray(ray);
+    Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
+    int waiting[STACK_SIZE];
+    float distance[STACK_SIZE];
+    int top = 0, reference = 0;
+    for (;;) {
+        if (reference >= 0) {
+            global const Node *node = scene->nodes + reference;
+            float entry[8];
+            uint entered = enter_boxes(&slabs, node, hit.t, entry);
+            if (entered) {
+                int nearest = 31 - clz(entered & -entered);
+                entered &= entered - 1;
+                while (entered) {
+                    int child = 31 - clz(entered & -entered);
+                    entered &= entered - 1;
+                    bool nearer = entry[child] < entry[nearest];
+                    int farther = nearer ? nearest : child;
+                    nearest = nearer ? child : nearest;
+                    waiting[top] = node->child[farther];
+                    distance[top++] = entry[farther];
+                }
+                reference = node->child[nearest];
+                continue;
+            }
+        } else {
+            hit_leaf(scene, &leaf, reference, stop_at_first, &hit);
+            if (stop_at_first && hit.primitive >= 0) return hit;
+        }
+        do {
+            if (top == 0) return hit;
+            reference = waiting[--top];
+        } while (distance[top] > hit.t);
+    }
+}

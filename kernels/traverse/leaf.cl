@@ -1,0 +1,59 @@
+// What a leaf holds and what happens there; the trees know only these two functions.
+//
+// Of several hits at the same t the lowest primitive wins, so the answer does not depend on the tree. `stop_at_first` is a
+// constant at every call: with it, the first hit found ends the search.
+#include "geometry/wide.cl"
+#include TRIANGLE_TEST
+#include SPHERE_TEST
+
+typedef struct {
+    Ray ray;
+#if TRIANGLES
+    TriangleRay triangle_ray;
+#endif
+} LeafRay;
+
+static inline LeafRay leaf_ray(const Ray *ray) {
+    LeafRay r;
+    r.ray = *ray;
+#if TRIANGLES
+    r.triangle_ray = triangle_ray(ray);
+#endif
+    return r;
+}
+
+static inline void keep_closest(Hit *hit, float t, float u, float v, int primitive) {
+    if (t < hit->t || (t == hit->t && primitive < hit->primitive)) *hit = (Hit){t, u, v, primitive};
+}
+
+#if TRIANGLES
+static inline void hit_triangles(const LeafRay *ray, global const Triangles *leaf, const bool stop_at_first, Hit *hit) {
+    WideHit found = intersect_triangles(&ray->triangle_ray, leaf, hit->t);
+    if (!WIDE_ANY(found.hit)) return;
+#if WIDTH == 1
+    keep_closest(hit, found.t, found.u, found.v, leaf->primitive);
+#else
+    if (stop_at_first) {
+        hit->primitive = 0;
+        return;
+    }
+    float t[WIDTH], u[WIDTH], v[WIDTH];
+    int inside[WIDTH];
+    vstore8(found.t, 0, t);
+    vstore8(found.u, 0, u);
+    vstore8(found.v, 0, v);
+    vstore8(found.hit, 0, inside);
+    for (int i = 0; i < WIDTH; ++i)
+        if (inside[i]) keep_closest(hit, t[i], u[i], v[i], leaf->primitive[i]);
+#endif
+}
+#endif
+
+#if SPHERES
+static inline void hit_spheres(const LeafRay *ray, global const LeafSphere *spheres, int count, Hit *hit) {
+    for (int i = 0; i < count; ++i) {
+        float t;
+        if (intersect_sphere(&ray->ray, spheres + i, hit->t, &t)) keep_closest(hit, t, 0.0f, 0.0f, spheres[i].primitive);
+    }
+}
+#endif

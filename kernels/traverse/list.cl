@@ -1,0 +1,15 @@
+// No tree: every primitive is tested. The yardstick for the trees.
+#include "traverse/leaf.cl"
+
+static inline Hit traverse(const Scene *scene, const Ray *ray, const bool stop_at_first) {
+    LeafRay leaf = leaf_ray(ray);
+    Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
+#if TRIANGLES
+    for (int i = 0; i < scene->counts.triangles && !(stop_at_first && hit.primitive >= 0); ++i)
+        hit_triangles(&leaf, scene->leaf_triangles + i, stop_at_first, &hit);
+#endif
+#if SPHERES
+    if (!(stop_at_first && hit.primitive >= 0)) hit_spheres(&leaf, scene->leaf_spheres, scene->counts.spheres, &hit);
+#endif
+    return hit;
+}

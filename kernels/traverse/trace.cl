@@ -1,0 +1,54 @@
+// Rays of all lanes: closest_hit and any_hit, by the tree that the host chose.
+//
+// A scene without primitives has no tree: every ray escapes, and none of this is compiled.
+#include "vector.cl"
+#include TREE
+
+typedef struct { real t, u, v; ireal primitive; } Hits;   // primitive < 0: nothing was hit
+
+#if PRIMITIVES
+static inline Ray one_ray(const real3 *origin, const real3 *direction, const real *t_max, int lane) {
+    const float *o = (const float *)origin, *d = (const float *)direction, *t = (const float *)t_max;
+    return (Ray){{o[lane], o[lane + LANES], o[lane + 2 * LANES]}, {d[lane], d[lane + LANES], d[lane + 2 * LANES]}, t[lane]};
+}
+#endif
+
+// The nearest hit of each active lane's ray with 0 < t < infinity.
+static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction, ireal active) {
+    RealLanes t, u, v;
+    IntLanes primitive, enabled;
+    t.all = (real)(INFINITY);
+    u.all = v.all = ZERO;
+    primitive.all = (ireal)(-1);
+#if PRIMITIVES
+    enabled.all = active;
+    real t_max = (real)(INFINITY);
+    for (int lane = 0; lane < LANES; ++lane) {
+        if (!enabled.lane[lane]) continue;
+        Ray ray = one_ray(&origin, &direction, &t_max, lane);
+        Hit hit = traverse(scene, &ray, false);
+        t.lane[lane] = hit.t;
+        u.lane[lane] = hit.u;
+        v.lane[lane] = hit.v;
+        primitive.lane[lane] = hit.primitive;
+    }
+#endif
+    return (Hits){t.all, u.all, v.all, primitive.all};
+}
+
+// Which active lanes meet anything with 0 < t < t_max.
+static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active) {
+    ireal blocked = NO_LANES;
+#if PRIMITIVES
+    IntLanes enabled, found;
+    enabled.all = active;
+    found.all = (ireal)(-1);
+    for (int lane = 0; lane < LANES; ++lane) {
+        if (!enabled.lane[lane]) continue;
+        Ray ray = one_ray(&origin, &direction, &t_max, lane);
+        found.lane[lane] = traverse(scene, &ray, true).primitive;
+    }
+    blocked = found.all >= 0;
+#endif
+    return blocked;
+}

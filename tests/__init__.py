@@ -1,0 +1,1 @@
+"""Tests of clrt, laid out like its rooms."""

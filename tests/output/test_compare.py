@@ -1,0 +1,98 @@
+"""The measures against sums done by hand."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.errors import SceneError
+from clrt.output.compare import compare, compare_files, relmse
+from clrt.output.images import read_image, write_image
+
+
+def picture(*pixels: tuple[float, float, float]) -> NDArray[np.float32]:
+    return np.array([pixels], np.float32)
+
+
+def test_measures_of_two_pixels() -> None:
+    """Differences 1 0 2 | 0 -0.5 0 against references 1 2 0 | 0 0.5 3."""
+    reference, image = picture((1, 2, 0), (0, 0.5, 3)), picture((2, 2, 2), (0, 0, 3))
+    result = compare(image, reference)
+    assert result["relmse"] == pytest.approx((1 / 1.01 + 4 / 0.01 + 0.25 / 0.26) / 6, rel=1e-12)
+    assert result["rmse"] == pytest.approx(math.sqrt((1 + 4 + 0.25) / 6), rel=1e-12)
+    assert result["max_abs"] == 2
+    assert result["mean_ratio"] == pytest.approx([2 / 1, 2 / 2.5, 5 / 3], rel=1e-12)
+    assert result["nonfinite"] == result["nonfinite_reference"] == 0
+
+
+def test_a_picture_equals_itself() -> None:
+    image = np.random.default_rng(0).random((16, 16, 3), dtype=np.float32)
+    assert compare(image, image) == {"relmse": 0, "rmse": 0, "mean_ratio": [1, 1, 1], "flip": 0, "max_abs": 0,
+                                     "nonfinite": 0, "nonfinite_reference": 0}
+
+
+def test_a_black_reference_has_no_ratio() -> None:
+    result = compare(picture((1, 1, 1)), picture((0, 0, 0)))
+    assert result["mean_ratio"] == [None, None, None] and result["relmse"] == pytest.approx(100)
+    assert result["flip"] is None
+
+
+def test_nonfinite_values_are_counted_and_left_out() -> None:
+    image = picture((math.nan, 2, 2), (math.inf, -math.inf, 4))
+    reference = picture((1, 1, math.inf), (1, 1, 2))
+    result = compare(image, reference)
+    assert (result["nonfinite"], result["nonfinite_reference"]) == (3, 1)
+    # Left: 2 against 1 in green, 4 against 2 in blue.
+    assert result["relmse"] == pytest.approx((1 / 1.01 + 4 / 4.01) / 2, rel=1e-12)
+    assert result["mean_ratio"] == [None, 2, 2]
+    nothing = compare(image, np.full_like(reference, np.nan))
+    assert (nothing["relmse"], nothing["rmse"], nothing["max_abs"]) == (None, None, None)
+
+
+@pytest.mark.filterwarnings("error")
+def test_sums_are_float64() -> None:
+    """1e38² is beyond float32; so is a part in 1e8 of the sum of four million pixels."""
+    assert compare(picture((1e38, 0, 0)), picture((0, 0, 0)))["rmse"] == pytest.approx(1e38 / math.sqrt(3), rel=1e-6)
+    reference = np.ones((2048, 2048, 3), np.float32)
+    image = reference.copy()
+    image[7, 7] = 2
+    assert relmse(image, reference) == pytest.approx(1 / 1.01 / 2048**2, rel=1e-12)
+
+
+def test_flip_depends_on_how_much_is_wrong() -> None:
+    reference = np.random.default_rng(0).random((32, 32, 3), dtype=np.float32)
+    for hdr in (False, True):
+        near, far = (compare(reference * np.float32(gain), reference, hdr=hdr)["flip"] for gain in (1.05, 1.5))
+        assert 0 < near < far < 1
+
+
+def test_ldr_flip_of_black_and_white_is_one() -> None:
+    """FLIP scales the largest difference of colours to 1 (Andersson et al. 2020), and black and white come close."""
+    white = np.ones((64, 64, 3), np.float32)
+    assert compare(0 * white, white, hdr=False)["flip"] == pytest.approx(1, abs=0.05)
+    assert compare(5 * white, white, hdr=False)["flip"] == 0
+
+
+@pytest.mark.parametrize("first, second, hdr", [("a.png", "b.png", False), ("a.exr", "b.png", True),
+                                                ("a.png", "b.hdr", True)])
+def test_files(tmp_path: Path, first: str, second: str, hdr: bool) -> None:
+    rng = np.random.default_rng(1)
+    write_image(tmp_path / first, rng.random((16, 16, 3), dtype=np.float32))
+    write_image(tmp_path / second, rng.random((16, 16, 3), dtype=np.float32))
+    result = compare_files(tmp_path / first, tmp_path / second)
+    image, reference = read_image(tmp_path / first), read_image(tmp_path / second)
+    assert result == compare(image, reference, hdr=hdr)
+    assert result["flip"] != compare(image, reference, hdr=not hdr)["flip"]
+
+
+def test_sizes_must_agree(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="the image has 4x2 pixels, the reference 4x3;"):
+        compare(np.zeros((2, 4, 3), np.float32), np.zeros((3, 4, 3), np.float32))
+    write_image(tmp_path / "small.exr", np.zeros((2, 4, 3), np.float32))
+    write_image(tmp_path / "large.png", np.zeros((20, 40, 3), np.float32))
+    with pytest.raises(SceneError, match=r"small\.exr has 4x2 pixels, .*large\.png 40x20"):
+        compare_files(tmp_path / "small.exr", tmp_path / "large.png")

@@ -1,0 +1,92 @@
+"""Scenes stored as JSON beside their converged pictures, turned into clrt's scenes.
+
+`NAME.json` has a camera (`fov`: full angle, of a square picture), materials, shapes (.ply meshes, spheres), lights and
+`max_depth`; `NAME.exr` is the converged picture; meshes and environment pictures lie beside them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clrt.scene.lights import PointLight
+from clrt.scene.materials import Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.pictures import read_picture
+
+Record = dict[str, Any]
+
+
+def load_reference(json_path: Path) -> tuple[Scene, NDArray[np.float32]]:
+    """The scene of `json_path` and the (h, w, 3) float32 linear picture beside it. ValueError for what clrt lacks."""
+    record: Record = json.loads(json_path.read_text(encoding="utf-8"))
+    folder, view = json_path.parent, record["camera"]
+    if view["width"] != view["height"]:
+        raise ValueError(f"{json_path}: the camera's fov is defined for square pictures only")
+    scene = Scene(
+        meshes=[mesh for shape in record["shapes"] if shape["type"] == "mesh"
+                for mesh in _meshes(folder, shape, record["materials"])],
+        spheres=[_sphere(shape, record["materials"]) for shape in record["shapes"] if shape["type"] == "sphere"],
+        lights=[PointLight(position=_triple(light["position"]), intensity=_triple(light["intensity"]))
+                for light in record["lights"] if light["type"] == "point"],
+        camera=Camera(position=_triple(view["origin"]), look_at=_triple(view["target"]), up=_triple(view["up"]),
+                      fov_degrees=view["fov"]),
+        environment=_environment(folder, record["lights"]),
+        render=RenderSettings(size=(view["width"], view["height"]), max_depth=record["max_depth"]),
+        name=record["name"])
+    return scene, read_picture(json_path.with_suffix(".exr"))
+
+
+def _meshes(folder: Path, shape: Record, materials: dict[str, Record]) -> list[Mesh]:
+    from clrt.scene.meshes import read_mesh
+
+    material = _material(shape, materials)
+    return [replace(mesh, material=material) for mesh in read_mesh(folder / shape["file"], "file")]
+
+
+def _sphere(shape: Record, materials: dict[str, Record]) -> Sphere:
+    return Sphere(center=_triple(shape["center"]), radius=shape["radius"], material=_material(shape, materials))
+
+
+def _environment(folder: Path, lights: list[Record]) -> Environment:
+    for light in lights:
+        if light["type"] == "constant":
+            return Environment(color=_triple(light["radiance"]))
+        if light["type"] == "env":
+            return Environment(image=read_picture(folder / light["file"]))
+    return Environment()
+
+
+def _material(shape: Record, materials: dict[str, Record]) -> Material:
+    record = materials[shape["material"]]
+    if record["type"] not in MAKERS:
+        raise ValueError(f"material {shape['material']}: clrt has no {record['type']} yet")
+    return replace(MAKERS[record["type"]](record), emission=_triple(shape.get("emission", (0.0, 0.0, 0.0))))
+
+
+def _ggx(record: Record) -> Material:
+    """GGX with a constant Fresnel term, which is Schlick's where F0 = 1, and then only."""
+    if record["color"] != [1, 1, 1]:
+        raise ValueError(f"ggx of color {record['color']}: only white has the same reflectance at every angle")
+    return MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=sqrt(record["alpha"]), smith="separable")
+
+
+MAKERS: dict[str, Callable[[Record], Material]] = {
+    "diffuse": lambda record: Diffuse(color=_triple(record["color"])),
+    "metal": lambda record: MetallicRoughness(color=_triple(record["color"]), metallic=1.0,
+                                              roughness=record["roughness"], smith="separable"),
+    "ggx": _ggx,
+    "mirror": lambda record: Mirror(color=_triple(record["color"])),
+}
+
+
+def _triple(values: list[float]) -> tuple[float, float, float]:
+    x, y, z = values
+    return float(x), float(y), float(z)
