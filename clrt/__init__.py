@@ -1,0 +1,52 @@
+"""clrt: a path tracer on any OpenCL device that says how far its picture is from the truth.
+
+    import clrt
+    image = clrt.render(clrt.load("scenes/cornell.toml"), spp=256)
+    image.save("cornell.png")
+
+Names are imported when first used, so `import clrt` loads nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .api import load as load, render as render
+    from .device.discover import devices as devices
+    from .errors import (ClrtError as ClrtError, DeviceError as DeviceError, KernelError as KernelError,
+                         OutputError as OutputError, SceneError as SceneError, UsageError as UsageError)
+    from .output.compare import compare as compare
+    from .output.image import Image as Image
+    from .rendering.renderer import Renderer as Renderer, State as State
+    from .scene.lights import DirectionalLight as DirectionalLight, PointLight as PointLight
+    from .scene.materials import (Diffuse as Diffuse, MetallicRoughness as MetallicRoughness, Mirror as Mirror)
+    from .scene.model import (Camera as Camera, Environment as Environment, Mesh as Mesh,
+                              RenderSettings as RenderSettings, Scene as Scene, Sphere as Sphere)
+
+_HOME = {
+    "api": ("load", "render"),
+    "device.discover": ("devices",),
+    "errors": ("ClrtError", "DeviceError", "KernelError", "OutputError", "SceneError", "UsageError"),
+    "output.compare": ("compare",),
+    "output.image": ("Image",),
+    "rendering.renderer": ("Renderer", "State"),
+    "scene.lights": ("DirectionalLight", "PointLight"),
+    "scene.materials": ("Diffuse", "MetallicRoughness", "Mirror"),
+    "scene.model": ("Camera", "Environment", "Mesh", "RenderSettings", "Scene", "Sphere"),
+}
+_MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
+__all__ = sorted(_MODULE_OF)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'clrt' has no attribute {name!r}")
+    value = getattr(import_module(f".{_MODULE_OF[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

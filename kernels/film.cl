@@ -7,7 +7,7 @@
 
 typedef struct {
     real3 sum, sum_error, square, square_error;
-    ureal count, dropped;
+    ureal count, dropped, rays;
 } Accumulator;
 
 static inline void two_sum(real *sum, real *error, real x) {
@@ -35,7 +35,7 @@ static inline void accumulate(Accumulator *a, real3 L, ireal counted) {
 static inline Accumulator load_pixels(global const Pixel *film, ireal pixel) {
     return (Accumulator){GATHER3(film, pixel, .sum), GATHER3(film, pixel, .sum_error), GATHER3(film, pixel, .square),
                          GATHER3(film, pixel, .square_error), GATHER(ureal, film, pixel, .count),
-                         GATHER(ureal, film, pixel, .dropped)};
+                         GATHER(ureal, film, pixel, .dropped), GATHER(ureal, film, pixel, .rays)};
 }
 
 static inline void store_rows(global float *row, const real3 *value, int lane) {
@@ -54,5 +54,6 @@ static inline void store_pixels(global Pixel *film, uint first, uint end, const 
         store_rows(pixel->square_error, &a->square_error, lane);
         pixel->count = ((const uint *)&a->count)[lane];
         pixel->dropped = ((const uint *)&a->dropped)[lane];
+        pixel->rays = ((const uint *)&a->rays)[lane];
     }
 }

@@ -24,7 +24,6 @@ typedef uint ureal;
 typedef PASTE(float, LANES) real;
 typedef PASTE(int, LANES) ireal;
 typedef PASTE(uint, LANES) ureal;
-#define ANY(mask) any(mask)
 #define TO_REAL(x) PASTE(convert_float, LANES)(x)
 #define TO_INT(x) PASTE(convert_int, LANES)(x)
 #define TO_UINT(x) PASTE(convert_uint, LANES)(x)
@@ -33,9 +32,12 @@ typedef PASTE(uint, LANES) ureal;
 #define GATHER8_(a, i, m) (a)[(i).s0] m, (a)[(i).s1] m, (a)[(i).s2] m, (a)[(i).s3] m, \
                           (a)[(i).s4] m, (a)[(i).s5] m, (a)[(i).s6] m, (a)[(i).s7] m
 #if LANES == 8
+#include "mask.cl"
+#define ANY(mask) (mask_bits(mask) != 0)
 #define GATHER(type, array, index, member) ((type)(GATHER8_(array, index, member)))
 #define LANE_INDEX ((ureal)(0, 1, 2, 3, 4, 5, 6, 7))
 #elif LANES == 16
+#define ANY(mask) any(mask)
 #define GATHER(type, array, index, member) ((type)(GATHER8_(array, (index).lo, member), GATHER8_(array, (index).hi, member)))
 #define LANE_INDEX ((ureal)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
 #endif

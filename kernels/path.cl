@@ -38,7 +38,7 @@ static inline real3 found_light(const Scene *scene, const Step *step, const Surf
 #if LIGHTS
 // 2. Light that arrives by a shadow ray towards a sampled point of a light.
 static inline real3 sampled_light(const Scene *scene, const Surface *surface, Frame shading, real3 ng, real3 wo,
-                                  ireal active, Sampler *sampler) {
+                                  ireal active, Sampler *sampler, ureal *rays) {
     LightSample light = light_sample(scene, surface->p, sampler);
     real3 wi = to_local(shading, light.wi);
     ireal above = dot3(light.wi, ng) > 0.0f;
@@ -49,6 +49,7 @@ static inline real3 sampled_light(const Scene *scene, const Surface *surface, Fr
     real3 origin = offset_origin(surface->p, surface->p_error, ng, light.wi);
     real3 direction = choose(light.infinite, light.wi, sub(light.target, origin));
     real t_max = light.infinite ? (real)(INFINITY) : ONE;
+    *rays += useful ? (ureal)(1) : (ureal)(0);
     ireal blocked = any_hit(scene, origin, direction, t_max, useful);
     real pdf = bsdf_pdf(scene, surface->material, wo, wi);
     real weight = (light.delta ? ONE : power_heuristic(light.pdf, pdf)) / light.pdf;
@@ -57,10 +58,11 @@ static inline real3 sampled_light(const Scene *scene, const Surface *surface, Fr
 #endif
 
 static inline real3 radiance(const Scene *scene, real3 origin, real3 direction, ireal active, int max_depth,
-                             Sampler *sampler) {
+                             Sampler *sampler, ureal *rays) {
     real3 L = splat(ZERO), beta = splat(ONE);
     Step step = {origin, direction, ONE, ALL_LANES};
     for (int depth = 1;; ++depth) {
+        *rays += active ? (ureal)(1) : (ureal)(0);
         Hits hits = closest_hit(scene, origin, step.wi, active);
         ireal hit = active & (hits.primitive >= 0);
         Surface surface;
@@ -81,7 +83,7 @@ static inline real3 radiance(const Scene *scene, real3 origin, real3 direction, 
         Frame shading = frame_around(ns);
         real3 wo = to_local(shading, towards);
 #if LIGHTS
-        real3 direct = sampled_light(scene, &surface, shading, ng, wo, active, sampler);
+        real3 direct = sampled_light(scene, &surface, shading, ng, wo, active, sampler, rays);
         L = add(L, mul(beta, direct));
 #endif
         // 3. Go on in a direction drawn from the material.
@@ -120,7 +122,8 @@ kernel void path(SCENE_PARAMETERS, global Pixel *film, const Launch launch) {
     for (uint s = 0; s < launch.sample_count; ++s) {
         Sampler sampler = {index, (ureal)(launch.first_sample + s), launch.seed, 0};
         real3 direction = camera_direction(&launch, x, y, next_2d(&sampler));
-        accumulate(&pixels, radiance(&scene, position, direction, inside, launch.max_depth, &sampler), inside);
+        real3 L = radiance(&scene, position, direction, inside, launch.max_depth, &sampler, &pixels.rays);
+        accumulate(&pixels, L, inside);
     }
     store_pixels(film, first, end, &pixels);
 }

@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .grow import OpenNodes, grow
-from .tree import BoolArray, FloatArray, Tree
+from .tree import BoolArray, FloatArray, Tree, half_area
 
 BINS = 16
 #: Just below BINS, so that the largest centroid falls into the last bin.
 _SCALE = np.float32(BINS * (1 - 1e-6))
-#: The box of no primitive (min, and negated max): finite, so that the area of an empty side times its count is 0.
-_NOTHING = np.finfo(np.float32).max
 #: A bin that no primitive lies beyond: the node stays whole.
 _NO_PLANE = np.uint8(255)
 
@@ -83,7 +81,7 @@ def _best_plane(nodes: OpenNodes, bins: NDArray[np.uint8], pack: int) -> tuple[N
     k = len(nodes.count)
     key = bins.astype(np.intp) * k + nodes.spread(np.arange(k))
     lefts = np.bincount(key, minlength=BINS * k).reshape(BINS, k)
-    left = np.full((6, BINS, k), _NOTHING, np.float32)
+    left = np.full((6, BINS, k), np.inf, np.float32)
     for union, box in zip(left.reshape(6, BINS * k), nodes.boxes):
         np.minimum.at(union, key, box)
     right = left.copy()
@@ -103,7 +101,5 @@ def _packs(count: NDArray[np.integer], pack: int) -> NDArray[np.integer]:
 
 
 def _half_area(boxes: FloatArray) -> NDArray[np.float64]:
-    """(6, ...) min and negated max to (...) float64, which neither overflows nor underflows for any float32 box."""
-    x, y, z = -(boxes[:3].astype(np.float64) + boxes[3:])
-    area: NDArray[np.float64] = x * y + y * z + z * x
-    return area
+    """(6, ...) min and negated max to (...)."""
+    return half_area(np.moveaxis(boxes[:3], 0, -1), -np.moveaxis(boxes[3:], 0, -1))

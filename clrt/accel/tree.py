@@ -82,7 +82,7 @@ def intersections(count: IntArray, spheres: BoolArray, pack: int) -> IntArray:
 
 
 def half_area(aabb_min: FloatArray, aabb_max: FloatArray) -> NDArray[np.float64]:
-    """Half the surface of boxes, (..., 3) float32 to (...) float64; 0 for inverted ones."""
+    """Half the surface of boxes, (..., 3) float32 to (...); 0 for inverted ones. No float32 box overflows float64."""
     x, y, z = np.moveaxis(np.maximum(aabb_max.astype(np.float64) - aabb_min, 0), -1, 0)
     area: NDArray[np.float64] = x * y + y * z + z * x
     return area

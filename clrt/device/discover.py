@@ -1,6 +1,6 @@
 """Which OpenCL devices there are, which can be used, and which one is meant.
 
-The best comes first: GPUs, then other accelerators, then CPUs, the larger before the smaller. A device that cannot
+The best comes first: GPUs, then other accelerators, CPUs and simulators, the larger before the smaller. A device that cannot
 run clrt is listed with the reason, last.
 """
 
@@ -86,11 +86,13 @@ def _every_device() -> Iterator[cl.Device]:
 
 
 def _rank(device: cl.Device) -> tuple[bool, int, int]:
-    order = {"gpu": 0, "accelerator": 1, "cpu": 2}
+    order = {"gpu": 0, "accelerator": 1, "cpu": 2, "simulator": 3}
     return bool(_unusable(device)), order[_type(device)], -device.max_compute_units * device.max_clock_frequency
 
 
 def _type(device: cl.Device) -> str:
+    if "Oclgrind" in device.platform.name:
+        return "simulator"
     if device.type & cl.device_type.GPU:
         return "gpu"
     return "cpu" if device.type & cl.device_type.CPU else "accelerator"
@@ -106,8 +108,6 @@ def _unusable(device: cl.Device) -> str:
         return "it is big-endian"
     if device.max_mem_alloc_size < MINIMUM_ALLOCATION:
         return f"its largest buffer is {device.max_mem_alloc_size} bytes; {MINIMUM_ALLOCATION} are needed"
-    if "Oclgrind" in device.platform.name:
-        return "it is a simulator for finding errors; name it to use it"
     return ""
 
 

@@ -65,25 +65,27 @@ def compose(preamble: str, entry: str, choices: Mapping[str, Sequence[str]], fol
 
 
 def build(device: Device, source: str) -> BuiltProgram:
-    """Builds `source` for the device, or takes it from this process or the cache; KernelError with the log if refused."""
+    """Builds `source` for the device, or takes it from this process or the cache; KernelError with the log if refused.
+
+    PoCL keeps what it compiled itself, and asking it for a binary costs as much as compiling, so for it the cache only
+    remembers that a program was built before.
+    """
     start = time.perf_counter()
     identity = "\n".join([source, *OPTIONS, device.info.id, device.info.platform_version, device.info.driver])
     key = hashlib.sha256(identity.encode()).hexdigest()
     context_key = f"{key}-{device.context.int_ptr}"
     cached = context_key in _built
     if not cached:
-        program = _from_binary(device, read_binary(key))
-        cached = program is not None
-        if program is None:
-            program = _compile(device, source)
-            write_binary(key, program.get_info(cl.program_info.BINARIES)[0])
-        _built[context_key] = program
+        binary = read_binary(key)
+        cached = binary is not None
+        _built[context_key] = (_from_binary(device, binary) if binary else None) or _compile(device, source)
+        if not cached:
+            keeps_its_own = device.info.platform == "Portable Computing Language"
+            write_binary(key, b"" if keeps_its_own else _built[context_key].get_info(cl.program_info.BINARIES)[0])
     return BuiltProgram(_built[context_key], time.perf_counter() - start, cached)
 
 
-def _from_binary(device: Device, binary: bytes | None) -> cl.Program | None:
-    if binary is None:
-        return None
+def _from_binary(device: Device, binary: bytes) -> cl.Program | None:
     try:
         return cl.Program(device.context, [device.cl], [binary]).build()
     except (cl.Error, ValueError):

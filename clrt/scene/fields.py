@@ -51,7 +51,7 @@ def unknown(name: object, known: Iterable[str]) -> str:
     import difflib
 
     known = sorted(known)
-    near = difflib.get_close_matches(str(name), known, 1)
+    near = difflib.get_close_matches(str(name), known, 1) or [word for word in known if word.startswith(f"{name}_")]
     if str(name) in LATER:
         return f"is not supported yet; this version knows {', '.join(known)}"
     if near:
@@ -67,6 +67,8 @@ def show(value: object) -> str:
         text = str(value).lower()
     elif isinstance(value, tuple):
         text = f"[{', '.join(show(entry) for entry in value[:20])}]"
+    elif isinstance(value, dict):
+        text = f"{{ {', '.join(f'{key} = {show(entry)}' for key, entry in value.items())} }}"
     else:
         text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

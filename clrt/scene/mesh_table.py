@@ -42,9 +42,10 @@ class MeshTable:
         """The table's transform. Raises SceneError if it is given twice or is not affine."""
         if self.matrix is None:
             return translation(self.translate) @ rotation(self.rotate_degrees) @ scaling(self.scale)
-        if (self.translate, self.scale, self.rotate_degrees) != ((0, 0, 0), (1, 1, 1), (0, 0, 0)):
+        plain = MeshTable()
+        if any(getattr(self, key) != getattr(plain, key) for key in ("translate", "scale", "rotate_degrees")):
             raise SceneError(f"{where}: has a matrix and translate, scale or rotate_degrees; keep one of them")
-        if self.matrix[3] != (0, 0, 0, 1):
+        if self.matrix[3] != (0.0, 0.0, 0.0, 1.0):
             raise SceneError(f"{where}.matrix[3]: {show(self.matrix[3])} is not affine; write [0, 0, 0, 1]")
         return np.array(self.matrix, np.float64)
 
@@ -64,7 +65,7 @@ class MeshTable:
         with np.errstate(over="ignore"):
             vertices = np.array(self.vertices, np.float32).reshape(-1, 3)
         faces = np.array(self.faces, np.int32).reshape(-1, 3)
-        mesh = Mesh(vertices, faces, Diffuse(), name=self.name or where)
+        mesh = Mesh(vertices, faces, Diffuse(), name=self.name or "mesh")
         problems = mesh_problems(mesh, where)
         if problems:
             raise SceneError(problems)

@@ -84,11 +84,14 @@ def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:
 
 def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
     """One mesh from trimesh's arrays, checked before anything follows their indices."""
-    with np.errstate(over="ignore"):
-        vertices = np.ascontiguousarray(piece["vertices"], np.float32)
-        stored = piece.get("vertex_normals")
-        stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
-    faces = _triangles(np.asarray(piece["faces"], np.int64), name)
+    try:
+        with np.errstate(over="ignore"):
+            vertices = np.ascontiguousarray(piece["vertices"], np.float32)
+            stored = piece.get("vertex_normals")
+            stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
+        faces = _triangles(np.asarray(piece["faces"], np.int64), name)
+    except (TypeError, ValueError):
+        raise SceneError(f'mesh "{name}": its lines have different numbers of values; export it again') from None
     mesh = Mesh(vertices, faces.astype(np.int32), obj_material(piece.get("visual")), name=name)
     problems = index_problems(faces, len(vertices), f'mesh "{name}"') or mesh_problems(mesh, "mesh")
     if problems:

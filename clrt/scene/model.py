@@ -16,7 +16,7 @@ Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 Pixels = Annotated[int, Ge(1), Le(65536)]
-Integrator = Literal["path", "direct", "normals", "albedo", "depth"]
+Integrator = Literal["path", "direct"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +14,7 @@ from .materials import MATERIALS, Diffuse, Material
 from .mesh_table import MeshTable
 from .model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from .pictures import read_picture
+from .sky import SUN
 from .transform import transform_mesh
 
 Kind = TypeVar("Kind")
@@ -39,12 +40,12 @@ class SceneReader:
             where = f"materials.{name}"
             self._materials[name] = self._typed(MATERIALS, values, where) or Diffuse()
         spheres = [self._sphere(values, f"sphere[{i}]") for i, values in enumerate(self._tables("sphere"))]
-        lights: list[Light | None] = [self._typed(LIGHTS, values, f"light[{i}]")
-                                      for i, values in enumerate(self._tables("light"))]
+        lights: list[Light] = [self._typed(LIGHTS, values, f"light[{i}]") or SUN  # keeps the later ones' numbers
+                               for i, values in enumerate(self._tables("light"))]
         meshes = [mesh for i, values in enumerate(self._tables("mesh")) for mesh in self._mesh(values, f"mesh[{i}]")]
-        return Scene(meshes=meshes, spheres=[sphere for sphere in spheres if sphere],
-                     lights=[light for light in lights if light], camera=camera or Camera(),
-                     environment=environment or Environment(), render=render or RenderSettings(), name=self._path.stem)
+        return Scene(meshes=meshes, spheres=[sphere for sphere in spheres if sphere], lights=lights,
+                     camera=camera or Camera(), environment=environment or Environment(),
+                     render=render or RenderSettings(), name=self._path.stem)
 
     def _table(self, name: str) -> Table:
         """The section [name], empty if there is none."""
@@ -128,14 +129,18 @@ class SceneReader:
         geometry = {key: values[key] for key in ("file", "vertices", "faces") if key in values}
         if table is None and field_problems(MeshTable, geometry, where):
             return []
-        meshes: list[Mesh] = []
+        meshes = self._tried((table or MeshTable(**geometry)).read, self._path.parent, where) or []
+        matrix = self._tried((table or MeshTable()).to_world, where)
+        return [transform_mesh(replace(mesh, material=material or mesh.material), matrix)
+                for mesh in meshes if matrix is not None]
+
+    def _tried(self, read: Callable[..., Kind], *arguments: Any) -> Kind | None:
+        """read(*arguments), or None if it finds mistakes."""
         try:
-            meshes = (table or MeshTable(**geometry)).read(self._path.parent, where)
-            matrix = (table or MeshTable()).to_world(where)
+            return read(*arguments)
         except SceneError as error:
             self.problems += error.problems
-            return []
-        return [transform_mesh(replace(mesh, material=material or mesh.material), matrix) for mesh in meshes]
+            return None
 
 
 def _frozen(value: Any) -> Any:

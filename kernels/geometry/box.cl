@@ -16,12 +16,15 @@ typedef struct {
 
 static inline SlabRay slab_ray(const Ray *ray) {
     SlabRay r;
-    for (int axis = 0; axis < 3; ++axis) {
-        float inverse = clamp(1.0f / ray->direction[axis], -LARGEST, LARGEST);
-        r.origin[axis] = ray->origin[axis];
-        r.near[axis] = inverse * (1.0f - SLAB_PAD);
-        r.far[axis] = clamp(inverse * (1.0f + SLAB_PAD), -LARGEST, LARGEST);
-        r.backward[axis] = inverse < 0.0f;
+#define INVERT(axis) { \
+        float inverse = clamp(1.0f / ray->direction[axis], -LARGEST, LARGEST); \
+        r.origin[axis] = ray->origin[axis]; \
+        r.near[axis] = inverse * (1.0f - SLAB_PAD); \
+        r.far[axis] = clamp(inverse * (1.0f + SLAB_PAD), -LARGEST, LARGEST); \
+        r.backward[axis] = inverse < 0.0f; \
     }
+    INVERT(0)
+    INVERT(1)
+    INVERT(2)
     return r;
 }

@@ -1,5 +1,6 @@
 // The primitives of a leaf are tested WIDTH at a time: 1 where a leaf is a list, 8 where it is a pack.
-// `wide` holds one float of each; load_wide reads a row of a record, whatever the width.
+// `wide` holds one float of each; LOAD_WIDE reads a row of a record, whatever the width.
+#include "mask.cl"
 
 #if WIDTH == 1
 typedef float wide;
@@ -11,7 +12,7 @@ typedef int wide_mask;
 typedef float8 wide;
 typedef int8 wide_mask;
 #define LOAD_WIDE(row) vload8(0, row)
-#define WIDE_ANY(mask) any(mask)
+#define WIDE_ANY(mask) (mask_bits(mask) != 0)
 #define WIDE_ABS(x) as_float8(as_int8(x) & 0x7fffffff)
 #endif
 

@@ -23,22 +23,19 @@ static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int referenc
 #endif
 }
 
-// Bit i is set where lane i of the mask is.
-static inline uint mask_bits(int8 mask) {
-    ulong bytes = as_ulong(convert_char8(mask));
-    return (uint)(((bytes & 0x8040201008040201UL) * 0x0101010101010101UL) >> 56);
-}
-
 // Tests the eight boxes of a node; returns the bits of those entered and where.
 static inline uint enter_boxes(const SlabRay *ray, global const Node *node, float t_max, float *entry) {
     float8 t_near = 0.0f, t_far = t_max;
     global const float *low = node->lo[0], *high = node->hi[0];
-    for (int axis = 0; axis < 3; ++axis) {
-        float8 near = (vload8(axis, ray->backward[axis] ? high : low) - ray->origin[axis]) * ray->near[axis];
-        float8 far = (vload8(axis, ray->backward[axis] ? low : high) - ray->origin[axis]) * ray->far[axis];
-        t_near = near > t_near ? near : t_near;
-        t_far = far < t_far ? far : t_far;
+#define SLAB(axis) { \
+        float8 near = (vload8(axis, ray->backward[axis] ? high : low) - ray->origin[axis]) * ray->near[axis]; \
+        float8 far = (vload8(axis, ray->backward[axis] ? low : high) - ray->origin[axis]) * ray->far[axis]; \
+        t_near = near > t_near ? near : t_near; \
+        t_far = far < t_far ? far : t_far; \
     }
+    SLAB(0)
+    SLAB(1)
+    SLAB(2)
     vstore8(t_near, 0, entry);
     return mask_bits(t_near <= t_far);
 }

@@ -38,6 +38,11 @@ class Film:
         return float(np.sqrt(np.mean(variance / (mean**2 + RELATIVE_FLOOR))))
 
     @property
+    def samples(self) -> int:
+        """Samples in the film, dropped ones included."""
+        return int(self.pixels["count"].sum(dtype=np.int64)) + self.nonfinite_samples
+
+    @property
     def nonfinite_samples(self) -> int:
         """How many samples were dropped because they were NaN or infinite."""
         return int(self.pixels["dropped"].sum(dtype=np.int64))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -41,6 +42,13 @@ class Session:
             raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes of buffers do not fit: {error}") from error
         self._kernel = self.program.program.path
         self._kernel.set_args(*self._scene, compiled.counts[0], self._film, self.launch[0])
+        self._warm_up()
+
+    def _warm_up(self) -> None:
+        """Launches no work: some drivers compile at the first launch, which belongs to the time of the build."""
+        start = time.perf_counter()
+        wait_for(self._launch())
+        self.build_seconds = self.program.build_seconds + time.perf_counter() - start
 
     @property
     def device_bytes(self) -> int:
@@ -55,14 +63,22 @@ class Session:
             count = min(pixels - first, max(LOCAL_SIZE * 64, self._launches.size // samples))
             self.launch["first_pixel"], self.launch["pixel_count"] = first, count
             self.launch["first_sample"], self.launch["sample_count"] = self.samples_done, samples
-            self._kernel.set_arg(len(self._scene) + 2, self.launch[0])
-            groups = -(-count // (self.compiled.choices.lanes * LOCAL_SIZE))
-            event = cl.enqueue_nd_range_kernel(self.device.queue, self._kernel, (groups * LOCAL_SIZE,), (LOCAL_SIZE,))
-            self.device.queue.flush()
-            self._launches.add(event, count * samples)
+            self._launches.add(self._launch(), count * samples)
             first += count
             yield
         self.samples_done += samples
+
+    def _launch(self) -> cl.Event:
+        """Enqueues the kernel for the range in the launch record."""
+        self._kernel.set_arg(len(self._scene) + 2, self.launch[0])
+        groups = max(1, -(-int(self.launch["pixel_count"][0]) // (self.compiled.choices.lanes * LOCAL_SIZE)))
+        event = cl.enqueue_nd_range_kernel(self.device.queue, self._kernel, (groups * LOCAL_SIZE,), (LOCAL_SIZE,))
+        self.device.queue.flush()
+        return event
+
+    def wait(self) -> None:
+        """Waits for the launches in flight."""
+        self._launches.wait()
 
     def pass_limit(self) -> int:
         """The most samples a pixel that one pass should add: a pass of one launch per 1024 pixels at least."""
@@ -70,7 +86,7 @@ class Session:
 
     def film(self) -> Film:
         """The film so far; waits for the launches in flight."""
-        self._launches.wait()
+        self.wait()
         pixels = np.empty((self.size[1], self.size[0]), PIXEL)
         wait_for(cl.enqueue_copy(self.device.queue, pixels, self._film, is_blocking=False))
         return Film(pixels)

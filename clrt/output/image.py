@@ -1,0 +1,37 @@
+"""A finished picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .images import write_image
+
+
+@dataclass(frozen=True)
+class Image:
+    """pixels: (height, width, 3) float32, linear Rec. 709; report: what made it, as `clrt render --report` writes it."""
+
+    pixels: NDArray[np.float32]
+    report: dict[str, Any] = field(default_factory=dict)
+
+    def save(self, path: str | Path, *, view: str = "srgb", exposure: float = 0.0) -> Path:
+        """Writes .exr, .hdr (linear) or .png (through `view` after 2^exposure); OutputError where that fails."""
+        write_image(Path(path), self.pixels, metadata=self.metadata(), view=view, exposure=exposure)
+        return Path(path)
+
+    def metadata(self) -> dict[str, str]:
+        """The report's plain values, for the file's header."""
+        return {f"clrt:{key}": str(value) for key, value in self.report.items()
+                if isinstance(value, (str, int, float)) and not isinstance(value, bool)}
+
+    def _repr_png_(self) -> bytes:
+        """How a notebook shows the picture."""
+        import tempfile
+
+        with tempfile.TemporaryDirectory() as folder:
+            return self.save(Path(folder) / "image.png").read_bytes()

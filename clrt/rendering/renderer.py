@@ -1,0 +1,137 @@
+"""Progressive rendering: passes over the whole picture until a stop condition is met, with noise and history."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.open import open_device
+from ..errors import UsageError
+from ..scene.model import RenderSettings, Scene
+from .compile import TREES, TRIANGLE_TESTS, Choices, compile_scene
+from .film import RELATIVE_FLOOR, Film
+from .session import Session
+
+#: Between two states at least this long passes, and this many times what making a state costs.
+STATE_SECONDS = 0.5
+STATE_COST = 20
+
+
+@dataclass(frozen=True)
+class State:
+    """The picture so far. `noise`: estimated √relMSE (None below 2 samples); `relmse`: against the reference, if given."""
+
+    spp: int
+    seconds: float
+    noise: float | None
+    relmse: float | None
+    film: Film
+
+    @cached_property
+    def pixels(self) -> NDArray[np.float32]:
+        """(height, width, 3) float32, linear Rec. 709."""
+        return self.film.mean.astype(np.float32)
+
+
+class Renderer:
+    """A scene on a device, ready to render. Everything not given is taken from `scene.render`.
+
+    device: see `clrt devices`; size: (width, height); triangle, builder, layout, lanes: see `compile.Choices`.
+    Raises SceneError, DeviceError, KernelError, UsageError.
+    """
+
+    def __init__(self, scene: Scene, *, device: str | int | None = None, size: tuple[int, int] | None = None,
+                 max_depth: int | None = None, seed: int | None = None, integrator: str | None = None,
+                 triangle: str = "watertight", builder: str = "sah", layout: str | None = None,
+                 lanes: int | None = None) -> None:
+        given = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator}
+        settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
+        self.scene = replace(scene, render=settings)
+        self.device = open_device(device)
+        choices = Choices(lanes or self.device.lanes, layout or self.device.layout, builder, triangle)
+        _check(choices)
+        self.compiled = compile_scene(self.scene, choices)
+        depth = settings.max_depth if settings.integrator == "path" else min(settings.max_depth, 2)
+        self.session = Session(self.device, self.compiled, self.scene.camera, settings.size, depth, settings.seed)
+        self.history: list[dict[str, Any]] = []
+        self.stop_reason: str | None = None
+        self.seconds = 0.0
+
+    @property
+    def settings(self) -> RenderSettings:
+        """The scene's settings with what was given."""
+        return self.scene.render
+
+    def passes(self, *, spp: int | None = None, time: float | None = None, error: float | None = None,
+               reference: NDArray[np.float32] | None = None) -> Iterator[State]:
+        """Renders, yielding a State at powers of two of the samples, from time to time between them, and at the end.
+
+        It ends at `spp` samples a pixel, after `time` seconds or at a noise of `error` (√relMSE), whatever comes
+        first; without any of them at the scene's `spp`. Call it again to go on. reference: (height, width, 3).
+        """
+        _check_stops(spp, time, error)
+        if spp is None and time is None and error is None:
+            spp = self.settings.spp
+        start, before, state_cost, last_state = clock.perf_counter(), self.seconds, 0.0, clock.perf_counter()
+        self.stop_reason = None
+        while True:
+            done = self.session.samples_done
+            for _ in self.session.render(self._pass_size(done, spp)):
+                self.seconds = before + clock.perf_counter() - start
+                if time is not None and self.seconds >= time and done:
+                    self.stop_reason = "time"
+                    break
+            now, done = clock.perf_counter(), self.session.samples_done
+            self.stop_reason = "spp" if spp is not None and done >= spp else self.stop_reason
+            if not (self.stop_reason or done & (done - 1) == 0 or now - last_state > max(STATE_SECONDS, STATE_COST * state_cost)):
+                continue
+            state = self._state(before, start, reference)
+            if error is not None and state.noise is not None and state.noise <= error and not self.stop_reason:
+                self.stop_reason = "error"
+            last_state = clock.perf_counter()
+            state_cost = last_state - now
+            yield state
+            if self.stop_reason:
+                return
+
+    def state(self, reference: NDArray[np.float32] | None = None) -> State:
+        """The picture as it is now, also in the middle of a pass that was interrupted."""
+        film = self.session.film()
+        relmse = None
+        if reference is not None:
+            expected = reference.astype(np.float64)
+            relmse = float(np.mean((film.mean - expected) ** 2 / (expected**2 + RELATIVE_FLOOR)))
+        return State(self.session.samples_done, self.seconds, film.noise, relmse, film)
+
+    def _state(self, before: float, start: float, reference: NDArray[np.float32] | None) -> State:
+        self.session.wait()
+        self.seconds = before + clock.perf_counter() - start
+        state = self.state(reference)
+        entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
+        self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
+        return state
+
+    def _pass_size(self, done: int, spp: int | None) -> int:
+        """Samples of the next pass: never past a power of two, so that history has them, nor past the end."""
+        next_power = 1 << done.bit_length()
+        end = next_power if spp is None else min(next_power, spp)
+        return max(1, min(end - done, self.session.pass_limit()))
+
+
+def _check(choices: Choices) -> None:
+    for name, value, known in [("layout", choices.layout, TREES), ("triangle", choices.triangle, TRIANGLE_TESTS),
+                               ("builder", choices.builder, ("sah", "midpoint")), ("lanes", choices.lanes, (1, 8, 16))]:
+        if value not in known:
+            raise UsageError(f"{name} {value!r} is unknown; choose from {', '.join(map(str, known))}")
+
+
+def _check_stops(spp: int | None, time: float | None, error: float | None) -> None:
+    for name, value in [("spp", spp), ("time", time), ("error", error)]:
+        if value is not None and not 0 < value < float("inf"):
+            raise UsageError(f"{name} is {value}; it must be above 0")

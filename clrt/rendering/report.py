@@ -1,0 +1,42 @@
+"""What a render did, as the JSON object of `--report`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .renderer import Renderer, State
+
+
+def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
+    """The report's fields, as listed in docs/report.md. `state` is the last one."""
+    info, compiled, session = renderer.device.info, renderer.compiled, renderer.session
+    width, height = session.size
+    samples = state.film.samples
+    seconds = renderer.seconds or float("nan")
+    return {
+        "scene": renderer.scene.name, "device": info.name, "platform": info.platform, "driver": info.driver,
+        "version": _version(), "width": width, "height": height, "spp": state.spp,
+        "max_depth": renderer.settings.max_depth, "seed": renderer.settings.seed, "seconds": renderer.seconds,
+        "samples": samples, "samples_per_second": samples / seconds,
+        "rays": state.film.rays, "rays_per_second": state.film.rays / seconds,
+        "stop_reason": renderer.stop_reason, "noise": state.noise, "nonfinite_samples": state.film.nonfinite_samples,
+        "bvh": tree_report(renderer),
+        "kernel": {"build_seconds": session.build_seconds, "cached": session.program.cached,
+                   "features": compiled.features},
+        "peak_device_bytes": session.device_bytes, "history": renderer.history,
+        **({} if state.relmse is None else {"relmse": state.relmse}),
+    }
+
+
+def tree_report(renderer: Renderer) -> dict[str, Any]:
+    """The tree's part of the report."""
+    tree, counts = renderer.compiled.tree, renderer.compiled.counts[0]
+    return {"triangles": int(counts["triangles"]), "spheres": int(counts["spheres"]), "instances": 0,
+            "nodes": tree.nodes, "bytes": tree.bytes, "build_seconds": tree.build_seconds, "sah_cost": tree.sah_cost,
+            "layout": tree.name, "builder": renderer.compiled.choices.builder, "depth": tree.depth}
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("clrt")

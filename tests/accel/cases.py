@@ -1,0 +1,67 @@
+"""Triangle soups, kind and nasty, as (m, 3, 3) float32 corners."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clrt.accel.tree import FloatArray
+
+
+def soup(count: int, size: float = 0.1, seed: int = 0) -> FloatArray:
+    """Random triangles of about `size` in the unit cube."""
+    rng = np.random.default_rng(seed)
+    corners: FloatArray = (rng.random((count, 1, 3)) + size * (rng.random((count, 3, 3)) - 0.5)).astype(np.float32)
+    return corners
+
+
+def spheres(count: int, seed: int = 0) -> FloatArray:
+    """Random spheres, (s, 4) centre and radius, in the unit cube."""
+    rng = np.random.default_rng(seed)
+    return np.hstack([rng.random((count, 3)), rng.uniform(0.01, 0.1, (count, 1))]).astype(np.float32)
+
+
+def grid(side: int) -> FloatArray:
+    """2·side² triangles that fill the unit square of the plane y = 0."""
+    z, x = np.divmod(np.arange(side * side), side)
+    corner = np.stack([x, 0 * x, z], axis=-1)[:, None]
+    lower, upper = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1]]), np.array([[0, 0, 0], [1, 0, 1], [0, 0, 1]])
+    return (np.concatenate([corner + lower, corner + upper]) / side).astype(np.float32)
+
+
+def _concentric(count: int) -> FloatArray:
+    """Triangles of all sizes whose boxes have one centre."""
+    size = np.arange(1, count + 1, dtype=np.float32)[:, None, None]
+    return size * np.array([[-1, -1, -1], [1, 1, 1], [-1, 1, 0]], np.float32)
+
+
+def _exponential(ratio: float, count: int) -> FloatArray:
+    """Each triangle `ratio` times as far from the origin, and as large, as the one before."""
+    size = (ratio ** np.arange(-count / 2, count / 2)).astype(np.float32)[:, None, None]
+    return size * np.array([[1, 1, 1], [1.2, 1, 1], [1, 1.2, 1]], np.float32)
+
+
+def _line(count: int) -> FloatArray:
+    """Triangles without area, one point each, along x."""
+    corners = np.zeros((count, 3, 3), np.float32)
+    corners[..., 0] = np.linspace(0, 1, count)[:, None]
+    return corners
+
+
+NASTY: dict[str, FloatArray] = {
+    "none": soup(0),
+    "one": soup(1),
+    "two": soup(2),
+    "soup": soup(500),
+    "duplicates": np.repeat(soup(40), 64, axis=0),
+    "equal_centroids": _concentric(10_000),
+    "points": np.ones((1000, 3, 3), np.float32),
+    "line": _line(1000),
+    "exponential": _exponential(1.9, 270),
+    "teapot_in_a_stadium": np.concatenate([soup(2000) * np.float32(1e-5), grid(10) * np.float32(1e5)]),
+    "flat_grid": grid(60),
+    "long_diagonals": np.concatenate([soup(300, 0.001), soup(300, 20.0)]),
+    "far_away": soup(500) + np.float32(1e6),
+    "enormous": np.concatenate([soup(200) * np.float32(3e38), soup(200) * np.float32(-3e38), soup(200)]),
+    "offset_1e30": soup(300, 1e-3) * np.float32(1e25) + np.float32(1e30),
+    "denormal": soup(500) * np.float32(1e-42),
+}

@@ -1,0 +1,230 @@
+"""What the records say is the scene: rays traced through them by the book, in float64, hit what brute force hits."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
+
+from clrt.accel.builders import BUILDERS
+from clrt.accel.layouts import (BVH2_NODE, BVH8_NODE, LAYOUTS, LEAF_SPHERE, LEAF_TRIANGLE, TRIANGLE_PACK, Layout, pack,
+                                sphere_boxes)
+from clrt.accel.tree import FloatArray
+from clrt.accel.wide import EMPTY
+from clrt.errors import UsageError
+
+from .cases import grid, soup, spheres
+
+Doubles = NDArray[np.float64]
+Ray = tuple[Doubles, Doubles]
+Hit = tuple[float, int]  # t and primitive
+MISS: Hit = (np.inf, -1)
+Box = tuple[Any, Any]
+Visit = tuple[list[tuple[Box, int]], Hit]  # children with their references, or what a leaf's primitives give
+
+SCENES = {
+    "mixed": (soup(400, 0.2), spheres(40)),
+    "triangles": (soup(300, 0.2), spheres(0)),
+    "spheres": (soup(0), spheres(60)),
+    "duplicates": (np.repeat(soup(10, 0.6), 64, axis=0), np.repeat(spheres(5), 3, axis=0)),
+    "flat": (grid(12), spheres(0)),
+    "degenerate": (np.concatenate([soup(40, 0.4), soup(40)[:, [0, 0, 1]]]), spheres(1)),
+    "one": (soup(1, 1.0), spheres(0)),
+    "one_sphere": (soup(0), np.array([[0.5, 0.5, 0.5, 0.4]], np.float32)),
+    "one_each": (soup(1, 1.0), spheres(1)),
+    "nothing": (soup(0), spheres(0)),
+}
+
+
+def rays(count: int = 60) -> list[Ray]:
+    """From around and inside the unit cube; every tenth one runs along an axis."""
+    rng = np.random.default_rng(3)
+    origins = rng.uniform(-1, 2, (count, 3))
+    directions = rng.random((count, 3)) - origins
+    axes = np.arange(0, count, 10)
+    origins[axes], directions[axes] = [0.4, 0.3, 0.6], 0
+    directions[axes, axes // 10 % 3] = 1
+    origins[axes, axes // 10 % 3] = -1
+    return list(zip(origins, directions))
+
+
+def hit_triangles(corners: Doubles, primitive: NDArray[np.int32], ray: Ray) -> Hit:
+    """Möller–Trumbore on (n, 3, 3), component by component: the same bits however many there are. Lowest at a tie."""
+    (ox, oy, oz), (dx, dy, dz) = ray
+    p0x, p0y, p0z, p1x, p1y, p1z, p2x, p2y, p2z = corners.reshape(-1, 9).T
+    ax, ay, az, bx, by, bz = p1x - p0x, p1y - p0y, p1z - p0z, p2x - p0x, p2y - p0y, p2z - p0z
+    sx, sy, sz = ox - p0x, oy - p0y, oz - p0z
+    qx, qy, qz = dy * bz - dz * by, dz * bx - dx * bz, dx * by - dy * bx
+    rx, ry, rz = sy * az - sz * ay, sz * ax - sx * az, sx * ay - sy * ax
+    det = qx * ax + qy * ay + qz * az
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u, v = (qx * sx + qy * sy + qz * sz) / det, (rx * dx + ry * dy + rz * dz) / det
+        t = (rx * bx + ry * by + rz * bz) / det
+        hit = (det != 0) & (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
+    return min([*zip(t[hit].tolist(), primitive[hit].tolist()), MISS])
+
+
+def hit_spheres(center: Doubles, radius: Doubles, primitive: NDArray[np.int32], ray: Ray) -> Hit:
+    (ox, oy, oz), (dx, dy, dz) = ray
+    x, y, z = ox - center[:, 0], oy - center[:, 1], oz - center[:, 2]
+    a, b = dx * dx + dy * dy + dz * dz, dx * x + dy * y + dz * z
+    discriminant = b * b - a * (x * x + y * y + z * z - radius * radius)
+    hits = []
+    for d, b_i, i in zip(discriminant.tolist(), b.tolist(), primitive.tolist()):
+        roots = [(-b_i + side * d ** 0.5) / a for side in (-1, 1)] if d >= 0 else []
+        hits += [(root, i) for root in roots if root > 0][:1]
+    return min([*hits, MISS])
+
+
+def brute_force(triangles: FloatArray, balls: FloatArray, ray: Ray) -> Hit:
+    number = np.arange(len(triangles) + len(balls), dtype=np.int32)
+    wide = balls.astype(np.float64)
+    return min(hit_triangles(triangles.astype(np.float64), number[:len(triangles)], ray),
+               hit_spheres(wide[:, :3], wide[:, 3], number[len(triangles):], ray))
+
+
+def triangle_records(records: NDArray[np.void], ray: Ray) -> Hit:
+    corners = np.stack([records["p0"], records["p1"], records["p2"]], axis=1).astype(np.float64)
+    return hit_triangles(corners, records["primitive"], ray)
+
+
+def pack_record(record: Any, ray: Ray) -> Hit:
+    corners = np.stack([record["p0"].T, record["p1"].T, record["p2"].T], axis=1).astype(np.float64)
+    return hit_triangles(corners, record["primitive"], ray)
+
+
+def sphere_records(records: NDArray[np.void], ray: Ray) -> Hit:
+    return hit_spheres(records["center"].astype(np.float64), records["radius"].astype(np.float64),
+                       records["primitive"], ray)
+
+
+def visit_bvh2(layout: Layout, reference: int, ray: Ray) -> Visit:
+    nodes = layout.buffers["nodes"]
+    first, count = int(nodes[reference]["left_first"]), int(nodes[reference]["count"])
+    if count == 0:
+        return [((nodes[i]["aabb_min"], nodes[i]["aabb_max"]), i) for i in (first, first + 1)], MISS
+    if count < 0:
+        return [], sphere_records(layout.buffers["leaf_spheres"][first:first - count], ray)
+    return [], triangle_records(layout.buffers["leaf_triangles"][first:first + count], ray)
+
+
+def visit_bvh8(layout: Layout, reference: int, ray: Ray) -> Visit:
+    if reference >= 0:
+        node = layout.buffers["nodes"][reference]
+        return [((node["lo"][:, i], node["hi"][:, i]), int(node["child"][i])) for i in range(8)], MISS
+    first, sphere, count = ~reference >> 4, ~reference >> 3 & 1, (~reference & 7) + 1
+    if sphere:
+        return [], sphere_records(layout.buffers["leaf_spheres"][first:first + count], ray)
+    record = layout.buffers["packs"][first]
+    assert np.count_nonzero(record["primitive"] >= 0) == count
+    return [], pack_record(record, ray)
+
+
+def enters(box: Box, ray: Ray) -> bool:
+    """Slabs in float64, near and far plane by the direction's sign, opened by far more than their rounding."""
+    near, far = 0.0, np.inf
+    for low, high, o, d in zip(box[0].tolist(), box[1].tolist(), *ray):
+        if d == 0:
+            if not low <= o <= high:
+                return False
+            continue
+        entry, leave = ((low - o) / d, (high - o) / d) if d > 0 else ((high - o) / d, (low - o) / d)
+        near, far = max(near, entry * (1 - 1e-12)), min(far, leave * (1 + 1e-12))
+    return near <= far
+
+
+def trace(layout: Layout, ray: Ray) -> Hit:
+    """Closest hit through the records, with a stack that may hold no more than the layout says."""
+    if layout.name == "list":
+        readers = {"leaf_triangles": triangle_records, "leaf_spheres": sphere_records}
+        return min([readers[name](records, ray) for name, records in layout.buffers.items()] + [MISS])
+    visit = {"bvh2": visit_bvh2, "bvh8": visit_bvh8}[layout.name]
+    stack, closest = [0], MISS
+    while stack:
+        assert len(stack) <= layout.stack
+        children, hit = visit(layout, stack.pop(), ray)
+        closest = min(closest, hit)
+        stack += [reference for box, reference in children if enters(box, ray)]
+    return closest
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("builder", BUILDERS)
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_rays_hit_what_brute_force_hits(layout: str, builder: str, scene: str) -> None:
+    packed = pack(layout, builder, *SCENES[scene])
+    expected = [brute_force(*SCENES[scene], ray) for ray in rays()]
+    assert [trace(packed, ray) for ray in rays()] == expected
+    assert any(hit != MISS for hit in expected) or scene == "nothing"
+
+
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_buffers_hold_every_primitive_once(layout: str, scene: str) -> None:
+    triangles, balls = SCENES[scene]
+    buffers = pack(layout, "sah", triangles, balls).buffers
+    names = {"nodes"} if layout != "list" else set()
+    names |= {"packs" if layout == "bvh8" else "leaf_triangles"} if len(triangles) else set()
+    names |= {"leaf_spheres"} if len(balls) else set()
+    assert set(buffers) == names
+
+    found = np.concatenate([buffers[name]["primitive"].ravel() for name in sorted(names - {"nodes"})] or [np.empty(0)])
+    np.testing.assert_array_equal(np.sort(found[found >= 0]), np.arange(len(triangles) + len(balls)))
+    if "packs" in buffers:
+        unused = buffers["packs"]["primitive"] < 0
+        for name in ("p0", "p1", "p2"):
+            assert np.isnan(buffers["packs"][name].transpose(0, 2, 1)[unused]).all()
+
+
+def test_siblings_of_a_binary_tree_share_a_cache_line() -> None:
+    nodes = pack("bvh2", "sah", *SCENES["mixed"]).buffers["nodes"]
+    assert (nodes["left_first"][nodes["count"] == 0] % 2 == 0).all()
+    assert np.count_nonzero(nodes["count"] == 0) > 50
+
+
+def test_a_tree_of_nothing_cannot_be_entered() -> None:
+    """Neither at its root nor, if the root is not tested, at the root's children."""
+    binary, wide = (pack(name, "sah", *SCENES["nothing"]).buffers["nodes"] for name in ("bvh2", "bvh8"))
+    first = binary["left_first"][0]
+    assert (binary["count"] == 0).all()
+    assert (binary["aabb_min"][[0, first, first + 1]] == np.inf).all()
+    assert (binary["aabb_max"][[0, first, first + 1]] == -np.inf).all()
+    assert (wide["lo"] == np.inf).all() and (wide["hi"] == -np.inf).all() and (wide["child"] == EMPTY).all()
+
+
+def test_records_have_the_sizes_that_the_device_expects() -> None:
+    sizes = {BVH2_NODE: 32, BVH8_NODE: 256, LEAF_TRIANGLE: 48, LEAF_SPHERE: 32, TRIANGLE_PACK: 320}
+    assert all(dtype.itemsize == size for dtype, size in sizes.items())
+
+
+COORDINATE = st.floats(width=32, allow_nan=False, allow_infinity=False)
+
+
+@settings(deadline=None)
+@given(balls=arrays(np.float32, (5, 4), elements=COORDINATE))
+def test_boxes_of_spheres_contain_them(balls: FloatArray) -> None:
+    """In exact arithmetic, up to the largest float; and within two steps of float32 of the sphere."""
+    balls[:, 3] = np.abs(balls[:, 3])
+    toward = np.array([np.inf, -np.inf], np.float32)
+    far = Fraction(float(np.finfo(np.float32).max))
+    for (*center, size), low, high in zip(balls.tolist(), *sphere_boxes(balls)):
+        for c, l, h in zip(center, low, high):
+            assert np.isfinite([l, h]).all()
+            exact_low, exact_high = Fraction(c) - Fraction(size), Fraction(c) + Fraction(size)
+            assert Fraction(float(l)) <= max(exact_low, -far) and Fraction(float(h)) >= min(exact_high, far)
+            if abs(exact_low) < far and abs(exact_high) < far:
+                inner = np.nextafter(np.nextafter(np.array([l, h]), toward), toward)
+                assert Fraction(float(inner[0])) >= exact_low and Fraction(float(inner[1])) <= exact_high
+
+
+@pytest.mark.parametrize("layout, builder, message", [("bvh3", "sah", "'bvh3'.*list, bvh2, bvh8"),
+                                                      ("bvh2", "shah", "'shah'.*sah, midpoint")])
+def test_unknown_names_are_refused(layout: str, builder: str, message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        pack(layout, builder, *SCENES["one"])

@@ -1,0 +1,301 @@
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from clrt.errors import SceneError
+from clrt.scene.gltf import Model, read_gltf
+from clrt.scene.materials import MetallicRoughness
+from .glb import Gltf
+from .shapes import cube, icosphere
+
+VERTICES, FACES = icosphere(0)
+TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+
+
+def ball() -> Gltf:
+    gltf = Gltf()
+    gltf.mesh(attributes={"POSITION": gltf.accessor(VERTICES)}, indices=gltf.accessor(FACES.ravel(), "<u2"))
+    return gltf
+
+
+def read(gltf: Gltf, folder: Path, name: str = "a.glb") -> Model:
+    return read_gltf(gltf.write(folder / name))
+
+
+def corners(model: Model) -> NDArray[np.float32]:
+    return np.concatenate([mesh.vertices[mesh.faces] for mesh in model.meshes])
+
+
+@pytest.mark.parametrize("name", ["a.glb", "a.gltf"])
+@pytest.mark.parametrize("dtype", ["<u1", "<u2", "<u4"])
+def test_containers_and_index_types(name: str, dtype: str, tmp_path: Path) -> None:
+    gltf = Gltf()
+    gltf.mesh(attributes={"POSITION": gltf.accessor(VERTICES)}, indices=gltf.accessor(FACES.ravel(), dtype))
+    mesh, = read(gltf, tmp_path, name).meshes
+    np.testing.assert_array_equal(mesh.vertices, VERTICES)
+    np.testing.assert_array_equal(mesh.faces, FACES)
+    assert mesh.normals is None and mesh.material == MetallicRoughness(color=(1, 1, 1), metallic=1, roughness=1)
+
+
+def test_file_names_are_percent_encoded(tmp_path: Path) -> None:
+    gltf = ball()
+    (tmp_path / "my data é.bin").write_bytes(gltf.data)
+    gltf.write_with_uri(tmp_path / "a.gltf", "my%20data%20%C3%A9.bin")
+    np.testing.assert_array_equal(corners(read_gltf(tmp_path / "a.gltf")), VERTICES[FACES])
+
+
+def test_interleaved_vertices(tmp_path: Path) -> None:
+    gltf = Gltf()
+    rows = np.zeros(len(VERTICES), [("position", "<f4", 3), ("color", "<u4"), ("normal", "<f4", 3)])
+    rows["position"], rows["normal"] = VERTICES, -VERTICES
+    view = gltf.view(b"head" + rows.tobytes(), byteStride=rows.itemsize)
+    attributes = {"POSITION": gltf.accessor(VERTICES, view=view, byteOffset=4),
+                  "NORMAL": gltf.accessor(VERTICES, view=view, byteOffset=20)}
+    gltf.mesh(attributes=attributes, indices=gltf.accessor(FACES.ravel(), "<u1"))
+    mesh, = read(gltf, tmp_path).meshes
+    np.testing.assert_array_equal(mesh.vertices, VERTICES)
+    assert mesh.normals is not None
+    np.testing.assert_allclose(mesh.normals, -VERTICES, atol=1e-6)
+
+
+@pytest.mark.parametrize("dtype, normalized, expected", [
+    ("<i1", True, [-1, -1, 0, 1]), ("<u1", True, [128 / 255, 129 / 255, 0, 127 / 255]),
+    ("<i2", True, [-128 / 32767, -127 / 32767, 0, 127 / 32767]), ("<i1", False, [-128, -127, 0, 127])])
+def test_quantised_positions(dtype: str, normalized: bool, expected: list[float], tmp_path: Path) -> None:
+    """Specification 3.6.2.2: unsigned c / max, signed max(c / max, −1)."""
+    gltf = Gltf()
+    values = np.array([-128, -127, 0, 127]).astype(dtype)
+    points = np.stack([values, np.roll(values, 1), np.roll(values, 2)], axis=1)
+    gltf.document["extensionsRequired"] = ["KHR_mesh_quantization"]
+    gltf.mesh(attributes={"POSITION": gltf.accessor(points, dtype, normalized=normalized)}, mode=5)
+    mesh, = read(gltf, tmp_path).meshes
+    np.testing.assert_allclose(mesh.vertices[:, 0], expected, rtol=1e-7)
+
+
+@pytest.mark.parametrize("base", [True, False])
+def test_sparse_accessor(base: bool, tmp_path: Path) -> None:
+    gltf = Gltf()
+    sparse = {"count": 2, "indices": {"bufferView": gltf.view(bytes([2, 5])), "componentType": 5121},
+              "values": {"bufferView": gltf.view(np.array([[7, 8, 9], [4, 5, 6]], "<f4").tobytes())}}
+    position = gltf.accessor(VERTICES, sparse=sparse)
+    if not base:
+        del gltf.document["accessors"][position]["bufferView"]
+    gltf.mesh(attributes={"POSITION": position}, mode=6)
+    mesh, = read(gltf, tmp_path).meshes
+    expected = VERTICES * base
+    expected[2], expected[5] = (7, 8, 9), (4, 5, 6)
+    np.testing.assert_array_equal(mesh.vertices, expected)
+
+
+@pytest.mark.parametrize("mode, expected", [(4, [[0, 1, 2], [3, 4, 5]]), (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0], [4, 5, 0]]),
+                                            (5, [[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]])])
+def test_modes(mode: int, expected: list[list[int]], tmp_path: Path) -> None:
+    """Specification 3.7.2.1: strips {i, i+1+(i mod 2), i+2−(i mod 2)}, fans {i+1, i+2, 0}."""
+    gltf = Gltf()
+    gltf.mesh(attributes={"POSITION": gltf.accessor(VERTICES[:6])}, mode=mode)
+    np.testing.assert_array_equal(read(gltf, tmp_path).meshes[0].faces, expected)
+
+
+@pytest.mark.parametrize("scale", [(1, 2, 3), (-1, 2, 3), (-1, -2, 0.5), (-1, -1, -1)])
+def test_node_hierarchy(scale: tuple[float, float, float], tmp_path: Path) -> None:
+    """A flat-shaded cube under three nodes: corners placed step by step in float64, and normals that agree with the
+    winding of the faces, mirrored or not."""
+    vertices, faces = cube()
+    split, normals = vertices[faces].reshape(-1, 3), np.repeat(vertices[faces].mean(axis=1).round(), 3, axis=0)
+    gltf = Gltf()
+    rng = np.random.default_rng(3)
+    turns = rng.normal(size=(2, 4))
+    inner = gltf.node(False, mesh=0, scale=scale, rotation=(turns[0] / np.linalg.norm(turns[0])).tolist())
+    matrix = np.eye(4)
+    matrix[:3] = rng.normal(size=(3, 4))
+    middle = gltf.node(False, matrix=matrix.T.ravel().tolist(), children=[inner])
+    gltf.node(translation=[5, 6, 7], rotation=(turns[1] / np.linalg.norm(turns[1])).tolist(), children=[middle])
+    normal = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    primitive = {"attributes": {"POSITION": gltf.accessor(split), "NORMAL": gltf.accessor(normal)}}
+    gltf.document["meshes"].append({"primitives": [primitive]})
+
+    def place(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        points = Rotation.from_quat(turns[0]).apply(points * scale)
+        points = points @ matrix[:3, :3].T + matrix[:3, 3]
+        return Rotation.from_quat(turns[1]).apply(points) + [5, 6, 7]
+
+    mesh, = read(gltf, tmp_path).meshes
+    np.testing.assert_allclose(mesh.vertices, place(split.astype(np.float64)), atol=1e-5)
+    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    wound = np.cross(b - a, c - a)
+    wound /= np.linalg.norm(wound, axis=1, keepdims=True)
+    assert mesh.normals is not None
+    np.testing.assert_allclose(mesh.normals[mesh.faces], np.repeat(wound[:, None], 3, axis=1), atol=1e-5)
+    outward = a.astype(np.float64) - place(np.zeros((1, 3)))
+    assert (np.einsum("ij,ij->i", outward, wound) > 0).all()
+
+
+def textured(color: tuple[int, int, int], folder: Path, **material: Any) -> MetallicRoughness:
+    """The material of a triangle whose three corners address the right one of a texture's two texels."""
+    import imageio.v3 as imageio
+    gltf = Gltf()
+    picture = imageio.imwrite("<bytes>", np.array([[[9, 99, 199], color]], np.uint8), extension=".png")
+    gltf.document["images"] = [{"bufferView": gltf.view(picture), "mimeType": "image/png"}]
+    gltf.document["textures"] = [{"source": 0}]
+    gltf.document["materials"] = [material]
+    uv = gltf.accessor(np.array([[0.6, 0.5], [0.99, 0.1], [-0.25, 1.0]]))
+    gltf.mesh(attributes={"POSITION": gltf.accessor(TRIANGLE), "TEXCOORD_0": uv}, material=0)
+    found = read(gltf, folder).meshes[0].material
+    assert isinstance(found, MetallicRoughness)
+    return found
+
+
+def test_material_factors_are_cut_to_their_limits(tmp_path: Path) -> None:
+    gltf = ball()
+    gltf.document["materials"] = [{
+        "pbrMetallicRoughness": {"baseColorFactor": [1.5, 0.25, -1, 1], "metallicFactor": 0.5, "roughnessFactor": 2},
+        "emissiveFactor": [1, 0.5, 0], "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}}}]
+    gltf.document["meshes"][0]["primitives"][0]["material"] = 0
+    assert read(gltf, tmp_path).meshes[0].material == MetallicRoughness(
+        color=(1, 0.25, 0), metallic=0.5, roughness=1, emission=(8, 4, 0))
+
+
+def test_texture_counts_by_the_texels_that_the_vertices_address(tmp_path: Path) -> None:
+    """sRGB 188 is linear ((188/255 + 0.055)/1.055)^2.4; metalness and roughness textures are linear."""
+    factors = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}, "baseColorFactor": [1, 0.5, 1, 1]}
+    material = textured((188, 188, 0), tmp_path, pbrMetallicRoughness=factors, emissiveFactor=[2, 2, 2],
+                        emissiveTexture={"index": 0})
+    linear = ((188 / 255 + 0.055) / 1.055) ** 2.4
+    assert material.color == pytest.approx((linear, linear / 2, 0))
+    assert material.emission == pytest.approx((2 * linear, 2 * linear, 0))
+    assert (material.metallic, material.roughness) == pytest.approx((0, 188 / 255))
+
+
+def test_missing_texture_is_grey_with_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    gltf = ball()
+    gltf.document |= {"images": [{"uri": "lost.png"}], "textures": [{"source": 0}],
+                      "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}, "alphaMode": "BLEND"}]}
+    primitive = gltf.document["meshes"][0]["primitives"][0]
+    primitive["material"] = 0
+    primitive["attributes"]["TEXCOORD_0"] = gltf.accessor(VERTICES[:, :2])
+    with caplog.at_level(logging.WARNING):
+        material = read(gltf, tmp_path).meshes[0].material
+    assert isinstance(material, MetallicRoughness) and material.color == (0.8, 0.8, 0.8)
+    assert "lost.png" in caplog.text and "left out: textures (their mean colour counts), transparency" in caplog.text
+
+
+def test_camera(tmp_path: Path) -> None:
+    """A camera looks along its own −Z with +Y up (specification 3.10), here turned to look along −X."""
+    gltf = ball()
+    gltf.document["cameras"] = [{"type": "orthographic"}, {"type": "perspective", "perspective": {"yfov": 0.5}}]
+    gltf.node(camera=0)
+    gltf.node(camera=1, translation=[10, 1, 0], rotation=[0, 0.5**0.5, 0, 0.5**0.5], scale=[2, 2, 2])
+    camera = read(gltf, tmp_path).camera
+    assert camera is not None
+    view = np.subtract(camera.look_at, camera.position)
+    assert camera.position == (10, 1, 0) and camera.fov_degrees == pytest.approx(np.degrees(0.5))
+    np.testing.assert_allclose(view, [-101**0.5, 0, 0], atol=1e-12)  # as deep as the ball's middle is far
+    np.testing.assert_allclose(camera.up, [0, 1, 0], atol=1e-15)
+
+
+def test_files_without_nodes_or_scenes(tmp_path: Path) -> None:
+    gltf = ball()
+    gltf.document["nodes"][0]["translation"] = [0, 0, 9]
+    del gltf.document["scene"], gltf.document["scenes"]
+    assert corners(read(gltf, tmp_path))[..., 2].min() > 7
+    gltf.document["nodes"] = []
+    np.testing.assert_array_equal(corners(read(gltf, tmp_path)), VERTICES[FACES])
+
+
+def edited(*path: Any, value: Any) -> Gltf:
+    gltf = ball()
+    place: Any = gltf.document
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    return gltf
+
+
+PRIMITIVE = ("meshes", 0, "primitives", 0)
+BROKEN = {
+    "version": (edited("asset", "version", value="1.0"), 'asset.version is "1.0"; only glTF 2'),
+    "extension": (edited("extensionsRequired", value=["KHR_draco_mesh_compression"]), "KHR_draco_mesh_compression, which is not"),
+    "view end": (edited("bufferViews", 1, "byteLength", value=9999), "bufferView 1: ends at byte"),
+    "view huge": (edited("bufferViews", 1, "byteLength", value=1e300), "bufferViews[1].byteLength: "),
+    "accessor end": (edited("accessors", 0, "count", value=13), "accessor 0: needs 156 bytes of bufferView 0, which has 144"),
+    "accessor offset": (edited("accessors", 0, "byteOffset", value=4), "accessor 0: needs 148 bytes of bufferView 0"),
+    "accessor type": (edited("accessors", 0, "type", value="VEC2"), "accessor 0 is VEC2, not VEC3"),
+    "accessor view": (edited("accessors", 0, "bufferView", value=7), "accessor 0 uses bufferView 7, but the file has 2"),
+    "accessor none": (edited(*PRIMITIVE, "indices", value=5), "uses accessor 5, but the file has 2"),
+    "component": (edited("accessors", 0, "componentType", value=5124), "accessors[0].componentType: "),
+    "float index": (edited(*PRIMITIVE, "indices", value=0), "accessor 0 is VEC3, not SCALAR"),
+    "signed index": (edited("accessors", 1, "componentType", value=5122), "accessor 1, are int16; they must be unsigned"),
+    "corners": (edited("accessors", 1, "count", value=58), "has 58 corners, which is no multiple of 3"),
+    "zeros": (edited("accessors", 0, value={"componentType": 5126, "count": 10**12, "type": "VEC3"}), "accessor 0: 1000000000000"),
+    "cycle": (edited("nodes", 0, "children", value=[0]), "node 0: has two parents or is its own ancestor"),
+    "child": (edited("nodes", 0, "children", value=[3]), "the scene uses node 3, but the file has 1"),
+    "scene": (edited("scene", value=2), "the file uses scene 2, but the file has 1"),
+    "mesh": (edited("nodes", 0, "mesh", value=2), "a node uses mesh 2, but the file has 1"),
+    "material": (edited(*PRIMITIVE, "material", value=0), "uses material 0, but the file has 0"),
+    "matrix": (edited("nodes", 0, "matrix", value=[1, 2, 3]), "nodes[0].matrix: "),
+    "rotation": (edited("nodes", 0, "rotation", value=[0, 0, 0, 0]), "node 0: its rotation is [0, 0, 0, 0]"),
+    "infinite": (edited("nodes", 0, "scale", value=[1e39, 1, 1]), 'mesh "mesh 0": vertices[0] = ['),
+    "points": (edited(*PRIMITIVE, "mode", value=0), "holds no triangles"),
+    "nothing": (edited("nodes", value=[{}]), "holds no triangles"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken_documents(name: str, tmp_path: Path) -> None:
+    gltf, sentence = BROKEN[name]
+    with pytest.raises(SceneError) as caught:
+        read(gltf, tmp_path)
+    problem, = caught.value.problems
+    assert problem.startswith(f"{tmp_path / 'a.glb'}: ") and sentence in problem
+
+
+def test_index_out_of_range(tmp_path: Path) -> None:
+    gltf = Gltf()
+    gltf.mesh(attributes={"POSITION": gltf.accessor(TRIANGLE)}, indices=gltf.accessor(np.array([0, 1, 3]), "<u1"))
+    with pytest.raises(SceneError, match=r'mesh "mesh 0": faces\[0\] uses vertex 3, but valid are 0 to 2'):
+        read(gltf, tmp_path)
+
+
+@pytest.mark.parametrize("size, sentence", [(0, "document: "), (10, "holds no JSON"), (30, "cut short"), (-4, "cut short")])
+def test_cut_files(size: int, sentence: str, tmp_path: Path) -> None:
+    (tmp_path / "a.glb").write_bytes(ball().glb()[:size])
+    with pytest.raises(SceneError, match=sentence):
+        read_gltf(tmp_path / "a.glb")
+
+
+@pytest.mark.parametrize("uri, sentence", [("lost.bin", 'cannot read the file "lost.bin"'), ("data:;base64,A", "no base64"),
+                                           ("data:;base64,AAAA", "buffer 0: has 3 of its"), (".", "cannot read the file"),
+                                           ("http://example.org/a.bin", "cannot read the file")])
+def test_unreadable_buffers(uri: str, sentence: str, tmp_path: Path) -> None:
+    ball().write_with_uri(tmp_path / "a.gltf", uri)
+    with pytest.raises(SceneError, match=sentence):
+        read_gltf(tmp_path / "a.gltf")
+
+
+@settings(max_examples=200, deadline=None)
+@given(edits=st.lists(st.tuples(st.floats(0, 1), st.one_of(st.binary(min_size=1, max_size=4),
+                                                           st.sampled_from([b"9", b"-", b"}", b"null", b"1e9"]))),
+                      min_size=1, max_size=4), cut=st.booleans())
+def test_damaged_files_raise_only_scene_errors(edits: list[tuple[float, bytes]], cut: bool,
+                                               tmp_path_factory: pytest.TempPathFactory) -> None:
+    content = bytearray(ball().glb())
+    for place, new in edits:
+        start = int(place * (len(content) - 1))
+        content[start:start + len(new)] = new
+    path = tmp_path_factory.getbasetemp() / "damaged.glb"
+    path.write_bytes(content[:-int(edits[0][0] * 300) or None] if cut else content)
+    try:
+        meshes = read_gltf(path).meshes
+    except SceneError as error:
+        assert str(path) in str(error)
+    else:
+        assert all(np.isfinite(mesh.vertices).all() for mesh in meshes)

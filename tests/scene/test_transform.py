@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from clrt.scene.model import Mesh
+from clrt.scene.transform import quaternion, rotation, scaling, transform_mesh, translation, unit
+from .shapes import icosphere, volume
+
+EPS = float(np.finfo(np.float32).eps)
+
+
+@pytest.mark.parametrize("degrees", [(30, 0, 0), (0, 50, 0), (0, 0, -70), (30, 50, -70), (200, -120, 400)])
+def test_rotation_is_about_fixed_x_then_y_then_z(degrees: tuple[float, float, float]) -> None:
+    expected = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix()
+    np.testing.assert_allclose(rotation(degrees)[:3, :3], expected, atol=1e-15)
+
+
+def test_rotation_turns_counter_clockwise() -> None:
+    np.testing.assert_allclose(rotation((0, 90, 0)) @ [0, 0, 1, 1], [1, 0, 0, 1], atol=1e-15)
+
+
+@pytest.mark.parametrize("q", [(0.1, -0.5, 0.3, 0.8), (2.0, 0.0, 0.0, 0.0), (0.0, 3e-9, 0.0, 4e-9)])
+def test_quaternion(q: tuple[float, float, float, float]) -> None:
+    np.testing.assert_allclose(quaternion(*q)[:3, :3], Rotation.from_quat(q).as_matrix(), atol=1e-15)
+
+
+@pytest.mark.parametrize("factors", [(2.0, 0.5, 3.0), (-1.0, 1.0, 1.0), (-2.0, -0.5, -3.0), (1e-12, 2e-12, 1e-12)])
+def test_transformed_sphere(factors: tuple[float, float, float]) -> None:
+    """Points go by M, normals by M⁻ᵀ (here inverted in float64), and the surface keeps its outside outside."""
+    vertices, faces = icosphere(2)
+    matrix = translation((1, -2, 3)) @ rotation((10, 20, 30)) @ scaling(factors)
+    linear = matrix[:3, :3]
+    mesh = transform_mesh(Mesh(vertices, faces, normals=vertices), matrix)
+    np.testing.assert_allclose(mesh.vertices, vertices @ linear.T + [1, -2, 3], rtol=2 * EPS, atol=2 * EPS)
+    expected = vertices @ np.linalg.inv(linear)
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    assert mesh.normals is not None
+    np.testing.assert_allclose(mesh.normals, expected, atol=4 * EPS)
+    # Mirrored or not, the faces enclose a positive volume; det M says how large it is.
+    enclosed = volume(vertices @ linear.T, mesh.faces)
+    assert enclosed == pytest.approx(abs(np.linalg.det(linear)) * volume(vertices, faces), rel=1e-12)
+
+
+def test_flattening_keeps_the_normals_across_the_sheet() -> None:
+    vertices, faces = icosphere(1)
+    mesh = transform_mesh(Mesh(vertices, faces, normals=vertices), scaling((1, 1, 0)))
+    assert mesh.normals is not None
+    across = abs(vertices[:, 2]) > 0.1
+    np.testing.assert_allclose(mesh.normals[across], np.sign(vertices[across, 2:]) * [[0, 0, 1]], atol=EPS)
+
+
+def test_what_leaves_float32_is_infinite() -> None:
+    mesh = transform_mesh(Mesh(*icosphere(0)), scaling((1e39, 1, 1)))
+    assert np.isinf(mesh.vertices[:, 0]).any() and mesh.vertices.dtype == np.float32
+
+
+def test_unit() -> None:
+    rows = np.array([[3, 0, 4], [3e-200, 0, 4e-200], [3e200, 0, 4e200], [0, 0, 0], [np.nan, 1, 0], [np.inf, 1, 0]])
+    expected = [[0.6, 0, 0.8]] * 3 + [[0, 0, 0]] * 3
+    np.testing.assert_allclose(unit(rows), expected, rtol=1e-15)
