@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -46,6 +47,11 @@ class CompiledScene:
     source: str
     tree: Layout
     choices: Choices
+
+    @property
+    def files(self) -> list[str]:
+        """The kernel files that the program is made of."""
+        return re.findall(r'^#line 1 "(.+)"$', self.source, re.MULTILINE)
 
     @property
     def bytes(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -43,20 +43,23 @@ class Renderer:
     """A scene on a device, ready to render. Everything not given is taken from `scene.render`.
 
     device: see `clrt devices`; size: (width, height); triangle, builder, layout, lanes: see `compile.Choices`.
+    on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
     Raises SceneError, DeviceError, KernelError, UsageError.
     """
 
     def __init__(self, scene: Scene, *, device: str | int | None = None, size: tuple[int, int] | None = None,
                  max_depth: int | None = None, seed: int | None = None, integrator: str | None = None,
                  triangle: str = "watertight", builder: str = "sah", layout: str | None = None,
-                 lanes: int | None = None) -> None:
+                 lanes: int | None = None, on_phase: Callable[[str], None] = lambda phase: None) -> None:
         given = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
         self.device = open_device(device)
         choices = Choices(lanes or self.device.lanes, layout or self.device.layout, builder, triangle)
         _check(choices)
+        on_phase("build")
         self.compiled = compile_scene(self.scene, choices)
+        on_phase("compile")
         depth = settings.max_depth if settings.integrator == "path" else min(settings.max_depth, 2)
         self.session = Session(self.device, self.compiled, self.scene.camera, settings.size, depth, settings.seed)
         self.history: list[dict[str, Any]] = []

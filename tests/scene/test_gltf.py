@@ -96,8 +96,9 @@ def test_sparse_accessor(base: bool, tmp_path: Path) -> None:
     np.testing.assert_array_equal(mesh.vertices, expected)
 
 
-@pytest.mark.parametrize("mode, expected", [(4, [[0, 1, 2], [3, 4, 5]]), (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0], [4, 5, 0]]),
-                                            (5, [[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]])])
+@pytest.mark.parametrize("mode, expected", [
+    (4, [[0, 1, 2], [3, 4, 5]]), (5, [[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4]]),
+    (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0], [4, 5, 0]])])
 def test_modes(mode: int, expected: list[list[int]], tmp_path: Path) -> None:
     """Specification 3.7.2.1: strips {i, i+1+(i mod 2), i+2−(i mod 2)}, fans {i+1, i+2, 0}."""
     gltf = Gltf()
@@ -126,7 +127,7 @@ def test_node_hierarchy(scale: tuple[float, float, float], tmp_path: Path) -> No
     def place(points: NDArray[np.float64]) -> NDArray[np.float64]:
         points = Rotation.from_quat(turns[0]).apply(points * scale)
         points = points @ matrix[:3, :3].T + matrix[:3, 3]
-        return Rotation.from_quat(turns[1]).apply(points) + [5, 6, 7]
+        return np.asarray(Rotation.from_quat(turns[1]).apply(points) + [5, 6, 7])
 
     mesh, = read(gltf, tmp_path).meshes
     np.testing.assert_allclose(mesh.vertices, place(split.astype(np.float64)), atol=1e-5)
@@ -166,7 +167,8 @@ def test_material_factors_are_cut_to_their_limits(tmp_path: Path) -> None:
 
 def test_texture_counts_by_the_texels_that_the_vertices_address(tmp_path: Path) -> None:
     """sRGB 188 is linear ((188/255 + 0.055)/1.055)^2.4; metalness and roughness textures are linear."""
-    factors = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}, "baseColorFactor": [1, 0.5, 1, 1]}
+    factors = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0},
+               "baseColorFactor": [1, 0.5, 1, 1]}
     material = textured((188, 188, 0), tmp_path, pbrMetallicRoughness=factors, emissiveFactor=[2, 2, 2],
                         emissiveTexture={"index": 0})
     linear = ((188 / 255 + 0.055) / 1.055) ** 2.4
@@ -197,7 +199,8 @@ def test_camera(tmp_path: Path) -> None:
     camera = read(gltf, tmp_path).camera
     assert camera is not None
     view = np.subtract(camera.look_at, camera.position)
-    assert camera.position == (10, 1, 0) and camera.fov_degrees == pytest.approx(np.degrees(0.5))
+    assert camera.position == (10, 1, 0)
+    assert camera.fov_degrees == pytest.approx(np.degrees(0.5))
     np.testing.assert_allclose(view, [-101**0.5, 0, 0], atol=1e-12)  # as deep as the ball's middle is far
     np.testing.assert_allclose(camera.up, [0, 1, 0], atol=1e-15)
 
@@ -223,19 +226,20 @@ def edited(*path: Any, value: Any) -> Gltf:
 PRIMITIVE = ("meshes", 0, "primitives", 0)
 BROKEN = {
     "version": (edited("asset", "version", value="1.0"), 'asset.version is "1.0"; only glTF 2'),
-    "extension": (edited("extensionsRequired", value=["KHR_draco_mesh_compression"]), "KHR_draco_mesh_compression, which is not"),
+    "extension": (edited("extensionsRequired", value=["KHR_draco_mesh_compression"]), "KHR_draco_mesh_compression, which"),
     "view end": (edited("bufferViews", 1, "byteLength", value=9999), "bufferView 1: ends at byte"),
     "view huge": (edited("bufferViews", 1, "byteLength", value=1e300), "bufferViews[1].byteLength: "),
-    "accessor end": (edited("accessors", 0, "count", value=13), "accessor 0: needs 156 bytes of bufferView 0, which has 144"),
+    "accessor end": (edited("accessors", 0, "count", value=13), "accessor 0: needs 156 bytes of bufferView 0"),
     "accessor offset": (edited("accessors", 0, "byteOffset", value=4), "accessor 0: needs 148 bytes of bufferView 0"),
     "accessor type": (edited("accessors", 0, "type", value="VEC2"), "accessor 0 is VEC2, not VEC3"),
-    "accessor view": (edited("accessors", 0, "bufferView", value=7), "accessor 0 uses bufferView 7, but the file has 2"),
+    "accessor view": (edited("accessors", 0, "bufferView", value=7), "accessor 0 uses bufferView 7, but the file"),
     "accessor none": (edited(*PRIMITIVE, "indices", value=5), "uses accessor 5, but the file has 2"),
     "component": (edited("accessors", 0, "componentType", value=5124), "accessors[0].componentType: "),
     "float index": (edited(*PRIMITIVE, "indices", value=0), "accessor 0 is VEC3, not SCALAR"),
-    "signed index": (edited("accessors", 1, "componentType", value=5122), "accessor 1, are int16; they must be unsigned"),
+    "signed index": (edited("accessors", 1, "componentType", value=5122), "accessor 1, are int16; they must"),
     "corners": (edited("accessors", 1, "count", value=58), "has 58 corners, which is no multiple of 3"),
-    "zeros": (edited("accessors", 0, value={"componentType": 5126, "count": 10**12, "type": "VEC3"}), "accessor 0: 1000000000000"),
+    "zeros": (edited("accessors", 0, value={"componentType": 5126, "count": 10**12, "type": "VEC3"}),
+              "accessor 0: 1000000000000 elements without a bufferView"),
     "cycle": (edited("nodes", 0, "children", value=[0]), "node 0: has two parents or is its own ancestor"),
     "child": (edited("nodes", 0, "children", value=[3]), "the scene uses node 3, but the file has 1"),
     "scene": (edited("scene", value=2), "the file uses scene 2, but the file has 1"),
@@ -265,16 +269,16 @@ def test_index_out_of_range(tmp_path: Path) -> None:
         read(gltf, tmp_path)
 
 
-@pytest.mark.parametrize("size, sentence", [(0, "document: "), (10, "holds no JSON"), (30, "cut short"), (-4, "cut short")])
+@pytest.mark.parametrize("size, sentence", [(0, "document: "), (10, "cut short"), (30, "cut short"), (-4, "cut short")])
 def test_cut_files(size: int, sentence: str, tmp_path: Path) -> None:
     (tmp_path / "a.glb").write_bytes(ball().glb()[:size])
     with pytest.raises(SceneError, match=sentence):
         read_gltf(tmp_path / "a.glb")
 
 
-@pytest.mark.parametrize("uri, sentence", [("lost.bin", 'cannot read the file "lost.bin"'), ("data:;base64,A", "no base64"),
-                                           ("data:;base64,AAAA", "buffer 0: has 3 of its"), (".", "cannot read the file"),
-                                           ("http://example.org/a.bin", "cannot read the file")])
+@pytest.mark.parametrize("uri, sentence", [
+    ("lost.bin", 'cannot read the file "lost.bin"'), ("http://example.org/a.bin", "cannot read the file"),
+    (".", "cannot read the file"), ("data:;base64,A", "no base64"), ("data:;base64,AAAA", "buffer 0: has 3 of its")])
 def test_unreadable_buffers(uri: str, sentence: str, tmp_path: Path) -> None:
     ball().write_with_uri(tmp_path / "a.gltf", uri)
     with pytest.raises(SceneError, match=sentence):

@@ -1,0 +1,51 @@
+"""The command line: one file a command; here only the choice of command and the way errors are told."""
+
+from __future__ import annotations
+
+import sys
+import time
+from importlib import import_module
+
+import click
+
+from ..errors import ClrtError
+
+STARTED = time.perf_counter()
+COMMANDS = ("render", "info", "compare", "devices", "cache")
+
+
+class _Commands(click.Group):
+    """Commands by name, each imported when it is used."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        command: click.Command = import_module(f".{name}", __name__).command
+        return command
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="clrt")
+def commands() -> None:
+    """Path tracing on any OpenCL device, with the error of every picture."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Runs a command and exits: 0 done, 2 usage, 3 scene, 4 device, 5 kernel, 6 output, 130 interrupted."""
+    try:
+        commands.main(arguments, prog_name="clrt", standalone_mode=False)
+    except click.exceptions.Exit as stop:
+        sys.exit(stop.exit_code)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(2)
+    except ClrtError as error:
+        print("\n".join(f"error: {line}" for line in getattr(error, "problems", [str(error)])), file=sys.stderr)
+        sys.exit(error.exit_code)
+    except (KeyboardInterrupt, click.Abort):
+        print("interrupted", file=sys.stderr)
+        sys.exit(130)
+    sys.exit(0)

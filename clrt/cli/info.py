@@ -1,0 +1,48 @@
+"""`clrt info`: what is in a scene, its tree, and what will be compiled and uploaded for it."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import tracing_options
+
+
+@click.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
+@tracing_options
+def command(scene: Path, as_json: bool, lanes: str | None, triangle: str, builder: str, layout: str | None) -> None:
+    """Show what SCENE contains and what is compiled for it; renders nothing and needs no device."""
+    from ..rendering.compile import Choices, compile_scene
+    from ..scene.file import load
+
+    content = load(scene)
+    compiled = compile_scene(content, Choices(int(lanes or 8), layout or "bvh8", builder, triangle))
+    tree = compiled.tree
+    report: dict[str, Any] = {
+        "scene": content.name,
+        "meshes": len(content.meshes), "triangles": sum(len(mesh.faces) for mesh in content.meshes),
+        "spheres": len(content.spheres),
+        "materials": dict(Counter(m.kernel for m in {x.material for x in [*content.meshes, *content.spheres]})),
+        "lights": {"entries": int(compiled.counts["lights"][0]),
+                   **Counter(type(light).kernel for light in content.lights)},
+        "tree": {"layout": tree.name, "builder": builder, "nodes": tree.nodes, "depth": tree.depth, "stack": tree.stack,
+                 "sah_cost": tree.sah_cost, "bytes": tree.bytes, "build_seconds": tree.build_seconds},
+        "features": compiled.features, "files": compiled.files, "kernel_bytes": len(compiled.source.encode()),
+        "buffers": {name: array.nbytes for name, (_, array) in compiled.buffers.items()},
+        "bytes": compiled.bytes,
+    }
+    if as_json:
+        click.echo(json.dumps(report))
+        return
+    for name, value in report.items():
+        if isinstance(value, dict):
+            value = "  ".join(f"{key} {part}" for key, part in value.items()) or "none"
+        elif isinstance(value, list):
+            value = " ".join(value)
+        click.echo(f"{name:13} {value}")

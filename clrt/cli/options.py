@@ -1,0 +1,37 @@
+"""Option types and groups that several commands share."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Size(click.ParamType):
+    """WIDTHxHEIGHT in pixels, e.g. 1920x1080."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> tuple[int, int]:
+        match = re.fullmatch(r"(\d+)[xX](\d+)", str(value))
+        if not match or not all(1 <= int(n) <= 65536 for n in match.groups()):
+            self.fail(f"{value!r} is no size; write WIDTHxHEIGHT with 1 to 65536 pixels, e.g. 640x480", param, context)
+        return int(match[1]), int(match[2])
+
+
+def tracing_options(command: F) -> F:
+    """How rays are traced: defaults suit the device; the other choices are there to compare."""
+    for option in [
+        click.option("--lanes", type=click.Choice(["1", "8", "16"]), help="Paths a work-item."),
+        click.option("--triangle", type=click.Choice(["watertight", "moller_trumbore"]), default="watertight",
+                     show_default=True, help="Triangle test."),
+        click.option("--builder", type=click.Choice(["sah", "midpoint"]), default="sah", show_default=True,
+                     help="Tree builder."),
+        click.option("--layout", type=click.Choice(["bvh8", "bvh2", "list"]), help="Tree layout; list is no tree."),
+    ]:
+        command = option(command)
+    return command

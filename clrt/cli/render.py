@@ -1,0 +1,108 @@
+"""`clrt render`: a scene to pictures and a report."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..errors import UsageError
+from . import STARTED
+from .options import Size, tracing_options
+from .progress import Progress, make_progress
+
+
+@click.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.option("-o", "--output", "outputs", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
+              help="Picture to write: .png, .exr or .hdr; may be repeated. Default: <scene>.png here.")
+@click.option("--size", type=Size(), help="Picture size in pixels.")
+@click.option("--spp", type=click.IntRange(min=1), help="Stop at this many samples a pixel.")
+@click.option("--time", "seconds", type=float, metavar="SECONDS", help="Stop after this time.")
+@click.option("--error", type=float, help="Stop at this estimated error (root of relMSE).")
+@click.option("--depth", type=click.IntRange(1, 1024), help="Path edges: 1 glow only, 2 direct light, 3 one bounce.")
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers.")
+@click.option("--device", metavar="SEL", help="Number, id, part of a name, cpu or gpu; see `clrt devices`.")
+@click.option("--integrator", type=click.Choice(["path", "direct"]), help="What to compute.")
+@click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error against.")
+@click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what was done.")
+@click.option("--view", default="srgb", show_default=True, metavar="NAME", help="View transform of .png pictures.")
+@click.option("--exposure", default=0.0, metavar="EV", help="Exposure of .png pictures, in stops.")
+@click.option("--progress", "progress_kind", type=click.Choice(["bar", "plain", "json"]), help="Progress on stderr.")
+@click.option("--print-kernel", is_flag=True, help="Print the program that would run, and stop.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress and no warnings.")
+@tracing_options
+def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None, spp: int | None,
+            seconds: float | None, error: float | None, depth: int | None, seed: int | None, device: str | None,
+            integrator: str | None, reference: Path | None, report: Path | None, view: str, exposure: float,
+            progress_kind: str | None, print_kernel: bool, quiet: bool, lanes: str | None, triangle: str, builder: str,
+            layout: str | None) -> None:
+    """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
+    outputs = outputs or (Path(f"{scene.stem}.png"),)
+    _check_outputs(outputs, report, view)
+    options = {"size": size, "max_depth": depth, "seed": seed, "device": device, "integrator": integrator,
+               "triangle": triangle, "builder": builder, "layout": layout, "lanes": int(lanes) if lanes else None}
+    with make_progress(progress_kind, quiet) as progress:
+        renderer = _prepare(scene, options, progress)
+        if print_kernel:
+            click.echo(renderer.compiled.source)
+            return
+        expected = None if reference is None else _read_reference(reference, renderer.settings.size)
+        progress.phase("render")
+        try:
+            for state in renderer.passes(spp=spp, time=seconds, error=error, reference=expected):
+                progress.state(state, spp or (None if seconds or error else renderer.settings.spp), seconds)
+        except KeyboardInterrupt:
+            state = renderer.state(expected)
+            renderer.stop_reason = "interrupted"
+        progress.phase("write")
+        _write(renderer, state, outputs, report, view, exposure)
+    if renderer.stop_reason == "interrupted":
+        sys.exit(130)
+
+
+def _check_outputs(outputs: tuple[Path, ...], report: Path | None, view: str) -> None:
+    """Finds out before the render whether its results can be written."""
+    from ..output.files import check_target
+    from ..output.images import check_writable
+    from ..output.view import check_view
+
+    check_view(view)
+    for output in outputs:
+        check_writable(output)
+    if report is not None:
+        check_target(report)
+
+
+def _prepare(path: Path, options: dict[str, Any], progress: Progress) -> Any:
+    progress.phase("load")
+    from ..rendering.renderer import Renderer
+    from ..scene.file import load
+
+    return Renderer(load(path), on_phase=progress.phase, **options)
+
+
+def _read_reference(path: Path, size: tuple[int, int]) -> Any:
+    from ..output.images import read_image
+
+    pixels = read_image(path)
+    height, width = pixels.shape[:2]
+    if (width, height) != size:
+        raise UsageError(f"{path}: the reference is {width}x{height}, the picture {size[0]}x{size[1]}; use --size {width}x{height}")
+    return pixels
+
+
+def _write(renderer: Any, state: Any, outputs: tuple[Path, ...], report: Path | None, view: str, exposure: float) -> None:
+    from ..output.image import Image
+    from ..output.report import write_report
+    from ..rendering.report import render_report
+
+    image = Image(state.pixels, render_report(renderer, state))
+    for output in outputs:
+        click.echo(str(image.save(output, view=view, exposure=exposure)))
+    if report is not None:
+        write_report(report, {**image.report, "total_seconds": time.perf_counter() - STARTED})
+        click.echo(str(report))
