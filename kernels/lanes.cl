@@ -5,6 +5,8 @@
 // `m ? a : b`, `a & b`, `a | b`, `!m` and ANY(m), which mean the same for both.
 // GATHER(type, array, index, .member) reads one record per lane; the index of an idle lane must be valid, too.
 
+#include "mask.cl"
+
 #define PASTE_(a, b) a##b
 #define PASTE(a, b) PASTE_(a, b)
 
@@ -32,7 +34,6 @@ typedef PASTE(uint, LANES) ureal;
 #define GATHER8_(a, i, m) (a)[(i).s0] m, (a)[(i).s1] m, (a)[(i).s2] m, (a)[(i).s3] m, \
                           (a)[(i).s4] m, (a)[(i).s5] m, (a)[(i).s6] m, (a)[(i).s7] m
 #if LANES == 8
-#include "mask.cl"
 #define ANY(mask) (mask_bits(mask) != 0)
 #define GATHER(type, array, index, member) ((type)(GATHER8_(array, index, member)))
 #define LANE_INDEX ((ureal)(0, 1, 2, 3, 4, 5, 6, 7))

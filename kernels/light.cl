@@ -9,16 +9,16 @@
 static inline ireal light_index(ireal code, ireal is_type) { return is_type ? code >> 4 : (ireal)(0); }
 
 static inline LightSample light_sample(const Scene *scene, real3 p, Sampler *sampler) {
-    ureal2 bits = next_bits(sampler);
+    ureal2 choice = next_bits(sampler), bits = next_bits(sampler);
     real2 u = next_2d(sampler);
-    ALIAS_PICK(scene->lights, scene->counts.lights, bits, entry)
+    ALIAS_PICK(scene->lights, scene->counts.lights, choice, entry)
     ireal code = GATHER(ireal, scene->lights, entry, .code);
     real probability = GATHER(real, scene->lights, entry, .probability);
     LightSample sample = {splat(ZERO), splat(ZERO), ONE, splat(ZERO), NO_LANES, NO_LANES};
 #define SAMPLE_LIGHT(name, type) { \
         ireal is_type = (code & 15) == type; \
         if (ANY(is_type)) { \
-            LightSample s = name##_light_sample(scene, light_index(code, is_type), p, u, sampler); \
+            LightSample s = name##_light_sample(scene, light_index(code, is_type), p, u, bits); \
             sample.wi = choose(is_type, s.wi, sample.wi); \
             sample.radiance = choose(is_type, s.radiance, sample.radiance); \
             sample.pdf = is_type ? s.pdf : sample.pdf; \

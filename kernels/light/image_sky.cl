@@ -48,9 +48,8 @@ static inline real sky_pdf(const Scene *scene, real3 wi) {
          * sky_pdf_at(scene, sky_texel(scene, sky_uv(scene, wi)), sqrt(wi.x * wi.x + wi.z * wi.z));
 }
 
-static inline LightSample sky_light_sample(const Scene *scene, ireal index, real3 p, real2 u, Sampler *sampler) {
+static inline LightSample sky_light_sample(const Scene *scene, ireal index, real3 p, real2 u, ureal2 bits) {
     int width = scene->environment->width, height = scene->environment->height;
-    ureal2 bits = next_bits(sampler);
     ALIAS_PICK(scene->sky_aliases, width * height, bits, texel)
     ireal row = texel / width, column = texel - row * width;
     real2 uv = {(TO_REAL(column) + u.x) / (float)width, (TO_REAL(row) + u.y) / (float)height};

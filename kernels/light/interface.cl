@@ -1,11 +1,12 @@
 // What every light's file provides, by its name:
 //
-//   NAME_light_sample(scene, index, p, u, sampler)     a direction from p towards the light
+//   NAME_light_sample(scene, index, p, u, bits)        a direction from p towards the light
 //   NAME_light_pdf(scene, index, p, wi, t, surface)    density per solid angle with which it chooses wi (0 for points
 //                                                      and directions, which no ray meets by chance)
 //   NAME_light_radiance(scene, index, wi, surface)     what arrives along wi from the surface that the ray met
 //
-// World frame; wi: unit, from p to the light; u in [0,1)².
+// World frame; wi: unit, from p to the light; u in [0,1)², bits random.
+// They draw no random numbers themselves: a lane's numbers must not depend on what its neighbours chose.
 #include "surface.cl"
 #include "sampling.cl"
 #include "rng.cl"

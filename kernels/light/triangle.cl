@@ -1,7 +1,7 @@
 // A triangle that shines from its front side: a point uniform over its area. World frame.
 #include "light/interface.cl"
 
-static inline LightSample triangle_light_sample(const Scene *scene, ireal index, real3 p, real2 u, Sampler *sampler) {
+static inline LightSample triangle_light_sample(const Scene *scene, ireal index, real3 p, real2 u, ureal2 bits) {
     real2 b = sample_triangle(u);
     real3 q = mad3(GATHER3(scene->triangle_lights, index, .e1), b.x,
               mad3(GATHER3(scene->triangle_lights, index, .e2), b.y, GATHER3(scene->triangle_lights, index, .p0)));

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .shapes import icosphere
+
 TYPES = {"<i1": 5120, "<u1": 5121, "<i2": 5122, "<u2": 5123, "<u4": 5125, "<f4": 5126}
 SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
@@ -74,3 +76,11 @@ class Gltf:
     def write_with_uri(self, path: Path, uri: str) -> None:
         self.document["buffers"] = [{"byteLength": len(self.data), "uri": uri}]
         path.write_text(json.dumps(self.document))
+
+
+def ball() -> Gltf:
+    """An icosahedron: accessor 0 its positions, accessor 1 its indices."""
+    vertices, faces = icosphere(0)
+    gltf = Gltf()
+    gltf.mesh(attributes={"POSITION": gltf.accessor(vertices)}, indices=gltf.accessor(faces.ravel(), "<u2"))
+    return gltf

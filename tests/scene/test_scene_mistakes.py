@@ -1,0 +1,134 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from clrt.errors import SceneError
+from clrt.scene.file import load
+
+BAD = """
+mesch = 3
+[camera]
+position = [0, 1]
+fov = 40
+[render]
+size = [512, 0]
+spp = 2.5
+integrator = "pth"
+[environment]
+image = "lost.hdr"
+color = [1, 1, 1]
+strength = nan
+[materials.white]
+type = "diffuse"
+color = [0.73, 1.5, -0.1]
+colour = [1, 1, 1]
+[materials.ring]
+type = "metalic_roughness"
+[[mesh]]
+file = "lost.ply"
+material = "whit"
+normals = "smoth"
+[[mesh]]
+vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+faces = [[0, 1, 2], [0, 1, 3]]
+matrix = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 2]]
+[[instance]]
+mesh = "dragon"
+[[sphere]]
+radius = 0
+material = "ring"
+[[light]]
+type = "point"
+position = [0, "one", inf]
+[[light]]
+type = "directional"
+direction = [0, 0, 0]
+irradiance = [1, 1, 1]
+"""
+SENTENCES = [
+    'key "mesch" is unknown; did you mean "mesh"?',
+    'key "instance" is not supported yet; this version knows camera, environment, light, materials, mesh, render, '
+    "sphere",
+    "camera.position: [0, 1] has 2 entries; write 3",
+    'camera: key "fov" is unknown; did you mean "fov_degrees"?',
+    "render.size[1]: 0 is below 1; write at least 1",
+    "render.spp: 2.5 is not a whole number; write one without quotes or decimal point",
+    'render.integrator: "pth" is unknown; did you mean "path"?',
+    "environment.image: {folder}/lost.hdr: no such picture file",
+    "environment: has a color and an image; keep one of them",
+    "environment.strength: nan is not a finite number; write one",
+    "materials.white.color[1]: 1.5 is above 1; write at most 1",
+    "materials.white.color[2]: -0.1 is below 0; write at least 0",
+    'materials.white: key "colour" is unknown; did you mean "color"?',
+    'materials.ring.type: "metalic_roughness" is unknown; did you mean "metallic_roughness"?',
+    "mesh[0].file: {folder}/lost.ply: no such model file",
+    'mesh[0].material: "whit" is unknown; did you mean "white"?',
+    'mesh[0].normals: "smoth" is unknown; did you mean "smooth"?',
+    'mesh[1] "mesh": faces[1] uses vertex 3, but valid are 0 to 2; repair the mesh',
+    "mesh[1].matrix[3]: [0, 0, 0, 2] is not affine; write [0, 0, 0, 1]",
+    "sphere[0].radius: 0 is not above 0; write more than 0",
+    'light[0].position[1]: "one" is not a number; write one without quotes',
+    "light[0].position[2]: inf is not a finite number; write one",
+    "light[0]: intensity is missing; add it",
+    "light[1].direction: [0, 0, 0] is no direction; write the one the light travels in",
+]
+
+
+def problems(folder: Path, text: str) -> list[str]:
+    """What load says about a scene file, without the file's name, which must come first in every line."""
+    path = folder / "box.toml"
+    path.write_text(text)
+    with pytest.raises(SceneError) as caught:
+        load(path)
+    assert all(problem.startswith(f"{path}: ") for problem in caught.value.problems)
+    return [problem.removeprefix(f"{path}: ") for problem in caught.value.problems]
+
+
+def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
+    assert sorted(problems(folder, BAD)) == sorted(line.format(folder=folder) for line in SENTENCES)
+
+
+@pytest.mark.parametrize("text, sentence", [
+    ('[materials.a]\ncolor = [1, 1, 1]', "materials.a: type is missing; write one of"),
+    ('[materials.a]\ntype = "dielectric"', 'materials.a.type: "dielectric" is not supported yet; this version knows'),
+    ('[materials.a]\ntype = "diffuse"\ncolor = { image = "a.png" }', 'color: { image = "a.png" } is a texture'),
+    ('[materials.a]\ntype = "diffuse"\ncolor = "red"', 'materials.a.color: "red" is not a list; write the numbers in'),
+    ('[materials]\na = "diffuse"', 'materials.a: "diffuse" is not a table; write its keys below [materials.a]'),
+    ('[render]\nintegrator = "raster"', 'render.integrator: "raster" is not supported yet'),
+    ('[camera]\nprojection = "orthographic"', 'camera: key "projection" is not supported yet'),
+    ('[camera]\nlook_at = [0, 0, 5]', "camera.look_at: [0, 0, 5] is the camera's own position; move one of them"),
+    ('[camera]\nup = [0, 0, 1]', "camera.up: [0, 0, 1] is parallel to the view"),
+    ('[camera]\nposition = [1e39, 0, 0]', "camera.position: [1e+39, 0, 0] is beyond the range of float32"),
+    ('camera = 3', "camera: 3 is not a table; write [camera]"),
+    ('[mesh]\nfile = "a.ply"', "mesh: is not a list of tables; write [[mesh]] in double brackets"),
+    ('mesh = [3]', "mesh[0]: 3 is not a table; write [[mesh]]"),
+    ('[[mesh]]\nname = "a"', "mesh[0]: file is missing; write a file, or vertices and faces"),
+    ('[[mesh]]\nvertices = [[0, 0, 0]]', "mesh[0]: faces is missing; write a file, or vertices and faces"),
+    ('[[mesh]]\nfaces = [[0, 0, 0]]\nfile = "a.ply"', "mesh[0]: has a file and vertices or faces; keep one of them"),
+    ('[[mesh]]\nvertices = [[0, 0, 0]]\nfaces = []', 'mesh[0] "mesh": has no triangles'),
+    ('[[mesh]]\nvertices = [[0, 1e39, 0]]\nfaces = [[0, 0, 0]]', "mesh[0].vertices: [[0, 1e+39, 0]] is beyond"),
+    ('[[mesh]]\nvertices = [[0, 0]]\nfaces = [[0, 0, 0]]', "mesh[0].vertices[0]: [0, 0] has 2 entries; write 3"),
+    ('[[mesh]]\nvertices = [[0, 0, 0]]\nfaces = [[0, -1, 0]]', "mesh[0].faces[0][1]: -1 is below 0"),
+    ('[[mesh]]\nfile = "models/triangle.obj"\nscale = "big"', 'mesh[0].scale: "big" is not a list'),
+    ('[[mesh]]\nfile = "models/triangle.obj"\nscale = [1e39, 1, 1]', "mesh[0].scale: [1e+39, 1, 1] is beyond"),
+    ('[[mesh]]\nfile = "models"', "models: a model must be one of .glb, .gltf"),
+    ('[[sphere]]\nmaterial = "gold"', 'sphere[0].material: "gold" is unknown; none is defined'),
+    ('[[light]]\ntype = { point = 1 }', "light[0].type: { point = 1 } is unknown; write one of directional, point"),
+    ('[environment]\nimage = 3', "environment.image: 3 is not a text; write a file name in quotes"),
+    ('[camera\nposition = 3', "is not valid TOML: "),
+])
+def test_each_mistake(text: str, sentence: str, folder: Path) -> None:
+    problem, = problems(folder, text)
+    assert sentence in problem
+
+
+def test_syntax_error_names_the_line(folder: Path) -> None:
+    assert "line 3" in problems(folder, "[camera]\nfov_degrees = 40\nup = [0 1]")[0]
+
+
+def test_endless_mistakes_are_counted(folder: Path) -> None:
+    rows = ", ".join(['["a", 0, 0]'] * 500)
+    lines = problems(folder, f"[[mesh]]\nvertices = [{rows}]\nfaces = [[0, 1, 2]]")
+    assert lines[-1] == f"mesh[0]: {500 - len(lines) + 1} more mistakes like these" and len(lines) < 20
