@@ -11,3 +11,5 @@ static inline uint mask_bits(int8 mask) {
     return (uint)(((bytes & 0x8040201008040201UL) * 0x0101010101010101UL) >> 56);
 }
 #endif
+
+static inline int first_bit(uint bits) { return 31 - (int)clz(bits & -bits); }

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .model import Camera, Mesh
 
 #: From the model's middle to the camera: in front (+Z), to the right and above.
-THREE_QUARTER = (0.55, 0.45, 1.0)
+THREE_QUARTER = (0.55, 0.36, 1.0)
 FOV_DEGREES = 35.0
 #: The part of the picture's half height and half width that the box may fill.
 FILL = 0.92

@@ -5,26 +5,36 @@
 // nothing as it is folded into 1/direction. A zero component gives ±inf, clamped to the largest float, so that no
 // 0·inf arises on a slab plane. Flat boxes are kept since near == far counts as a hit.
 #include "geometry/wide.cl"
+#include "vector.cl"
 
 #define SLAB_PAD (6.0f * 5.9604645e-8f)
 #define LARGEST 3.402823466e38f
 
 typedef struct {
     float origin[3], near[3], far[3];   // near, far: padded 1/direction
-    int backward[3];                    // 1 where the ray runs towards the box's low side
+    int backward[3];                    // where the ray runs towards the box's low side
 } SlabRay;
 
-static inline SlabRay slab_ray(const Ray *ray) {
-    SlabRay r;
-#define INVERT(axis) { \
-        float inverse = clamp(1.0f / ray->direction[axis], -LARGEST, LARGEST); \
-        r.origin[axis] = ray->origin[axis]; \
+typedef struct { real near[3], far[3]; ireal backward[3]; } SlabRays;   // the same for all lanes, made at once
+
+static inline SlabRays slab_rays(real3 direction) {
+    SlabRays r;
+#define INVERT(axis, d) { \
+        real inverse = 1.0f / d; \
+        inverse = minimum(maximum(inverse, (real)(-LARGEST)), (real)(LARGEST)); \
         r.near[axis] = inverse * (1.0f - SLAB_PAD); \
-        r.far[axis] = clamp(inverse * (1.0f + SLAB_PAD), -LARGEST, LARGEST); \
+        r.far[axis] = minimum(maximum(inverse * (1.0f + SLAB_PAD), (real)(-LARGEST)), (real)(LARGEST)); \
         r.backward[axis] = inverse < 0.0f; \
     }
-    INVERT(0)
-    INVERT(1)
-    INVERT(2)
+    INVERT(0, direction.x)
+    INVERT(1, direction.y)
+    INVERT(2, direction.z)
     return r;
+}
+
+static inline SlabRay slab_ray(const SlabRays *rays, const Ray *ray, int lane) {
+    return (SlabRay){{ray->origin[0], ray->origin[1], ray->origin[2]},
+                     {LANE(rays->near[0], lane), LANE(rays->near[1], lane), LANE(rays->near[2], lane)},
+                     {LANE(rays->far[0], lane), LANE(rays->far[1], lane), LANE(rays->far[2], lane)},
+                     {LANE_INT(rays->backward[0], lane), LANE_INT(rays->backward[1], lane), LANE_INT(rays->backward[2], lane)}};
 }

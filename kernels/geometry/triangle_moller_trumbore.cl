@@ -5,7 +5,9 @@
 
 typedef Ray TriangleRay;
 
-static inline TriangleRay triangle_ray(const Ray *ray) { return *ray; }
+typedef int TriangleRays;
+static inline TriangleRays triangle_rays(real3 origin, real3 direction) { return 0; }
+static inline TriangleRay triangle_ray(const TriangleRays *rays, const Ray *ray, int lane) { return *ray; }
 
 static inline WideHit intersect_triangles(const TriangleRay *ray, global const Triangles *leaf, float t_max) {
     const float *d = ray->direction;

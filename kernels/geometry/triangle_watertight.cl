@@ -14,20 +14,29 @@ typedef struct {
     float ox, oy, oz;     // the origin, permuted
 } TriangleRay;
 
-static inline TriangleRay triangle_ray(const Ray *ray) {
-    const float *d = ray->direction;
-    float ax = fabs(d[0]), ay = fabs(d[1]), az = fabs(d[2]);
-    TriangleRay r;
-    r.kz = az >= ax && az >= ay ? 2 : ay >= ax ? 1 : 0;
-    r.kx = r.kz == 2 ? 0 : r.kz + 1;
-    r.ky = r.kx == 2 ? 0 : r.kx + 1;
-    r.sz = 1.0f / d[r.kz];
-    r.sx = d[r.kx] * r.sz;
-    r.sy = d[r.ky] * r.sz;
-    r.ox = ray->origin[r.kx];
-    r.oy = ray->origin[r.ky];
-    r.oz = ray->origin[r.kz];
+typedef struct { ireal kx, ky, kz; real sx, sy, sz, ox, oy, oz; } TriangleRays;   // the same for all lanes
+
+static inline real component(real3 a, ireal axis) { return axis == 0 ? a.x : axis == 1 ? a.y : a.z; }
+
+static inline TriangleRays triangle_rays(real3 origin, real3 direction) {
+    real3 a = absolute3(direction);
+    TriangleRays r;
+    r.kz = (a.z >= a.x) & (a.z >= a.y) ? (ireal)(2) : a.y >= a.x ? (ireal)(1) : (ireal)(0);
+    r.kx = r.kz == 2 ? (ireal)(0) : r.kz + 1;
+    r.ky = r.kx == 2 ? (ireal)(0) : r.kx + 1;
+    r.sz = 1.0f / component(direction, r.kz);
+    r.sx = component(direction, r.kx) * r.sz;
+    r.sy = component(direction, r.ky) * r.sz;
+    r.ox = component(origin, r.kx);
+    r.oy = component(origin, r.ky);
+    r.oz = component(origin, r.kz);
     return r;
+}
+
+static inline TriangleRay triangle_ray(const TriangleRays *rays, const Ray *ray, int lane) {
+    return (TriangleRay){LANE_INT(rays->kx, lane), LANE_INT(rays->ky, lane), LANE_INT(rays->kz, lane),
+                         LANE(rays->sx, lane), LANE(rays->sy, lane), LANE(rays->sz, lane),
+                         LANE(rays->ox, lane), LANE(rays->oy, lane), LANE(rays->oz, lane)};
 }
 
 static inline WideHit intersect_triangles(const TriangleRay *ray, global const Triangles *leaf, float t_max) {
@@ -57,6 +66,8 @@ static inline WideHit intersect_triangles(const TriangleRay *ray, global const T
     bz *= ray->sz;
     cz *= ray->sz;
     result.t = (u * az + v * bz + w * cz) * inverse;
+    result.hit = result.hit & (result.t > 0.0f) & (result.t <= t_max) & (det != 0.0f);
+    if (!WIDE_ANY(result.hit)) return result;
     result.u = v * inverse;
     result.v = w * inverse;
 
@@ -67,6 +78,6 @@ static inline WideHit intersect_triangles(const TriangleRay *ray, global const T
     wide delta_x = GAMMA(5) * (max_x + max_z), delta_y = GAMMA(5) * (max_y + max_z);
     wide delta_e = 2.0f * (GAMMA(2) * max_x * max_y + delta_y * max_x + delta_x * max_y);
     wide t_min = 3.0f * (GAMMA(3) * max_e * max_z + delta_e * max_z + GAMMA(3) * max_z * max_e) * WIDE_ABS(inverse);
-    result.hit = result.hit & (det != 0.0f) & (result.t > t_min) & (result.t <= t_max);
+    result.hit = result.hit & (result.t > t_min);
     return result;
 }

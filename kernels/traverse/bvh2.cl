@@ -30,9 +30,15 @@ static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int first, i
 #endif
 }
 
-static inline Hit traverse(const Scene *scene, const Ray *ray, const bool stop_at_first) {
-    LeafRay leaf = leaf_ray(ray);
-    SlabRay slabs = slab_ray(ray);
+typedef struct { LeafRays leaves; SlabRays slabs; } TreeRays;
+
+static inline TreeRays tree_rays(real3 origin, real3 direction) {
+    return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
+}
+
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first) {
+    LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
+    SlabRay slabs = slab_ray(&rays->slabs, ray, lane);
     Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
     int waiting[STACK_SIZE];
     float distance[STACK_SIZE];

@@ -40,9 +40,15 @@ static inline uint enter_boxes(const SlabRay *ray, global const Node *node, floa
     return mask_bits(t_near <= t_far);
 }
 
-static inline Hit traverse(const Scene *scene, const Ray *ray, const bool stop_at_first) {
-    LeafRay leaf = leaf_ray(ray);
-    SlabRay slabs = slab_ray(ray);
+typedef struct { LeafRays leaves; SlabRays slabs; } TreeRays;
+
+static inline TreeRays tree_rays(real3 origin, real3 direction) {
+    return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
+}
+
+__attribute__((always_inline)) static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first) {
+    LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
+    SlabRay slabs = slab_ray(&rays->slabs, ray, lane);
     Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
     int waiting[STACK_SIZE];
     float distance[STACK_SIZE];
@@ -53,10 +59,10 @@ static inline Hit traverse(const Scene *scene, const Ray *ray, const bool stop_a
             float entry[8];
             uint entered = enter_boxes(&slabs, node, hit.t, entry);
             if (entered) {
-                int nearest = 31 - clz(entered & -entered);
+                int nearest = first_bit(entered);
                 entered &= entered - 1;
                 while (entered) {
-                    int child = 31 - clz(entered & -entered);
+                    int child = first_bit(entered);
                     entered &= entered - 1;
                     bool nearer = entry[child] < entry[nearest];
                     int farther = nearer ? nearest : child;

@@ -13,11 +13,26 @@ typedef struct {
 #endif
 } LeafRay;
 
-static inline LeafRay leaf_ray(const Ray *ray) {
+typedef struct {
+#if TRIANGLES
+    TriangleRays triangles;
+#endif
+    int unused;
+} LeafRays;
+
+static inline LeafRays leaf_rays(real3 origin, real3 direction) {
+    LeafRays r;
+#if TRIANGLES
+    r.triangles = triangle_rays(origin, direction);
+#endif
+    return r;
+}
+
+static inline LeafRay leaf_ray(const LeafRays *rays, const Ray *ray, int lane) {
     LeafRay r;
     r.ray = *ray;
 #if TRIANGLES
-    r.triangle_ray = triangle_ray(ray);
+    r.triangle_ray = triangle_ray(&rays->triangles, ray, lane);
 #endif
     return r;
 }
@@ -37,14 +52,11 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
         hit->primitive = 0;
         return;
     }
-    float t[WIDTH], u[WIDTH], v[WIDTH];
-    int inside[WIDTH];
-    vstore8(found.t, 0, t);
-    vstore8(found.u, 0, u);
-    vstore8(found.v, 0, v);
-    vstore8(found.hit, 0, inside);
-    for (int i = 0; i < WIDTH; ++i)
-        if (inside[i]) keep_closest(hit, t[i], u[i], v[i], leaf->primitive[i]);
+    const float *t = (const float *)&found.t, *u = (const float *)&found.u, *v = (const float *)&found.v;
+    for (uint inside = mask_bits(found.hit); inside; inside &= inside - 1) {
+        int i = first_bit(inside);
+        keep_closest(hit, t[i], u[i], v[i], leaf->primitive[i]);
+    }
 #endif
 }
 #endif

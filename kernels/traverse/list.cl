@@ -1,8 +1,11 @@
 // No tree: every primitive is tested. The yardstick for the trees.
 #include "traverse/leaf.cl"
 
-static inline Hit traverse(const Scene *scene, const Ray *ray, const bool stop_at_first) {
-    LeafRay leaf = leaf_ray(ray);
+typedef LeafRays TreeRays;
+static inline TreeRays tree_rays(real3 origin, real3 direction) { return leaf_rays(origin, direction); }
+
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first) {
+    LeafRay leaf = leaf_ray(rays, ray, lane);
     Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
 #if TRIANGLES
     for (int i = 0; i < scene->counts.triangles && !(stop_at_first && hit.primitive >= 0); ++i)

@@ -8,8 +8,8 @@ typedef struct { real t, u, v; ireal primitive; } Hits;   // primitive < 0: noth
 
 #if PRIMITIVES
 static inline Ray one_ray(const real3 *origin, const real3 *direction, const real *t_max, int lane) {
-    const float *o = (const float *)origin, *d = (const float *)direction, *t = (const float *)t_max;
-    return (Ray){{o[lane], o[lane + LANES], o[lane + 2 * LANES]}, {d[lane], d[lane + LANES], d[lane + 2 * LANES]}, t[lane]};
+    return (Ray){{LANE(origin->x, lane), LANE(origin->y, lane), LANE(origin->z, lane)},
+                 {LANE(direction->x, lane), LANE(direction->y, lane), LANE(direction->z, lane)}, LANE(*t_max, lane)};
 }
 #endif
 
@@ -23,10 +23,11 @@ static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction
 #if PRIMITIVES
     enabled.all = active;
     real t_max = (real)(INFINITY);
+    TreeRays rays = tree_rays(origin, direction);
     for (int lane = 0; lane < LANES; ++lane) {
         if (!enabled.lane[lane]) continue;
         Ray ray = one_ray(&origin, &direction, &t_max, lane);
-        Hit hit = traverse(scene, &ray, false);
+        Hit hit = traverse(scene, &rays, &ray, lane, false);
         t.lane[lane] = hit.t;
         u.lane[lane] = hit.u;
         v.lane[lane] = hit.v;
@@ -40,13 +41,14 @@ static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction
 static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active) {
     ireal blocked = NO_LANES;
 #if PRIMITIVES
+    TreeRays rays = tree_rays(origin, direction);
     IntLanes enabled, found;
     enabled.all = active;
     found.all = (ireal)(-1);
     for (int lane = 0; lane < LANES; ++lane) {
         if (!enabled.lane[lane]) continue;
         Ray ray = one_ray(&origin, &direction, &t_max, lane);
-        found.lane[lane] = traverse(scene, &ray, true).primitive;
+        found.lane[lane] = traverse(scene, &rays, &ray, lane, true).primitive;
     }
     blocked = found.all >= 0;
 #endif

@@ -1,0 +1,169 @@
+// Test-only entry points: each hands arrays to one function of the kernels, LANES elements a work-item.
+//
+// The text is appended to a scene's program, so what is probed is what renders that scene. Arrays are rows of n
+// floats: row r of element i is array[r·n + i]. Whole numbers up to 2^24 and masks (0, 1) are written as floats.
+
+#define ELEMENTS \
+    Scene scene = SCENE_ARGUMENTS; \
+    ureal element = (ureal)((uint)get_global_id(0) * LANES) + LANE_INDEX; \
+    ireal active = element < (ureal)(n); \
+    element = active ? element : (ureal)(0);
+#define ROW(array, row) GATHER(real, (array) + (row) * n, element, )
+#define ROW3(array, row) vector(ROW(array, row), ROW(array, (row) + 1), ROW(array, (row) + 2))
+#define FLAG(mask) ((mask) ? ONE : ZERO)
+
+static void put(global float *out, uint n, uint row, real value) {
+    RealLanes lanes;
+    lanes.all = value;
+    uint first = (uint)get_global_id(0) * LANES;
+    for (uint lane = 0; lane < LANES && first + lane < n; ++lane) out[row * n + first + lane] = lanes.lane[lane];
+}
+
+static void put3(global float *out, uint n, uint row, real3 value) {
+    put(out, n, row, value.x);
+    put(out, n, row + 1, value.y);
+    put(out, n, row + 2, value.z);
+}
+
+// in: u (2), cone height -> out: cosine wi (3), pdf; cone wi (3), pdf; triangle b1, b2; sine, cosine of 2·pi·u.x
+kernel void probe_warps(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    real2 u = {ROW(in, 0), ROW(in, 1)};
+    real height = ROW(in, 2), sine, cosine;
+    real3 cosine_wi = sample_cosine(u);
+    put3(out, n, 0, cosine_wi);
+    put(out, n, 3, cosine_pdf(cosine_wi.z));
+    put3(out, n, 4, sample_cone(u, height));
+    put(out, n, 7, cone_pdf(height));
+    real2 b = sample_triangle(u);
+    put(out, n, 8, b.x);
+    put(out, n, 9, b.y);
+    sincos_turns(u.x, &sine, &cosine);
+    put(out, n, 10, sine);
+    put(out, n, 11, cosine);
+}
+
+// in: pixel (of 32 bits, as two halves), sample (as two halves) -> out: u (2)
+kernel void probe_random(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed, uint dimension) {
+    ELEMENTS
+    Sampler sampler = {(TO_UINT(ROW(in, 0)) << 16) + TO_UINT(ROW(in, 1)),
+                       (TO_UINT(ROW(in, 2)) << 16) + TO_UINT(ROW(in, 3)), seed, dimension};
+    real2 u = next_2d(&sampler);
+    put(out, n, 0, u.x);
+    put(out, n, 1, u.y);
+}
+
+// in: the radiance (3) of every sample of `samples` -> out: sum, sum_error, square, square_error (3 each), count, dropped
+kernel void probe_accumulate(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint samples) {
+    ELEMENTS
+    Accumulator a = {splat(ZERO), splat(ZERO), splat(ZERO), splat(ZERO), (ureal)(0), (ureal)(0), (ureal)(0)};
+    real3 L = ROW3(in, 0);
+    for (uint i = 0; i < samples; ++i) accumulate(&a, L, active);
+    put3(out, n, 0, a.sum);
+    put3(out, n, 3, a.sum_error);
+    put3(out, n, 6, a.square);
+    put3(out, n, 9, a.square_error);
+    put(out, n, 12, TO_REAL(a.count));
+    put(out, n, 13, TO_REAL(a.dropped));
+}
+
+// in: material, wo (3), u (2), lobe -> out: wi (3), weight (3), pdf, specular
+kernel void probe_bsdf_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    real2 u = {ROW(in, 4), ROW(in, 5)};
+    BsdfSample sample = bsdf_sample(&scene, TO_INT(ROW(in, 0)), ROW3(in, 1), u, ROW(in, 6));
+    put3(out, n, 0, sample.wi);
+    put3(out, n, 3, sample.weight);
+    put(out, n, 6, sample.pdf);
+    put(out, n, 7, FLAG(sample.specular));
+}
+
+// in: material, wo (3), wi (3) -> out: f·|cos| (3), pdf
+kernel void probe_bsdf_value(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    ireal material = TO_INT(ROW(in, 0));
+    put3(out, n, 0, bsdf_eval(&scene, material, ROW3(in, 1), ROW3(in, 4)));
+    put(out, n, 3, bsdf_pdf(&scene, material, ROW3(in, 1), ROW3(in, 4)));
+}
+
+// in: origin (3), direction (3) -> out: t, u, v, primitive
+kernel void probe_closest_hit(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    Hits hits = closest_hit(&scene, ROW3(in, 0), ROW3(in, 3), active);
+    put(out, n, 0, hits.t);
+    put(out, n, 1, hits.u);
+    put(out, n, 2, hits.v);
+    put(out, n, 3, TO_REAL(hits.primitive));
+}
+
+// in: origin (3), direction (3), t_max -> out: whether something is hit
+kernel void probe_any_hit(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    put(out, n, 0, FLAG(any_hit(&scene, ROW3(in, 0), ROW3(in, 3), ROW(in, 6), active)));
+}
+
+#if PRIMITIVES
+// in: origin (3), direction (3), new direction (3) -> out: p, p_error, ng (3 each), the new ray's origin (3), its hit's t and
+// primitive
+kernel void probe_leave(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    real3 origin = ROW3(in, 0), direction = ROW3(in, 3), next = ROW3(in, 6);
+    Hits hits = closest_hit(&scene, origin, direction, active);
+    Surface surface = surface_at(&scene, origin, direction, &hits);
+    real3 left = offset_origin(surface.p, surface.p_error, surface.ng, next);
+    Hits again = closest_hit(&scene, left, next, active);
+    put3(out, n, 0, surface.p);
+    put3(out, n, 3, surface.p_error);
+    put3(out, n, 6, surface.ng);
+    put3(out, n, 9, left);
+    put(out, n, 12, again.t);
+    put(out, n, 13, TO_REAL(again.primitive));
+}
+#endif
+
+#if LIGHTS
+// in: p (3) -> out: wi (3), radiance (3), pdf, target (3), infinite, delta. Element i draws the numbers of pixel i.
+kernel void probe_light_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed) {
+    ELEMENTS
+    Sampler sampler = {element, (ureal)(0), seed, 0};
+    LightSample light = light_sample(&scene, ROW3(in, 0), &sampler);
+    put3(out, n, 0, light.wi);
+    put3(out, n, 3, light.radiance);
+    put(out, n, 6, light.pdf);
+    put3(out, n, 7, light.target);
+    put(out, n, 10, FLAG(light.infinite));
+    put(out, n, 11, FLAG(light.delta));
+}
+
+// -> out: the entry of the light table that the numbers of pixel i pick
+kernel void probe_alias(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed) {
+    ELEMENTS
+    Sampler sampler = {element, (ureal)(0), seed, 0};
+    ureal2 bits = next_bits(&sampler);
+    ALIAS_PICK(scene.lights, scene.counts.lights, bits, entry)
+    put(out, n, 0, TO_REAL(entry));
+}
+#endif
+
+#if EMITTERS
+// in: p (3), wi (3) -> out: radiance (3) of the emitter met, the density with which light_sample chooses wi, primitive
+kernel void probe_emitter(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    real3 p = ROW3(in, 0), wi = ROW3(in, 3);
+    Hits hits = closest_hit(&scene, p, wi, active);
+    Surface surface = surface_at(&scene, p, wi, &hits);
+    real pdf;
+    put3(out, n, 0, emitter_radiance(&scene, p, wi, hits.t, &surface, active & (hits.primitive >= 0), &pdf));
+    put(out, n, 3, pdf);
+    put(out, n, 4, TO_REAL(hits.primitive));
+}
+#endif
+
+#if SKY
+// in: wi (3) -> out: radiance (3), the density with which light_sample chooses wi
+kernel void probe_sky(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    put3(out, n, 0, sky_radiance(&scene, ROW3(in, 0)));
+    put(out, n, 3, sky_pdf(&scene, ROW3(in, 0)));
+}
+#endif
