@@ -40,7 +40,7 @@ class Session:
             wait_for(cl.enqueue_fill_buffer(device.queue, self._film, np.uint8(0), 0, self._film.size))
         except cl.Error as error:
             raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes of buffers do not fit: {error}") from error
-        self._kernel = self.program.program.path
+        self._kernel = cl.Kernel(self.program.program, "path")
         self._kernel.set_args(*self._scene, compiled.counts[0], self._film, self.launch[0])
         self._warm_up()
 
