@@ -47,7 +47,7 @@ class Probe:
         context, queue = self._device.context, self._device.queue
         source = cl.Buffer(context, cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR, hostbuf=given)
         target = cl.Buffer(context, cl.mem_flags.WRITE_ONLY, answer.nbytes)
-        kernel = getattr(self._program, f"probe_{entry}")
+        kernel = cl.Kernel(self._program, f"probe_{entry}")
         kernel.set_args(*self._scene, self.compiled.counts[0], np.uint32(n), source, target,
                         *map(np.uint32, scalars.values()))
         per_group = self.compiled.choices.lanes * LOCAL_SIZE

@@ -24,11 +24,12 @@ def command(scene: Path, as_json: bool, lanes: str | None, triangle: str, builde
     content = load(scene)
     compiled = compile_scene(content, Choices(int(lanes or 8), layout or "bvh8", builder, triangle))
     tree = compiled.tree
+    materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}
     report: dict[str, Any] = {
         "scene": content.name,
         "meshes": len(content.meshes), "triangles": sum(len(mesh.faces) for mesh in content.meshes),
         "spheres": len(content.spheres),
-        "materials": dict(Counter(m.kernel for m in {x.material for x in [*content.meshes, *content.spheres]})),
+        "materials": dict(Counter(material.kernel for material in materials)),
         "lights": {"entries": int(compiled.counts["lights"][0]),
                    **Counter(type(light).kernel for light in content.lights)},
         "tree": {"layout": tree.name, "builder": builder, "nodes": tree.nodes, "depth": tree.depth, "stack": tree.stack,

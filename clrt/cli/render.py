@@ -27,7 +27,7 @@ from .progress import Progress, make_progress
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers.")
 @click.option("--device", metavar="SEL", help="Number, id, part of a name, cpu or gpu; see `clrt devices`.")
 @click.option("--integrator", type=click.Choice(["path", "direct"]), help="What to compute.")
-@click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error against.")
+@click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error by.")
 @click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what was done.")
 @click.option("--view", default="srgb", show_default=True, metavar="NAME", help="View transform of .png pictures.")
 @click.option("--exposure", default=0.0, metavar="EV", help="Exposure of .png pictures, in stops.")
@@ -91,11 +91,13 @@ def _read_reference(path: Path, size: tuple[int, int]) -> Any:
     pixels = read_image(path)
     height, width = pixels.shape[:2]
     if (width, height) != size:
-        raise UsageError(f"{path}: the reference is {width}x{height}, the picture {size[0]}x{size[1]}; use --size {width}x{height}")
+        raise UsageError(f"{path}: the reference is {width}x{height}, the picture {size[0]}x{size[1]}; "
+                         f"use --size {width}x{height}")
     return pixels
 
 
-def _write(renderer: Any, state: Any, outputs: tuple[Path, ...], report: Path | None, view: str, exposure: float) -> None:
+def _write(renderer: Any, state: Any, outputs: tuple[Path, ...], report: Path | None, view: str,
+           exposure: float) -> None:
     from ..output.image import Image
     from ..output.report import write_report
     from ..rendering.report import render_report

@@ -1,7 +1,7 @@
 """Which OpenCL devices there are, which can be used, and which one is meant.
 
-The best comes first: GPUs, then other accelerators, CPUs and simulators, the larger before the smaller. A device that cannot
-run clrt is listed with the reason, last.
+The best comes first: GPUs, then other accelerators, CPUs and simulators, the larger before the smaller. A device
+that cannot run clrt is listed with the reason, last.
 """
 
 from __future__ import annotations
@@ -119,8 +119,8 @@ def _describe(device: cl.Device, index: int, chosen: bool) -> DeviceInfo:
         index=index, id=hashlib.sha256(identity.encode()).hexdigest()[:8], name=device.name.strip(),
         platform=platform.name.strip(), platform_version=platform.version.strip(), driver=device.driver_version.strip(),
         type=_type(device), compute_units=device.max_compute_units, global_bytes=device.global_mem_size,
-        max_alloc_bytes=device.max_mem_alloc_size, usable=not reason, why=reason or f"a {_type(device)} with OpenCL C 1.2",
-        chosen=chosen)
+        max_alloc_bytes=device.max_mem_alloc_size, usable=not reason,
+        why=reason or f"a {_type(device)} with OpenCL C 1.2", chosen=chosen)
 
 
 def _matches(info: DeviceInfo, selector: str | int | None) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import pyopencl as cl
+from pyopencl import CommandQueue, Context
 
 from ..errors import DeviceError
 from . import pocl
@@ -17,8 +18,8 @@ class Device:
 
     info: DeviceInfo
     cl: cl.Device
-    context: cl.Context
-    queue: cl.CommandQueue
+    context: Context
+    queue: CommandQueue
 
     @property
     def lanes(self) -> int:
@@ -37,7 +38,7 @@ def open_device(selector: str | int | None = None) -> Device:
     if info.platform == "Portable Computing Language":
         pocl.name_processor(device)
     try:
-        context = cl.Context([device])
-        return Device(info, device, context, cl.CommandQueue(context))
+        context = Context([device])
+        return Device(info, device, context, CommandQueue(context))
     except cl.Error as error:
         raise DeviceError(f"{info.name} ({info.platform}) cannot be opened: {error}") from error

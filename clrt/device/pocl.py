@@ -17,7 +17,8 @@ import pyopencl as cl
 #: LLVM name → the /proc/cpuinfo flags of the instructions that its code generator may choose, best first.
 PROCESSORS = {
     "icelake-server": {"avx512f", "avx512dq", "avx512bw", "avx512vl", "avx512cd", "avx512vbmi", "avx512_vbmi2",
-                       "avx512_vnni", "avx512_bitalg", "avx512_vpopcntdq", "avx512ifma", "gfni", "fma", "bmi2", "movbe"},
+                       "avx512_vnni", "avx512_bitalg", "avx512_vpopcntdq", "avx512ifma", "gfni", "fma", "bmi2",
+                       "movbe"},
     "skylake-avx512": {"avx512f", "avx512dq", "avx512bw", "avx512vl", "avx512cd", "fma", "bmi2", "movbe"},
     "haswell": {"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe"},
     "nehalem": {"sse4_2", "popcnt"},

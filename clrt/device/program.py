@@ -81,13 +81,20 @@ def build(device: Device, source: str) -> BuiltProgram:
         _built[context_key] = (_from_binary(device, binary) if binary else None) or _compile(device, source)
         if not cached:
             keeps_its_own = device.info.platform == "Portable Computing Language"
-            write_binary(key, b"" if keeps_its_own else _built[context_key].get_info(cl.program_info.BINARIES)[0])
+            write_binary(key, b"" if keeps_its_own else _binary(_built[context_key]))
     return BuiltProgram(_built[context_key], time.perf_counter() - start, cached)
+
+
+def _binary(program: cl.Program) -> bytes:
+    binaries: list[bytes] = program.get_info(cl.program_info.BINARIES)  # type: ignore[assignment]
+    return binaries[0]
 
 
 def _from_binary(device: Device, binary: bytes) -> cl.Program | None:
     try:
-        return cl.Program(device.context, [device.cl], [binary]).build()
+        program = cl.Program(device.context, [device.cl], [binary])
+        program.build()
+        return program
     except (cl.Error, ValueError):
         return None  # a driver may refuse an old or damaged binary: compile again
 
@@ -96,7 +103,9 @@ def _compile(device: Device, source: str) -> cl.Program:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", cl.CompilerWarning)
-            return cl.Program(device.context, source).build(options=OPTIONS, cache_dir=False)
+            program = cl.Program(device.context, source)
+            program.build(options=OPTIONS, cache_dir=False)  # type: ignore[arg-type]  # False: pyopencl's own cache off
+            return program
     except cl.Error as error:
         log = str(error).strip()
         raise KernelError(f"{device.info.name} ({device.info.platform}) cannot build the kernel:\n{log}") from error

@@ -14,7 +14,7 @@ from .images import write_image
 
 @dataclass(frozen=True)
 class Image:
-    """pixels: (height, width, 3) float32, linear Rec. 709; report: what made it, as `clrt render --report` writes it."""
+    """pixels: (height, width, 3) float32, linear Rec. 709; report: what made it, see `clrt render --report`."""
 
     pixels: NDArray[np.float32]
     report: dict[str, Any] = field(default_factory=dict)

@@ -67,7 +67,7 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl") -> Com
     tree = pack(choices.layout, choices.builder, triangles, spheres)
     sky = pack_sky(scene.environment)
     emitters = pack_emitters(scene, triangles, sky, _radius(triangles, spheres))
-    users: list[Material] = [x.material for x in [*scene.meshes, *scene.spheres]]
+    users = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
     codes, material_buffers = _materials(users)
     if sky.sampled:
         sky.buffers["environment"][1]["probability"] = emitters.sky_probability
@@ -104,7 +104,8 @@ def _geometry(scene: Scene) -> tuple[NDArray[np.float32], dict[int, NDArray[np.f
 
 def _radius(triangles: NDArray[np.float32], spheres: NDArray[np.float32]) -> float:
     """Half the diagonal of the box around everything."""
-    points = np.concatenate([triangles.reshape(-1, 3), spheres[:, :3] - spheres[:, 3:], spheres[:, :3] + spheres[:, 3:]])
+    centers, radii = spheres[:, :3], spheres[:, 3:]
+    points = np.concatenate([triangles.reshape(-1, 3), centers - radii, centers + radii])
     return float(np.linalg.norm(np.ptp(points.astype(np.float64), axis=0)) / 2) if len(points) else 1.0
 
 
@@ -145,7 +146,8 @@ def _normal_records(normals: dict[int, NDArray[np.float32]]) -> NDArray[Any]:
     return records
 
 
-def _sphere_records(spheres: NDArray[np.float32], materials: NDArray[np.int32], lights: NDArray[np.int32]) -> NDArray[Any]:
+def _sphere_records(spheres: NDArray[np.float32], materials: NDArray[np.int32],
+                    lights: NDArray[np.int32]) -> NDArray[Any]:
     records = np.zeros(len(spheres), SPHERE)
     records["center"], records["radius"] = spheres[:, :3], spheres[:, 3]
     records["material"], records["light"] = materials, lights

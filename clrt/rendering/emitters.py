@@ -26,7 +26,7 @@ SURFACES = ("triangle", "sphere")
 
 @dataclass
 class Emitters:
-    """buffers: name → (C type, records). types: those in use. triangle, sphere: each primitive's entry of the table, or −1."""
+    """buffers: name → (C type, records). types: those in use. triangle, sphere: each one's entry of the table, or −1."""
 
     buffers: dict[str, tuple[str, NDArray[Any]]]
     types: list[str]
@@ -72,24 +72,27 @@ def pack_emitters(scene: Scene, triangles: NDArray[np.float32], sky: Sky, scene_
             lamp = np.zeros(1, SPHERE_LIGHT)
             lamp["center"], lamp["radius"], lamp["radiance"] = sphere.center, sphere.radius, sphere.material.emission
             area = 4 * np.pi * sphere.radius**2
-            of_sphere[i] = table.add("sphere", np.pi * area * LUMINANCE @ sphere.material.emission * np.ones(1), lamp)[0]
+            power = np.pi * area * LUMINANCE @ sphere.material.emission
+            of_sphere[i] = table.add("sphere", np.array([power]), lamp)[0]
     disc = np.pi * scene_radius**2
     for light in scene.lights:
         if isinstance(light, PointLight):
             point = np.zeros(1, POINT_LIGHT)
             point["position"], point["intensity"] = light.position, light.intensity
-            table.add("point", 4 * np.pi * LUMINANCE @ light.intensity * np.ones(1), point)
+            table.add("point", np.array([4 * np.pi * LUMINANCE @ light.intensity]), point)
         else:
             beam = np.zeros(1, DIRECTIONAL_LIGHT)
             beam["towards"] = -np.asarray(light.direction) / np.linalg.norm(light.direction)
             beam["irradiance"] = light.irradiance
-            table.add("directional", disc * LUMINANCE @ light.irradiance * np.ones(1), beam)
+            table.add("directional", np.array([disc * LUMINANCE @ light.irradiance]), beam)
     if sky.sampled:
         table.add("sky", np.array([disc * sky.power]), None)
     return _finish(table, of_triangle, of_sphere)
 
 
-def _triangle_lights(corners: NDArray[np.float64], emission: tuple[float, float, float]) -> tuple[NDArray[Any], NDArray[np.float64]]:
+def _triangle_lights(corners: NDArray[np.float64],
+                     emission: tuple[float, float, float]) -> tuple[NDArray[Any], NDArray[np.float64]]:
+    """Records of emissive triangles with corners (k, 3, 3), and their powers (k,)."""
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     cross = np.cross(e1, e2)
     norm = np.linalg.norm(cross, axis=1)

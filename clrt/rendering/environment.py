@@ -17,7 +17,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 @dataclass(frozen=True)
 class Sky:
-    """What the kernels get of the environment: a kernel file (None: a black sky), buffers, and ∫L dω of its luminance."""
+    """What the kernels get of the environment: a file (None: a black sky), buffers, and ∫L dω of its luminance."""
 
     kernel: str | None
     buffers: dict[str, tuple[str, NDArray[Any]]]
@@ -38,7 +38,8 @@ def pack_sky(environment: Environment) -> Sky:
         if not color.any():
             return Sky(None, {}, 0.0)
         record["color"] = color
-        return Sky("light/constant_sky.cl", {"environment": ("Environment", record)}, float(4 * np.pi * LUMINANCE @ color))
+        power = float(4 * np.pi * LUMINANCE @ color)
+        return Sky("light/constant_sky.cl", {"environment": ("Environment", record)}, power)
     radiance = image.astype(np.float64) * environment.strength
     weights = _texel_weights(radiance)
     if not weights.any():
@@ -54,7 +55,8 @@ def pack_sky(environment: Environment) -> Sky:
     aliases = np.zeros(width * height, SKY_ALIAS)
     aliases["threshold"], aliases["alias"] = threshold, alias
     buffers: dict[str, tuple[str, NDArray[Any]]] = {
-        "environment": ("Environment", record), "sky_texels": ("SkyTexel", texels), "sky_aliases": ("SkyAlias", aliases)}
+        "environment": ("Environment", record), "sky_texels": ("SkyTexel", texels),
+        "sky_aliases": ("SkyAlias", aliases)}
     return Sky("light/image_sky.cl", buffers, float(weights.sum()))
 
 

@@ -26,9 +26,10 @@ SKY_TEXEL = record(radiance="3f4", density="f4")
 SKY_ALIAS = np.dtype([("threshold", "f4"), ("alias", "i4")])
 
 COUNTS = record(triangles="i4", spheres="i4", lights="i4", pad="i4")
-PIXEL = record(sum="3f4", count="u4", sum_error="3f4", dropped="u4", square="3f4", rays="u4", square_error="3f4", pad="u4")
-LAUNCH = record(position="3f4", width="u4", right="3f4", height="u4", up="3f4", max_depth="i4", forward="3f4", seed="u4",
-                first_pixel="u4", pixel_count="u4", first_sample="u4", sample_count="u4")
+PIXEL = record(sum="3f4", count="u4", sum_error="3f4", dropped="u4", square="3f4", rays="u4", square_error="3f4",
+               pad="u4")
+LAUNCH = record(position="3f4", width="u4", right="3f4", height="u4", up="3f4", max_depth="i4", forward="3f4",
+                seed="u4", first_pixel="u4", pixel_count="u4", first_sample="u4", sample_count="u4")
 
 
 def material_record(material: type[Material]) -> np.dtype[Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..accel.builders import BUILDERS
 from ..device.open import open_device
 from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
@@ -25,7 +26,7 @@ STATE_COST = 20
 
 @dataclass(frozen=True)
 class State:
-    """The picture so far. `noise`: estimated √relMSE (None below 2 samples); `relmse`: against the reference, if given."""
+    """The picture so far. noise: estimated √relMSE, None below 2 samples; relmse: against the reference, if given."""
 
     spp: int
     seconds: float
@@ -51,7 +52,7 @@ class Renderer:
                  max_depth: int | None = None, seed: int | None = None, integrator: str | None = None,
                  triangle: str = "watertight", builder: str = "sah", layout: str | None = None,
                  lanes: int | None = None, on_phase: Callable[[str], None] = lambda phase: None) -> None:
-        given = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator}
+        given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
         self.device = open_device(device)
@@ -65,6 +66,7 @@ class Renderer:
         self.history: list[dict[str, Any]] = []
         self.stop_reason: str | None = None
         self.seconds = 0.0
+        self._clock = 0.0
 
     @property
     def settings(self) -> RenderSettings:
@@ -81,27 +83,20 @@ class Renderer:
         _check_stops(spp, time, error)
         if spp is None and time is None and error is None:
             spp = self.settings.spp
-        start, before, state_cost, last_state = clock.perf_counter(), self.seconds, 0.0, clock.perf_counter()
         self.stop_reason = None
-        while True:
-            done = self.session.samples_done
-            for _ in self.session.render(self._pass_size(done, spp)):
-                self.seconds = before + clock.perf_counter() - start
-                if time is not None and self.seconds >= time and done:
-                    self.stop_reason = "time"
-                    break
+        self._clock = clock.perf_counter() - self.seconds
+        next_state = 0.0
+        while self.stop_reason is None:
+            self._run_pass(spp, time)
             now, done = clock.perf_counter(), self.session.samples_done
-            self.stop_reason = "spp" if spp is not None and done >= spp else self.stop_reason
-            if not (self.stop_reason or done & (done - 1) == 0 or now - last_state > max(STATE_SECONDS, STATE_COST * state_cost)):
+            if self.stop_reason is None and done & (done - 1) and now < next_state:
                 continue
-            state = self._state(before, start, reference)
-            if error is not None and state.noise is not None and state.noise <= error and not self.stop_reason:
+            state = self._record_state(reference)
+            if self.stop_reason is None and error is not None and state.noise is not None and state.noise <= error:
                 self.stop_reason = "error"
-            last_state = clock.perf_counter()
-            state_cost = last_state - now
+            cost = clock.perf_counter() - now
+            next_state = now + max(STATE_SECONDS, STATE_COST * cost)
             yield state
-            if self.stop_reason:
-                return
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
@@ -112,9 +107,19 @@ class Renderer:
             relmse = float(np.mean((film.mean - expected) ** 2 / (expected**2 + RELATIVE_FLOOR)))
         return State(self.session.samples_done, self.seconds, film.noise, relmse, film)
 
-    def _state(self, before: float, start: float, reference: NDArray[np.float32] | None) -> State:
+    def _run_pass(self, spp: int | None, time: float | None) -> None:
+        """One pass; sets the stop reason where `spp` is reached, or `time` is over, which may be inside the pass."""
+        for _ in self.session.render(self._pass_size(self.session.samples_done, spp)):
+            self.seconds = clock.perf_counter() - self._clock
+            if time is not None and self.seconds >= time and self.session.samples_done:
+                self.stop_reason = "time"
+                return
+        if spp is not None and self.session.samples_done >= spp:
+            self.stop_reason = "spp"
+
+    def _record_state(self, reference: NDArray[np.float32] | None) -> State:
         self.session.wait()
-        self.seconds = before + clock.perf_counter() - start
+        self.seconds = clock.perf_counter() - self._clock
         state = self.state(reference)
         entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
         self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
@@ -128,10 +133,11 @@ class Renderer:
 
 
 def _check(choices: Choices) -> None:
-    for name, value, known in [("layout", choices.layout, TREES), ("triangle", choices.triangle, TRIANGLE_TESTS),
-                               ("builder", choices.builder, ("sah", "midpoint")), ("lanes", choices.lanes, (1, 8, 16))]:
-        if value not in known:
-            raise UsageError(f"{name} {value!r} is unknown; choose from {', '.join(map(str, known))}")
+    known: dict[str, Sequence[object]] = {"layout": list(TREES), "triangle": list(TRIANGLE_TESTS),
+                                          "builder": list(BUILDERS), "lanes": (1, 8, 16)}
+    for name, values in known.items():
+        if (value := getattr(choices, name)) not in values:
+            raise UsageError(f"{name} {value!r} is unknown; choose from {', '.join(map(str, values))}")
 
 
 def _check_stops(spp: int | None, time: float | None, error: float | None) -> None:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pyopencl as cl
+from numpy.typing import NDArray
 
 from ..device.launch import Launches, wait_for
 from ..device.open import Device
@@ -30,6 +32,7 @@ class Session:
         self.program: BuiltProgram = build(device, compiled.source)
         self.launch = _launch_record(camera, size, max_depth, seed)
         self.samples_done = 0
+        self._next_pixel, self._pass_samples = 0, 0
         self._launches = Launches(FIRST_LAUNCH_SAMPLES)
         width, height = size
         flags = cl.mem_flags
@@ -37,9 +40,10 @@ class Session:
             self._scene = [cl.Buffer(device.context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=array)
                            for _, array in compiled.buffers.values()]
             self._film = cl.Buffer(device.context, flags.READ_WRITE, width * height * PIXEL.itemsize)
-            wait_for(cl.enqueue_fill_buffer(device.queue, self._film, np.uint8(0), 0, self._film.size))
+            wait_for(cl.enqueue_fill_buffer(device.queue, self._film, np.zeros(1, np.uint8), 0, self._film.size))
         except cl.Error as error:
-            raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes of buffers do not fit: {error}") from error
+            needed = f"{self.device_bytes} bytes of buffers do not fit"
+            raise DeviceError(f"{device.info.name}: {needed}: {error}") from error
         self._kernel = cl.Kernel(self.program.program, "path")
         self._kernel.set_args(*self._scene, compiled.counts[0], self._film, self.launch[0])
         self._warm_up()
@@ -56,17 +60,24 @@ class Session:
         return self.compiled.bytes + self.size[0] * self.size[1] * PIXEL.itemsize
 
     def render(self, samples: int) -> Iterator[None]:
-        """Adds the next `samples` samples to every pixel, in bounded launches; yields after each."""
+        """Adds the next `samples` samples to every pixel, in bounded launches; yields after each.
+
+        If it is left before its end, the next call first ends that pass.
+        """
         pixels = self.size[0] * self.size[1]
-        first = 0
-        while first < pixels:
+        if self._next_pixel == 0:
+            self._pass_samples = samples
+        samples, done = self._pass_samples, self.samples_done
+        while self.samples_done == done:
+            first = self._next_pixel
             count = min(pixels - first, max(LOCAL_SIZE * 64, self._launches.size // samples))
             self.launch["first_pixel"], self.launch["pixel_count"] = first, count
-            self.launch["first_sample"], self.launch["sample_count"] = self.samples_done, samples
-            self._launches.add(self._launch(), count * samples)
-            first += count
+            self.launch["first_sample"], self.launch["sample_count"] = done, samples
+            event = self._launch()
+            self._next_pixel = (first + count) % pixels
+            self.samples_done += samples if self._next_pixel == 0 else 0
+            self._launches.add(event, count * samples)
             yield
-        self.samples_done += samples
 
     def _launch(self) -> cl.Event:
         """Enqueues the kernel for the range in the launch record."""
@@ -92,7 +103,7 @@ class Session:
         return Film(pixels)
 
 
-def _launch_record(camera: Camera, size: tuple[int, int], max_depth: int, seed: int) -> np.ndarray[tuple[int], np.dtype[np.void]]:
+def _launch_record(camera: Camera, size: tuple[int, int], max_depth: int, seed: int) -> NDArray[Any]:
     """The LAUNCH record with its camera: right and up carry the picture's half extents (kernels/camera.cl)."""
     width, height = size
     forward = np.subtract(camera.look_at, camera.position, dtype=np.float64)

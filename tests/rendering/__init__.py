@@ -1,0 +1,1 @@
+"""Tests of the rendering room and of the kernels."""
