@@ -26,7 +26,7 @@ SURFACES = ("triangle", "sphere")
 
 @dataclass
 class Emitters:
-    """buffers: name → (C type, records). types: those in use. triangle, sphere: each one's entry of the table, or −1."""
+    """buffers: name → (C type, records). types: those in use. triangle, sphere: each one's entry in the table or −1."""
 
     buffers: dict[str, tuple[str, NDArray[Any]]]
     types: list[str]

@@ -77,7 +77,7 @@ static inline real metallic_roughness_density(const MetallicRoughnessLobes *m, r
     real visible = ggx_d(h, m->alpha) / (4.0f * wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
     real p = specular_probability(m, wo);
     real pdf = p * visible + (1.0f - p) * cosine_pdf(wi.z);
-    return (wo.z > 0.0f) & (wi.z > 0.0f) ? pdf : ZERO;
+    return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
 }
 
 static inline real3 metallic_roughness_eval(const Scene *scene, ireal index, real3 wo, real3 wi) {

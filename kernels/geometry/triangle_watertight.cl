@@ -21,7 +21,7 @@ static inline real component(real3 a, ireal axis) { return axis == 0 ? a.x : axi
 static inline TriangleRays triangle_rays(real3 origin, real3 direction) {
     real3 a = absolute3(direction);
     TriangleRays r;
-    r.kz = (a.z >= a.x) & (a.z >= a.y) ? (ireal)(2) : a.y >= a.x ? (ireal)(1) : (ireal)(0);
+    r.kz = ((a.z >= a.x) & (a.z >= a.y)) ? (ireal)(2) : a.y >= a.x ? (ireal)(1) : (ireal)(0);
     r.kx = r.kz == 2 ? (ireal)(0) : r.kz + 1;
     r.ky = r.kx == 2 ? (ireal)(0) : r.kx + 1;
     r.sz = 1.0f / component(direction, r.kz);

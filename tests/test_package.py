@@ -1,0 +1,31 @@
+"""What is installed is what the tree holds, and importing it loads nothing heavy."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+
+
+def test_wheel_holds_every_module_and_kernel(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.mkdir()
+    for name in ("setup.cfg", "pyproject.toml", "README.md", "LICENSE", "clrt", "kernels"):
+        subprocess.run(["cp", "-r", ROOT / name, source], check=True)
+    subprocess.run([sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", tmp_path, source],
+                   check=True, capture_output=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    packed = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    modules = {str(file.relative_to(ROOT)) for file in (ROOT / "clrt").rglob("*.py")} | {"clrt/py.typed"}
+    kernels = {f"clrt/{file.relative_to(ROOT)}" for pattern in ("*.cl", "__init__.py")
+               for file in (ROOT / "kernels").rglob(pattern)}
+    assert packed == modules | kernels
+
+
+def test_import_loads_nothing_heavy() -> None:
+    code = "import sys, clrt; print(*sorted({'numpy', 'pyopencl', 'pydantic', 'trimesh', 'rich'} & set(sys.modules)))"
+    result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert result.stdout.strip() == ""
