@@ -9,40 +9,71 @@ from numpy.typing import NDArray
 
 from .model import Camera, Mesh
 
-#: From the model's middle to the camera: in front (+Z), to the right and above.
-THREE_QUARTER = (0.55, 0.36, 1.0)
-FOV_DEGREES = 35.0
-#: The part of the picture's half height and half width that the box may fill.
+#: From the model to the camera: in front (+Z), 28° to the right and 17° above.
+THREE_QUARTER = (0.53, 0.34, 1.0)
+FOV_DEGREES = 30.0
+#: The part of a square picture's width or height, whichever is the tighter, that the model fills.
 FILL = 0.92
+#: Rounds of the search for the centre of the looser side; it ends by itself after 3 to 6.
+ROUNDS = 20
+
+FloatArray = NDArray[np.float64]
 
 
 def frame(meshes: list[Mesh]) -> Camera:
-    """The nearest three-quarter view that keeps the meshes' bounding box inside a square picture.
+    """The nearest three-quarter view that keeps every vertex inside a square picture, the model in its middle.
 
-    Only vertices that a face uses count. A corner q, seen from the box's middle, is inside if |q·right| and |q·up|
-    are at most FILL tan(fov/2) (d − q·back), which bounds the distance d from below.
+    Only vertices that a face uses count. The model fills FILL of the picture's width or height, and its left and right
+    margins are equal, as are those above and below.
     """
-    low, high = bounds(meshes)
-    middle, half = low / 2 + high / 2, high / 2 - low / 2
     back = np.array(THREE_QUARTER) / np.linalg.norm(THREE_QUARTER)
     right = np.cross([0.0, 1.0, 0.0], back) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], back))
-    up = np.cross(back, right)
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
-    corners = signs * half
-    aside = np.maximum(abs(corners @ right), abs(corners @ up))
-    distance = np.max(corners @ back + aside / (FILL * math.tan(math.radians(FOV_DEGREES) / 2)))
-    position = middle + back * (distance if distance > 0 else 1.0)
-    x, y, z = position.tolist()
-    at_x, at_y, at_z = middle.tolist()
-    return Camera(position=(x, y, z), look_at=(at_x, at_y, at_z), fov_degrees=FOV_DEGREES)
+    axes = np.array([right, np.cross(back, right), back])
+    vertices = _used_vertices(meshes)
+    middle = vertices.min(axis=0) / 2 + vertices.max(axis=0) / 2
+    x, y, z = axes @ (vertices - middle).T
+    # From (cx, cy, d) a vertex is seen at |x - cx| <= slope (d - z): cx + slope d and slope d - cx have lower bounds,
+    # whose sum bounds d alone.
+    slope = FILL * math.tan(math.radians(FOV_DEGREES) / 2)
+    distance = max(float(np.max(slope * z + s) + np.max(slope * z - s)) for s in (x, y)) / (2 * slope)
+    distance = distance if distance > 0 else 1.0
+    center = middle + np.array([_center(x, z, distance), _center(y, z, distance), 0.0]) @ axes
+    return Camera(position=_vector(center + distance * back), look_at=_vector(center), fov_degrees=FOV_DEGREES)
 
 
-def bounds(meshes: list[Mesh]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def bounds(meshes: list[Mesh]) -> tuple[FloatArray, FloatArray]:
     """Lowest and highest coordinates, (3,) each, of the vertices that the faces use."""
-    boxes = []
+    vertices = _used_vertices(meshes)
+    return vertices.min(axis=0), vertices.max(axis=0)
+
+
+def _used_vertices(meshes: list[Mesh]) -> FloatArray:
+    """The vertices that faces use, (n, 3)."""
+    rows = []
     for mesh in meshes:
         used = np.zeros(len(mesh.vertices), bool)
         used[mesh.faces] = True
-        vertices = mesh.vertices[used].astype(np.float64)
-        boxes.append((vertices.min(axis=0), vertices.max(axis=0)))
-    return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+        rows.append(mesh.vertices[used])
+    return np.concatenate(rows).astype(np.float64)
+
+
+def _center(x: FloatArray, z: FloatArray, distance: float) -> float:
+    """Where the camera must be along x so that the model's two edges are equally far from the picture's middle.
+
+    Its half width in the picture is the greatest (x_i - x_j) / (2 distance - z_i - z_j) of all pairs. Each round takes
+    the best pair for the last ratio (Dinkelbach 1967): the ratio grows until the pair stays the same.
+    """
+    slope, pair = 0.0, (0, 0)
+    for _ in range(ROUNDS):
+        last, pair = pair, (int(np.argmax(x + slope * z)), int(np.argmin(x - slope * z)))
+        if pair == last:
+            break
+        high, low = pair
+        slope = float((x[high] - x[low]) / (2 * distance - z[high] - z[low]))
+    high, low = pair
+    return float(x[high] + slope * z[high] + x[low] - slope * z[low]) / 2
+
+
+def _vector(values: FloatArray) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z

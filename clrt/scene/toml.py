@@ -33,7 +33,7 @@ class SceneReader:
         self.problems = [f'key "{key}" {unknown(key, SECTIONS)}' for key in document if key not in SECTIONS]
 
     def scene(self) -> Scene:
-        camera = self._build(Camera, self._table("camera"), "camera")
+        camera = self._camera(self._table("camera"))
         render = self._build(RenderSettings, self._table("render"), "render")
         environment = self._environment(self._table("environment"))
         for name, values in self._table("materials").items():
@@ -44,8 +44,14 @@ class SceneReader:
                                for i, values in enumerate(self._tables("light"))]
         meshes = [mesh for i, values in enumerate(self._tables("mesh")) for mesh in self._mesh(values, f"mesh[{i}]")]
         return Scene(meshes=meshes, spheres=[sphere for sphere in spheres if sphere], lights=lights,
-                     camera=camera or Camera(), environment=environment or Environment(),
+                     camera=camera, environment=environment or Environment(),
                      render=render or RenderSettings(), name=self._path.stem)
+
+    def _camera(self, values: Table) -> Camera:
+        """The camera; if some of it is wrong, what places it, so that this is checked all the same."""
+        camera = self._build(Camera, values, "camera")
+        place = {key: values[key] for key in ("position", "look_at", "up") if key in values}
+        return camera or (Camera() if field_problems(Camera, place, "camera") else Camera(**place))
 
     def _table(self, name: str) -> Table:
         """The section [name], empty if there is none."""

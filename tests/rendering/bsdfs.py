@@ -23,7 +23,7 @@ NUMBERS: dict[str, tuple[Any, ...]] = {
     "metallic": (0.0, 0.5, 1.0),
     "roughness": (0.01, 0.1, 0.3, 0.6, 1.0),
 }
-AZIMUTH = 1.0
+AZIMUTH, GRAZING = 1.0, 0.01
 
 
 def variants(kind: type[Material]) -> list[Material]:
@@ -74,9 +74,12 @@ def bsdfs(device: Device, materials: list[Material] | None = None) -> Bsdfs:
 
 
 def view(cosine: float) -> Doubles:
-    """A unit wo at an angle to the normal."""
-    sine = np.sqrt(1 - cosine**2)
-    return np.array([sine * np.cos(AZIMUTH), sine * np.sin(AZIMUTH), cosine])
+    """A unit wo at an angle to the normal.
+
+    At grazing angles along x: a mirror-like lobe is then 1e-7 wide in azimuth, which float32 resolves only around 0.
+    """
+    sine, azimuth = np.sqrt(1 - cosine**2), AZIMUTH if cosine > GRAZING else 0.0
+    return np.array([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine])
 
 
 def uniform(count: int, seed: int) -> Doubles:

@@ -6,12 +6,14 @@ Cells are rectangles (c0, c1, phi0, phi1) in c = 1 − cos θ and the azimuth ph
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 Doubles = NDArray[np.float64]
 HEMISPHERE = (0.0, 1.0, 0.0, 2 * np.pi)
+THINNING = (0.0, 0.1, 0.5, 0.9, 1.0)
 
 #: An integral over a rectangle is done when cutting it in four changes it by no more than these, relative or absolute.
 RELATIVE, ABSOLUTE, DEEPEST = 2e-3, 2e-6, 14
@@ -31,21 +33,41 @@ def direction(c: Doubles, phi: Doubles) -> Doubles:
     return np.column_stack([sine * np.cos(phi), sine * np.sin(phi), 1 - c])
 
 
-def count_in_cells(training: Doubles, points: Doubles, levels: int,
-                   cell: tuple[float, ...] = HEMISPHERE) -> tuple[list[tuple[float, ...]], list[int]]:
+@dataclass
+class Cells:
+    """Parts of the hemisphere: `counts[i]` points lie in the rectangles (m, 4) whose `owner` (m,) is i."""
+
+    counts: list[int]
+    rectangles: list[Doubles]
+
+    @property
+    def owner(self) -> NDArray[np.intp]:
+        return np.repeat(np.arange(len(self.counts)), [len(part) for part in self.rectangles])
+
+
+def count_in_cells(training: Doubles, points: Doubles, levels: int, cell: tuple[float, ...] = HEMISPHERE) -> Cells:
     """Cuts the hemisphere at the medians of `training`, in turn across c and phi: 2^levels cells that should hold alike.
 
-    Returns the cells and how many of `points` each holds. Both sets are charted, (n, 2), and independent.
+    Both sets are charted, (n, 2), and independent. A cell's rectangles are cut where its training points thin out, so
+    that a peak in its corner is not overlooked.
     """
     if levels == 0:
-        return [cell], [len(points)]
+        return Cells([len(points)], [_graded(training, cell)])
     axis = levels % 2
     middle = float(np.median(training[:, axis]))
     low, high = list(cell), list(cell)
     low[2 * axis + 1] = high[2 * axis] = middle
-    halves = [count_in_cells(training[side(training)], points[side(points)], levels - 1, tuple(part))
-              for part, side in ((low, lambda p: p[:, axis] < middle), (high, lambda p: p[:, axis] >= middle))]
-    return halves[0][0] + halves[1][0], halves[0][1] + halves[1][1]
+    first, second = (count_in_cells(training[side(training)], points[side(points)], levels - 1, tuple(part))
+                     for part, side in ((low, lambda p: p[:, axis] < middle), (high, lambda p: p[:, axis] >= middle)))
+    return Cells(first.counts + second.counts, first.rectangles + second.rectangles)
+
+
+def _graded(training: Doubles, cell: tuple[float, ...]) -> Doubles:
+    c, phi = (np.concatenate([cell[i:i + 1], np.quantile(training[:, i // 2], THINNING), cell[i + 1:i + 2]])
+              for i in (0, 2))
+    c0, phi0 = np.meshgrid(c[:-1], phi[:-1])
+    c1, phi1 = np.meshgrid(c[1:], phi[1:])
+    return np.stack([c0, c1, phi0, phi1], axis=-1).reshape(-1, 4)
 
 
 def integrate(density: Callable[[NDArray[np.intp], Doubles], Doubles], cells: Doubles) -> Doubles:

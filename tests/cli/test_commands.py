@@ -1,0 +1,178 @@
+"""The command line from end to end: what it writes, prints and returns."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clrt.output.images import read_image
+
+SCENE = """
+[camera]
+position = [0, 0, 5]
+[render]
+size = [24, 16]
+spp = 4
+[environment]
+color = [0.5, 0.6, 0.7]
+[materials.red]
+type = "diffuse"
+color = [0.8, 0.1, 0.1]
+[[sphere]]
+radius = 1
+material = "red"
+"""
+REPORT_FIELDS = {
+    "scene", "device", "platform", "driver", "version", "width", "height", "spp", "max_depth", "seed", "seconds",
+    "samples", "samples_per_second", "rays", "rays_per_second", "stop_reason", "noise", "nonfinite_samples", "bvh",
+    "kernel", "peak_device_bytes", "history", "total_seconds"}
+BVH_FIELDS = {"triangles", "spheres", "instances", "nodes", "bytes", "build_seconds", "sah_cost", "layout"}
+
+
+def clrt(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "clrt", *map(str, arguments)], cwd=cwd, capture_output=True, text=True)
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "ball.toml"
+    path.write_text(SCENE)
+    return path
+
+
+def test_render_writes_pictures_and_report(scene: Path) -> None:
+    result = clrt("render", scene, "-o", "a.exr", "-o", "a.png", "-o", "a.hdr", "--report", "r.json", cwd=scene.parent)
+    assert (result.returncode, result.stdout.split()) == (0, ["a.exr", "a.png", "a.hdr", "r.json"]), result.stderr
+    pixels = read_image(scene.parent / "a.exr")
+    assert pixels.shape == (16, 24, 3)
+    assert pixels[0, 0] == pytest.approx([0.5, 0.6, 0.7], rel=1e-6), "the sky fills the corner"
+    report = json.loads((scene.parent / "r.json").read_text())
+    assert REPORT_FIELDS <= set(report) and BVH_FIELDS <= set(report["bvh"])
+    assert (report["spp"], report["samples"], report["stop_reason"]) == (4, 24 * 16 * 4, "spp")
+    assert [entry["spp"] for entry in report["history"]] == [1, 2, 4]
+    assert {"build_seconds", "cached", "features"} <= set(report["kernel"])
+
+
+def test_default_output_is_named_after_the_scene(scene: Path) -> None:
+    result = clrt("render", scene, "-q", cwd=scene.parent)
+    assert (result.returncode, result.stdout, result.stderr) == (0, "ball.png\n", "")
+    assert read_image(scene.parent / "ball.png").shape == (16, 24, 3)
+
+
+def test_command_line_overrides_the_scene_and_measures_against_a_reference(scene: Path) -> None:
+    options = ("--size", "8x8", "--seed", "7", "--depth", "2")
+    assert clrt("render", scene, *options, "--spp", "512", "-o", "ref.exr", cwd=scene.parent).returncode == 0
+    result = clrt("render", scene, *options, "--spp", "8", "--reference", "ref.exr", "--report", "r.json",
+                  "--progress", "json", cwd=scene.parent)
+    report = json.loads((scene.parent / "r.json").read_text())
+    assert (report["width"], report["height"], report["seed"], report["max_depth"]) == (8, 8, 7, 2)
+    assert all(entry["relmse"] >= 0 for entry in report["history"])
+    assert report["history"][-1]["relmse"] < report["history"][0]["relmse"]
+    phases = [json.loads(line)["phase"] for line in result.stderr.splitlines()]
+    assert list(dict.fromkeys(phases)) == ["load", "build", "compile", "render", "write"]
+
+
+def test_time_and_error_end_a_render(scene: Path) -> None:
+    clrt("render", scene, "--time", "0.3", "--report", "t.json", cwd=scene.parent)
+    clrt("render", scene, "--error", "0.01", "--report", "e.json", cwd=scene.parent)
+    timed, measured = (json.loads((scene.parent / name).read_text()) for name in ("t.json", "e.json"))
+    assert timed["stop_reason"] == "time" and timed["seconds"] >= 0.3 and timed["spp"] > 4
+    assert measured["stop_reason"] == "error" and measured["noise"] <= 0.01
+
+
+def test_interrupt_keeps_the_picture(scene: Path) -> None:
+    command = [sys.executable, "-m", "clrt", "render", str(scene), "--time", "600", "-o", "i.exr", "--report", "i.json",
+               "--progress", "json"]
+    process = subprocess.Popen(command, cwd=scene.parent, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    while '"spp"' not in process.stderr.readline():
+        assert process.poll() is None, "ended before it was interrupted"
+    time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert json.loads((scene.parent / "i.json").read_text())["stop_reason"] == "interrupted"
+    assert read_image(scene.parent / "i.exr")[0, 0] == pytest.approx([0.5, 0.6, 0.7], rel=1e-6)
+
+
+def test_six_mistakes_are_six_messages(tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text("""
+[camera]
+position = [0, 0, 0]
+look_at = [0, 0, 0]
+fov_degrees = 400
+[render]
+sise = [64, 64]
+[materials.white]
+type = "difuse"
+[[sphere]]
+radius = -1
+material = "whit"
+[[mesh]]
+file = "nowhere.ply"
+""")
+    result = clrt("render", "bad.toml", cwd=tmp_path)
+    assert result.returncode == 3 and result.stdout == ""
+    errors = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
+    for word in ("look_at", "fov_degrees", "sise", "difuse", "radius", "whit", "nowhere.ply"):
+        assert any(word in line for line in errors), f"{word} is not named in:\n{result.stderr}"
+    assert "did you mean" in result.stderr and "Traceback" not in result.stderr
+    assert not list(tmp_path.glob("*.png"))
+
+
+@pytest.mark.parametrize(("arguments", "code", "words"), [
+    (("render", "missing.toml"), 3, ["missing.toml"]),
+    (("render", "ball.toml", "-o", "no/such/folder/x.png"), 6, ["no/such/folder"]),
+    (("render", "ball.toml", "-o", "x.pgn"), 6, [".pgn", "did you mean", ".png"]),
+    (("render", "ball.toml", "--device", "nonesuch"), 4, ["nonesuch"]),
+    (("render", "ball.toml", "--size", "0x4"), 2, ["0x4"]),
+    (("render", "ball.toml", "--view", "srbg"), 2, ["srbg"]),
+    (("render", "ball.toml", "--spp", "0"), 2, ["--spp"]),
+    (("render", "ball.toml", "--time", "-1"), 2, ["time", "-1"]),
+    (("compare", "ball.toml", "ball.toml"), 3, ["ball.toml"]),
+])
+def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], code: int, words: list[str]) -> None:
+    result = clrt(*arguments, cwd=scene.parent)
+    assert result.returncode == code and result.stdout == ""
+    assert "Traceback" not in result.stderr and all(word in result.stderr for word in words), result.stderr
+
+
+def test_print_kernel_prints_what_the_scene_needs(scene: Path) -> None:
+    source = clrt("render", scene, "--print-kernel", cwd=scene.parent).stdout
+    assert "kernel void path" in source and "diffuse_eval" in source and "intersect_sphere" in source
+    assert "mirror_eval" not in source and "intersect_triangles(const" not in source and "sky_texels" not in source
+
+
+def test_info_lists_what_is_compiled_and_uploaded(scene: Path) -> None:
+    info = json.loads(clrt("info", scene, "--json", cwd=scene.parent).stdout)
+    assert info["spheres"] == 1 and info["triangles"] == 0 and info["materials"] == {"diffuse": 1}
+    assert "MATERIAL_DIFFUSE" in info["features"] and "bsdf/diffuse.cl" in info["files"]
+    assert sum(info["buffers"].values()) == info["bytes"]
+
+
+def test_devices_lists_the_one_in_use(scene: Path) -> None:
+    devices = json.loads(clrt("devices", "--json", cwd=scene.parent).stdout)
+    fields = {"index", "id", "name", "platform", "platform_version", "driver", "type", "compute_units", "global_bytes",
+              "max_alloc_bytes", "usable", "why", "chosen"}
+    assert all(fields <= set(device) for device in devices)
+    assert [device["chosen"] for device in devices].count(True) == 1
+    chosen = next(device for device in devices if device["chosen"])
+    assert clrt("render", scene, "--device", chosen["id"], cwd=scene.parent).returncode == 0
+
+
+def test_compare_prints_the_metrics(scene: Path) -> None:
+    from clrt.output.images import write_image
+
+    reference = np.full((4, 4, 3), 0.5, np.float32)
+    write_image(scene.parent / "r.exr", reference)
+    write_image(scene.parent / "i.exr", reference * np.float32(1.1))
+    result = json.loads(clrt("compare", "i.exr", "r.exr", "--json", cwd=scene.parent).stdout)
+    assert result["relmse"] == pytest.approx(0.05**2 / (0.5**2 + 0.01), rel=1e-5)
+    assert result["mean_ratio"] == pytest.approx([1.1] * 3, rel=1e-6) and result["nonfinite"] == 0
