@@ -2,11 +2,16 @@
 
 `NAME.json` has a camera (`fov`: full angle, of a square picture), materials, shapes (.ply meshes, spheres), lights and
 `max_depth`; `NAME.exr` is the converged picture; meshes and environment pictures lie beside them.
+
+    python -m tests.references FOLDER [SPP]
+
+renders each and prints how far it is from its picture.
 """
 
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from math import sqrt
@@ -90,3 +95,24 @@ MAKERS: dict[str, Callable[[Record], Material]] = {
 def _triple(values: list[float]) -> tuple[float, float, float]:
     x, y, z = values
     return float(x), float(y), float(z)
+
+
+def main(folder: Path, spp: int) -> None:
+    """Prints a line for each reference in `folder`."""
+    import clrt
+
+    print(f"{'reference':16} {'relMSE':>10} {'noise²':>10}  {'mean ratio - 1, in 1e-5':28} seconds")
+    for path in sorted(folder.glob("*.json")):
+        try:
+            scene, expected = load_reference(path)
+        except (ValueError, KeyError):
+            continue  # an index or a table, or a scene that clrt cannot draw
+        image = clrt.render(scene, spp=spp)
+        result = clrt.compare(image.pixels, expected)
+        ratios = "".join(f"{(ratio - 1) * 1e5:9.1f}" for ratio in result["mean_ratio"])
+        print(f"{path.stem:16} {result['relmse']:10.3g} {image.report['noise'] ** 2:10.3g}  {ratios}  "
+              f"{image.report['seconds']:6.1f}", flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 256)

@@ -21,6 +21,10 @@ static inline ireal sky_texel(const Scene *scene, real2 uv) {
     return clamp_index(TO_INT(uv.y * (float)height), height) * width + clamp_index(TO_INT(uv.x * (float)width), width);
 }
 
+static inline float4 sky_texel_at(const Scene *scene, int texel) {
+    return vload4(0, (global const float *)(scene->sky_texels + texel));
+}
+
 static inline real3 sky_radiance_uv(const Scene *scene, real2 uv) {
     int width = scene->environment->width, height = scene->environment->height;
     real x = uv.x * (float)width - 0.5f, y = uv.y * (float)height - 0.5f;
@@ -29,11 +33,18 @@ static inline real3 sky_radiance_uv(const Scene *scene, real2 uv) {
     ireal left = column < 0 ? column + width : column;
     ireal right = column + 1 >= width ? column + 1 - width : column + 1;
     ireal top = clamp_index(row, height) * width, bottom = clamp_index(row + 1, height) * width;
-    real3 upper = mad3(GATHER3(scene->sky_texels, top + left, .radiance), 1.0f - fx,
-                       scale(GATHER3(scene->sky_texels, top + right, .radiance), fx));
-    real3 lower = mad3(GATHER3(scene->sky_texels, bottom + left, .radiance), 1.0f - fx,
-                       scale(GATHER3(scene->sky_texels, bottom + right, .radiance), fx));
-    return mad3(upper, 1.0f - fy, scale(lower, fy));
+    IntLanes corners[4] = {{top + left}, {top + right}, {bottom + left}, {bottom + right}};
+    RealLanes r, g, b;
+    for (int lane = 0; lane < LANES; ++lane) {
+        float u = LANE(fx, lane), v = LANE(fy, lane);
+        float4 upper = mix(sky_texel_at(scene, corners[0].lane[lane]), sky_texel_at(scene, corners[1].lane[lane]), u);
+        float4 lower = mix(sky_texel_at(scene, corners[2].lane[lane]), sky_texel_at(scene, corners[3].lane[lane]), u);
+        float4 radiance = mix(upper, lower, v);
+        r.lane[lane] = radiance.x;
+        g.lane[lane] = radiance.y;
+        b.lane[lane] = radiance.z;
+    }
+    return (real3){r.all, g.all, b.all};
 }
 
 static inline real3 sky_radiance(const Scene *scene, real3 wi) { return sky_radiance_uv(scene, sky_uv(scene, wi)); }

@@ -79,7 +79,7 @@ def view(cosine: float) -> Doubles:
     At grazing angles along x: a mirror-like lobe is then 1e-7 wide in azimuth, which float32 resolves only around 0.
     """
     sine, azimuth = np.sqrt(1 - cosine**2), AZIMUTH if cosine > GRAZING else 0.0
-    return np.array([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine])
+    return np.array([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], np.float32).astype(np.float64)
 
 
 def uniform(count: int, seed: int) -> Doubles:
