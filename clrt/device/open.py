@@ -27,6 +27,11 @@ class Device:
         return 8 if self.info.type == "cpu" else 1
 
     @property
+    def local_size(self) -> int:
+        """Work-items of a group. On a CPU one: its compiler then has no loop over work-items to write around."""
+        return 1 if self.info.type == "cpu" else 64
+
+    @property
     def layout(self) -> str:
         """The tree layout that suits the device: eight boxes at a time where there are vectors, else two."""
         return "bvh8" if self.info.type == "cpu" else "bvh2"

@@ -19,7 +19,8 @@ from .compile import CompiledScene
 from .film import Film
 from .records import LAUNCH, PIXEL
 
-LOCAL_SIZE = 16
+#: Pixels of a launch, at least.
+FEWEST_PIXELS = 1024
 FIRST_LAUNCH_SAMPLES = 1 << 15
 
 
@@ -70,7 +71,7 @@ class Session:
         samples, done = self._pass_samples, self.samples_done
         while self.samples_done == done:
             first = self._next_pixel
-            count = min(pixels - first, max(LOCAL_SIZE * 64, self._launches.size // samples))
+            count = min(pixels - first, max(FEWEST_PIXELS, self._launches.size // samples))
             self.launch["first_pixel"], self.launch["pixel_count"] = first, count
             self.launch["first_sample"], self.launch["sample_count"] = done, samples
             event = self._launch()
@@ -82,8 +83,9 @@ class Session:
     def _launch(self) -> cl.Event:
         """Enqueues the kernel for the range in the launch record."""
         self._kernel.set_arg(len(self._scene) + 2, self.launch[0])
-        groups = max(1, -(-int(self.launch["pixel_count"][0]) // (self.compiled.choices.lanes * LOCAL_SIZE)))
-        event = cl.enqueue_nd_range_kernel(self.device.queue, self._kernel, (groups * LOCAL_SIZE,), (LOCAL_SIZE,))
+        local = self.device.local_size
+        groups = max(1, -(-int(self.launch["pixel_count"][0]) // (self.compiled.choices.lanes * local)))
+        event = cl.enqueue_nd_range_kernel(self.device.queue, self._kernel, (groups * local,), (local,))
         self.device.queue.flush()
         return event
 
@@ -93,7 +95,7 @@ class Session:
 
     def pass_limit(self) -> int:
         """The most samples a pixel that one pass should add: a pass of one launch per 1024 pixels at least."""
-        return max(1, self._launches.size // (LOCAL_SIZE * 64))
+        return max(1, self._launches.size // FEWEST_PIXELS)
 
     def film(self) -> Film:
         """The film so far; waits for the launches in flight."""
