@@ -28,8 +28,9 @@ static inline real3 found_light(const Scene *scene, const Step *step, const Surf
 #endif
 #if SKY
     if (ANY(escaped)) {
-        real weight = step->specular ? ONE : power_heuristic(step->pdf, sky_pdf(scene, step->wi));
-        L = choose(escaped, scale(sky_radiance(scene, step->wi), weight), L);
+        real3 wi = choose(escaped, step->wi, vector(ZERO, ONE, ZERO));   // an idle lane's may be NaN, and so its texel
+        real weight = step->specular ? ONE : power_heuristic(step->pdf, sky_pdf(scene, wi));
+        L = choose(escaped, scale(sky_radiance(scene, wi), weight), L);
     }
 #endif
     return L;

@@ -16,7 +16,6 @@ from clrt.scene.model import Scene
 
 Rows = NDArray[np.float64]
 ENTRIES = '#line 1 "probe.cl"\n' + (Path(__file__).parent / "kernels" / "probe.cl").read_text(encoding="utf-8")
-LOCAL_SIZE = 16
 
 
 def choices(device: Device, **chosen: Any) -> Choices:
@@ -50,7 +49,8 @@ class Probe:
         kernel = cl.Kernel(self._program, f"probe_{entry}")
         kernel.set_args(*self._scene, self.compiled.counts[0], np.uint32(n), source, target,
                         *map(np.uint32, scalars.values()))
-        per_group = self.compiled.choices.lanes * LOCAL_SIZE
-        cl.enqueue_nd_range_kernel(queue, kernel, (-(-n // per_group) * LOCAL_SIZE,), (LOCAL_SIZE,))
+        local = self._device.local_size
+        groups = -(-n // (self.compiled.choices.lanes * local))
+        cl.enqueue_nd_range_kernel(queue, kernel, (groups * local,), (local,))
         cl.enqueue_copy(queue, answer, target)
         return answer.T.astype(np.float64)

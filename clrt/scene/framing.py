@@ -17,7 +17,7 @@ FILL = 0.92
 #: Rounds of the search for the centre of the looser side; it ends by itself after 3 to 6.
 ROUNDS = 20
 
-FloatArray = NDArray[np.float64]
+Doubles = NDArray[np.float64]
 
 
 def frame(meshes: list[Mesh]) -> Camera:
@@ -41,13 +41,13 @@ def frame(meshes: list[Mesh]) -> Camera:
     return Camera(position=_vector(center + distance * back), look_at=_vector(center), fov_degrees=FOV_DEGREES)
 
 
-def bounds(meshes: list[Mesh]) -> tuple[FloatArray, FloatArray]:
+def bounds(meshes: list[Mesh]) -> tuple[Doubles, Doubles]:
     """Lowest and highest coordinates, (3,) each, of the vertices that the faces use."""
     vertices = _used_vertices(meshes)
     return vertices.min(axis=0), vertices.max(axis=0)
 
 
-def _used_vertices(meshes: list[Mesh]) -> FloatArray:
+def _used_vertices(meshes: list[Mesh]) -> Doubles:
     """The vertices that faces use, (n, 3)."""
     rows = []
     for mesh in meshes:
@@ -57,7 +57,7 @@ def _used_vertices(meshes: list[Mesh]) -> FloatArray:
     return np.concatenate(rows).astype(np.float64)
 
 
-def _center(x: FloatArray, z: FloatArray, distance: float) -> float:
+def _center(x: Doubles, z: Doubles, distance: float) -> float:
     """Where the camera must be along x so that the model's two edges are equally far from the picture's middle.
 
     Its half width in the picture is the greatest (x_i - x_j) / (2 distance - z_i - z_j) of all pairs. Each round takes
@@ -74,6 +74,6 @@ def _center(x: FloatArray, z: FloatArray, distance: float) -> float:
     return float(x[high] + slope * z[high] + x[low] - slope * z[low]) / 2
 
 
-def _vector(values: FloatArray) -> tuple[float, float, float]:
+def _vector(values: Doubles) -> tuple[float, float, float]:
     x, y, z = values.tolist()
     return x, y, z

@@ -103,21 +103,22 @@ kernel void probe_any_hit(SCENE_PARAMETERS, uint n, global const float *in, glob
 }
 
 #if PRIMITIVES
-// in: origin (3), direction (3), new direction (3) -> out: p, p_error, ng (3 each), the new ray's origin (3), its hit's t and
-// primitive
+// in: origin (3), direction (3), new direction (3) -> out: primitive; p, p_error, ng (3 each); the new ray's origin (3), its
+// t. All is 0 where the first ray misses.
 kernel void probe_leave(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     real3 origin = ROW3(in, 0), direction = ROW3(in, 3), next = ROW3(in, 6);
     Hits hits = closest_hit(&scene, origin, direction, active);
+    ireal hit = hits.primitive >= 0;
     Surface surface = surface_at(&scene, origin, direction, &hits);
     real3 left = offset_origin(surface.p, surface.p_error, surface.ng, next);
-    Hits again = closest_hit(&scene, left, next, active);
-    put3(out, n, 0, surface.p);
-    put3(out, n, 3, surface.p_error);
-    put3(out, n, 6, surface.ng);
-    put3(out, n, 9, left);
-    put(out, n, 12, again.t);
-    put(out, n, 13, TO_REAL(again.primitive));
+    Hits again = closest_hit(&scene, left, next, active & hit);
+    put(out, n, 0, TO_REAL(hits.primitive));
+    put3(out, n, 1, choose(hit, surface.p, splat(ZERO)));
+    put3(out, n, 4, choose(hit, surface.p_error, splat(ZERO)));
+    put3(out, n, 7, choose(hit, surface.ng, splat(ZERO)));
+    put3(out, n, 10, choose(hit, left, splat(ZERO)));
+    put(out, n, 13, hit ? again.t : ZERO);
 }
 #endif
 

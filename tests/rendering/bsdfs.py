@@ -23,7 +23,9 @@ NUMBERS: dict[str, tuple[Any, ...]] = {
     "metallic": (0.0, 0.5, 1.0),
     "roughness": (0.01, 0.1, 0.3, 0.6, 1.0),
 }
-AZIMUTH, GRAZING = 1.0, 0.01
+AZIMUTH = 1.0
+GRAZING = 2.0**-10      # its sine is 1 − 2^-21, a float32
+COSINES = (1.0, 0.6, 0.1, GRAZING)
 
 
 def variants(kind: type[Material]) -> list[Material]:
@@ -74,11 +76,11 @@ def bsdfs(device: Device, materials: list[Material] | None = None) -> Bsdfs:
 
 
 def view(cosine: float) -> Doubles:
-    """A unit wo at an angle to the normal.
+    """A unit wo at an angle to the normal, with components that float32 holds.
 
-    At grazing angles along x: a mirror-like lobe is then 1e-7 wide in azimuth, which float32 resolves only around 0.
+    At GRAZING it is along x, where a mirror-like lobe is 1e-7 wide in azimuth, which float32 resolves only around 0.
     """
-    sine, azimuth = np.sqrt(1 - cosine**2), AZIMUTH if cosine > GRAZING else 0.0
+    sine, azimuth = np.sqrt(1 - cosine**2), 0.0 if cosine == GRAZING else AZIMUTH
     return np.array([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], np.float32).astype(np.float64)
 
 

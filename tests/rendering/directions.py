@@ -1,8 +1,7 @@
 """Cells of the upper hemisphere in which every lobe is smooth, and the integral of a density over them.
 
-A direction wi is charted by its half vector with wo, h = (wo + wi)/|wo + wi|: the azimuth phi of h from wo, and the
-logarithm of its slope r = tan θ over the slope at which wi sinks below the horizon. With wo = (s, 0, c) that is the
-root of c·r² − 2·r·s·cos phi − c = 0. A mirror-like lobe, around slope 0, and a wide one then both spread over many cells.
+A direction wi is charted by its half vector with wo, h = (wo + wi)/|wo + wi|: the logarithm of h's slope r = tan θ and
+its azimuth from wo. A mirror-like lobe, around slope 0, and a wide one then both spread over many cells.
 """
 
 from __future__ import annotations
@@ -14,41 +13,45 @@ from numpy.typing import NDArray
 
 Doubles = NDArray[np.float64]
 
-RADIAL, AZIMUTHAL = 40, 12
-LOWEST = np.log(1e-8)
+#: Rows of cells in log r, columns in azimuth. 90°, where the horizon runs at grazing wo, is the middle of a column.
+ROWS, COLUMNS = 48, 12
+LOWEST, HIGHEST = np.log(1e-6), np.log(1e4)
 #: Points inside a cell at which a density is summed.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
-STEPS = 12
+STEPS = 24
 
 
 def count(wo: Doubles, wi: Doubles) -> NDArray[np.int64]:
-    """(RADIAL·AZIMUTHAL,) how many of the unit vectors wi (n, 3) lie in each cell."""
-    h = wo + wi
-    azimuth = np.arctan2(h[:, 1], h[:, 0]) - np.arctan2(wo[1], wo[0])
-    slope = np.hypot(h[:, 0], h[:, 1]) / h[:, 2]
-    depth = np.log(np.maximum(slope / _horizon(wo, azimuth), 1e-30)) / LOWEST
-    row = np.clip(depth * RADIAL, 0, RADIAL - 1).astype(np.intp)
-    column = np.minimum(azimuth / (2 * np.pi) % 1 * AZIMUTHAL, AZIMUTHAL - 1).astype(np.intp)
-    return np.bincount(row * AZIMUTHAL + column, minlength=RADIAL * AZIMUTHAL)
+    """(ROWS·COLUMNS,) how many of the unit vectors wi (n, 3) lie in each cell."""
+    x, y, z = wi.T
+    # Where x is nearly ±1 its last bit is as much as a narrow lobe at grazing wo is wide; y and z say it better.
+    exact_x = np.where(np.abs(x) > 0.9, np.copysign(np.sqrt(np.maximum(1 - y * y - z * z, 0)), x), x)
+    h = wo + np.column_stack([exact_x, y, z])
+    turn = (np.arctan2(h[:, 1], h[:, 0]) - np.arctan2(wo[1], wo[0])) / (2 * np.pi) + 0.5 / COLUMNS
+    slope = np.maximum(np.hypot(h[:, 0], h[:, 1]) / h[:, 2], 1e-30)
+    row = np.clip((np.log(slope) - LOWEST) / (HIGHEST - LOWEST) * ROWS, 0, ROWS - 1).astype(np.intp)
+    column = np.minimum(turn % 1 * COLUMNS, COLUMNS - 1).astype(np.intp)
+    return np.bincount(row * COLUMNS + column, minlength=ROWS * COLUMNS)
 
 
 def integrate(density: Callable[[Doubles], Doubles], wo: Doubles) -> Doubles:
-    """(RADIAL·AZIMUTHAL,) integrals over solid angle of density(wi (n, 3)) -> (n,) above the horizon."""
-    phi = 2 * np.pi * (np.arange(AZIMUTHAL * STEPS) + 0.5) / (AZIMUTHAL * STEPS)
-    log_rho = LOWEST * (np.arange(RADIAL)[:, None] + (NODES + 1) / 2).reshape(-1, 1) / RADIAL
-    r = np.ravel(np.exp(log_rho) * _horizon(wo, phi))
-    azimuth = np.tile(phi, RADIAL * len(NODES)) + np.arctan2(wo[1], wo[0])
+    """(ROWS·COLUMNS,) integrals over solid angle of density(wi (n, 3)) -> (n,) above the horizon."""
+    phi = 2 * np.pi * ((np.arange(COLUMNS * STEPS) + 0.5) / STEPS - 0.5) / COLUMNS
+    edges = np.minimum(np.linspace(LOWEST, HIGHEST, ROWS + 1)[:, None], _log_horizon(wo, phi))
+    low, width = edges[:-1, None], (edges[1:] - edges[:-1])[:, None]
+    r = np.exp(low + width * (NODES[:, None] + 1) / 2).ravel()
+    azimuth = np.tile(phi, ROWS * len(NODES)) + np.arctan2(wo[1], wo[0])
     h = np.column_stack([r * np.cos(azimuth), r * np.sin(azimuth), np.ones(len(r))]) / np.sqrt(1 + r * r)[:, None]
     cosine = h @ wo
     # dωi = 4 (wo·h) dωh, and dωh = cos³θ times the area r dr dphi = r² d(log r) dphi of slopes.
     jacobian = 4 * cosine * h[:, 2]**3 * r * r
     values = density(2 * cosine[:, None] * h - wo) * jacobian
-    area = -LOWEST / RADIAL / 2 * 2 * np.pi / (AZIMUTHAL * STEPS)
-    return np.einsum("rnas,n->ra", values.reshape(RADIAL, len(NODES), AZIMUTHAL, STEPS), WEIGHTS).ravel() * area
+    parts = values.reshape(ROWS, len(NODES), COLUMNS * STEPS) * width * WEIGHTS[:, None] / 2
+    return parts.reshape(ROWS, len(NODES), COLUMNS, STEPS).sum(axis=(1, 3)).ravel() * 2 * np.pi / (COLUMNS * STEPS)
 
 
-def _horizon(wo: Doubles, azimuth: Doubles) -> Doubles:
-    """The half vector's slope, at an azimuth from wo, at which wi meets the horizon."""
+def _log_horizon(wo: Doubles, azimuth: Doubles) -> Doubles:
+    """log r where wi meets the horizon: the root of c·r² − 2·r·s·cos(azimuth) − c = 0 for wo = (s, 0, c)."""
     b, c = np.hypot(wo[0], wo[1]) * np.cos(azimuth), wo[2]
     root = np.sqrt(b * b + c * c)
-    return np.where(b > 0, (b + root) / c, c / (root - np.minimum(b, 0)))
+    return np.log(np.where(b > 0, (b + root) / c, c / (root - np.minimum(b, 0))))

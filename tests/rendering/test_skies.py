@@ -1,0 +1,130 @@
+"""Skies: looked up by the convention, sampled by their brightness, and bright as a quadrature says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.device.open import Device
+from clrt.scene.model import Environment, Scene
+
+from ..probe import Probe
+from ..stats import chi2_test, mean_test, sidak
+from . import skies
+
+Doubles = NDArray[np.float64]
+COUNT, FAMILY = 1 << 19, 1e-3
+HEIGHT, WIDTH = 16, 32
+
+
+def gradient() -> NDArray[np.float32]:
+    """Brighter downwards and around, in each channel differently."""
+    v, u = np.meshgrid((np.arange(HEIGHT) + 0.5) / HEIGHT, (np.arange(WIDTH) + 0.5) / WIDTH, indexing="ij")
+    return np.stack([0.1 + v, 1.5 + np.sin(2 * np.pi * u), 1.2 + v * np.cos(2 * np.pi * u)], axis=-1).astype(np.float32)
+
+
+def sun() -> NDArray[np.float32]:
+    """One texel of 1e5 in uneven haze."""
+    image = np.random.default_rng(1).uniform(0.5, 1.5, (HEIGHT, WIDTH, 3)).astype(np.float32)
+    image[4, 20] = 1e5
+    return image
+
+
+def texel(values: tuple[float, float, float]) -> NDArray[np.float32]:
+    return np.array([[values]], np.float32)
+
+
+SKIES = {"gradient": (gradient(), 0.0), "turned": (gradient(), 77.0), "sun": (sun(), -130.0),
+         "one_texel": (texel((0.5, 1.0, 2.0)), 10.0)}
+
+
+@pytest.fixture(scope="module", params=SKIES)
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def probe(device: Device, name: str) -> Probe:
+    image, rotation = SKIES[name]
+    return Probe(device, Scene(environment=Environment(image=image, rotation_degrees=rotation)))
+
+
+def directions(count: int) -> Doubles:
+    """Unit vectors everywhere, both poles, and both sides of the seam and of the axes."""
+    w = np.random.default_rng(2).normal(size=(count, 3))
+    w /= np.linalg.norm(w, axis=1, keepdims=True)
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    seam = np.array([[x, y, -np.sqrt(1 - y * y)] for x in (0.0, -0.0, 1e-6, -1e-6) for y in (-0.7, 0.0, 0.9)])
+    return np.concatenate([w, axes, seam]).astype(np.float32).astype(np.float64)
+
+
+def test_radiance_follows_the_convention(probe: Probe, name: str) -> None:
+    """An angle is off by 4e-7 at most (atan2 of OpenCL: 6 ulp); that moves radiance by the image's steepest step."""
+    image, rotation = SKIES[name]
+    w = directions(100_000)
+    found = probe("sky", 4, w)[:, :3]
+    steps = [np.abs(np.diff(image.astype(np.float64), axis=axis, append=image.take([0], axis=axis))).max(initial=0)
+             for axis in (0, 1)]
+    # Near the poles the azimuth is as uncertain as the direction's last digits are large beside its sine.
+    blur = 4e-7 * np.maximum(1, 0.1 / np.maximum(np.hypot(w[:, 0], w[:, 2]), 1e-30))
+    tolerance = blur * max(steps) * 2 * WIDTH + 1e-6 * image.max()
+    smooth = np.hypot(w[:, 0], w[:, 2]) > 1e-5   # at a pole itself no azimuth is wrong
+    error = np.abs(found - skies.lookup(image, w, rotation)).max(axis=1)
+    assert np.all(error[smooth] <= tolerance[smooth])
+    assert np.isfinite(found).all()
+
+
+def test_density_integrates_to_one(probe: Probe) -> None:
+    """∫ pdf dω by the midpoint rule: 8 by 8 points a texel, inside which pdf·sin θ is constant."""
+    v, u = np.meshgrid((np.arange(8 * HEIGHT) + 0.5) / (8 * HEIGHT), (np.arange(8 * WIDTH) + 0.5) / (8 * WIDTH),
+                       indexing="ij")
+    pdf = probe("sky", 4, skies.from_uv(u.ravel(), v.ravel()))[:, 3]
+    integral = np.sum(pdf * np.sin(np.pi * v.ravel())) * 2 * np.pi**2 / v.size
+    assert abs(integral - 1) < 2e-6 * WIDTH   # where the sky is turned, edges of texels round to either side
+
+
+def test_samples_follow_the_density(probe: Probe, name: str) -> None:
+    """Chi-square over the texels; each sample reports the density and radiance that its direction has."""
+    image, rotation = SKIES[name]
+    height, width = image.shape[:2]
+    sample = probe("light_sample", 12, np.zeros((COUNT, 3)), seed=3)
+    u, v = skies.to_uv(skies.turned(sample[:, :3], -rotation))
+    cell = np.minimum((v * height).astype(int), height - 1) * width + np.minimum((u * width).astype(int), width - 1)
+    density = probe.compiled.buffers["sky_texels"][1]["density"].astype(np.float64)
+    found = np.bincount(cell, minlength=density.size)
+    assert density.size == 1 or chi2_test(found, density / density.sum() * COUNT) > 1e-4
+
+    looked_up = probe("sky", 4, sample[:, :3])
+    inside = np.all([np.abs(x * size % 1 - 0.5) < 0.499 for x, size in ((u, width), (v, height))], axis=0)
+    inside &= np.hypot(sample[:, 0], sample[:, 2]) > 0.01
+    np.testing.assert_allclose(looked_up[inside, 3], sample[inside, 6], rtol=2e-5)
+    np.testing.assert_allclose(looked_up[inside, :3], sample[inside, 3:6], rtol=1e-3, atol=1e-5 * image.max())
+
+
+def test_irradiance(probe: Probe, name: str) -> None:
+    """The samples' mean of radiance·cos/pdf against a quadrature in float64."""
+    image, rotation = SKIES[name]
+    normals = np.array([[0.0, 1.0, 0.0], [0.6, 0.0, -0.8], [-0.48, -0.6, 0.64]])
+    p_values = []
+    for seed, normal in enumerate(normals):
+        sample = probe("light_sample", 12, np.zeros((COUNT, 3)), seed=seed)
+        values = sample[:, 3:6] * (np.maximum(sample[:, :3] @ normal, 0) / sample[:, 6])[:, None]
+        expected = skies.irradiance(image, normal, rotation, steps=24 if image.size > 3 else 1000)
+        # The quadrature's own error is some 1e-5.
+        p_values.append(mean_test(values.mean(axis=0), values.var(axis=0) + COUNT * (3e-5 * expected)**2, COUNT, expected))
+    assert np.min(p_values) > sidak(FAMILY, np.size(p_values))
+
+
+def test_constant_sky(device: Device) -> None:
+    """The same from everywhere, and left to the surfaces' own directions."""
+    probe = Probe(device, Scene(environment=Environment(color=(0.5, 0.25, 2.0), strength=3.0)))
+    out = probe("sky", 4, directions(100))
+    assert np.all(out == [1.5, 0.75, 6.0, 0.0])
+    assert probe.compiled.counts["lights"] == 0
+
+
+def test_black_sky_is_left_out(device: Device) -> None:
+    for black in (Environment(), Environment(image=np.zeros((2, 4, 3), np.float32)),
+                  Environment(color=(1.0, 1.0, 1.0), strength=0.0)):
+        assert "SKY" not in Probe(device, Scene(environment=black)).compiled.features

@@ -1,0 +1,175 @@
+"""Rays through every tree layout: no cracks, the hits of brute force in float64, and ties broken alike."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.device.open import Device
+from clrt.scene.model import Mesh, Scene, Sphere
+
+from ..accel.cases import soup, spheres
+from ..probe import Probe
+from . import rays
+
+Doubles = NDArray[np.float64]
+LAYOUTS = ("bvh8", "bvh2", "list")
+TREES = (("bvh8", "sah"), ("bvh8", "midpoint"), ("bvh2", "sah"), ("bvh2", "midpoint"))
+
+
+def mesh(corners: NDArray[np.float32]) -> Mesh:
+    """Triangles (m, 3, 3) that share nothing."""
+    return Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3))
+
+
+def balls(table: NDArray[np.float32]) -> list[Sphere]:
+    return [Sphere(center=(x, y, z), radius=r) for x, y, z, r in table.astype(np.float64).tolist()]
+
+
+def random_rays(count: int, seed: int) -> tuple[Doubles, Doubles]:
+    """From around and inside the unit cube towards points in it, as float32 holds them; not of unit length."""
+    rng = np.random.default_rng(seed)
+    origin, target = rng.uniform(-1, 2, (count, 3)), rng.random((count, 3))
+    return (origin.astype(np.float32).astype(np.float64), (target - origin).astype(np.float32).astype(np.float64))
+
+
+closed_sphere = cache(lambda: rays.icosphere(6))
+
+
+@pytest.mark.parametrize("layout", ["bvh8", "bvh2"])
+@pytest.mark.parametrize("offset", [0.0, 1000.0])
+def test_closed_mesh_has_no_cracks(device: Device, layout: str, offset: float) -> None:
+    """From inside 81 920 triangles towards their vertices, edges and faces: not one of 10^6 rays gets out."""
+    vertices, faces = closed_sphere()
+    vertices = vertices + np.float32(offset)
+    rng = np.random.default_rng(0)
+    corners = vertices[faces].astype(np.float64)
+    edges = np.concatenate([(corners[:, i] + corners[:, i - 1]) / 2 for i in range(3)])
+    anywhere = np.einsum("nij,ni->nj", corners[rng.integers(len(faces), size=400_000)], rng.dirichlet([1, 1, 1], 400_000))
+    target = np.concatenate([np.repeat(vertices, 9, axis=0), edges, anywhere])
+    origin = (offset + rng.uniform(-0.5, 0.5, target.shape)).astype(np.float32)
+    assert len(target) > 1_000_000
+    found = Probe(device, Scene(meshes=[Mesh(vertices, faces)]), layout=layout)("closest_hit", 4, origin, target - origin)
+    assert np.count_nonzero(found[:, 3] < 0) == 0
+    assert np.abs(found[:, 0] - 1).max() < 0.01 + offset * 1e-6   # the facets are a ten-thousandth flatter than the sphere
+
+
+@pytest.mark.parametrize(("layout", "builder"), [*TREES, ("list", "sah")])
+def test_triangles_as_in_float64(device: Device, layout: str, builder: str) -> None:
+    """2000 rays against 600 triangles: hits, t, u and v, wherever float32 can decide."""
+    corners = np.concatenate([soup(300, 0.3, seed=1), soup(300, 0.05, seed=2)])
+    origin, direction = random_rays(2000, 3)
+    t, which, margin = rays.hit_triangles(corners.astype(np.float64), origin, direction)
+    clear = margin > 1e-4
+    assert np.count_nonzero(clear & np.isfinite(t)) > 1000 and np.mean(clear) > 0.95
+    found = Probe(device, Scene(meshes=[mesh(corners)]), layout=layout, builder=builder)("closest_hit", 4, origin, direction)
+    np.testing.assert_array_equal(found[clear, 3], np.where(np.isfinite(t), which, -1)[clear])
+    hit = clear & np.isfinite(t)
+    p0, p1, p2 = corners[which[hit]].astype(np.float64).transpose(1, 0, 2)
+    u, v = found[hit, 1, None], found[hit, 2, None]
+    there = origin[hit] + t[hit, None] * direction[hit]
+    np.testing.assert_allclose(p0 + u * (p1 - p0) + v * (p2 - p0), there, atol=2e-6)
+    np.testing.assert_allclose(found[hit, 0], t[hit], rtol=2e-5)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_spheres_as_in_float64(device: Device, layout: str) -> None:
+    """From inside and outside, tiny and huge; t within some ulps of what the position's own rounding allows."""
+    table = np.concatenate([spheres(60, seed=4), [[0.5, 0.5, 0.5, 0.9], [0.5, -1000.0, 0.5, 999.5], [0.2, 0.2, 3.0, 1e-4]]])
+    table = table.astype(np.float32)
+    origin, direction = random_rays(20_000, 5)
+    t, which, margin = rays.hit_spheres(table.astype(np.float64), origin, direction)
+    clear = margin > 1e-3
+    assert np.count_nonzero(clear & np.isfinite(t)) > 10_000
+    found = Probe(device, Scene(spheres=balls(table)), layout=layout)("closest_hit", 4, origin, direction)
+    np.testing.assert_array_equal(found[clear, 3], np.where(np.isfinite(t), which, -1)[clear])
+    hit = clear & np.isfinite(t)
+    there = origin[hit] + found[hit, :1] * direction[hit]
+    # Distance from the surface, beside the rounding of origin − centre and of the root, which grazing rays amplify.
+    off = np.abs(np.linalg.norm(there - table[which[hit], :3], axis=1) - table[which[hit], 3])
+    size = np.linalg.norm(origin[hit] - table[which[hit], :3], axis=1) + table[which[hit], 3]
+    assert (off / size).max() < 1e-6
+
+
+@pytest.mark.parametrize("kind", ["edges", "duplicates", "mixed"])
+def test_ties_are_broken_alike(device: Device, kind: str) -> None:
+    """Layouts and builders find the same primitive at the same t; of equal ones the first."""
+    if kind == "edges":
+        vertices, faces = rays.icosphere(3)
+        scene, target = Scene(meshes=[Mesh(vertices, faces)]), np.repeat(vertices, 30, axis=0).astype(np.float64)
+        direction = target - np.random.default_rng(1).uniform(-0.5, 0.5, target.shape).astype(np.float32)
+        origin = target - direction
+    else:
+        triangles = np.repeat(soup(40, 0.5), 64, axis=0)
+        scene = Scene(meshes=[mesh(triangles)], spheres=balls(np.repeat(spheres(10), 8, axis=0)) if kind == "mixed" else [])
+        origin, direction = random_rays(20_000, 6)
+    found = {tree: Probe(device, scene, layout=tree[0], builder=tree[1])("closest_hit", 4, origin, direction)
+             for tree in (*TREES, ("list", "sah"))}
+    reference = found.pop(("list", "sah"))
+    for tree, hits in found.items():
+        differ = np.any(hits != reference, axis=1)
+        assert np.count_nonzero(differ) == 0, (tree, hits[differ][:3], reference[differ][:3])
+    if kind == "duplicates":
+        hit = reference[:, 3] >= 0
+        assert hit.any() and np.all(reference[hit, 3] % 64 == 0)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_flat_grid_along_the_axes(device: Device, layout: str) -> None:
+    """Straight down, with zeros of both signs, onto 5000 triangles of one plane: corners, edges and faces."""
+    vertices, faces = rays.grid(50)
+    x, z = np.meshgrid(np.arange(0, 50.25, 0.25), np.arange(0, 50.25, 0.25))
+    origin = np.column_stack([x.ravel(), np.full(x.size, 3.0), z.ravel()])
+    probe = Probe(device, Scene(meshes=[Mesh(vertices, faces)]), layout=layout)
+    for zero in (0.0, -0.0):
+        for side in (1.0, -1.0):
+            found = probe("closest_hit", 4, origin * [1, side, 1], np.tile([zero, -2 * side, zero], (len(origin), 1)))
+            assert np.all(found[:, 0] == 1.5)
+            assert np.count_nonzero(found[:, 3] < 0) == 0
+    # In the plane itself, along an axis or across: neither hit nor hang.
+    inside = origin * [1, 0, 1]
+    for along in ([1.0, 0.0, 0.0], [0.0, -0.0, -1.0], [0.6, 0.0, 0.8]):
+        assert np.all(probe("closest_hit", 4, inside, np.tile(along, (len(inside), 1)))[:, 3] == -1)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_axis_parallel_rays_from_box_planes(device: Device, layout: str) -> None:
+    """Stacked unit squares whose tree has boxes at whole numbers; rays start on those planes and run along axes."""
+    vertices, faces = rays.grid(8)
+    levels = [Mesh(vertices + np.float32([0, y, 0]), faces) for y in range(8)]
+    standing = [Mesh(np.roll(vertices, 1, axis=1) + np.float32([0, 0, z]), faces) for z in range(9)]
+    probe = Probe(device, Scene(meshes=[*levels, *standing]), layout=layout)
+    x, z = (grid.ravel().astype(float) for grid in np.meshgrid(np.arange(0.5, 8), np.arange(0.5, 8)))
+    for y in range(7):
+        found = probe("closest_hit", 4, np.column_stack([x, np.full(64, float(y)), z]), np.tile([0.0, 1.0, -0.0], (64, 1)))
+        # A ray that starts in a level's plane may meet that level at 0, which is no hit, and then the next at 1.
+        assert np.all(found[:, 0] == 1.0)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_any_hit_is_a_closest_hit_before_t_max(device: Device, layout: str) -> None:
+    """Also where t_max is the hit's own t, or its neighbour among the floats."""
+    scene = Scene(meshes=[mesh(soup(500, 0.2))], spheres=balls(spheres(20)))
+    origin, direction = random_rays(50_000, 7)
+    probe = Probe(device, scene, layout=layout)
+    t = probe("closest_hit", 4, origin, direction)[:, 0].astype(np.float32)
+    hit = np.isfinite(t)
+    assert 0.2 < np.mean(hit) < 0.98
+    one, none = np.float32(1), np.float32(0)
+    limits = {"infinite": np.full_like(t, np.inf), "half": np.where(hit, t / 2, one), "double": np.where(hit, 2 * t, one),
+              "before": np.nextafter(t, none), "at": t, "behind": np.nextafter(t, np.float32(np.inf))}
+    wrong = {name: int(np.count_nonzero((probe("any_hit", 1, origin, direction, limit)[:, 0] > 0) != (hit & (t < limit))))
+             for name, limit in limits.items()}
+    assert not any(wrong.values()), wrong
+
+
+def test_portable_mask_gives_the_same_hits(device: Device) -> None:
+    """The multiplication that gathers mask bits on processors without an instruction for it."""
+    scene = Scene(meshes=[mesh(soup(2000, 0.1))], spheres=balls(spheres(50)))
+    origin, direction = random_rays(50_000, 8)
+    default, portable = (Probe(device, scene, defines, layout="bvh8", lanes=8)("closest_hit", 4, origin, direction)
+                         for defines in ("", "#define PORTABLE_MASK 1"))
+    assert np.array_equal(default, portable)
