@@ -51,11 +51,9 @@ def hit_triangles(corners: Doubles, origin: Doubles, direction: Doubles) -> tupl
         t, u, v = (np.sum(x * y, axis=2) * inverse for x, y in ((r, e2), (q, s), (r, direction[:, None])))
     least = np.minimum(np.minimum(u, v), 1 - u - v)
     t_hit = np.where((least >= 0) & (t > 0), t, np.inf)
-    order = np.sort(t_hit, axis=1)
-    closest = order[:, 0]
-    gap = np.where(np.isfinite(order[:, 1]), order[:, 1] / closest - 1, np.inf)
+    closest = t_hit.min(axis=1)
     matters = (t > 0) & (t <= closest[:, None] * 1.001)
-    margin = np.minimum(np.where(matters, np.abs(least), np.inf).min(axis=1), gap)
+    margin = np.minimum(np.where(matters, np.abs(least), np.inf).min(axis=1), _gap(t_hit))
     return closest, t_hit.argmin(axis=1), margin
 
 
@@ -68,6 +66,10 @@ def hit_spheres(spheres: Doubles, origin: Doubles, direction: Doubles) -> tuple[
     root = np.sqrt(np.maximum(discriminant, 0)) * spheres[:, 3] * np.sqrt(a)
     t = np.where(-b - root > 0, -b - root, -b + root) / a
     t_hit = np.where((discriminant >= 0) & (t > 0), t, np.inf)
-    order = np.sort(t_hit, axis=1)
-    gap = np.where(np.isfinite(order[:, 1]), order[:, 1] / order[:, 0] - 1, np.inf)
-    return order[:, 0], t_hit.argmin(axis=1), np.minimum(np.abs(discriminant).min(axis=1), gap)
+    return t_hit.min(axis=1), t_hit.argmin(axis=1), np.minimum(np.abs(discriminant).min(axis=1), _gap(t_hit))
+
+
+def _gap(t_hit: Doubles) -> Doubles:
+    """How much farther the second hit is than the first, relatively; inf where there are not two."""
+    first, second = np.sort(t_hit, axis=1)[:, :2].T
+    return np.divide(second, first, out=np.full(len(first), np.inf), where=np.isfinite(second)) - 1
