@@ -39,10 +39,9 @@ static inline Accumulator load_pixels(global const Pixel *film, ireal pixel) {
 }
 
 static inline void store_rows(global float *row, const real3 *value, int lane) {
-    const float *lanes = (const float *)value;
-    row[0] = lanes[lane];
-    row[1] = lanes[lane + LANES];
-    row[2] = lanes[lane + 2 * LANES];
+    row[0] = LANE(value->x, lane);
+    row[1] = LANE(value->y, lane);
+    row[2] = LANE(value->z, lane);
 }
 
 static inline void store_pixels(global Pixel *film, uint first, uint end, const Accumulator *a) {
@@ -52,8 +51,8 @@ static inline void store_pixels(global Pixel *film, uint first, uint end, const 
         store_rows(pixel->sum_error, &a->sum_error, lane);
         store_rows(pixel->square, &a->square, lane);
         store_rows(pixel->square_error, &a->square_error, lane);
-        pixel->count = ((const uint *)&a->count)[lane];
-        pixel->dropped = ((const uint *)&a->dropped)[lane];
-        pixel->rays = ((const uint *)&a->rays)[lane];
+        pixel->count = LANE_UINT(a->count, lane);
+        pixel->dropped = LANE_UINT(a->dropped, lane);
+        pixel->rays = LANE_UINT(a->rays, lane);
     }
 }

@@ -52,11 +52,12 @@ typedef struct { real x, y, z; } real3;
                                                GATHER(real, array, index, member[1]), \
                                                GATHER(real, array, index, member[2])})
 
-// One lane at a time, for the code that handles single rays: unions to write, LANE and LANE_INT to read.
+// One lane at a time, for the code that handles single rays: unions to write, LANE… to read.
 typedef union { real all; float lane[LANES]; } RealLanes;
 typedef union { ireal all; int lane[LANES]; } IntLanes;
 #define LANE(value, lane) (((const float *)&(value))[lane])
 #define LANE_INT(value, lane) (((const int *)&(value))[lane])
+#define LANE_UINT(value, lane) (((const uint *)&(value))[lane])
 
 #define ZERO ((real)(0.0f))
 #define ONE ((real)(1.0f))

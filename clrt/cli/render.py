@@ -25,7 +25,8 @@ from .progress import Progress, make_progress
 @click.option("--error", type=float, help="Stop at this estimated error (root of relMSE).")
 @click.option("--depth", type=click.IntRange(1, 1024), help="Path edges: 1 glow only, 2 direct light, 3 one bounce.")
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers.")
-@click.option("--device", metavar="SEL", help="Number, id, part of a name, cpu or gpu; see `clrt devices`.")
+@click.option("--device", "devices", multiple=True, metavar="SEL",
+              help="Number, id, part of a name, cpu or gpu; see `clrt devices`.")
 @click.option("--integrator", type=click.Choice(["path", "direct"]), help="What to compute.")
 @click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error by.")
 @click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what was done.")
@@ -36,15 +37,18 @@ from .progress import Progress, make_progress
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no warnings.")
 @tracing_options
 def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None, spp: int | None,
-            seconds: float | None, error: float | None, depth: int | None, seed: int | None, device: str | None,
+            seconds: float | None, error: float | None, depth: int | None, seed: int | None, devices: tuple[str, ...],
             integrator: str | None, reference: Path | None, report: Path | None, view: str, exposure: float,
             progress_kind: str | None, print_kernel: bool, quiet: bool, lanes: str | None, triangle: str, builder: str,
             layout: str | None) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
     outputs = outputs or (Path(f"{scene.stem}.png"),)
+    if len(devices) > 1:
+        raise UsageError(f"--device is given {len(devices)} times; this version renders on one device, so name one")
     _check_outputs(outputs, report, view)
-    options = {"size": size, "max_depth": depth, "seed": seed, "device": device, "integrator": integrator,
-               "triangle": triangle, "builder": builder, "layout": layout, "lanes": int(lanes) if lanes else None}
+    options = {"size": size, "max_depth": depth, "seed": seed, "device": devices[0] if devices else None,
+               "integrator": integrator, "triangle": triangle, "builder": builder, "layout": layout,
+               "lanes": int(lanes) if lanes else None}
     with make_progress(progress_kind, quiet) as progress:
         renderer = _prepare(scene, options, progress)
         if print_kernel:

@@ -50,7 +50,11 @@ class Launches:
 
 
 def wait_for(event: cl.Event) -> None:
-    """Returns when the event is complete, letting signals through; DeviceError where it failed."""
+    """Returns when the event is complete, letting signals through; DeviceError where it failed.
+
+    Asking for an event's status starts nothing: a driver may hold commands back until their queue is flushed.
+    """
+    event.command_queue.flush()
     pause = 1e-5
     while (status := event.command_execution_status) > cl.command_execution_status.COMPLETE:
         time.sleep(pause)

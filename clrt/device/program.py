@@ -85,6 +85,14 @@ def build(device: Device, source: str) -> BuiltProgram:
     return BuiltProgram(_built[context_key], time.perf_counter() - start, cached)
 
 
+def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
+    """The kernel `name` of a program; KernelError where the driver fails only now."""
+    try:
+        return cl.Kernel(built.program, name)
+    except cl.Error as error:
+        raise KernelError(f"{device.info.name} ({device.info.platform}) cannot create kernel {name}: {error}") from error
+
+
 def _binary(program: cl.Program) -> bytes:
     binaries: list[bytes] = program.get_info(cl.program_info.BINARIES)  # type: ignore[assignment]
     return binaries[0]

@@ -19,7 +19,7 @@ def scene_struct(buffers: Buffers) -> str:
     The order of `buffers` is the order of the kernel's arguments; the counts come last.
     """
     members = [f"global const {c_type} *{name}" for name, (c_type, _) in buffers.items()]
-    parameters = [f"global const {c_type} *restrict {name}" for name, (c_type, _) in buffers.items()]
+    parameters = [f"global const {c_type} *{name}" for name, (c_type, _) in buffers.items()]
     typedefs = {c_type: c_typedef(c_type, array.dtype) for c_type, array in buffers.values()}
     return "\n".join([
         *typedefs.values(),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..device.launch import Launches, wait_for
 from ..device.open import Device
-from ..device.program import BuiltProgram, build
+from ..device.program import BuiltProgram, build, make_kernel
 from ..errors import DeviceError
 from ..scene.model import Camera
 from .compile import CompiledScene
@@ -45,7 +45,7 @@ class Session:
         except cl.Error as error:
             needed = f"{self.device_bytes} bytes of buffers do not fit"
             raise DeviceError(f"{device.info.name}: {needed}: {error}") from error
-        self._kernel = cl.Kernel(self.program.program, "path")
+        self._kernel = make_kernel(device, self.program, "path")
         self._kernel.set_args(*self._scene, compiled.counts[0], self._film, self.launch[0])
         self._warm_up()
 
