@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ ENTRIES = '#line 1 "probe.cl"\n' + (Path(__file__).parent / "kernels" / "probe.c
 
 def choices(device: Device, **chosen: Any) -> Choices:
     """The device's own choices, but for those given."""
-    return Choices(**({"lanes": device.lanes, "layout": device.layout} | chosen))
+    return replace(Choices(device.lanes, device.layout), **chosen)
 
 
 class Probe:

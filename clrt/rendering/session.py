@@ -21,6 +21,8 @@ from .records import LAUNCH, PIXEL
 
 #: Pixels of a launch, at least.
 FEWEST_PIXELS = 1024
+#: Launches of a pass, about, unless a single sample a pixel takes more.
+PASS_LAUNCHES = 4
 FIRST_LAUNCH_SAMPLES = 1 << 15
 
 
@@ -94,8 +96,8 @@ class Session:
         self._launches.wait()
 
     def pass_limit(self) -> int:
-        """The most samples a pixel that one pass should add: a pass of one launch per 1024 pixels at least."""
-        return max(1, self._launches.size // FEWEST_PIXELS)
+        """The most samples a pixel that one pass should add, so that ending inside a pass leaves an even picture."""
+        return max(1, PASS_LAUNCHES * self._launches.size // (self.size[0] * self.size[1]))
 
     def film(self) -> Film:
         """The film so far; waits for the launches in flight."""

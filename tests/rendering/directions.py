@@ -47,11 +47,12 @@ def integrate(density: Callable[[Doubles], Doubles], wo: Doubles) -> Doubles:
     jacobian = 4 * cosine * h[:, 2]**3 * r * r
     values = density(2 * cosine[:, None] * h - wo) * jacobian
     parts = values.reshape(ROWS, len(NODES), COLUMNS * STEPS) * width * WEIGHTS[:, None] / 2
-    return parts.reshape(ROWS, len(NODES), COLUMNS, STEPS).sum(axis=(1, 3)).ravel() * 2 * np.pi / (COLUMNS * STEPS)
+    sums = parts.reshape(ROWS, len(NODES), COLUMNS, STEPS).sum(axis=(1, 3))
+    return np.asarray(sums.ravel() * 2 * np.pi / (COLUMNS * STEPS))
 
 
 def _log_horizon(wo: Doubles, azimuth: Doubles) -> Doubles:
     """log r where wi meets the horizon: the root of c·r² − 2·r·s·cos(azimuth) − c = 0 for wo = (s, 0, c)."""
     b, c = np.hypot(wo[0], wo[1]) * np.cos(azimuth), wo[2]
     root = np.sqrt(b * b + c * c)
-    return np.log(np.where(b > 0, (b + root) / c, c / (root - np.minimum(b, 0))))
+    return np.asarray(np.log(np.where(b > 0, (b + root) / c, c / (root - np.minimum(b, 0)))))

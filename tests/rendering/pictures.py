@@ -63,7 +63,7 @@ def frame(camera: Camera) -> tuple[Doubles, Doubles, Doubles, float]:
 
 
 def pixel_points(camera: Camera, size: tuple[int, int], height: float, steps: int = 4) -> Doubles:
-    """(h, w, steps², 3): where the plane y = height is seen, at Gauss–Legendre points of each pixel; see pixel_means."""
+    """(h, w, steps², 3): the plane y = height seen at Gauss–Legendre points of each pixel (see pixel_means)."""
     nodes = (np.polynomial.legendre.leggauss(steps)[0] + 1) / 2
     x, y = np.meshgrid(np.add.outer(np.arange(size[0]), nodes).ravel(), np.add.outer(np.arange(size[1]), nodes).ravel())
     w = view_rays(camera, size, x, y)

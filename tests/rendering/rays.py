@@ -24,7 +24,8 @@ def icosphere(subdivisions: int) -> tuple[NDArray[np.float32], NDArray[np.int32]
         ab, bc, ca = (len(vertices) + middle.reshape(-1, 3)).T
         vertices = np.concatenate([vertices, vertices[unique].mean(axis=1)])
         vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
-        faces = np.concatenate([np.stack(part, axis=1) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+        parts = (a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)
+        faces = np.concatenate([np.stack(part, axis=1) for part in parts])
     return (vertices / np.linalg.norm(vertices, axis=1, keepdims=True)).astype(np.float32), faces.astype(np.int32)
 
 
@@ -72,4 +73,4 @@ def hit_spheres(spheres: Doubles, origin: Doubles, direction: Doubles) -> tuple[
 def _gap(t_hit: Doubles) -> Doubles:
     """How much farther the second hit is than the first, relatively; inf where there are not two."""
     first, second = np.sort(t_hit, axis=1)[:, :2].T
-    return np.divide(second, first, out=np.full(len(first), np.inf), where=np.isfinite(second)) - 1
+    return np.asarray(np.divide(second, first, out=np.full(len(first), np.inf), where=np.isfinite(second)) - 1)

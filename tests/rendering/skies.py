@@ -39,7 +39,7 @@ def from_uv(u: Doubles, v: Doubles) -> Doubles:
 def turned(w: Doubles, degrees: float) -> Doubles:
     """Turned about +Y, counter-clockwise seen from above: +Z goes towards +X."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    return w @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T
+    return np.asarray(w @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T)
 
 
 def irradiance(image: NDArray[np.float32], normal: Doubles, rotation_degrees: float = 0.0, steps: int = 24) -> Doubles:
@@ -50,4 +50,4 @@ def irradiance(image: NDArray[np.float32], normal: Doubles, rotation_degrees: fl
     grid_u, grid_v = (grid.ravel() for grid in np.meshgrid(u, v))
     w = from_uv(grid_u, grid_v)
     weight = np.maximum(turned(w, rotation_degrees) @ normal, 0) * np.sin(np.pi * grid_v)
-    return lookup(image, w).T @ weight * 2 * np.pi**2 / len(w)
+    return np.asarray(lookup(image, w).T @ weight * 2 * np.pi**2 / len(w))

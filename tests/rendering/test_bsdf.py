@@ -1,4 +1,4 @@
-"""Every material of the registry: samples follow the density, weights are f·|cos|/pdf, no light is made, f is reciprocal."""
+"""Every material of the registry: its samples follow its density, it is reciprocal, and it makes no light."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def drawn(every: Bsdfs) -> list[Drawn]:
 
 
 def test_samples_follow_the_density(drawn: list[Drawn]) -> None:
-    """Chi-square over cells of the hemisphere and one for the samples that failed, which the pdf's integral leaves out."""
+    """Chi-square over cells of the hemisphere, and one for the failed samples: what the pdf's integral leaves out."""
     lobes = [case for case in drawn if not case.specular]
     p_values, integrals = [], []
     for case in lobes:
@@ -154,7 +154,7 @@ def test_white_furnace(device: Device) -> None:
     for cosine in (1.0, 0.6, 0.2, 0.05):
         for exact in (0, 1):
             _, weight, _, _ = furnace.sample(exact, view(cosine), uniform(1000, exact))
-            assert np.all(weight == np.float32(color))
+            assert np.all(weight == np.array(color, np.float32))
         for i, metal in enumerate(metals, start=2):
             _, weight, _, _ = furnace.sample(i, view(cosine), uniform(400_000, i))
             expected = albedo(metal.roughness**2, cosine, metal.smith)
@@ -166,4 +166,5 @@ def directions_above(count: int, seed: int) -> Doubles:
     """(count, 3) unit vectors all over the upper hemisphere, as float32 holds them."""
     w = np.random.default_rng(seed).normal(size=(count, 3))
     w[:, 2] = np.maximum(np.abs(w[:, 2]), 1e-3)
-    return (w / np.linalg.norm(w, axis=1, keepdims=True)).astype(np.float32).astype(np.float64)
+    unit: Doubles = (w / np.linalg.norm(w, axis=1, keepdims=True)).astype(np.float32).astype(np.float64)
+    return unit

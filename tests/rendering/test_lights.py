@@ -49,7 +49,7 @@ def sphere_irradiance(center: Doubles, radius: float, points: Doubles) -> Double
 
 
 def rectangle_irradiance(x0: float, x1: float, z0: float, z1: float, height: float, points: Doubles) -> Doubles:
-    """E = pi L F, F the form factor of a rectangle parallel to the receiver (Howell, configuration B-3), corner by corner."""
+    """E = pi L F, F the form factor of a rectangle parallel to the receiver, corner by corner (Howell, B-3)."""
 
     def corner(x: Doubles, z: Doubles) -> Doubles:
         h = height - points[:, 1]
@@ -58,7 +58,8 @@ def rectangle_irradiance(x0: float, x1: float, z0: float, z1: float, height: flo
         return np.asarray((a / p * np.arctan(b / p) + b / q * np.arctan(a / q)) / (2 * np.pi))
 
     ones = np.ones(len(points))
-    form = sum(sign * corner(x * ones, z * ones) for x, z, sign in ((x1, z1, 1), (x0, z1, -1), (x1, z0, -1), (x0, z0, 1)))
+    corners = (x1, z1, 1), (x0, z1, -1), (x1, z0, -1), (x0, z0, 1)
+    form = sum(sign * corner(x * ones, z * ones) for x, z, sign in corners)
     return np.outer(np.pi * form, RADIANCE)
 
 
@@ -68,7 +69,8 @@ def rectangle(x0: float, x1: float, z0: float, z1: float, height: float) -> Mesh
     return Mesh(np.array(corners, np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.int32), LAMP)
 
 
-@pytest.mark.parametrize(("center", "radius"), [((0.3, 3.0, 0.2), 1.5), ((1.0, 2.0, -1.0), 0.01), ((0.0, 1e4, 3e3), 1.0)])
+@pytest.mark.parametrize(("center", "radius"), [((0.3, 3.0, 0.2), 1.5), ((1.0, 2.0, -1.0), 0.01),
+                                                ((0.0, 1e4, 3e3), 1.0)])
 def test_sphere(device: Device, center: tuple[float, float, float], radius: float) -> None:
     probe = Probe(device, Scene(spheres=[Sphere(center=center, radius=radius, material=LAMP)]))
     assert_mean(probe, POINTS, sphere_irradiance(np.array(center), radius, POINTS))
@@ -80,7 +82,8 @@ def test_inside_a_sphere_light_is_darkness(device: Device) -> None:
     assert not probe("light_sample", 12, inside, seed=0)[:, 3:6].any()
 
 
-@pytest.mark.parametrize("side", [(-1.0, 0.7, -0.4, 1.5), (0.25, 0.25 + 2.0**-10, -0.5, 2.0**-10 - 0.5)], ids=["large", "tiny"])
+@pytest.mark.parametrize("side", [(-1.0, 0.7, -0.4, 1.5), (0.25, 0.25 + 2.0**-10, -0.5, 2.0**-10 - 0.5)],
+                         ids=["large", "tiny"])
 def test_rectangle(device: Device, side: tuple[float, float, float, float]) -> None:
     probe = Probe(device, Scene(meshes=[rectangle(*side, 2.0)]))
     assert_mean(probe, POINTS, rectangle_irradiance(*side, 2.0, POINTS))

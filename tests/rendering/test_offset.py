@@ -31,7 +31,7 @@ def leaving(normal: Doubles, seed: int) -> Doubles:
 
 def rays_to(points: Doubles, normal: Doubles, distance: float) -> tuple[Doubles, Doubles]:
     """Origins in front of points, and directions towards them."""
-    origin = (points + distance * leaving(normal, 1)).astype(np.float32)
+    origin = (points + distance * leaving(normal, 1)).astype(np.float32).astype(np.float64)
     return origin, points - origin
 
 

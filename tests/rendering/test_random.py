@@ -51,9 +51,9 @@ def walks(start: int) -> dict[str, tuple[ArrayLike, ...]]:
     """(pixel, sample, dimension, seed) along which numbers are drawn."""
     i, few = np.arange(COUNT), np.arange(COUNT) % 64
     many = i // 64
-    return {"pixels": (start + i, 3, 2, 1), "samples": (7, start + i, 2, 1), "pixels and samples": (start + many, few, 0, 0),
-            "dimensions": (start + many, 5, few, 1), "seeds": (start + many, 5, 1, 1000 * few),
-            "large seeds": (start + many, 5, 1, (1 << 32) - 1 - few)}
+    return {"pixels": (start + i, 3, 2, 1), "samples": (7, start + i, 2, 1),
+            "pixels and samples": (start + many, few, 0, 0), "dimensions": (start + many, 5, few, 1),
+            "seeds": (start + many, 5, 1, 1000 * few), "large seeds": (start + many, 5, 1, (1 << 32) - 1 - few)}
 
 
 def test_numbers_are_uniform(draw: Draw) -> None:
@@ -62,16 +62,16 @@ def test_numbers_are_uniform(draw: Draw) -> None:
     assert min(p_values.values()) > sidak(FAMILY, len(p_values)), p_values
 
 
-@pytest.mark.parametrize("step", [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (64, 0, 0, 0), (1920, 0, 0, 0),
-                                  (1, 1, 0, 0), (1, -1, 0, 0)], ids=str)
+@pytest.mark.parametrize("step", [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (64, 0, 0, 0),
+                                  (1920, 0, 0, 0), (1, 1, 0, 0), (1, -1, 0, 0)], ids=str)
 def test_neighbours_are_unrelated(draw: Draw, step: tuple[int, int, int, int]) -> None:
     """Pairs of numbers one step apart in (pixel, sample, dimension, seed) are independent and uncorrelated."""
     p_values = {}
     for start in STARTS:
         i = np.arange(COUNT)
-        here = (start + i % 8192, 1 + i // 8192, 4, 9)
-        there = tuple(index + offset for index, offset in zip(here, step))
-        a, b = draw(*here), draw(*there)
+        pixel, sample, dimension, seed = start + i % 8192, 1 + i // 8192, 4, 9
+        a = draw(pixel, sample, dimension, seed)
+        b = draw(pixel + step[0], sample + step[1], dimension + step[2], seed + step[3])
         for x, y in product((0, 1), repeat=2):
             products = 12 * (a[:, x] - 0.5) * (b[:, y] - 0.5)
             p_values[start, x, y, "chi²"] = independence(a[:, x], b[:, y])

@@ -111,8 +111,8 @@ def test_irradiance(probe: Probe, name: str) -> None:
         sample = probe("light_sample", 12, np.zeros((COUNT, 3)), seed=seed)
         values = sample[:, 3:6] * (np.maximum(sample[:, :3] @ normal, 0) / sample[:, 6])[:, None]
         expected = skies.irradiance(image, normal, rotation, steps=24 if image.size > 3 else 1000)
-        # The quadrature's own error is some 1e-5.
-        p_values.append(mean_test(values.mean(axis=0), values.var(axis=0) + COUNT * (3e-5 * expected)**2, COUNT, expected))
+        variance = values.var(axis=0) + COUNT * (3e-5 * expected)**2   # and the quadrature's own error
+        p_values.append(mean_test(values.mean(axis=0), variance, COUNT, expected))
     assert np.min(p_values) > sidak(FAMILY, np.size(p_values))
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from functools import cache
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +20,7 @@ from ..probe import Probe
 from . import rays
 
 Doubles = NDArray[np.float64]
+HOUSE = Path(__file__).parents[2]
 LAYOUTS = ("bvh8", "bvh2", "list")
 TREES = (("bvh8", "sah"), ("bvh8", "midpoint"), ("bvh2", "sah"), ("bvh2", "midpoint"))
 
@@ -49,13 +53,15 @@ def test_closed_mesh_has_no_cracks(device: Device, layout: str, offset: float) -
     rng = np.random.default_rng(0)
     corners = vertices[faces].astype(np.float64)
     edges = np.concatenate([(corners[:, i] + corners[:, i - 1]) / 2 for i in range(3)])
-    anywhere = np.einsum("nij,ni->nj", corners[rng.integers(len(faces), size=400_000)], rng.dirichlet([1, 1, 1], 400_000))
+    some, b = rng.integers(len(faces), size=400_000), rng.dirichlet([1, 1, 1], 400_000)
+    anywhere = np.einsum("nij,ni->nj", corners[some], b)
     target = np.concatenate([np.repeat(vertices, 9, axis=0), edges, anywhere])
     origin = (offset + rng.uniform(-0.5, 0.5, target.shape)).astype(np.float32)
     assert len(target) > 1_000_000
-    found = Probe(device, Scene(meshes=[Mesh(vertices, faces)]), layout=layout)("closest_hit", 4, origin, target - origin)
+    probe = Probe(device, Scene(meshes=[Mesh(vertices, faces)]), layout=layout)
+    found = probe("closest_hit", 4, origin, target - origin)
     assert np.count_nonzero(found[:, 3] < 0) == 0
-    assert np.abs(found[:, 0] - 1).max() < 0.01 + offset * 1e-6   # the facets are a ten-thousandth flatter than the sphere
+    assert np.abs(found[:, 0] - 1).max() < 0.01 + offset * 1e-6   # a facet is a ten-thousandth flatter than the sphere
 
 
 @pytest.mark.parametrize(("layout", "builder"), [*TREES, ("list", "sah")])
@@ -66,7 +72,8 @@ def test_triangles_as_in_float64(device: Device, layout: str, builder: str) -> N
     t, which, margin = rays.hit_triangles(corners.astype(np.float64), origin, direction)
     clear = margin > 1e-4
     assert np.count_nonzero(clear & np.isfinite(t)) > 1000 and np.mean(clear) > 0.95
-    found = Probe(device, Scene(meshes=[mesh(corners)]), layout=layout, builder=builder)("closest_hit", 4, origin, direction)
+    probe = Probe(device, Scene(meshes=[mesh(corners)]), layout=layout, builder=builder)
+    found = probe("closest_hit", 4, origin, direction)
     np.testing.assert_array_equal(found[clear, 3], np.where(np.isfinite(t), which, -1)[clear])
     hit = clear & np.isfinite(t)
     p0, p1, p2 = corners[which[hit]].astype(np.float64).transpose(1, 0, 2)
@@ -79,8 +86,8 @@ def test_triangles_as_in_float64(device: Device, layout: str, builder: str) -> N
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_spheres_as_in_float64(device: Device, layout: str) -> None:
     """From inside and outside, tiny and huge; t within some ulps of what the position's own rounding allows."""
-    table = np.concatenate([spheres(60, seed=4), [[0.5, 0.5, 0.5, 0.9], [0.5, -1000.0, 0.5, 999.5], [0.2, 0.2, 3.0, 1e-4]]])
-    table = table.astype(np.float32)
+    special = [[0.5, 0.5, 0.5, 0.9], [0.5, -1000.0, 0.5, 999.5], [0.2, 0.2, 3.0, 1e-4]]
+    table = np.concatenate([spheres(60, seed=4), special]).astype(np.float32)
     origin, direction = random_rays(20_000, 5)
     t, which, margin = rays.hit_spheres(table.astype(np.float64), origin, direction)
     clear = margin > 1e-3
@@ -105,7 +112,8 @@ def test_ties_are_broken_alike(device: Device, kind: str) -> None:
         origin = target - direction
     else:
         triangles = np.repeat(soup(40, 0.5), 64, axis=0)
-        scene = Scene(meshes=[mesh(triangles)], spheres=balls(np.repeat(spheres(10), 8, axis=0)) if kind == "mixed" else [])
+        repeated = balls(np.repeat(spheres(10), 8, axis=0))
+        scene = Scene(meshes=[mesh(triangles)], spheres=repeated if kind == "mixed" else [])
         origin, direction = random_rays(20_000, 6)
     found = {tree: Probe(device, scene, layout=tree[0], builder=tree[1])("closest_hit", 4, origin, direction)
              for tree in (*TREES, ("list", "sah"))}
@@ -120,19 +128,20 @@ def test_ties_are_broken_alike(device: Device, kind: str) -> None:
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_flat_grid_along_the_axes(device: Device, layout: str) -> None:
-    """Straight down, with zeros of both signs, onto 5000 triangles of one plane: corners, edges, faces and the border."""
+    """Straight down, with zeros of both signs, onto 5000 triangles of one plane: corners, edges, faces, the border."""
     vertices, faces = rays.grid(50)
     x, z = np.meshgrid(np.arange(0, 50.25, 0.25), np.arange(0, 50.25, 0.25))
     origin = np.column_stack([x.ravel(), np.full(x.size, 3.0), z.ravel()])
     scene = Scene(meshes=[Mesh(vertices, faces)])
     probe, no_tree = Probe(device, scene, layout=layout), Probe(device, scene, layout="list")
-    lost, other = 0, 0
+    lost, other = [], []
     for zero, side in product((0.0, -0.0), (1.0, -1.0)):
         down = np.tile([zero, -2 * side, zero], (len(origin), 1))
         found = probe("closest_hit", 4, origin * [1, side, 1], down)
-        lost += np.count_nonzero(found[:, 0] != 1.5)
-        other += np.count_nonzero(found[:, 3] != no_tree("closest_hit", 4, origin * [1, side, 1], down)[:, 3])
-    assert (lost, other) == (0, 0)   # of 4 · 40 401
+        listed = no_tree("closest_hit", 4, origin * [1, side, 1], down)
+        lost.append(np.count_nonzero(found[:, 0] != 1.5))
+        other.append(np.count_nonzero(found[:, 3] != listed[:, 3]))
+    assert not any(lost + other), (lost, other)   # of 40 401 each
     # In the plane itself, along an axis or across: neither hit nor hang.
     inside = origin * [1, 0, 1]
     for along in ([1.0, 0.0, 0.0], [0.0, -0.0, -1.0], [0.6, 0.0, 0.8]):
@@ -143,12 +152,13 @@ def test_flat_grid_along_the_axes(device: Device, layout: str) -> None:
 def test_axis_parallel_rays_from_box_planes(device: Device, layout: str) -> None:
     """Stacked unit squares whose tree has boxes at whole numbers; rays start on those planes and run along axes."""
     vertices, faces = rays.grid(8)
-    levels = [Mesh(vertices + np.float32([0, y, 0]), faces) for y in range(8)]
-    standing = [Mesh(np.roll(vertices, 1, axis=1) + np.float32([0, 0, z]), faces) for z in range(9)]
+    levels = [Mesh(vertices + np.array([0, y, 0], np.float32), faces) for y in range(8)]
+    standing = [Mesh(np.roll(vertices, 1, axis=1) + np.array([0, 0, z], np.float32), faces) for z in range(9)]
     probe = Probe(device, Scene(meshes=[*levels, *standing]), layout=layout)
     x, z = (grid.ravel().astype(float) for grid in np.meshgrid(np.arange(0.5, 8), np.arange(0.5, 8)))
     for y in range(7):
-        found = probe("closest_hit", 4, np.column_stack([x, np.full(64, float(y)), z]), np.tile([0.0, 1.0, -0.0], (64, 1)))
+        origin = np.column_stack([x, np.full(64, float(y)), z])
+        found = probe("closest_hit", 4, origin, np.tile([0.0, 1.0, -0.0], (64, 1)))
         # A ray that starts in a level's plane may meet that level at 0, which is no hit, and then the next at 1.
         assert np.all(found[:, 0] == 1.0)
 
@@ -162,12 +172,58 @@ def test_any_hit_is_a_closest_hit_before_t_max(device: Device, layout: str) -> N
     t = probe("closest_hit", 4, origin, direction)[:, 0].astype(np.float32)
     hit = np.isfinite(t)
     assert 0.2 < np.mean(hit) < 0.98
-    one, none = np.float32(1), np.float32(0)
-    limits = {"infinite": np.full_like(t, np.inf), "half": np.where(hit, t / 2, one), "double": np.where(hit, 2 * t, one),
-              "before": np.nextafter(t, none), "at": t, "behind": np.nextafter(t, np.float32(np.inf))}
-    wrong = {name: int(np.count_nonzero((probe("any_hit", 1, origin, direction, limit)[:, 0] > 0) != (hit & (t < limit))))
-             for name, limit in limits.items()}
+    limits: dict[str, NDArray[np.floating]] = {
+        "infinite": np.full_like(t, np.inf), "half": t / 2, "double": 2 * t, "at": t,
+        "before": np.nextafter(t, np.float32(0)), "behind": np.nextafter(t, np.float32(np.inf))}
+    blocked = {name: probe("any_hit", 1, origin, direction, limit)[:, 0] > 0 for name, limit in limits.items()}
+    wrong = {name: np.count_nonzero(blocked[name] != (hit & (t < limit))) for name, limit in limits.items()}
     assert not any(wrong.values()), wrong
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("scale", [2.0**-66, 2.0**-30, 2.0**30, 2.0**50])
+def test_scaled_mesh_has_the_same_hits(device: Device, layout: str, scale: float) -> None:
+    """From 1e-20 to 1e15: powers of two change no digit, so nothing may change but t."""
+    corners = soup(300, 0.3)
+    origin, direction = random_rays(10_000, 9)
+    unscaled = Probe(device, Scene(meshes=[mesh(corners)]), layout=layout)("closest_hit", 4, origin, direction)
+    scene = Scene(meshes=[mesh(corners * np.float32(scale))])
+    scaled = Probe(device, scene, layout=layout)("closest_hit", 4, scale * origin, direction)
+    assert np.count_nonzero(scaled[:, 3] != unscaled[:, 3]) == 0
+    np.testing.assert_allclose(scaled[:, 0], scale * unscaled[:, 0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("length", [2.0**-30, 2.0**-10, 2.0**10, 2.0**30])
+def test_length_of_the_direction_does_not_matter(device: Device, layout: str, length: float) -> None:
+    """t counts lengths of the direction; shadow rays have that of the way to their light, whatever the scene's unit."""
+    scene = Scene(meshes=[mesh(soup(300, 0.3))], spheres=balls(spheres(20)))
+    origin, direction = random_rays(10_000, 10)
+    probe = Probe(device, scene, layout=layout)
+    unscaled, scaled = (probe("closest_hit", 4, origin, factor * direction) for factor in (1.0, length))
+    assert np.count_nonzero(scaled[:, 3] != unscaled[:, 3]) == 0
+    np.testing.assert_allclose(length * scaled[:, 0], unscaled[:, 0], rtol=1e-6)
+
+
+def test_a_ray_that_is_no_ray_hits_nothing(device: Device) -> None:
+    """NaN and infinite places and directions, in a process of their own: what runs off the stack ends the process."""
+    program = f"""
+import numpy as np
+from clrt.device.open import open_device
+from clrt.scene.model import Mesh, Scene, Sphere
+from tests.accel.cases import soup
+from tests.probe import Probe
+rays = np.tile([0.5, 0.5, 3.0, 0.1, 0.1, -1.0], (12, 1))
+for i, bad in enumerate((np.nan, np.inf, -np.inf, 0.0)):
+    rays[3 * i, :3] = rays[3 * i + 1, 3:] = rays[3 * i + 2] = bad
+mesh = Mesh(soup(100).reshape(-1, 3), np.arange(300, dtype=np.int32).reshape(-1, 3))
+for layout in {LAYOUTS}:
+    probe = Probe(open_device({device.info.index}), Scene(meshes=[mesh], spheres=[Sphere()]), layout=layout)
+    out = probe("closest_hit", 4, np.delete(rays, 9, axis=0))
+    assert np.all(out[:, 3] == -1), (layout, out)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=HOUSE)
+    assert done.returncode == 0, f"exit status {done.returncode}\n{done.stderr[-500:]}"
 
 
 def test_portable_mask_gives_the_same_hits(device: Device) -> None:
