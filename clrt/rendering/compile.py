@@ -10,22 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..accel.kernels import tree_buffers, tree_defines, tree_files
 from ..accel.layouts import Layout, pack
+from ..device.preamble import Buffers, defines, scene_struct, type_list, typedefs
 from ..device.program import compose
 from ..scene.materials import MATERIALS, Material
 from ..scene.model import Scene
 from ..scene.validate import validate
 from .emitters import SURFACES, TYPES, Emitters, pack_emitters
 from .environment import Sky, pack_sky
-from .preamble import Buffers, defines, scene_struct, type_list, typedefs
 from .records import COUNTS, LAUNCH, NORMALS, PIXEL, SPHERE, TRIANGLE, material_record
-
-#: Files and record names of the tree layouts; `width` primitives of a leaf are tested at a time.
-TREES = {"bvh8": ("traverse/bvh8.cl", 8), "bvh2": ("traverse/bvh2.cl", 1), "list": ("traverse/list.cl", 1)}
-TRIANGLE_TESTS = {"watertight": "geometry/triangle_watertight.cl",
-                  "moller_trumbore": "geometry/triangle_moller_trumbore.cl"}
-TREE_RECORDS = {"nodes": "Node", "packs": "Triangles", "leaf_triangles": "Triangles", "leaf_spheres": "LeafSphere"}
-
 
 @dataclass(frozen=True)
 class Choices:
@@ -72,7 +66,7 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl") -> Com
     if sky.sampled:
         sky.buffers["environment"][1]["probability"] = emitters.sky_probability
 
-    buffers: dict[str, tuple[str, NDArray[Any]]] = {name: (TREE_RECORDS[name], a) for name, a in tree.buffers.items()}
+    buffers = tree_buffers(tree)
     if len(triangles):
         per_mesh = np.repeat(np.arange(len(scene.meshes)), [len(mesh.faces) for mesh in scene.meshes])
         buffers["triangles"] = ("Triangle", _triangle_records(triangles, codes[per_mesh], emitters.triangle, normals))
@@ -86,7 +80,7 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl") -> Com
 
     used = [m for m in MATERIALS if m.kernel in material_buffers]
     features = _features(scene, used, users, emitters, sky, choices)
-    text = compose(_preamble(buffers, features, used, emitters, choices, tree.stack), entry,
+    text = compose(_preamble(buffers, features, used, emitters, choices, tree), entry,
                    _files(used, emitters, sky, choices, bool(len(triangles)), bool(len(spheres))))
     return CompiledScene(buffers, counts, sorted(features), text, tree, choices)
 
@@ -167,10 +161,10 @@ def _features(scene: Scene, used: Iterable[type[Material]], users: Iterable[Mate
 
 
 def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], emitters: Emitters, choices: Choices,
-              stack: int) -> str:
+              tree: Layout) -> str:
     surfaces = [t for t in emitters.types if t in SURFACES]
     return "\n".join([
-        defines({"LANES": choices.lanes, "WIDTH": TREES[choices.layout][1], "STACK_SIZE": _rounded_stack(stack)}),
+        defines({"LANES": choices.lanes, **tree_defines(tree)}),
         defines({feature: 1 for feature in sorted(features)}),
         typedefs({"Counts": COUNTS, "Pixel": PIXEL, "Launch": LAUNCH}),
         scene_struct(buffers),
@@ -179,16 +173,9 @@ def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], 
         type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces])])
 
 
-def _rounded_stack(bound: int) -> int:
-    """Rounded up to steps of 32 entries, so that trees of similar depth share a program."""
-    return max(32, -(-bound // 32) * 32)
-
-
 def _files(used: list[type[Material]], emitters: Emitters, sky: Sky, choices: Choices, triangles: bool,
            spheres: bool) -> dict[str, list[str]]:
     lights = [f"light/{t}.cl" for t in emitters.types if t != "sky"]
-    return {"TREE": [TREES[choices.layout][0]] if triangles or spheres else [],
-            "TRIANGLE_TEST": [TRIANGLE_TESTS[choices.triangle]] if triangles else [],
-            "SPHERE_TEST": ["geometry/sphere.cl"] if spheres else [],
+    return {**tree_files(choices.layout, choices.triangle, triangles, spheres),
             "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in used],
             "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else [])}

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accel.builders import BUILDERS
+from ..accel.kernels import TREES, TRIANGLE_TESTS
 from ..device.open import open_device
 from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
-from .compile import TREES, TRIANGLE_TESTS, Choices, compile_scene
+from .compile import Choices, compile_scene
 from .film import RELATIVE_FLOOR, Film
 from .session import Session
 
