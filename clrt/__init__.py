@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .accel.query import RayQuery as RayQuery
     from .api import load as load, render as render
     from .device.discover import devices as devices
     from .errors import (ClrtError as ClrtError, DeviceError as DeviceError, KernelError as KernelError,
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
                               RenderSettings as RenderSettings, Scene as Scene, Sphere as Sphere)
 
 _HOME = {
+    "accel.query": ("RayQuery",),
     "api": ("load", "render"),
     "device.discover": ("devices",),
     "errors": ("ClrtError", "DeviceError", "KernelError", "OutputError", "SceneError", "UsageError"),

@@ -2,8 +2,11 @@
 //
 // A plain float sum of n samples stops growing near n = 2^24; here the rounding error of every addition is kept in a
 // second float (Knuth's two-sum), so the mean stays right to a few units in the last place for any n. The two-sum
-// has no products, hence nothing to contract. Non-finite samples are dropped and counted.
+// has no products, hence nothing to contract. Samples that are not finite, or so bright that a sum of 2^24 of them
+// would overflow, are dropped and counted.
 #include "vector.cl"
+
+#define BRIGHTEST 1e31f
 
 typedef struct {
     real3 sum, sum_error, square, square_error;
@@ -13,12 +16,13 @@ typedef struct {
 static inline void two_sum(real *sum, real *error, real x) {
     real s = *sum + x;
     real b = s - *sum;
-    *error += (*sum - (s - b)) + (x - b);
-    *sum = s;
+    real e = *error + ((*sum - (s - b)) + (x - b));
+    *sum = s + e;
+    *error = e - (*sum - s);
 }
 
 static inline void accumulate(Accumulator *a, real3 L, ireal counted) {
-    ireal finite = (absolute(L.x) <= 3.4e38f) & (absolute(L.y) <= 3.4e38f) & (absolute(L.z) <= 3.4e38f);
+    ireal finite = (absolute(L.x) <= BRIGHTEST) & (absolute(L.y) <= BRIGHTEST) & (absolute(L.z) <= BRIGHTEST);
     ireal kept = counted & finite;
     L = choose(kept, L, splat(ZERO));
     a->count += kept ? (ureal)(1) : (ureal)(0);

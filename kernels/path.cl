@@ -64,7 +64,7 @@ static inline real3 radiance(const Scene *scene, real3 origin, real3 direction, 
     Step step = {origin, direction, ONE, ALL_LANES};
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
-        Hits hits = closest_hit(scene, origin, step.wi, active);
+        Hits hits = closest_hit(scene, origin, step.wi, (real)(INFINITY), active);
         ireal hit = active & (hits.primitive >= 0);
         Surface surface;
 #if PRIMITIVES

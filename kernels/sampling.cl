@@ -1,7 +1,7 @@
 // Warps of the unit square and their densities. Directions are unit vectors; densities are per solid angle.
 #include "vector.cl"
 
-// sin and cos of 2·pi·u for u in [0, 1): octant reduction and minimax polynomials on [-pi/4, pi/4], error < 1e-7.
+// sin and cos of 2·pi·u for u in [0, 1): octant reduction and minimax polynomials on [-pi/4, pi/4], error < 1.1e-7.
 // The built-in pair handles arguments of any size and costs several times as much.
 static inline void sincos_turns(real u, real *sine, real *cosine) {
     ireal q = TO_INT(u * 4.0f + 0.5f);

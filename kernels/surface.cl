@@ -13,6 +13,12 @@ typedef struct {
 } Surface;
 
 #if TRIANGLES
+// The edges are brought to length one or so first: the square of their product must not leave the range of floats.
+static inline real3 triangle_normal(real3 e1, real3 e2) {
+    real3 n = cross3(scale(e1, 1.0f / largest(absolute3(e1))), scale(e2, 1.0f / largest(absolute3(e2))));
+    return normalize3(n);
+}
+
 static inline void triangle_surface(const Scene *scene, const Hits *hits, ireal primitive, Surface *surface) {
     real3 p0 = GATHER3(scene->triangles, primitive, .p0);
     real3 p1 = GATHER3(scene->triangles, primitive, .p1);
@@ -21,7 +27,7 @@ static inline void triangle_surface(const Scene *scene, const Hits *hits, ireal 
     surface->p = mad3(p0, b0, mad3(p1, b1, scale(p2, b2)));
     real3 size = mad3(absolute3(p0), absolute(b0), mad3(absolute3(p1), b1, scale(absolute3(p2), b2)));
     surface->p_error = scale(size, (real)(GAMMA(9)));
-    surface->ng = normalize3(cross3(sub(p1, p0), sub(p2, p0)));
+    surface->ng = triangle_normal(sub(p1, p0), sub(p2, p0));
     surface->ns = surface->ng;
     surface->material = GATHER(ireal, scene->triangles, primitive, .material);
     surface->light = GATHER(ireal, scene->triangles, primitive, .light);

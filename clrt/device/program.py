@@ -90,7 +90,8 @@ def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
     try:
         return cl.Kernel(built.program, name)
     except cl.Error as error:
-        raise KernelError(f"{device.info.name} ({device.info.platform}) cannot create kernel {name}: {error}") from error
+        where = f"{device.info.name} ({device.info.platform})"
+        raise KernelError(f"{where} cannot create kernel {name}: {error}") from error
 
 
 def _binary(program: cl.Program) -> bytes:

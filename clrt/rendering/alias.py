@@ -24,7 +24,7 @@ def alias_table(weights: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDAr
         lack = np.cumsum(1 - scaled[light])
         excess = np.cumsum(scaled[heavy] - 1)
         before = np.concatenate([[0.0], lack[:-1]])
-        giver = np.minimum(np.searchsorted(excess, before, side="right"), heavy.size - 1)
+        giver = np.minimum(np.searchsorted(excess, before, side="left"), heavy.size - 1)
         threshold[light] = scaled[light]
         alias[light] = heavy[giver]
         last = np.searchsorted(lack, excess[:-1], side="right")

@@ -15,11 +15,13 @@ from ..accel.layouts import Layout, pack
 from ..device.preamble import Buffers, defines, scene_struct, type_list, typedefs
 from ..device.program import compose
 from ..scene.materials import MATERIALS, Material
-from ..scene.model import Scene
+from ..scene.model import Camera, Scene
+from ..scene.scaling import scaled, unit_of
 from ..scene.validate import validate
 from .emitters import SURFACES, TYPES, Emitters, pack_emitters
 from .environment import Sky, pack_sky
 from .records import COUNTS, LAUNCH, NORMALS, PIXEL, SPHERE, TRIANGLE, material_record
+
 
 @dataclass(frozen=True)
 class Choices:
@@ -33,7 +35,10 @@ class Choices:
 
 @dataclass(frozen=True)
 class CompiledScene:
-    """What a device needs to render a scene. The buffers' order is the order of the kernel's arguments."""
+    """What a device needs to render a scene. The buffers' order is the order of the kernel's arguments.
+
+    All lengths, the camera's too, are those of the scene times `unit` (see scene.scaling).
+    """
 
     buffers: Buffers
     counts: NDArray[Any]
@@ -41,6 +46,8 @@ class CompiledScene:
     source: str
     tree: Layout
     choices: Choices
+    camera: Camera
+    unit: float
 
     @property
     def files(self) -> list[str]:
@@ -56,6 +63,8 @@ class CompiledScene:
 def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl") -> CompiledScene:
     """Validates and packs `scene` for the kernel file `entry`; SceneError lists all that is wrong with it."""
     validate(scene)
+    unit = unit_of(scene)
+    scene = scaled(scene, unit)
     triangles, normals = _geometry(scene)
     spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
     tree = pack(choices.layout, choices.builder, triangles, spheres)
@@ -82,7 +91,7 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl") -> Com
     features = _features(scene, used, users, emitters, sky, choices)
     text = compose(_preamble(buffers, features, used, emitters, choices, tree), entry,
                    _files(used, emitters, sky, choices, bool(len(triangles)), bool(len(spheres))))
-    return CompiledScene(buffers, counts, sorted(features), text, tree, choices)
+    return CompiledScene(buffers, counts, sorted(features), text, tree, choices, scene.camera, unit)
 
 
 def _geometry(scene: Scene) -> tuple[NDArray[np.float32], dict[int, NDArray[np.float32]]]:

@@ -63,7 +63,7 @@ class Renderer:
         self.compiled = compile_scene(self.scene, choices)
         on_phase("compile")
         depth = settings.max_depth if settings.integrator == "path" else min(settings.max_depth, 2)
-        self.session = Session(self.device, self.compiled, self.scene.camera, settings.size, depth, settings.seed)
+        self.session = Session(self.device, self.compiled, settings.size, depth, settings.seed)
         self.history: list[dict[str, Any]] = []
         self.stop_reason: str | None = None
         self.seconds = 0.0
@@ -88,7 +88,10 @@ class Renderer:
         self._clock = clock.perf_counter() - self.seconds
         next_state = 0.0
         while self.stop_reason is None:
-            self._run_pass(spp, time)
+            if spp is None or self.session.samples_done < spp:
+                self._run_pass(spp, time)
+            if spp is not None and self.session.samples_done >= spp and self.stop_reason is None:
+                self.stop_reason = "spp"
             now, done = clock.perf_counter(), self.session.samples_done
             if self.stop_reason is None and done & (done - 1) and now < next_state:
                 continue
@@ -109,14 +112,12 @@ class Renderer:
         return State(self.session.samples_done, self.seconds, film.noise, relmse, film)
 
     def _run_pass(self, spp: int | None, time: float | None) -> None:
-        """One pass; sets the stop reason where `spp` is reached, or `time` is over, which may be inside the pass."""
+        """One pass; sets the stop reason where `time` is over, which may be inside the pass."""
         for _ in self.session.render(self._pass_size(self.session.samples_done, spp)):
             self.seconds = clock.perf_counter() - self._clock
             if time is not None and self.seconds >= time and self.session.samples_done:
                 self.stop_reason = "time"
                 return
-        if spp is not None and self.session.samples_done >= spp:
-            self.stop_reason = "spp"
 
     def _record_state(self, reference: NDArray[np.float32] | None) -> State:
         self.session.wait()

@@ -29,11 +29,11 @@ FIRST_LAUNCH_SAMPLES = 1 << 15
 class Session:
     """Renders ranges of samples of one compiled scene at one size. Nothing depends on how the ranges are cut."""
 
-    def __init__(self, device: Device, compiled: CompiledScene, camera: Camera, size: tuple[int, int], max_depth: int,
+    def __init__(self, device: Device, compiled: CompiledScene, size: tuple[int, int], max_depth: int,
                  seed: int) -> None:
         self.device, self.compiled, self.size = device, compiled, size
         self.program: BuiltProgram = build(device, compiled.source)
-        self.launch = _launch_record(camera, size, max_depth, seed)
+        self.launch = _launch_record(compiled.camera, size, max_depth, seed)
         self.samples_done = 0
         self._next_pixel, self._pass_samples = 0, 0
         self._launches = Launches(FIRST_LAUNCH_SAMPLES)

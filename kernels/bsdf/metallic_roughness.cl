@@ -1,5 +1,10 @@
-// Cook–Torrance over Lambert (Suchiński 6.5–6.15, Nadolny 3.5–3.13; glTF 2.0, appendix B):
-//   f = F·G·D/(4·cos wi·cos wo) + (1 − F)·albedo/pi,  F = f0 + (1 − f0)(1 − wi·h)^5,  h = half vector.
+// Cook–Torrance over Lambert (Suchiński 6.5–6.15, Nadolny 3.5–3.13):
+//   f = F(wi·h)·G·D/(4·cos wi·cos wo) + (1 − F(cos wi))(1 − F(cos wo))·albedo/pi
+// with F(c) = f0 + (1 − f0)(1 − c)^5 and h the half vector.
+//
+// The sources, and glTF, weigh Lambert by 1 − F(wi·h). That makes light: a white plastic of roughness 0.1 reflects
+// 1.7 times what it gets at grazing angles. Light that reaches the body crosses the surface twice, which the two
+// factors stand for; they are reciprocal and never sum to more than 1 with the specular part.
 //
 // D is GGX (Walter et al. 2007, eq. 33). The microfacet lobe draws normals visible from wo (Dupuy and Benyoub 2023,
 // "Sampling Visible GGX Normals with Spherical Caps"); it and the cosine lobe are chosen by the Fresnel term at wo.
@@ -23,6 +28,8 @@ static inline real3 fresnel_schlick(real3 f0, real cos_theta) {
     real c = maximum(1.0f - cos_theta, ZERO), c2 = c * c;
     return mad3(sub(splat(ONE), f0), c2 * c2 * c, f0);
 }
+
+static inline real3 transmitted(real3 f0, real cos_theta) { return sub(splat(ONE), fresnel_schlick(f0, cos_theta)); }
 
 // Walter's D(h), with the denominator summed so that a tiny alpha keeps its digits at the lobe's centre.
 static inline real ggx_d(real3 h, real alpha) {
@@ -68,7 +75,8 @@ static inline real3 metallic_roughness_value(const MetallicRoughnessLobes *m, re
     real3 h = normalize3(add(wo, wi));
     real3 f = fresnel_schlick(m->f0, dot3(wi, h));
     real specular = ggx_d(h, m->alpha) * shadowing(m, wo, wi) / (4.0f * wo.z);
-    real3 diffuse = scale(mul(sub(splat(ONE), f), m->albedo), wi.z * (1.0f / PI));
+    real3 crossing = mul(transmitted(m->f0, wi.z), transmitted(m->f0, wo.z));
+    real3 diffuse = scale(mul(crossing, m->albedo), wi.z * (1.0f / PI));
     return choose((wo.z > 0.0f) & (wi.z > 0.0f), mad3(f, specular, diffuse), splat(ZERO));
 }
 

@@ -2,13 +2,12 @@
 //
 // A plane's t is (plane − origin)·(1/direction): three roundings, so a relative error below 3 units. Near planes are
 // pulled in and far planes pushed out by twice that (Ize 2013, "Robust BVH Ray Traversal", JCGT 2(2)), which costs
-// nothing as it is folded into 1/direction. A zero component gives ±inf, clamped to the largest float, so that no
-// 0·inf arises on a slab plane. Flat boxes are kept since near == far counts as a hit.
+// nothing as it is folded into 1/direction. A zero component gives ±inf, and on a slab plane 0·inf = NaN, which every
+// comparison here drops: such a ray counts as inside the slab. Flat boxes are kept since near == far counts as a hit.
 #include "geometry/wide.cl"
 #include "vector.cl"
 
 #define SLAB_PAD (6.0f * 5.9604645e-8f)
-#define LARGEST 3.402823466e38f
 
 typedef struct {
     float origin[3], near[3], far[3];   // near, far: padded 1/direction
@@ -21,9 +20,8 @@ static inline SlabRays slab_rays(real3 direction) {
     SlabRays r;
 #define INVERT(axis, d) { \
         real inverse = 1.0f / d; \
-        inverse = minimum(maximum(inverse, (real)(-LARGEST)), (real)(LARGEST)); \
         r.near[axis] = inverse * (1.0f - SLAB_PAD); \
-        r.far[axis] = minimum(maximum(inverse * (1.0f + SLAB_PAD), (real)(-LARGEST)), (real)(LARGEST)); \
+        r.far[axis] = inverse * (1.0f + SLAB_PAD); \
         r.backward[axis] = inverse < 0.0f; \
     }
     INVERT(0, direction.x)

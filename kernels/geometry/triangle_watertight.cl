@@ -62,6 +62,7 @@ static inline WideHit intersect_triangles(const TriangleRay *ray, global const T
     wide u = u1 - u2, v = v1 - v2, w = w1 - w2;
     wide det = u + v + w;
     wide inverse = 1.0f / det;
+    wide max_z = wide_max3(WIDE_ABS(az), WIDE_ABS(bz), WIDE_ABS(cz));
     az *= ray->sz;
     bz *= ray->sz;
     cz *= ray->sz;
@@ -71,12 +72,12 @@ static inline WideHit intersect_triangles(const TriangleRay *ray, global const T
     result.u = v * inverse;
     result.v = w * inverse;
 
-    wide max_z = wide_max3(WIDE_ABS(az), WIDE_ABS(bz), WIDE_ABS(cz));
     wide max_x = wide_max3(WIDE_ABS(ax), WIDE_ABS(bx), WIDE_ABS(cx));
     wide max_y = wide_max3(WIDE_ABS(ay), WIDE_ABS(by), WIDE_ABS(cy));
     wide max_e = wide_max3(WIDE_ABS(u), WIDE_ABS(v), WIDE_ABS(w));
     wide delta_x = GAMMA(5) * (max_x + max_z), delta_y = GAMMA(5) * (max_y + max_z);
     wide delta_e = 2.0f * (GAMMA(2) * max_x * max_y + delta_y * max_x + delta_x * max_y);
+    max_z *= fabs(ray->sz);
     wide t_min = 3.0f * (GAMMA(3) * max_e * max_z + delta_e * max_z + GAMMA(3) * max_z * max_e) * WIDE_ABS(inverse);
     result.hit = result.hit & (result.t > t_min);
     return result;

@@ -49,7 +49,7 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
     keep_closest(hit, found.t, found.u, found.v, leaf->primitive);
 #else
     if (stop_at_first) {
-        hit->primitive = 0;
+        if (WIDE_ANY(found.hit & (found.t < hit->t))) hit->primitive = 0;
         return;
     }
     const float *t = (const float *)&found.t, *u = (const float *)&found.u, *v = (const float *)&found.v;

@@ -13,16 +13,22 @@ static inline Ray one_ray(const real3 *origin, const real3 *direction, const rea
 }
 #endif
 
-// The nearest hit of each active lane's ray with 0 < t < infinity.
-static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction, ireal active) {
+// Whether a ray has finite numbers and a direction: one of NaN would enter every box, the empty slots' too, and run off
+// the stack. Such rays meet nothing.
+static inline ireal is_ray(real3 origin, real3 direction) {
+    real sum = origin.x + origin.y + origin.z + (direction.x + direction.y + direction.z);
+    return (absolute(sum) <= 3.4e38f) & (largest(absolute3(direction)) > 0.0f);
+}
+
+// The nearest hit of each active lane's ray with 0 < t < t_max.
+static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active) {
     RealLanes t, u, v;
     IntLanes primitive, enabled;
     t.all = (real)(INFINITY);
     u.all = v.all = ZERO;
     primitive.all = (ireal)(-1);
 #if PRIMITIVES
-    enabled.all = active;
-    real t_max = (real)(INFINITY);
+    enabled.all = active & is_ray(origin, direction);
     TreeRays rays = tree_rays(origin, direction);
     for (int lane = 0; lane < LANES; ++lane) {
         if (!enabled.lane[lane]) continue;
@@ -43,7 +49,7 @@ static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, r
 #if PRIMITIVES
     TreeRays rays = tree_rays(origin, direction);
     IntLanes enabled, found;
-    enabled.all = active;
+    enabled.all = active & is_ray(origin, direction);
     found.all = (ireal)(-1);
     for (int lane = 0; lane < LANES; ++lane) {
         if (!enabled.lane[lane]) continue;

@@ -89,7 +89,7 @@ kernel void probe_bsdf_value(SCENE_PARAMETERS, uint n, global const float *in, g
 // in: origin (3), direction (3) -> out: t, u, v, primitive
 kernel void probe_closest_hit(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
-    Hits hits = closest_hit(&scene, ROW3(in, 0), ROW3(in, 3), active);
+    Hits hits = closest_hit(&scene, ROW3(in, 0), ROW3(in, 3), (real)(INFINITY), active);
     put(out, n, 0, hits.t);
     put(out, n, 1, hits.u);
     put(out, n, 2, hits.v);
@@ -108,11 +108,11 @@ kernel void probe_any_hit(SCENE_PARAMETERS, uint n, global const float *in, glob
 kernel void probe_leave(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     real3 origin = ROW3(in, 0), direction = ROW3(in, 3), next = ROW3(in, 6);
-    Hits hits = closest_hit(&scene, origin, direction, active);
+    Hits hits = closest_hit(&scene, origin, direction, (real)(INFINITY), active);
     ireal hit = hits.primitive >= 0;
     Surface surface = surface_at(&scene, origin, direction, &hits);
     real3 left = offset_origin(surface.p, surface.p_error, surface.ng, next);
-    Hits again = closest_hit(&scene, left, next, active & hit);
+    Hits again = closest_hit(&scene, left, next, (real)(INFINITY), active & hit);
     put(out, n, 0, TO_REAL(hits.primitive));
     put3(out, n, 1, choose(hit, surface.p, splat(ZERO)));
     put3(out, n, 4, choose(hit, surface.p_error, splat(ZERO)));
@@ -151,7 +151,7 @@ kernel void probe_alias(SCENE_PARAMETERS, uint n, global const float *in, global
 kernel void probe_emitter(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     real3 p = ROW3(in, 0), wi = ROW3(in, 3);
-    Hits hits = closest_hit(&scene, p, wi, active);
+    Hits hits = closest_hit(&scene, p, wi, (real)(INFINITY), active);
     Surface surface = surface_at(&scene, p, wi, &hits);
     real pdf;
     put3(out, n, 0, emitter_radiance(&scene, p, wi, hits.t, &surface, active & (hits.primitive >= 0), &pdf));

@@ -11,7 +11,10 @@ Doubles = NDArray[np.float64]
 
 
 def cook_torrance(material: MetallicRoughness, wo: Doubles, wi: Doubles) -> Doubles:
-    """(n, 3) f = F·G·D/(4 cos cos) + (1 − F)·(1 − metallic)·color/pi; F of Schlick, D of Walter 2007 (eq. 33)."""
+    """(n, 3) f = F·G·D/(4 cos cos) + (1 − F(cos wi))(1 − F(cos wo))(1 − metallic)·color/pi.
+
+    F of Schlick, D of Walter 2007 (eq. 33).
+    """
     color, f0, metallic = np.array(material.color), np.full(3, 0.04), material.metallic
     if material.preset is not None:
         f0, metallic = np.array(F0_PRESETS[material.preset][0]), F0_PRESETS[material.preset][1]
@@ -22,9 +25,10 @@ def cook_torrance(material: MetallicRoughness, wo: Doubles, wi: Doubles) -> Doub
     tan2_h = (1 - cos_h**2) / cos_h**2
     d = alpha**2 / (np.pi * cos_h**4 * (alpha**2 + tan2_h)**2)
     g = masking(material.smith, alpha, wo[:, 2], wi[:, 2])
-    fresnel = f0 + (1 - f0) * (1 - np.sum(wi * h, axis=1, keepdims=True))**5
+    fresnel, enter, leave = (f0 + (1 - f0) * (1 - cosine)**5
+                             for cosine in (np.sum(wi * h, axis=1, keepdims=True), wi[:, 2:], wo[:, 2:]))
     specular = (d * g / (4 * wo[:, 2] * wi[:, 2]))[:, None]
-    return np.asarray(fresnel * specular + (1 - fresnel) * (1 - metallic) * color / np.pi)
+    return np.asarray(fresnel * specular + (1 - enter) * (1 - leave) * (1 - metallic) * color / np.pi)
 
 
 def masking(smith: str, alpha: float, cos_o: Doubles, cos_i: Doubles) -> Doubles:

@@ -23,7 +23,7 @@ Doubles = NDArray[np.float64]
 def session(device: Device, scene: Scene, **chosen: Any) -> Session:
     """The scene with its own settings; `chosen`: see Choices. Programs stay in memory from one to the next."""
     settings = scene.render
-    return Session(device, compile_scene(scene, choices(device, **chosen)), scene.camera, settings.size,
+    return Session(device, compile_scene(scene, choices(device, **chosen)), settings.size,
                    settings.max_depth, settings.seed)
 
 

@@ -183,12 +183,14 @@ def test_any_hit_is_a_closest_hit_before_t_max(device: Device, layout: str) -> N
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("scale", [2.0**-66, 2.0**-30, 2.0**30, 2.0**50])
 def test_scaled_mesh_has_the_same_hits(device: Device, layout: str, scale: float) -> None:
-    """From 1e-20 to 1e15: powers of two change no digit, so nothing may change but t."""
+    """From 1e-20 to 1e15: powers of two change no digit, so nothing may change but t. The device has its own unit."""
     corners = soup(300, 0.3)
     origin, direction = random_rays(10_000, 9)
     unscaled = Probe(device, Scene(meshes=[mesh(corners)]), layout=layout)("closest_hit", 4, origin, direction)
     scene = Scene(meshes=[mesh(corners * np.float32(scale))])
-    scaled = Probe(device, scene, layout=layout)("closest_hit", 4, scale * origin, direction)
+    probe = Probe(device, scene, layout=layout)
+    scale *= probe.compiled.unit
+    scaled = probe("closest_hit", 4, scale * origin, direction)
     assert np.count_nonzero(scaled[:, 3] != unscaled[:, 3]) == 0
     np.testing.assert_allclose(scaled[:, 0], scale * unscaled[:, 0], rtol=1e-6)
 

@@ -1,0 +1,108 @@
+"""Devices are found, ranked and chosen; the one that is meant, or an error that lists them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pyopencl as cl
+import pytest
+
+from clrt.device import discover, pocl
+from clrt.device.discover import DeviceInfo, choose, devices, find_devices
+from clrt.device.open import Device, open_device
+from clrt.errors import DeviceError
+
+FIELDS = ["index", "id", "name", "platform", "platform_version", "driver", "type", "compute_units", "global_bytes",
+          "max_alloc_bytes", "usable", "why", "chosen"]
+
+MACHINE = [("NVIDIA H200", "gpu"), ("NVIDIA H200", "gpu"), ("Radeon RX 9070", "gpu"), ("pthread-EPYC", "cpu"),
+           ("Oclgrind Simulator", "simulator")]
+
+
+@pytest.fixture
+def machine(monkeypatch: pytest.MonkeyPatch) -> list[DeviceInfo]:
+    """A machine with five devices: two alike, and the third cannot be used. Only the list is made up."""
+    own = find_devices()[0]
+    infos = [replace(own[0], index=i, id=f"{i}a{i}b", name=name, type=kind, chosen=i == 0, usable=i != 2,
+                     why="its driver has no compiler" if i == 2 else "fine") for i, (name, kind) in enumerate(MACHINE)]
+    monkeypatch.setattr(discover, "find_devices", lambda: [(info, own[1]) for info in infos])
+    monkeypatch.delenv("CLRT_DEVICE", raising=False)
+    return infos
+
+
+@pytest.mark.parametrize(("selector", "index"), [
+    (None, 0), (1, 1), ("1", 1), (" 3 ", 3), ("3a3b", 3), ("gpu", 0), ("GPU", 0), ("cpu", 3), ("epyc", 3),
+    ("oclgrind", 4), ("Simulator", 4)])
+def test_selectors(machine: list[DeviceInfo], selector: str | int | None, index: int) -> None:
+    """A number, an id, a kind, or a part of a name in any case."""
+    assert choose(selector)[0] is machine[index]
+
+
+@pytest.mark.parametrize(("selector", "words"), [
+    ("h200", "2 devices match 'h200'.*0a0b.*1a1b"), ("quadro", "no usable device matches 'quadro'.*Radeon"),
+    ("7", "no usable device matches '7'"), ("radeon", "Radeon RX 9070 cannot be used: its driver has no compiler"),
+    (2, "cannot be used")])
+def test_wrong_selectors_list_the_devices(machine: list[DeviceInfo], selector: str | int, words: str) -> None:
+    with pytest.raises(DeviceError, match=f"(?s){words}"):
+        choose(selector)
+
+
+def test_environment_variable(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch) -> None:
+    """CLRT_DEVICE stands in for a selector that is not given; empty is none."""
+    monkeypatch.setenv("CLRT_DEVICE", "epyc")
+    assert choose()[0] is machine[3]
+    assert choose("0")[0] is machine[0]
+    monkeypatch.setenv("CLRT_DEVICE", "")
+    assert choose()[0] is machine[0]
+
+
+def test_no_device_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(discover, "find_devices", lambda: [])
+    with pytest.raises(DeviceError, match="pip install"):
+        choose()
+
+
+def test_this_machines_devices() -> None:
+    """Best first, one chosen, every field, as JSON; ids tell drivers apart."""
+    listed = devices()
+    assert listed and all(list(device) == FIELDS for device in listed)
+    assert [device["index"] for device in listed] == list(range(len(listed)))
+    assert [device["chosen"] for device in listed] == [True] + [False] * (len(listed) - 1)
+    usable = [device["usable"] for device in listed]
+    assert usable == sorted(usable, reverse=True)
+    identities = [(d["platform"], d["platform_version"], d["name"], d["driver"]) for d in listed]
+    assert len({device["id"] for device in listed}) == len(set(identities))
+    assert json.loads(json.dumps(listed)) == listed
+
+
+def test_a_platform_that_fails_does_not_hide_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Broken:
+        def get_devices(self) -> list[cl.Device]:
+            raise cl.RuntimeError("no devices")
+
+    own = cl.get_platforms()
+    monkeypatch.setattr(cl, "get_platforms", lambda: [Broken(), *own])
+    assert devices()
+
+
+def test_open_device_by_index() -> None:
+    opened = open_device(0)
+    assert opened.info.chosen and opened.lanes in (1, 8) and opened.layout in ("bvh2", "bvh8")
+
+
+SKYLAKE = {"avx512f", "avx512dq", "avx512bw", "avx512vl", "avx512cd", "fma", "bmi2", "movbe", "avx2", "bmi1", "f16c"}
+
+
+@pytest.mark.parametrize(("flags", "name"), [
+    (set(), "x86-64"), ({"sse4_2", "popcnt"}, "nehalem"), ({"avx2", "fma", "bmi1", "bmi2", "f16c"}, "x86-64"),
+    ({"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe", "sse4_2", "popcnt"}, "haswell"), (SKYLAKE, "skylake-avx512"),
+    (SKYLAKE - {"avx512bw"}, "haswell"), (set().union(*pocl.PROCESSORS.values()), "icelake-server")])
+def test_best_processor(flags: set[str], name: str) -> None:
+    """The newest whose instructions are all there: one that is not crashes the process."""
+    assert pocl.best_processor(flags) == name
+
+
+def test_a_named_processor_stays(device: Device) -> None:
+    """Once named, or known from the start, nothing is touched again."""
+    assert not pocl.name_processor(device.cl)

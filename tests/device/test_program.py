@@ -1,0 +1,160 @@
+"""Programs from files: what is included, what is built, and that no cache, however broken, is in the way."""
+
+from __future__ import annotations
+
+import re
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+from clrt.device import cache, program
+from clrt.device.open import Device
+from clrt.device.program import build, compose
+from clrt.errors import KernelError
+from clrt.rendering.compile import Choices, compile_scene
+from clrt.scene.materials import MATERIALS
+from clrt.scene.model import Environment
+
+from ..rendering.bsdfs import variants
+from ..rendering.test_variants import everything
+
+KERNELS = Path(str(files("clrt.kernels")))
+FILES = sorted(str(path.relative_to(KERNELS)) for path in KERNELS.rglob("*.cl"))
+DOUBLE = "kernel void twice(global float *x) { x[get_global_id(0)] *= 2.0f; }"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Three kernel files that include each other."""
+    (tmp_path / "a.cl").write_text('#include "b.cl"\n#include CHOSEN\nint a;\n')
+    (tmp_path / "b.cl").write_text("int b;\n")
+    (tmp_path / "c.cl").write_text('#include "b.cl"\nint c;\n')
+    return tmp_path
+
+
+def test_a_file_is_included_once(folder: Path) -> None:
+    """Where it is first asked for; #line names the file that follows."""
+    text = compose("int first;", "a.cl", {"CHOSEN": ["c.cl", "b.cl"]}, folder)
+    assert re.findall(r"int (\w+);", text) == ["first", "b", "c", "a"]
+    assert re.findall(r'#line 1 "(.+)"', text) == ["a.cl", "b.cl", "c.cl"]
+    lines = text.splitlines()
+    assert lines[lines.index("int a;") - 1] == '#line 3 "a.cl"'
+
+
+def test_a_choice_may_be_no_file(folder: Path) -> None:
+    assert "int c;" not in compose("", "a.cl", {"CHOSEN": []}, folder)
+
+
+@pytest.mark.parametrize(("choices", "error"), [({}, KeyError), ({"CHOSEN": ["d.cl"]}, FileNotFoundError)])
+def test_unknown_includes_are_errors(folder: Path, choices: dict[str, list[str]], error: type[Exception]) -> None:
+    with pytest.raises(error, match="CHOSEN|d.cl"):
+        compose("", "a.cl", choices, folder)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_includes_stand_outside_conditions(name: str) -> None:
+    """They are resolved before the preprocessor runs, so one inside #if would be there always."""
+    depth = 0
+    for number, line in enumerate((KERNELS / name).read_text(encoding="utf-8").splitlines(), start=1):
+        word = re.match(r"\s*#\s*(\w+)", line)
+        if word and word[1].startswith("if"):
+            depth += 1
+        elif word and word[1] == "endif":
+            depth -= 1
+        elif word and word[1] == "include":
+            assert depth == 0, f"{name}:{number} includes inside #if"
+            assert re.match(r'#include ("[^"]+"|\w+)$', line), f"{name}:{number} is not understood by compose()"
+    assert depth == 0
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_kernel_file_opens_with_what_it_is(name: str) -> None:
+    assert re.match(r"// \S", (KERNELS / name).read_text(encoding="utf-8"))
+
+
+def test_every_kernel_file_is_used() -> None:
+    """By some scene, with some choice."""
+    used: set[str] = set()
+    for layout in ("bvh8", "bvh2", "list"):
+        for triangle in ("watertight", "moller_trumbore"):
+            choices = Choices(layout=layout, triangle=triangle)
+            for environment in (everything().environment, Environment(color=(1.0, 1.0, 1.0))):
+                scene = everything()
+                scene.environment = environment
+                used |= set(compile_scene(scene, choices).files)
+    assert sorted(used) == FILES
+
+
+def test_programs_build_without_a_warning(device: Device, capfd: pytest.CaptureFixture[str]) -> None:
+    """Warnings of a driver's compiler land on the user's terminal, in the middle of the progress bar."""
+    scene = everything()
+    scene.spheres = scene.spheres + [type(scene.spheres[0])(material=material)
+                                     for kind in MATERIALS for material in variants(kind)]
+    source = compile_scene(scene, Choices(device.lanes, device.layout)).source
+    built = build(device, source + "\n// its own text, so that no cache has it")
+    log = built.program.get_build_info(device.cl, cl.program_build_info.LOG)  # type: ignore[no-untyped-call]
+    assert not log.strip()
+    assert "warning" not in capfd.readouterr().err
+
+
+def test_compiler_errors_are_told(device: Device) -> None:
+    with pytest.raises(KernelError, match="(?s)cannot build the kernel:.*undeclared"):
+        build(device, "kernel void broken() { undeclared = 1; }")
+
+
+@pytest.mark.parametrize("state", ["absent", "stored", "corrupt", "truncated", "empty", "no folder",
+                                   "a folder in its place"])
+def test_a_program_is_built_whatever_the_cache_holds(device: Device, state: str, tmp_path: Path,
+                                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "cache"
+    monkeypatch.setenv("CLRT_CACHE_DIR", str(folder))
+    source = f"{DOUBLE} // {state}"
+    build(device, source)
+    stored = list(folder.iterdir())
+    assert len(stored) == 1
+    content = stored[0].read_bytes()
+    monkeypatch.setattr(program, "_built", {})
+    if state == "absent":
+        cache.clear()
+    elif state == "corrupt":
+        stored[0].write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+    elif state == "truncated":
+        stored[0].write_bytes(content[:20])
+    elif state == "empty":
+        stored[0].write_bytes(b"")
+    elif state == "no folder":
+        stored[0].unlink()
+        folder.rmdir()
+        folder.write_text("a file where the folder should be")
+    elif state == "a folder in its place":
+        stored[0].unlink()
+        stored[0].mkdir()
+    built = build(device, source)
+    assert built.cached == (state == "stored")
+    assert run_twice(device, built.program) == [2.0, 4.0, 6.0]
+
+
+def run_twice(device: Device, twice: cl.Program) -> list[float]:
+    x = np.array([1, 2, 3], np.float32)
+    buffer = cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=x)
+    kernel = cl.Kernel(twice, "twice")
+    kernel.set_args(buffer)
+    cl.enqueue_nd_range_kernel(device.queue, kernel, (3,), None)
+    cl.enqueue_copy(device.queue, x, buffer)
+    return [float(value) for value in x]
+
+
+def test_a_binary_comes_back_only_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path))
+    cache.write_binary("key", b"binary")
+    assert cache.read_binary("key") == b"binary" and cache.read_binary("other") is None
+    assert cache.clear() == 1 and cache.read_binary("key") is None
+    assert not list(tmp_path.iterdir())
+
+
+def test_programs_of_a_process_are_kept(device: Device) -> None:
+    first, second = build(device, DOUBLE), build(device, DOUBLE)
+    assert second.program is first.program and second.cached

@@ -1,0 +1,79 @@
+"""Host and device lay every record out alike: the device is asked for its sizes and offsets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+from clrt.accel import layouts
+from clrt.device.open import Device
+from clrt.device.program import build
+from clrt.device.records import c_typedef, record
+from clrt.rendering import records
+from clrt.scene.materials import MATERIALS
+
+RECORDS: dict[str, np.dtype[Any]] = {
+    f"{module.__name__.rsplit('.', 1)[1]}_{name}": value for module in (records, layouts)
+    for name, value in vars(module).items() if isinstance(value, np.dtype) and value.names
+} | {f"material_{kind.__name__}": records.material_record(kind) for kind in MATERIALS}
+
+
+def offsets(dtype: np.dtype[Any]) -> list[int]:
+    return [place[1] for place in (dtype.fields or {}).values()]
+
+
+def test_every_record_is_here() -> None:
+    """Those of rendering, of the trees, and of the materials."""
+    assert len(RECORDS) >= 13 + 5 + len(MATERIALS)
+
+
+def test_device_agrees_with_numpy(device: Device) -> None:
+    """One program with all typedefs; a kernel writes each record's size and the offset of each member."""
+    places, texts = [], []
+    for name, dtype in RECORDS.items():
+        texts.append(c_typedef(name, dtype))
+        places.append(f"sizeof({name})")
+        places += [f"(uint)((global char *)&(({name} global *)base)->{field} - (global char *)base)"
+                   for field in dtype.names or ()]
+    writes = "".join(f"out[{i}] = {place};" for i, place in enumerate(places))
+    source = "\n".join([*texts, f"kernel void sizes(global uint *base, global uint *out) {{ {writes} }}"])
+    kernel = cl.Kernel(build(device, source).program, "sizes")
+    found = np.zeros(len(places), np.uint32)
+    scratch, out = (cl.Buffer(device.context, cl.mem_flags.READ_WRITE, size) for size in (4096, found.nbytes))
+    kernel.set_args(scratch, out)
+    cl.enqueue_nd_range_kernel(device.queue, kernel, (1,), (1,))
+    cl.enqueue_copy(device.queue, found, out)
+    expected = [size for dtype in RECORDS.values() for size in (dtype.itemsize, *offsets(dtype))]
+    wrong = [(place, int(a), b) for place, a, b in zip(places, found, expected) if a != b]
+    assert not wrong
+
+
+def test_pyopencl_agrees(device: Device) -> None:
+    """Its own matcher of dtypes to C structs finds no other layout."""
+    for name, dtype in RECORDS.items():
+        matched, _ = cl.tools.match_dtype_to_c_struct(device.cl, name, dtype)
+        assert matched.itemsize == dtype.itemsize
+        assert offsets(matched) == offsets(dtype)
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_records_keep_the_rules(name: str) -> None:
+    """Four-byte members, no gaps, no vector types; sizes in steps of 16, which the alias table of skies halves."""
+    dtype = RECORDS[name]
+    sizes = [dtype[field].itemsize for field in dtype.names or ()]
+    assert sum(sizes) == dtype.itemsize and all(size % 4 == 0 for size in sizes)
+    assert dtype.itemsize % (8 if name == "records_SKY_ALIAS" else 16) == 0
+
+
+def test_typedef() -> None:
+    dtype = record(center="3f4", radius="f4", box="(2,3)f4", index="i4", flags="u4")
+    assert c_typedef("Thing", dtype) == ("typedef struct { float center[3]; float radius; float box[2][3]; int index; "
+                                         "uint flags; } Thing;")
+
+
+def test_a_record_needs_a_multiple_of_16_bytes() -> None:
+    with pytest.raises(ValueError, match="20 bytes"):
+        record(center="3f4", radius="f4", index="i4")

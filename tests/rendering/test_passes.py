@@ -1,0 +1,127 @@
+"""Progressive rendering: when it stops, what it tells on the way, and what the report says in the end."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from clrt.device.open import Device
+from clrt.errors import UsageError
+from clrt.rendering.renderer import Renderer
+from clrt.rendering.report import render_report
+from clrt.scene.lights import PointLight
+from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
+
+#: What other programs read; the command line adds total_seconds.
+REPORT = {"scene", "device", "platform", "driver", "version", "width", "height", "spp", "max_depth", "seed",
+          "seconds", "samples", "samples_per_second", "rays", "rays_per_second", "stop_reason", "noise",
+          "nonfinite_samples", "bvh", "kernel", "peak_device_bytes", "history"}
+BVH = {"triangles", "spheres", "instances", "nodes", "bytes", "build_seconds", "sah_cost", "layout"}
+KERNEL = {"build_seconds", "cached", "features"}
+
+
+@pytest.fixture
+def renderer(device: Device) -> Renderer:
+    """A lamp above a sphere under a sky: noisy, and quick."""
+    scene = Scene(spheres=[Sphere(), Sphere(center=(0.0, -101.0, 0.0), radius=100.0)], name="ball",
+                  lights=[PointLight(position=(2.0, 3.0, 2.0), intensity=(20.0, 20.0, 20.0))],
+                  environment=Environment(color=(0.5, 0.5, 0.5)), camera=Camera(position=(0.0, 1.0, 6.0)),
+                  render=RenderSettings(size=(40, 30), spp=12, max_depth=4, seed=6))
+    return Renderer(scene, device=device.info.index)
+
+
+def test_stops_at_spp(renderer: Renderer) -> None:
+    """The scene's own number of samples unless told otherwise; the history has the powers of two and the end."""
+    states = list(renderer.passes())
+    assert renderer.stop_reason == "spp" and states[-1].spp == 12
+    assert np.all(states[-1].film.pixels["count"] == 12)
+    spps = [entry["spp"] for entry in renderer.history]
+    assert spps == [state.spp for state in states] and {1, 2, 4, 8, 12} <= set(spps)
+    seconds = [entry["seconds"] for entry in renderer.history]
+    assert seconds == sorted(seconds) and seconds[0] > 0
+    assert renderer.history[0]["noise"] is None
+    noises = [entry["noise"] for entry in renderer.history[1:]]
+    assert all(noise > 0 for noise in noises)
+
+
+def test_goes_on_where_it_stopped(renderer: Renderer, device: Device) -> None:
+    """5 samples and then up to 12 are the same picture as 12 at once, bit for bit."""
+    first = list(renderer.passes(spp=5))[-1]
+    assert first.spp == 5
+    last = list(renderer.passes(spp=12))[-1]
+    assert last.spp == 12 and renderer.history[-1]["seconds"] > first.seconds
+    at_once = list(Renderer(renderer.scene, device=device.info.index).passes(spp=12))[-1]
+    assert last.film.pixels.tobytes() == at_once.film.pixels.tobytes()
+
+
+def test_stops_after_a_time(renderer: Renderer) -> None:
+    last = list(renderer.passes(time=0.2))[-1]
+    assert renderer.stop_reason == "time" and last.seconds >= 0.2
+    assert last.spp >= 1 and np.all(last.film.pixels["count"] >= last.spp)
+
+
+def test_stops_at_an_error(renderer: Renderer) -> None:
+    """At the first state whose noise is low enough."""
+    states = list(renderer.passes(error=0.02))
+    assert renderer.stop_reason == "error"
+    *before, last = [state.noise for state in states]
+    assert last is not None and last <= 0.02
+    assert all(noise is None or noise > 0.02 for noise in before)
+
+
+@pytest.mark.parametrize(("stops", "reason"), [({"spp": 4, "time": 1000.0, "error": 1e-9}, "spp"),
+                                               ({"spp": 1 << 20, "time": 1000.0, "error": 0.05}, "error"),
+                                               ({"spp": 1 << 30, "time": 0.1, "error": 1e-9}, "time")])
+def test_the_first_condition_met_ends_it(renderer: Renderer, stops: dict[str, float], reason: str) -> None:
+    for _ in renderer.passes(**stops):  # type: ignore[arg-type]
+        pass
+    assert renderer.stop_reason == reason
+
+
+@pytest.mark.parametrize("stops", [{"spp": 0}, {"time": -1.0}, {"error": float("nan")}, {"time": float("inf")}],
+                         ids=str)
+def test_impossible_conditions_are_refused(renderer: Renderer, stops: dict[str, float]) -> None:
+    with pytest.raises(UsageError, match=next(iter(stops))):
+        next(renderer.passes(**stops))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("chosen", [{"layout": "octree"}, {"lanes": 3}, {"triangle": "square"}, {"builder": "hope"}],
+                         ids=str)
+def test_unknown_choices_are_refused(device: Device, chosen: dict[str, object]) -> None:
+    with pytest.raises(UsageError, match=next(iter(chosen))):
+        Renderer(Scene(), device=device.info.index, **chosen)  # type: ignore[arg-type]
+
+
+def test_relmse_against_a_reference(renderer: Renderer) -> None:
+    """mean((x − r)²/(r² + 0.01)), in the state and in the history."""
+    reference = np.random.default_rng(0).random((30, 40, 3)).astype(np.float32)
+    last = list(renderer.passes(spp=4, reference=reference))[-1]
+    expected = np.mean((last.pixels.astype(float) - reference)**2 / (reference.astype(float)**2 + 0.01))
+    assert last.relmse == pytest.approx(expected, rel=1e-6)
+    assert renderer.history[-1]["relmse"] == last.relmse
+
+
+def test_report(renderer: Renderer) -> None:
+    """Every field, and numbers that fit each other; as JSON without NaN."""
+    last = list(renderer.passes(spp=8, reference=np.ones((30, 40, 3), np.float32)))[-1]
+    report = json.loads(json.dumps(render_report(renderer, last), allow_nan=False))
+    assert REPORT <= set(report) and BVH <= set(report["bvh"]) and KERNEL <= set(report["kernel"])
+    assert all({"spp", "seconds", "noise", "relmse"} <= set(entry) for entry in report["history"])
+    assert (report["scene"], report["width"], report["height"], report["spp"]) == ("ball", 40, 30, 8)
+    assert (report["max_depth"], report["seed"], report["stop_reason"], report["nonfinite_samples"]) == (4, 6, "spp", 0)
+    assert report["samples"] == 40 * 30 * 8 and report["rays"] > report["samples"]
+    assert report["samples_per_second"] == pytest.approx(report["samples"] / report["seconds"])
+    assert report["rays_per_second"] == pytest.approx(report["rays"] / report["seconds"])
+    assert report["noise"] == report["history"][-1]["noise"] == last.noise
+    assert (report["bvh"]["triangles"], report["bvh"]["spheres"]) == (0, 2)
+    assert report["peak_device_bytes"] > 40 * 30 * 12
+    assert isinstance(report["kernel"]["cached"], bool) and "SPHERES" in report["kernel"]["features"]
+
+
+def test_direct_is_two_edges(renderer: Renderer, device: Device) -> None:
+    """The integrator "direct" is the path tracer of depth 2."""
+    direct, shallow = (list(Renderer(renderer.scene, device=device.info.index, **given).passes(spp=4))[-1].pixels
+                       for given in ({"integrator": "direct"}, {"max_depth": 2}))
+    assert np.array_equal(direct, shallow)

@@ -1,0 +1,127 @@
+"""The same picture from every way of computing it, and only the code that the scene needs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.device.open import Device
+from clrt.rendering import session as session_module
+from clrt.scene.lights import DirectionalLight, PointLight
+from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
+from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+
+from . import rays
+from .pictures import film, quad, session
+
+Doubles = NDArray[np.float64]
+
+
+def everything() -> Scene:
+    """All kinds of primitives, materials and lights, with a picture wide enough for uneven lanes."""
+    vertices, faces = rays.icosphere(2)
+    gold, plastic = MetallicRoughness(preset="gold", roughness=0.4), MetallicRoughness(roughness=0.2, smith="schlick")
+    ball = Mesh(vertices + np.array([1.2, 0.8, 0], np.float32), faces, gold, normals=vertices)
+    lamp = quad([(-1, 4, -1), (1, 4, -1), (1, 4, 1), (-1, 4, 1)], Diffuse(emission=(6.0, 5.0, 4.0)))
+    floor = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse(color=(0.7, 0.6, 0.5)))
+    sky = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)
+    return Scene(
+        meshes=[floor, lamp, ball],
+        spheres=[Sphere(center=(-1.0, 0.7, 0.5), radius=0.7, material=Mirror(color=(0.9, 0.9, 0.9))),
+                 Sphere(center=(0.0, 2.2, 0.0), radius=0.2, material=Diffuse(emission=(9.0, 1.0, 1.0))),
+                 Sphere(center=(0.0, 0.3, 1.5), radius=0.3, material=plastic)],
+        lights=[PointLight(position=(3.0, 2.0, 2.0), intensity=(5.0, 5.0, 9.0)),
+                DirectionalLight(direction=(1.0, -2.0, -1.0), irradiance=(0.5, 0.4, 0.3))],
+        environment=Environment(image=sky, rotation_degrees=30.0),
+        camera=Camera(position=(0.0, 2.0, 6.0), look_at=(0.0, 1.0, 0.0)),
+        render=RenderSettings(size=(45, 33), spp=4, max_depth=6, seed=11))
+
+
+@pytest.fixture(scope="module")
+def reference(device: Device) -> Doubles:
+    return film(device, everything(), lanes=8, layout="bvh8").mean
+
+
+@pytest.mark.parametrize("chosen", [{"lanes": 1}, {"lanes": 16}, {"layout": "bvh2"}, {"layout": "list"},
+                                    {"builder": "midpoint"}, {"lanes": 1, "layout": "bvh2"}], ids=str)
+def test_lanes_layouts_and_builders_agree(device: Device, reference: Doubles, chosen: dict[str, Any]) -> None:
+    """To float rounding: a sample is a chain of some hundred operations, so most pixels agree to 1e-5.
+
+    A rounding can also turn a decision (which lobe, which side of an edge): then one of the 4 samples of a pixel is
+    another. Each sample takes some 50 decisions that a relative 1e-6 may turn: fewer than 1 pixel in 1000.
+    """
+    wanted: dict[str, Any] = {"lanes": 8, "layout": "bvh8"} | chosen
+    picture = film(device, everything(), **wanted).mean
+    differs = np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)
+    assert np.mean(differs) < 1e-3, np.argwhere(differs)
+
+
+def test_pictures_do_not_depend_on_passes_and_launches(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bit for bit: eight samples in one pass, or in several, in one launch or in many, twice the same."""
+    scene = replace(everything(), render=RenderSettings(size=(64, 48), spp=8, seed=2))
+    films = []
+    for passes, first_launch in (([8], 1 << 15), ([8], 1), ([1] * 8, 1 << 20), ([3, 5], 1), ([8], 1 << 15)):
+        monkeypatch.setattr(session_module, "FIRST_LAUNCH_SAMPLES", first_launch)
+        running = session(device, scene)
+        for samples in passes:
+            for _ in running.render(samples):
+                pass
+        films.append(running.film().pixels)
+    assert all(pixels.tobytes() == films[0].tobytes() for pixels in films[1:])
+
+
+def test_seeds_differ(device: Device) -> None:
+    """Another seed gives other noise: two pictures of independent samples, in nearly all pixels that have noise."""
+    scene = everything()
+    pictures = [film(device, replace(scene, render=replace(scene.render, seed=seed))).mean
+                for seed in (0, 1, 2**32 - 1)]
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        assert np.mean(np.any(pictures[i] != pictures[j], axis=2)) > 0.95
+        mean = [p.mean() for p in (pictures[i], pictures[j])]
+        assert abs(mean[0] / mean[1] - 1) < 0.2
+
+
+def test_empty_scene_is_the_sky(device: Device) -> None:
+    """Every sample finds the same color: exactly that."""
+    sky = Environment(color=(0.3, 0.6, 0.1), strength=2.0)
+    picture = film(device, Scene(environment=sky, render=RenderSettings(size=(20, 10), spp=5)))
+    assert np.all(picture.mean.astype(np.float32) == np.array([0.6, 1.2, 0.2], np.float32))
+    black = film(device, Scene(render=RenderSettings(size=(20, 10), spp=5)))
+    assert not black.mean.any() and black.samples == 1000
+
+
+@pytest.mark.parametrize("layout", ["bvh8", "bvh2", "list"])
+def test_a_scene_compiles_to_what_it_needs(device: Device, layout: str) -> None:
+    """Files, features and buffers of a scene of spheres, of one of triangles, and of an empty one."""
+    triangle = quad([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], Diffuse())
+    compiled = {name: session(device, scene, layout=layout).compiled for name, scene in
+                {"spheres": Scene(spheres=[Sphere()]), "triangles": Scene(meshes=[triangle]), "empty": Scene()}.items()}
+    assert "geometry/sphere.cl" in compiled["spheres"].files
+    assert "geometry/triangle_watertight.cl" in compiled["triangles"].files
+    for name, unwanted in {"spheres": "triangle", "triangles": "sphere"}.items():
+        program = compiled[name]
+        assert not [file for file in program.files if unwanted in file.split("/")[-1]]
+        assert unwanted.upper() + "S" not in program.features
+        assert not [buffer for buffer in program.buffers if unwanted in buffer]
+        scene_struct = next(line for line in program.source.splitlines() if line.endswith(" Scene;"))
+        assert unwanted not in scene_struct.lower().replace("counts", "")
+    for name in ("spheres", "triangles", "empty"):
+        program = compiled[name]
+        assert not [file for file in program.files if file.startswith("light/") and file != "light/interface.cl"]
+        assert not {"LIGHTS", "EMITTERS", "SKY", "SMOOTH_NORMALS"} & set(program.features)
+        assert "bsdf/mirror.cl" not in program.files and "bsdf/metallic_roughness.cl" not in program.files
+    trees = ("geometry/", "traverse/bvh", "traverse/list")
+    assert not [file for file in compiled["empty"].files if file.startswith(trees)]
+
+
+def test_settings_do_not_change_the_program(device: Device) -> None:
+    """Camera, size, samples, depth, seed and every number of the scene are arguments."""
+    scene = everything()
+    other = replace(scene, camera=Camera(position=(1.0, 1.0, 9.0), fov_degrees=70.0),
+                    render=RenderSettings(size=(7, 5), spp=3, max_depth=2, seed=99),
+                    lights=[PointLight(position=(0.0, 9.0, 0.0), intensity=(1.0, 2.0, 3.0)), scene.lights[1]])
+    assert session(device, scene).compiled.source == session(device, other).compiled.source

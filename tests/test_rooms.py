@@ -1,0 +1,98 @@
+"""The rooms of the house: who may import whom, who may know of OpenCL, and how long a file may be."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+HOUSE = Path(__file__).parents[1]
+SOURCES = sorted((HOUSE / "clrt").rglob("*.py"))
+KERNELS = sorted((HOUSE / "kernels").rglob("*.cl"))
+LONGEST = 300
+
+#: In order: a room imports only from itself and those before it. `clrt` itself is the public names alone.
+ROOMS = ["errors", "scene", "device", "accel", "rendering", "output", "api", "clrt", "cli", "__main__"]
+KNOW_OPENCL = {"device", "rendering"}
+#: Beyond the order: trees are built, and pictures written, without any device.
+NEVER = {"accel": {"device", "scene"}, "output": {"device", "accel", "rendering"}}
+
+
+def room(module: str) -> str:
+    """The room of a module given by its full name."""
+    parts = module.split(".")
+    return parts[1] if len(parts) > 1 else parts[0]
+
+
+def name(path: Path) -> str:
+    """clrt.scene.model, of clrt/scene/model.py; a package is named like its folder."""
+    parts = path.relative_to(HOUSE).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imported(path: Path) -> Iterator[str]:
+    """The full name of each module that a file imports anywhere in it; `from . import x` counts as x."""
+    package = name(path) if path.name == "__init__.py" else name(path).rpartition(".")[0]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[:len(package.split(".")) - node.level + 1] if node.level else []
+            base = ".".join(above + ([node.module] if node.module else []))
+            yield from ([base] if node.module else [f"{base}.{alias.name}" for alias in node.names])
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=name)
+def test_rooms_are_entered_in_order(path: Path) -> None:
+    own = room(name(path))
+    for module in imported(path):
+        if module.split(".")[0] == "clrt":
+            assert ROOMS.index(room(module)) <= ROOMS.index(own), f"{name(path)} imports {module}"
+            assert room(module) not in NEVER.get(own, set()), f"{name(path)} imports {module}"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=name)
+def test_only_some_rooms_know_opencl(path: Path) -> None:
+    if room(name(path)) not in KNOW_OPENCL:
+        assert not [module for module in imported(path) if module.split(".")[0] == "pyopencl"]
+
+
+def test_every_room_is_in_the_list() -> None:
+    assert {room(name(path)) for path in SOURCES} == set(ROOMS)
+
+
+@pytest.mark.parametrize("path", SOURCES + KERNELS, ids=lambda path: str(path.relative_to(HOUSE)))
+def test_files_are_short(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST
+
+
+def test_scenes_load_without_opencl(tmp_path: Path) -> None:
+    """Files of both kinds are read and validated, and pictures written, where pyopencl cannot be imported."""
+    (tmp_path / "scene.toml").write_text('[materials.red]\ntype = "diffuse"\ncolor = [1, 0, 0]\n'
+                                         '[[mesh]]\nfile = "model.obj"\nmaterial = "red"\n'
+                                         '[[sphere]]\nmaterial = "red"\n')
+    (tmp_path / "model.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    program = f"""
+import sys
+sys.modules["pyopencl"] = None
+import clrt, numpy
+from clrt.scene.file import load
+from clrt.scene.validate import validate
+from pathlib import Path
+folder = Path({str(tmp_path)!r})
+for file in ("scene.toml", "model.obj"):
+    validate(load(folder / file))
+clrt.Image(numpy.zeros((2, 3, 3), numpy.float32), {{}}).save(folder / "black.png")
+try:
+    import clrt.device.open
+except ImportError:
+    pass
+else:
+    raise SystemExit("pyopencl was not blocked")
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=HOUSE)
+    assert done.returncode == 0, done.stderr
