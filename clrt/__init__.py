@@ -13,13 +13,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .accel.query import RayQuery as RayQuery
     from .api import load as load, render as render
     from .device.discover import devices as devices
     from .errors import (ClrtError as ClrtError, DeviceError as DeviceError, KernelError as KernelError,
                          OutputError as OutputError, SceneError as SceneError, UsageError as UsageError)
     from .output.compare import compare as compare
     from .output.image import Image as Image
+    from .query import RayQuery as RayQuery
     from .rendering.renderer import Renderer as Renderer, State as State
     from .scene.lights import DirectionalLight as DirectionalLight, PointLight as PointLight
     from .scene.materials import (Diffuse as Diffuse, MetallicRoughness as MetallicRoughness, Mirror as Mirror)
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
                               RenderSettings as RenderSettings, Scene as Scene, Sphere as Sphere)
 
 _HOME = {
-    "accel.query": ("RayQuery",),
     "api": ("load", "render"),
     "device.discover": ("devices",),
     "errors": ("ClrtError", "DeviceError", "KernelError", "OutputError", "SceneError", "UsageError"),
     "output.compare": ("compare",),
     "output.image": ("Image",),
+    "query": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
     "scene.lights": ("DirectionalLight", "PointLight"),
     "scene.materials": ("Diffuse", "MetallicRoughness", "Mirror"),

@@ -14,7 +14,7 @@ import numpy as np
 from .lights import Light, PointLight
 from .model import Mesh, Scene, Sphere, Vector
 
-#: Scenes whose largest coordinate lies between 2^-20 and 2^20 are left as they are.
+#: Scenes whose largest coordinate (the camera's aside) lies between 2^-20 and 2^20 are left as they are.
 COMFORTABLE = 20
 
 
@@ -22,9 +22,7 @@ def unit_of(scene: Scene) -> float:
     """The power of two by which lengths should be multiplied: 1 unless the scene is very small or very large."""
     lengths = [float(np.abs(mesh.vertices).max()) for mesh in scene.meshes if mesh.vertices.size]
     lengths += [max(map(abs, sphere.center)) + sphere.radius for sphere in scene.spheres]
-    if not lengths:
-        return 1.0
-    return unit_for(max(*lengths, *map(abs, scene.camera.position)))
+    return unit_for(max(lengths, default=0.0))
 
 
 def unit_for(largest: float) -> float:

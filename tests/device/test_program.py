@@ -84,7 +84,7 @@ def test_every_kernel_file_is_used() -> None:
             for environment in (everything().environment, Environment(color=(1.0, 1.0, 1.0))):
                 scene = everything()
                 scene.environment = environment
-                used |= set(compile_scene(scene, choices).files)
+                used |= set(compile_scene(scene, choices).files) | set(compile_scene(scene, choices, "query.cl").files)
     assert sorted(used) == FILES
 
 

@@ -9,15 +9,15 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import ArrayLike, NDArray
 
-from ..device.launch import wait_for
-from ..device.open import open_device
-from ..device.preamble import defines, scene_struct, typedefs
-from ..device.program import build, compose, make_kernel
-from ..device.records import record
-from ..errors import SceneError, UsageError
-from ..scene.scaling import unit_for
-from .kernels import tree_buffers, tree_defines, tree_files
-from .layouts import pack
+from .accel.kernels import tree_buffers, tree_defines, tree_files
+from .accel.layouts import pack
+from .device.launch import wait_for
+from .device.open import open_device
+from .device.preamble import defines, scene_struct, typedefs
+from .device.program import build, compose, make_kernel
+from .device.records import record
+from .errors import SceneError, UsageError
+from .scene.scaling import unit_for
 
 HIT = record(t="f4", primitive="i4", u="f4", v="f4")
 COUNTS = record(triangles="i4", spheres="i4", pad="2i4")
@@ -45,14 +45,16 @@ class RayQuery:
                               typedefs({"Counts": COUNTS, "RayHit": HIT}), scene_struct(buffers)])
         source = compose(preamble, "query.cl", tree_files(self.tree.name, triangle, bool(len(triangles)), False))
         program = build(self.device, source)
-        self._kernels = {name: make_kernel(self.device, program, f"query_{name}") for name in ("closest_hit", "any_hit")}
+        self._kernels = {name: make_kernel(self.device, program, f"query_{name}")
+                         for name in ("closest_hit", "any_hit")}
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
         counts = np.zeros(1, COUNTS)
         counts["triangles"] = len(triangles)
-        self._scene = [*(cl.Buffer(self.device.context, flags, hostbuf=array) for _, array in buffers.values()), counts[0]]
+        self._scene = [cl.Buffer(self.device.context, flags, hostbuf=array) for _, array in buffers.values()]
+        self._counts = counts[0]
 
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[Any]:
-        """(n,) records of t float32 (inf: a miss), primitive int32 (−1), u, v float32: the nearest hit with 0 < t < t_max.
+        """(n,) records of t float32 (inf: a miss), primitive int32 (−1), u, v float32: the first at 0 < t < t_max.
 
         origins, directions: (n, 3), or (3,) for all; t_max: (n,) or one number, in lengths of the direction. The hit
         point is origin + t·direction = (1 − u − v)·p0 + u·p1 + v·p2. Of hits at the same t the lowest primitive wins.
@@ -79,7 +81,7 @@ class RayQuery:
         inputs = [cl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=array) for array in rays]
         output = cl.Buffer(context, flags.WRITE_ONLY, n * answer.itemsize)
         kernel, local = self._kernels[name], self.device.local_size
-        kernel.set_args(*self._scene, *inputs, output, np.float32(self.unit), np.uint32(n))
+        kernel.set_args(*self._scene, self._counts, *inputs, output, np.float32(self.unit), np.uint32(n))
         groups = -(-n // (self.device.lanes * local))
         wait_for(cl.enqueue_nd_range_kernel(queue, kernel, (groups * local,), (local,)))
         answers = np.empty(n, answer)
