@@ -1,0 +1,117 @@
+"""RayQuery: the same answers as float64 brute force, whatever the layout, the chunks and the order of the rays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import clrt
+from clrt import query
+from clrt.device.open import Device
+
+Doubles = NDArray[np.float64]
+RNG = np.random.default_rng(5)
+VERTICES = RNG.uniform(-1, 1, (150, 3)).astype(np.float32)
+FACES = RNG.integers(0, 150, (400, 3), dtype=np.int32)
+ORIGINS = RNG.uniform(-2, 2, (3000, 3)).astype(np.float32)
+DIRECTIONS = (RNG.normal(size=(3000, 3)) * RNG.uniform(0.1, 10, (3000, 1))).astype(np.float32)
+
+
+@pytest.fixture(params=["bvh8", "bvh2", "list"])
+def soup(request: pytest.FixtureRequest, device: Device) -> clrt.RayQuery:
+    return clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout=request.param)
+
+
+def brute_force(origins: Doubles, directions: Doubles) -> tuple[Doubles, Doubles]:
+    """(n, m) float64: t of every ray at every triangle, inf outside, and how deep inside the hit lies."""
+    p0, p1, p2 = (VERTICES[FACES[:, i]].astype(np.float64) for i in range(3))
+    normal = np.cross(p1 - p0, p2 - p0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = ((p0 * normal).sum(1) - origins @ normal.T) / (directions @ normal.T)
+        point = origins[:, None] + t[..., None] * directions[:, None]
+        edges = [np.einsum("nmk,mk->nm", np.cross(b - a, point - a), normal) / (normal**2).sum(1)
+                 for a, b in ((p0, p1), (p1, p2), (p2, p0))]
+        depth = np.minimum.reduce(edges)
+        return np.where((depth >= 0) & (t > 0), t, np.inf), np.where(t > 0, depth, -np.inf)
+
+
+def test_closest_hit_is_the_nearest_of_all(soup: clrt.RayQuery) -> None:
+    t, depth = brute_force(ORIGINS.astype(np.float64), DIRECTIONS.astype(np.float64))
+    clear = (np.abs(depth) > 1e-5).all(axis=1)
+    hits = soup.closest_hit(ORIGINS, DIRECTIONS)
+    nearest, primitive = t.min(axis=1), np.where(np.isfinite(t.min(axis=1)), t.argmin(axis=1), -1)
+    second = np.partition(t, 1, axis=1)[:, 1]
+    clear &= (second > 1.0001 * nearest) | np.isinf(nearest)
+    assert clear.mean() > 0.9, "rays through the middle of triangles are the rule"
+    np.testing.assert_array_equal(hits["primitive"][clear], primitive[clear])
+    np.testing.assert_allclose(hits["t"][clear], nearest[clear], rtol=2e-4)
+    hit = clear & (primitive >= 0)
+    corners = VERTICES[FACES[hits["primitive"][hit]]].astype(np.float64)
+    u, v = hits["u"][hit, None].astype(np.float64), hits["v"][hit, None].astype(np.float64)
+    at = (1 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
+    ray = ORIGINS[hit] + nearest[hit, None] * DIRECTIONS[hit]
+    np.testing.assert_allclose(at, ray, atol=1e-4)
+
+
+def test_any_hit_agrees_with_closest_hit(soup: clrt.RayQuery) -> None:
+    hits = soup.closest_hit(ORIGINS, DIRECTIONS)
+    limit = RNG.uniform(0, 2, len(ORIGINS)).astype(np.float32)
+    np.testing.assert_array_equal(soup.any_hit(ORIGINS, DIRECTIONS), hits["primitive"] >= 0)
+    np.testing.assert_array_equal(soup.any_hit(ORIGINS, DIRECTIONS, limit), hits["t"] < limit)
+    short = soup.closest_hit(ORIGINS, DIRECTIONS, limit)
+    np.testing.assert_array_equal(short["primitive"], np.where(hits["t"] < limit, hits["primitive"], -1))
+    assert np.isinf(short["t"][short["primitive"] < 0]).all()
+
+
+def test_chunks_and_order_do_not_matter(soup: clrt.RayQuery, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = soup.closest_hit(ORIGINS, DIRECTIONS)
+    order = RNG.permutation(len(ORIGINS))
+    np.testing.assert_array_equal(soup.closest_hit(ORIGINS[order], DIRECTIONS[order]), whole[order])
+    monkeypatch.setattr(query, "CHUNK", 257)
+    np.testing.assert_array_equal(soup.closest_hit(ORIGINS, DIRECTIONS), whole)
+
+
+@pytest.mark.parametrize("scale", [1e-20, 1.0, 1e15])
+def test_size_does_not_matter(device: Device, scale: float) -> None:
+    base = clrt.RayQuery(VERTICES, FACES, device=device.info.index).closest_hit(ORIGINS, DIRECTIONS)
+    size = 2.0 ** np.round(np.log2(scale))
+    hits = clrt.RayQuery(VERTICES * size, FACES, device=device.info.index).closest_hit(ORIGINS * size, DIRECTIONS)
+    np.testing.assert_array_equal(hits["primitive"], base["primitive"])
+    np.testing.assert_allclose(hits["t"], base["t"] * size, rtol=1e-6)
+
+
+def test_strange_rays_meet_nothing(soup: clrt.RayQuery) -> None:
+    strange: list[Any] = [[0, 0, 0], [np.nan, 0, 1], [np.inf, 0, 1], [-np.inf] * 3]
+    assert not soup.any_hit([0.0, 0.0, 0.0], strange).any()
+    assert not soup.any_hit(np.array(strange[1:]), [0.0, 0.0, 1.0]).any()
+    assert not soup.any_hit(ORIGINS, DIRECTIONS, 0.0).any() and not soup.any_hit(ORIGINS, DIRECTIONS, np.nan).any()
+    assert soup.closest_hit(np.zeros((0, 3)), np.zeros((0, 3))).shape == (0,)
+
+
+def test_a_mesh_without_faces_is_empty(device: Device) -> None:
+    empty = clrt.RayQuery(np.zeros((0, 3)), np.zeros((0, 3), int), device=device.info.index)
+    assert not empty.any_hit(ORIGINS, DIRECTIONS).any()
+    assert (empty.closest_hit(ORIGINS, DIRECTIONS)["primitive"] == -1).all()
+
+
+@pytest.mark.parametrize(("vertices", "faces", "words"), [
+    (np.zeros((3, 2)), [[0, 1, 2]], "(3, 2)"),
+    (np.zeros((3, 3)), [[0, 1, 3]], "faces[0]"),
+    (np.zeros((3, 3)), [[0, -1, 2]], "faces[0]"),
+    (np.zeros((3, 3)), [[0.0, 1.0, 2.0]], "float64"),
+    ([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]], "vertices[2]"),
+])
+def test_what_is_no_mesh_is_refused(vertices: Any, faces: Any, words: str) -> None:
+    with pytest.raises(clrt.SceneError) as caught:
+        clrt.RayQuery(vertices, faces)
+    assert words in str(caught.value)
+
+
+def test_rays_that_do_not_fit_are_refused(soup: clrt.RayQuery) -> None:
+    for origins, directions, t_max in [(np.zeros((2, 3)), np.ones((3, 3)), 1.0), (np.zeros(2), np.ones(3), 1.0),
+                                       (np.zeros((2, 3)), np.ones((2, 3)), np.ones(3))]:
+        with pytest.raises(clrt.UsageError):
+            soup.closest_hit(origins, directions, t_max)
