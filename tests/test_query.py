@@ -111,7 +111,8 @@ def test_what_is_no_mesh_is_refused(vertices: Any, faces: Any, words: str) -> No
 
 
 def test_rays_that_do_not_fit_are_refused(soup: clrt.RayQuery) -> None:
-    for origins, directions, t_max in [(np.zeros((2, 3)), np.ones((3, 3)), 1.0), (np.zeros(2), np.ones(3), 1.0),
-                                       (np.zeros((2, 3)), np.ones((2, 3)), np.ones(3))]:
+    misfits: list[tuple[Any, Any, Any]] = [(np.zeros((2, 3)), np.ones((3, 3)), 1.0), (np.zeros(2), np.ones(3), 1.0),
+                                           (np.zeros((2, 3)), np.ones((2, 3)), np.ones(3))]
+    for origins, directions, t_max in misfits:
         with pytest.raises(clrt.UsageError):
             soup.closest_hit(origins, directions, t_max)
