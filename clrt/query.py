@@ -23,6 +23,7 @@ HIT = record(t="f4", primitive="i4", u="f4", v="f4")
 COUNTS = record(triangles="i4", spheres="i4", pad="2i4")
 #: Rays that are on the device at once: 44 bytes each.
 CHUNK = 1 << 20
+Rays = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
 class RayQuery:
@@ -30,6 +31,10 @@ class RayQuery:
 
     vertices: (n, 3) float32; faces: (m, 3) int32. device, layout, builder, triangle: as in `Renderer`.
     Raises SceneError for arrays of other shapes, vertices that are not finite and indices out of range.
+
+    Of a ray, origins and directions are (n, 3), or (3,) for all; t_max is (n,) or one number, and t counts lengths of
+    the direction. Of hits at the same t the lowest primitive comes first. A ray whose direction is zero, or that holds
+    a NaN or infinity, meets nothing; t_max may be infinite. UsageError where the arrays do not fit.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, device: str | int | None = None,
@@ -39,54 +44,80 @@ class RayQuery:
         triangles = (triangles * np.float64(self.unit)).astype(np.float32)
         self.device = open_device(device)
         self.tree = pack(layout or self.device.layout, builder, triangles, np.zeros((0, 4), np.float32))
-        buffers = tree_buffers(self.tree)
-        features = {"TRIANGLES": 1, "PRIMITIVES": 1} if len(triangles) else {}
-        preamble = "\n".join([defines({"LANES": self.device.lanes, **tree_defines(self.tree), **features}),
-                              typedefs({"Counts": COUNTS, "RayHit": HIT}), scene_struct(buffers)])
-        source = compose(preamble, "query.cl", tree_files(self.tree.name, triangle, bool(len(triangles)), False))
-        program = build(self.device, source)
-        self._kernels = {name: make_kernel(self.device, program, f"query_{name}")
-                         for name in ("closest_hit", "any_hit")}
+        self._triangle = triangle
+        self._counts = np.zeros(1, COUNTS)
+        self._counts["triangles"] = len(triangles)
+        self._kernels: dict[str, cl.Kernel] = {}
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
-        counts = np.zeros(1, COUNTS)
-        counts["triangles"] = len(triangles)
-        self._scene = [cl.Buffer(self.device.context, flags, hostbuf=array) for _, array in buffers.values()]
-        self._counts = counts[0]
+        self._scene = [cl.Buffer(self.device.context, flags, hostbuf=a) for a in self.tree.buffers.values()]
 
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[Any]:
         """(n,) records of t float32 (inf: a miss), primitive int32 (−1), u, v float32: the first at 0 < t < t_max.
 
-        origins, directions: (n, 3), or (3,) for all; t_max: (n,) or one number, in lengths of the direction. The hit
-        point is origin + t·direction = (1 − u − v)·p0 + u·p1 + v·p2. Of hits at the same t the lowest primitive wins.
-        A ray whose direction is zero, or that holds a NaN or infinity, meets nothing.
+        The hit point is origin + t·direction = (1 − u − v)·p0 + u·p1 + v·p2.
         """
-        return self._ask("closest_hit", HIT, origins, directions, t_max)
+        rays = _rays(origins, directions, t_max)
+        return self._ask("closest_hit", rays, np.empty(len(rays[2]), HIT))
 
     def any_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[np.bool_]:
-        """(n,) bool: whether anything lies at 0 < t < t_max. The arguments are those of `closest_hit`."""
-        return self._ask("any_hit", np.dtype(np.bool_), origins, directions, t_max)
-
-    def _ask(self, name: str, answer: np.dtype[Any], origins: ArrayLike, directions: ArrayLike,
-             t_max: ArrayLike) -> NDArray[Any]:
+        """(n,) bool: whether anything lies at 0 < t < t_max."""
         rays = _rays(origins, directions, t_max)
-        n = len(rays[2])
-        answers = np.empty(n, answer)
-        for part in _chunks(n):
-            answers[part] = self._ask_chunk(name, answer, [np.ascontiguousarray(a[part], np.float32) for a in rays])
+        return self._ask("any_hit", rays, np.empty(len(rays[2]), np.bool_))
+
+    def all_hits(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf, *,
+                 max_hits: int = 100) -> tuple[NDArray[np.int64], NDArray[Any]]:
+        """Every hit at 0 < t < t_max, up to `max_hits` a ray: (k,) indices of rays, and (k,) records of `closest_hit`.
+
+        Sorted by ray, then t, then primitive. Each hit is found from the one before by comparing (t, primitive), not
+        by moving the origin, so surfaces that touch or coincide all count, once each.
+        """
+        if max_hits < 1:
+            raise UsageError(f"max_hits is {max_hits}; it must be at least 1")
+        o, d, t = _rays(origins, directions, t_max)
+        index = np.arange(len(t))
+        last = np.zeros(len(t), HIT)
+        last["primitive"] = -1
+        indices, hits = [index[:0]], [last[:0]]
+        for _ in range(max_hits):
+            last = self._ask("next_hit", (o[index], d[index], t[index]), last)
+            index, last = index[last["primitive"] >= 0], last[last["primitive"] >= 0]
+            if not len(index):
+                break
+            indices.append(index)
+            hits.append(last)
+        order = np.argsort(np.concatenate(indices), kind="stable")
+        return np.concatenate(indices)[order], np.concatenate(hits)[order]
+
+    def _ask(self, name: str, rays: Rays, answers: NDArray[Any]) -> NDArray[Any]:
+        """A new array like `answers`, with what kernel query_`name` writes over it for the rays."""
+        answers = answers.copy()
+        for part in _chunks(len(answers)):
+            inputs = [np.ascontiguousarray(array[part], np.float32) for array in rays]
+            self._ask_chunk(name, inputs, answers[part])
         return answers
 
-    def _ask_chunk(self, name: str, answer: np.dtype[Any], rays: list[NDArray[np.float32]]) -> NDArray[Any]:
-        n, context, queue = len(rays[2]), self.device.context, self.device.queue
+    def _ask_chunk(self, name: str, inputs: list[NDArray[np.float32]], answers: NDArray[Any]) -> None:
+        n, context, queue = len(answers), self.device.context, self.device.queue
         flags = cl.mem_flags
-        inputs = [cl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=array) for array in rays]
-        output = cl.Buffer(context, flags.WRITE_ONLY, n * answer.itemsize)
-        kernel, local = self._kernels[name], self.device.local_size
-        kernel.set_args(*self._scene, self._counts, *inputs, output, np.float32(self.unit), np.uint32(n))
+        buffers = [cl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=array) for array in inputs]
+        output = cl.Buffer(context, flags.READ_WRITE | flags.COPY_HOST_PTR, hostbuf=answers)
+        kernel, local = self._kernel(name), self.device.local_size
+        kernel.set_args(*self._scene, self._counts[0], *buffers, output, np.float32(self.unit), np.uint32(n))
         groups = -(-n // (self.device.lanes * local))
         wait_for(cl.enqueue_nd_range_kernel(queue, kernel, (groups * local,), (local,)))
-        answers = np.empty(n, answer)
         wait_for(cl.enqueue_copy(queue, answers, output, is_blocking=False))
-        return answers
+
+    def _kernel(self, name: str) -> cl.Kernel:
+        """The kernel query_`name`, built when it is first asked for."""
+        if name not in self._kernels:
+            buffers, present = tree_buffers(self.tree), bool(self._counts["triangles"][0])
+            features = {"TRIANGLES": 1, "PRIMITIVES": 1} if present else {}
+            features |= {"NEXT_HIT": 1} if name == "next_hit" else {}
+            preamble = "\n".join([defines({"LANES": self.device.lanes, **tree_defines(self.tree), **features}),
+                                  typedefs({"Counts": COUNTS, "RayHit": HIT}), scene_struct(buffers)])
+            source = compose(preamble, "query.cl", tree_files(self.tree.name, self._triangle, present, False))
+            self._kernels[name] = make_kernel(self.device, build(self.device, source), f"query_{name}")
+        return self._kernels[name]
 
 
 def _chunks(n: int) -> Iterator[slice]:
@@ -111,7 +142,7 @@ def _triangles(vertices: ArrayLike, faces: ArrayLike) -> NDArray[np.float32]:
     return points[indices.astype(np.intp).reshape(-1, 3)]
 
 
-def _rays(origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike) -> list[NDArray[np.floating[Any]]]:
+def _rays(origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike) -> Rays:
     """The three arrays, broadcast to the same number of rays; UsageError where they do not fit."""
     o, d, t = np.asarray(origins), np.asarray(directions), np.asarray(t_max)
     try:
@@ -122,4 +153,4 @@ def _rays(origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike) -> list[N
         raise UsageError(f"origins {o.shape}, directions {d.shape} and t_max {t.shape} must have shapes (n, 3), (n, 3) "
                          "and (n,), or stand for all rays with (3,) or one number")
     n = shape or (1,)
-    return [np.broadcast_to(o, (*n, 3)), np.broadcast_to(d, (*n, 3)), np.broadcast_to(t, n)]
+    return np.broadcast_to(o, (*n, 3)), np.broadcast_to(d, (*n, 3)), np.broadcast_to(t, n)

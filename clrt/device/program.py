@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from pathlib import Path
 
 import pyopencl as cl
 
@@ -42,7 +43,7 @@ def compose(preamble: str, entry: str, choices: Mapping[str, Sequence[str]], fol
 
     choices: for each NAME in `#include NAME` the files to put there. folder: where kernel files lie (clrt.kernels).
     """
-    folder = folder or files("clrt.kernels")
+    folder = folder or kernel_folder()
     seen: set[str] = set()
     lines = [preamble]
 
@@ -62,6 +63,14 @@ def compose(preamble: str, entry: str, choices: Mapping[str, Sequence[str]], fol
 
     include(entry)
     return "\n".join(lines) + "\n"
+
+
+def kernel_folder() -> Traversable:
+    """Where the kernel files are: the installed package clrt.kernels, or the folder beside clrt in a source tree."""
+    try:
+        return files("clrt.kernels")
+    except ModuleNotFoundError:
+        return Path(__file__).parents[2] / "kernels"
 
 
 def build(device: Device, source: str) -> BuiltProgram:

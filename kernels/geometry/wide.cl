@@ -16,7 +16,13 @@ typedef int8 wide_mask;
 #define WIDE_ABS(x) as_float8(as_int8(x) & 0x7fffffff)
 #endif
 
-typedef struct { float origin[3], direction[3], t_max; } Ray;      // t counts lengths of `direction`
+typedef struct {
+    float origin[3], direction[3], t_max;      // t counts lengths of `direction`
+#if NEXT_HIT
+    float after_t;                             // only hits behind this one count, by t and then by primitive
+    int after_primitive;
+#endif
+} Ray;
 typedef struct { float t, u, v; int primitive; } Hit;              // primitive < 0: nothing was hit
 typedef struct { wide t, u, v; wide_mask hit; } WideHit;
 

@@ -37,7 +37,10 @@ static inline LeafRay leaf_ray(const LeafRays *rays, const Ray *ray, int lane) {
     return r;
 }
 
-static inline void keep_closest(Hit *hit, float t, float u, float v, int primitive) {
+static inline void keep_closest(const Ray *ray, Hit *hit, float t, float u, float v, int primitive) {
+#if NEXT_HIT
+    if (t < ray->after_t || (t == ray->after_t && primitive <= ray->after_primitive)) return;
+#endif
     if (t < hit->t || (t == hit->t && primitive < hit->primitive)) *hit = (Hit){t, u, v, primitive};
 }
 
@@ -46,7 +49,7 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
     WideHit found = intersect_triangles(&ray->triangle_ray, leaf, hit->t);
     if (!WIDE_ANY(found.hit)) return;
 #if WIDTH == 1
-    keep_closest(hit, found.t, found.u, found.v, leaf->primitive);
+    keep_closest(&ray->ray, hit, found.t, found.u, found.v, leaf->primitive);
 #else
     if (stop_at_first) {
         if (WIDE_ANY(found.hit & (found.t < hit->t))) hit->primitive = 0;
@@ -55,7 +58,7 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
     const float *t = (const float *)&found.t, *u = (const float *)&found.u, *v = (const float *)&found.v;
     for (uint inside = mask_bits(found.hit); inside; inside &= inside - 1) {
         int i = first_bit(inside);
-        keep_closest(hit, t[i], u[i], v[i], leaf->primitive[i]);
+        keep_closest(&ray->ray, hit, t[i], u[i], v[i], leaf->primitive[i]);
     }
 #endif
 }
@@ -65,7 +68,8 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
 static inline void hit_spheres(const LeafRay *ray, global const LeafSphere *spheres, int count, Hit *hit) {
     for (int i = 0; i < count; ++i) {
         float t;
-        if (intersect_sphere(&ray->ray, spheres + i, hit->t, &t)) keep_closest(hit, t, 0.0f, 0.0f, spheres[i].primitive);
+        if (intersect_sphere(&ray->ray, spheres + i, hit->t, &t))
+            keep_closest(&ray->ray, hit, t, 0.0f, 0.0f, spheres[i].primitive);
     }
 }
 #endif

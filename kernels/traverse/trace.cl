@@ -8,8 +8,19 @@ typedef struct { real t, u, v; ireal primitive; } Hits;   // primitive < 0: noth
 
 #if PRIMITIVES
 static inline Ray one_ray(const real3 *origin, const real3 *direction, const real *t_max, int lane) {
-    return (Ray){{LANE(origin->x, lane), LANE(origin->y, lane), LANE(origin->z, lane)},
-                 {LANE(direction->x, lane), LANE(direction->y, lane), LANE(direction->z, lane)}, LANE(*t_max, lane)};
+    Ray ray;
+    ray.origin[0] = LANE(origin->x, lane);
+    ray.origin[1] = LANE(origin->y, lane);
+    ray.origin[2] = LANE(origin->z, lane);
+    ray.direction[0] = LANE(direction->x, lane);
+    ray.direction[1] = LANE(direction->y, lane);
+    ray.direction[2] = LANE(direction->z, lane);
+    ray.t_max = LANE(*t_max, lane);
+#if NEXT_HIT
+    ray.after_t = 0.0f;
+    ray.after_primitive = -1;
+#endif
+    return ray;
 }
 #endif
 
@@ -20,8 +31,12 @@ static inline ireal is_ray(real3 origin, real3 direction) {
     return (absolute(sum) <= 3.4e38f) & (largest(absolute3(direction)) > 0.0f);
 }
 
-// The nearest hit of each active lane's ray with 0 < t < t_max.
-static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active) {
+// The nearest hit of each active lane's ray with 0 < t < t_max; in a program with NEXT_HIT the first behind `after`.
+static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active
+#if NEXT_HIT
+                               , const Hits *after
+#endif
+) {
     RealLanes t, u, v;
     IntLanes primitive, enabled;
     t.all = (real)(INFINITY);
@@ -33,6 +48,10 @@ static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction
     for (int lane = 0; lane < LANES; ++lane) {
         if (!enabled.lane[lane]) continue;
         Ray ray = one_ray(&origin, &direction, &t_max, lane);
+#if NEXT_HIT
+        ray.after_t = LANE(after->t, lane);
+        ray.after_primitive = LANE_INT(after->primitive, lane);
+#endif
         Hit hit = traverse(scene, &rays, &ray, lane, false);
         t.lane[lane] = hit.t;
         u.lane[lane] = hit.u;
