@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from . import trimesh as trimesh
     from .api import load as load, render as render
     from .device.discover import devices as devices
     from .errors import (ClrtError as ClrtError, DeviceError as DeviceError, KernelError as KernelError,
@@ -38,11 +39,14 @@ _HOME = {
     "scene.materials": ("Diffuse", "MetallicRoughness", "Mirror"),
     "scene.model": ("Camera", "Environment", "Mesh", "RenderSettings", "Scene", "Sphere"),
 }
+_MODULES = ("trimesh",)
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
-__all__ = sorted(_MODULE_OF)
+__all__ = sorted([*_MODULE_OF, *_MODULES])
 
 
 def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f".{name}", __name__)
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'clrt' has no attribute {name!r}")
     value = getattr(import_module(f".{_MODULE_OF[name]}", __name__), name)
