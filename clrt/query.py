@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -22,7 +23,7 @@ from .scene.scaling import unit_for
 HIT = record(t="f4", primitive="i4", u="f4", v="f4")
 COUNTS = record(triangles="i4", spheres="i4", pad="2i4")
 #: Rays that are on the device at once: 44 bytes each.
-CHUNK = 1 << 20
+CHUNK = 1 << 18
 Rays = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
@@ -30,6 +31,7 @@ class RayQuery:
     """Triangles to shoot rays at. The answers do not depend on the device, the tree or the order of the rays.
 
     vertices: (n, 3) float32; faces: (m, 3) int32. device, layout, builder, triangle: as in `Renderer`.
+    kernel_seconds: the time of all kernels so far, without uploads and downloads.
     Raises SceneError for arrays of other shapes, vertices that are not finite and indices out of range.
 
     Of a ray, origins and directions are (n, 3), or (3,) for all; t_max is (n,) or one number, and t counts lengths of
@@ -48,6 +50,7 @@ class RayQuery:
         self._counts = np.zeros(1, COUNTS)
         self._counts["triangles"] = len(triangles)
         self._kernels: dict[str, cl.Kernel] = {}
+        self.kernel_seconds = 0.0
         flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
         self._scene = [cl.Buffer(self.device.context, flags, hostbuf=a) for a in self.tree.buffers.values()]
 
@@ -104,7 +107,9 @@ class RayQuery:
         kernel, local = self._kernel(name), self.device.local_size
         kernel.set_args(*self._scene, self._counts[0], *buffers, output, np.float32(self.unit), np.uint32(n))
         groups = -(-n // (self.device.lanes * local))
+        start = time.perf_counter()
         wait_for(cl.enqueue_nd_range_kernel(queue, kernel, (groups * local,), (local,)))
+        self.kernel_seconds += time.perf_counter() - start
         wait_for(cl.enqueue_copy(queue, answers, output, is_blocking=False))
 
     def _kernel(self, name: str) -> cl.Kernel:

@@ -16,7 +16,7 @@ KERNELS = sorted((HOUSE / "kernels").rglob("*.cl"))
 LONGEST = 300
 
 #: In order: a room imports only from itself and those before it. `clrt` itself is the public names alone.
-ROOMS = ["errors", "scene", "device", "accel", "query", "trimesh", "rendering", "output", "api", "clrt", "cli",
+ROOMS = ["errors", "scene", "device", "accel", "query", "trimesh", "rendering", "output", "study", "api", "clrt", "cli",
          "__main__"]
 KNOW_OPENCL = {"device", "query", "rendering"}
 #: Beyond the order: trees are built, and pictures written, without any device.

@@ -11,7 +11,7 @@ import click
 from ..errors import ClrtError
 
 STARTED = time.perf_counter()
-COMMANDS = ("render", "info", "compare", "devices", "cache")
+COMMANDS = ("render", "info", "compare", "devices", "bench", "cache")
 
 
 class _Commands(click.Group):

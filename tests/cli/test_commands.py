@@ -176,3 +176,19 @@ def test_compare_prints_the_metrics(scene: Path) -> None:
     result = json.loads(clrt("compare", "i.exr", "r.exr", "--json", cwd=scene.parent).stdout)
     assert result["relmse"] == pytest.approx(0.05**2 / (0.5**2 + 0.01), rel=1e-5)
     assert result["mean_ratio"] == pytest.approx([1.1] * 3, rel=1e-6) and result["nonfinite"] == 0
+
+
+def test_bench_rays_counts_the_hits_of_a_file(tmp_path: Path) -> None:
+    """A square of two triangles, and a grid of rays of which a quarter passes through it."""
+    (tmp_path / "square.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
+    x, y = np.meshgrid((np.arange(32) + 0.5) / 16, (np.arange(32) + 0.5) / 16)
+    origins = np.stack([x.ravel(), y.ravel(), np.ones(1024)], axis=1)
+    np.savez(tmp_path / "rays.npz", origins=origins, directions=np.tile([0, 0, -1], (1024, 1)), t_max=np.full(1024, 9))
+    result = clrt("bench", "rays", "--mesh", "square.obj", "--rays", "rays.npz", "--json", "b.json", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    figures = json.loads((tmp_path / "b.json").read_text())
+    assert (figures["hits"], figures["rays"], figures["triangles"]) == (256, 1024, 2)
+    assert all(figures[name] > 0 for name in ("build_seconds", "mrays_closest", "mrays_any", "bytes_per_triangle"))
+    (tmp_path / "no.npz").write_text("no rays")
+    failed = clrt("bench", "rays", "--mesh", "square.obj", "--rays", "no.npz", cwd=tmp_path)
+    assert failed.returncode == 3 and "no.npz" in failed.stderr and "Traceback" not in failed.stderr
