@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +21,8 @@ class Progress:
     def phase(self, name: str) -> None:
         """A phase of PHASES begins."""
 
-    def state(self, state: State, spp: int | None, seconds: float | None) -> None:
-        """A state was reached; spp, seconds: where the render will stop, as far as that is known."""
+    def state(self, state: State, goal: Goal) -> None:
+        """A state was reached on the way to the goal."""
 
     def __enter__(self) -> Progress:
         return self
@@ -37,8 +38,8 @@ class PlainProgress(Progress):
     def phase(self, name: str) -> None:
         _say(PHASES[name])
 
-    def state(self, state: State, spp: int | None, seconds: float | None) -> None:
-        left = time_left(state, spp, seconds)
+    def state(self, state: State, goal: Goal) -> None:
+        left = time_left(state, goal)
         _say(f"{describe(state)}" + (f"  about {left:.0f} s left" if left is not None else ""))
 
 
@@ -48,10 +49,10 @@ class JsonProgress(Progress):
     def phase(self, name: str) -> None:
         _say(json.dumps({"phase": name}))
 
-    def state(self, state: State, spp: int | None, seconds: float | None) -> None:
+    def state(self, state: State, goal: Goal) -> None:
         values: dict[str, Any] = {"phase": "render", "spp": state.spp, "seconds": state.seconds, "noise": state.noise,
                                   "relmse": state.relmse, "samples_per_second": rate(state),
-                                  "seconds_left": time_left(state, spp, seconds)}
+                                  "seconds_left": time_left(state, goal)}
         _say(json.dumps(values))
 
 
@@ -69,11 +70,10 @@ class BarProgress(Progress):
     def phase(self, name: str) -> None:
         self._bar.update(self._task, description=PHASES[name])
 
-    def state(self, state: State, spp: int | None, seconds: float | None) -> None:
-        done = state.spp / spp if spp else state.seconds / seconds if seconds else 0.0
-        left = time_left(state, spp, seconds)
+    def state(self, state: State, goal: Goal) -> None:
+        left = time_left(state, goal)
         status = describe(state) + (f"  {left:.0f} s left" if left is not None else "")
-        self._bar.update(self._task, total=1.0 if spp or seconds else None, completed=min(done, 1.0), status=status)
+        self._bar.update(self._task, total=1.0, completed=goal.done(state), status=status)
 
     def __enter__(self) -> Progress:
         self._bar.start()
@@ -97,11 +97,29 @@ def rate(state: State) -> float:
     return state.film.samples / max(state.seconds, 1e-9)
 
 
-def time_left(state: State, spp: int | None, seconds: float | None) -> float | None:
-    """Seconds until the render stops by `spp` or `seconds`, whatever comes first; None where neither is known."""
-    ends = [] if seconds is None else [seconds - state.seconds]
-    if spp is not None:
-        ends.append((spp - state.spp) * state.seconds / state.spp)
+@dataclass(frozen=True)
+class Goal:
+    """Where a render will stop, as far as that is known."""
+
+    spp: int | None
+    seconds: float | None
+    error: float | None
+
+    def done(self, state: State) -> float:
+        """The part that is done, 0 to 1."""
+        parts = [state.spp / self.spp] if self.spp else []
+        parts += [state.seconds / self.seconds] if self.seconds else []
+        parts += [(self.error / state.noise) ** 2] if self.error and state.noise else []
+        return min(1.0, max(parts, default=0.0))
+
+
+def time_left(state: State, goal: Goal) -> float | None:
+    """Seconds until the render stops by what comes first; None where nothing is known. Noise² falls as 1/samples."""
+    ends = [] if goal.seconds is None else [goal.seconds - state.seconds]
+    if goal.spp is not None:
+        ends.append((goal.spp - state.spp) * state.seconds / max(1, state.spp))
+    if goal.error is not None and state.noise:
+        ends.append(((state.noise / goal.error) ** 2 - 1) * state.seconds)
     return max(0.0, min(ends)) if ends else None
 
 
@@ -114,4 +132,7 @@ def describe(state: State) -> str:
 
 
 def _say(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
+    try:
+        print(line, file=sys.stderr, flush=True)
+    except OSError:
+        return  # who listened has gone; the render goes on

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import signal
 import sys
 import time
 from pathlib import Path
@@ -12,7 +14,7 @@ import click
 from ..errors import UsageError
 from . import STARTED
 from .options import Size, tracing_options
-from .progress import Progress, make_progress
+from .progress import Goal, make_progress
 
 
 @click.command()
@@ -42,23 +44,34 @@ def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None
             progress_kind: str | None, print_kernel: bool, quiet: bool, lanes: str | None, triangle: str, builder: str,
             layout: str | None) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
+    from ..rendering.renderer import Renderer, check_stops
+    from ..scene.file import load
+
     outputs = outputs or (Path(f"{scene.stem}.png"),)
     if len(devices) > 1:
         raise UsageError(f"--device is given {len(devices)} times; this version renders on one device, so name one")
-    _check_outputs(outputs, report, view)
-    options = {"size": size, "max_depth": depth, "seed": seed, "device": devices[0] if devices else None,
-               "integrator": integrator, "triangle": triangle, "builder": builder, "layout": layout,
-               "lanes": int(lanes) if lanes else None}
+    _check_outputs(outputs, report, view, reference)
+    check_stops(spp, seconds, error)
+    if quiet:
+        logging.disable(logging.WARNING)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's end keeps the picture, too
+    options: dict[str, Any] = {
+        "size": size, "max_depth": depth, "seed": seed, "device": devices[0] if devices else None,
+        "integrator": integrator, "triangle": triangle, "builder": builder, "layout": layout,
+        "lanes": int(lanes) if lanes else None}
     with make_progress(progress_kind, quiet) as progress:
-        renderer = _prepare(scene, options, progress)
+        progress.phase("load")
+        content = load(scene)
+        expected = None if reference is None else _read_reference(reference, size or content.render.size)
+        renderer = Renderer(content, on_phase=progress.phase, **options)
         if print_kernel:
             click.echo(renderer.compiled.source)
             return
-        expected = None if reference is None else _read_reference(reference, renderer.settings.size)
         progress.phase("render")
+        goal = Goal(spp or (None if seconds or error else renderer.settings.spp), seconds, error)
         try:
             for state in renderer.passes(spp=spp, time=seconds, error=error, reference=expected):
-                progress.state(state, spp or (None if seconds or error else renderer.settings.spp), seconds)
+                progress.state(state, goal)
         except KeyboardInterrupt:
             state = renderer.state(expected)
             renderer.stop_reason = "interrupted"
@@ -68,7 +81,7 @@ def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None
         sys.exit(130)
 
 
-def _check_outputs(outputs: tuple[Path, ...], report: Path | None, view: str) -> None:
+def _check_outputs(outputs: tuple[Path, ...], report: Path | None, view: str, reference: Path | None) -> None:
     """Finds out before the render whether its results can be written."""
     from ..output.files import check_target
     from ..output.images import check_writable
@@ -77,16 +90,10 @@ def _check_outputs(outputs: tuple[Path, ...], report: Path | None, view: str) ->
     check_view(view)
     for output in outputs:
         check_writable(output)
+        if reference is not None and output.resolve() == reference.resolve():
+            raise UsageError(f"{output}: is the reference, and would be overwritten; name another picture with -o")
     if report is not None:
         check_target(report)
-
-
-def _prepare(path: Path, options: dict[str, Any], progress: Progress) -> Any:
-    progress.phase("load")
-    from ..rendering.renderer import Renderer
-    from ..scene.file import load
-
-    return Renderer(load(path), on_phase=progress.phase, **options)
 
 
 def _read_reference(path: Path, size: tuple[int, int]) -> Any:

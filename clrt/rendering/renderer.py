@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -20,6 +21,8 @@ from .compile import Choices, compile_scene
 from .film import RELATIVE_FLOOR, Film
 from .session import Session
 
+#: With a wanted error the noise is looked at whenever the samples have grown by one part in this.
+CHECK_FRACTION = 8
 #: Between two states at least this long passes, and this many times what making a state costs.
 STATE_SECONDS = 0.5
 STATE_COST = 20
@@ -61,6 +64,8 @@ class Renderer:
         _check(choices)
         on_phase("build")
         self.compiled = compile_scene(self.scene, choices)
+        if not {"LIGHTS", "SKY"} & set(self.compiled.features):
+            logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
         on_phase("compile")
         depth = settings.max_depth if settings.integrator == "path" else min(settings.max_depth, 2)
         self.session = Session(self.device, self.compiled, settings.size, depth, settings.seed)
@@ -81,20 +86,22 @@ class Renderer:
         It ends at `spp` samples a pixel, after `time` seconds or at a noise of `error` (√relMSE), whatever comes
         first; without any of them at the scene's `spp`. Call it again to go on. reference: (height, width, 3).
         """
-        _check_stops(spp, time, error)
+        check_stops(spp, time, error)
         if spp is None and time is None and error is None:
             spp = self.settings.spp
         self.stop_reason = None
         self._clock = clock.perf_counter() - self.seconds
-        next_state = 0.0
+        next_state, next_check = 0.0, 1
         while self.stop_reason is None:
             if spp is None or self.session.samples_done < spp:
-                self._run_pass(spp, time)
+                self._run_pass(spp, time, next_check if error is not None else None)
             if spp is not None and self.session.samples_done >= spp and self.stop_reason is None:
                 self.stop_reason = "spp"
             now, done = clock.perf_counter(), self.session.samples_done
-            if self.stop_reason is None and done & (done - 1) and now < next_state:
+            due = now >= next_state or done & (done - 1) == 0 or (error is not None and done >= next_check)
+            if self.stop_reason is None and not due:
                 continue
+            next_check = done + 1 + done // CHECK_FRACTION
             state = self._record_state(reference)
             if self.stop_reason is None and error is not None and state.noise is not None and state.noise <= error:
                 self.stop_reason = "error"
@@ -111,9 +118,10 @@ class Renderer:
             relmse = float(np.mean((film.mean - expected) ** 2 / (expected**2 + RELATIVE_FLOOR)))
         return State(self.session.samples_done, self.seconds, film.noise, relmse, film)
 
-    def _run_pass(self, spp: int | None, time: float | None) -> None:
-        """One pass; sets the stop reason where `time` is over, which may be inside the pass."""
-        for _ in self.session.render(self._pass_size(self.session.samples_done, spp)):
+    def _run_pass(self, spp: int | None, time: float | None, check: int | None) -> None:
+        """One pass, not past `check` samples; sets the stop reason where `time` is over, maybe inside the pass."""
+        ends = [end for end in (spp, check) if end is not None]
+        for _ in self.session.render(self._pass_size(self.session.samples_done, min(ends, default=None))):
             self.seconds = clock.perf_counter() - self._clock
             if time is not None and self.seconds >= time and self.session.samples_done:
                 self.stop_reason = "time"
@@ -142,7 +150,8 @@ def _check(choices: Choices) -> None:
             raise UsageError(f"{name} {value!r} is unknown; choose from {', '.join(map(str, values))}")
 
 
-def _check_stops(spp: int | None, time: float | None, error: float | None) -> None:
+def check_stops(spp: int | None, time: float | None, error: float | None) -> None:
+    """UsageError unless each stop condition that is given is above 0 and finite."""
     for name, value in [("spp", spp), ("time", time), ("error", error)]:
         if value is not None and not 0 < value < float("inf"):
             raise UsageError(f"{name} is {value}; it must be above 0")

@@ -38,6 +38,7 @@ class Session:
         self._next_pixel, self._pass_samples = 0, 0
         self._launches = Launches(FIRST_LAUNCH_SAMPLES)
         width, height = size
+        self._check_memory()
         flags = cl.mem_flags
         try:
             self._scene = [cl.Buffer(device.context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=array)
@@ -45,11 +46,19 @@ class Session:
             self._film = cl.Buffer(device.context, flags.READ_WRITE, width * height * PIXEL.itemsize)
             wait_for(cl.enqueue_fill_buffer(device.queue, self._film, np.zeros(1, np.uint8), 0, self._film.size))
         except cl.Error as error:
-            needed = f"{self.device_bytes} bytes of buffers do not fit"
-            raise DeviceError(f"{device.info.name}: {needed}: {error}") from error
+            raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes do not fit: {error}") from error
         self._kernel = make_kernel(device, self.program, "path")
         self._kernel.set_args(*self._scene, compiled.counts[0], self._film, self.launch[0])
         self._warm_up()
+
+    def _check_memory(self) -> None:
+        """DeviceError with the numbers where the picture or a buffer of the scene cannot fit."""
+        info, (width, height) = self.device.info, self.size
+        largest = max([width * height * PIXEL.itemsize, *(a.nbytes for _, a in self.compiled.buffers.values())])
+        if largest > info.max_alloc_bytes or self.device_bytes > info.global_bytes:
+            raise DeviceError(f"{info.name}: a picture of {width}x{height} and its scene need {self.device_bytes} "
+                              f"bytes, {largest} of them in one buffer; the device has {info.global_bytes}, and at "
+                              f"most {info.max_alloc_bytes} in one; render a smaller --size")
 
     def _warm_up(self) -> None:
         """Launches no work: some drivers compile at the first launch, which belongs to the time of the build."""
@@ -97,7 +106,8 @@ class Session:
 
     def pass_limit(self) -> int:
         """The most samples a pixel that one pass should add, so that ending inside a pass leaves an even picture."""
-        return max(1, PASS_LAUNCHES * self._launches.size // (self.size[0] * self.size[1]))
+        pixels, work = self.size[0] * self.size[1], self._launches.size
+        return max(1, min(PASS_LAUNCHES * work // pixels, work // min(pixels, FEWEST_PIXELS)))
 
     def film(self) -> Film:
         """The film so far; waits for the launches in flight."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from .materials import Radiance
+from .materials import Radiance, tuples_for_lists
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,6 +16,9 @@ class PointLight:
     position: tuple[float, float, float]
     intensity: Radiance
 
+    def __post_init__(self) -> None:
+        tuples_for_lists(self)
+
 
 @dataclass(frozen=True, kw_only=True)
 class DirectionalLight:
@@ -24,6 +27,9 @@ class DirectionalLight:
     kernel: ClassVar[str] = "directional"
     direction: tuple[float, float, float]
     irradiance: Radiance
+
+    def __post_init__(self) -> None:
+        tuples_for_lists(self)
 
 
 Light = PointLight | DirectionalLight

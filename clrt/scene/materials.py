@@ -8,7 +8,7 @@ the packing and the tests of every BSDF find it in that list. Field types carry 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Ge, Le
 
@@ -41,12 +41,25 @@ Smith = Literal["height_correlated", "separable", "schlick", "schlick_ibl"]
 ALPHA_MIN = 1e-4
 
 
+def tuples_for_lists(record: Any) -> None:
+    """Makes tuples of a dataclass's lists and arrays of numbers, so that it can be written either way and hashed."""
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if hasattr(value, "tolist"):
+            value = value.tolist()
+        if isinstance(value, list):
+            object.__setattr__(record, field.name, tuple(value))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """What every material has. `emission`: radiance in W·sr⁻¹·m⁻² that its front side sends out."""
 
     kernel: ClassVar[str]
     emission: Radiance = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        tuples_for_lists(self)
 
     def parameters(self) -> dict[str, Parameter]:
         """The values its kernel reads, in the order of the kernel's record."""

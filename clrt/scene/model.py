@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 from numpy.typing import NDArray
 
 from .lights import Light
-from .materials import Diffuse, Material, NonNegative
+from .materials import Diffuse, Material, NonNegative, tuples_for_lists
 
 Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]
@@ -28,6 +29,9 @@ class Camera:
     up: Vector = (0.0, 1.0, 0.0)
     fov_degrees: Annotated[float, Gt(0), Lt(180)] = 40.0
 
+    def __post_init__(self) -> None:
+        tuples_for_lists(self)
+
 
 @dataclass(eq=False)
 class Mesh:
@@ -43,6 +47,14 @@ class Mesh:
     normals: FloatArray | None = None
     name: str = "mesh"
 
+    def __post_init__(self) -> None:
+        """Lists become arrays; what is wrong with an array is for `validate` to say."""
+        written: dict[str, Any] = {"vertices": self.vertices, "faces": self.faces}
+        for (name, value), dtype in zip(written.items(), (np.float32, np.int32)):
+            if isinstance(value, list):
+                with suppress(ValueError, TypeError, OverflowError):
+                    setattr(self, name, np.array(value, dtype))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Sphere:
@@ -52,6 +64,9 @@ class Sphere:
     radius: Annotated[float, Gt(0)] = 1.0
     material: Material = field(default_factory=Diffuse)
     name: str = "sphere"
+
+    def __post_init__(self) -> None:
+        tuples_for_lists(self)
 
 
 @dataclass(eq=False, kw_only=True)
@@ -79,6 +94,9 @@ class RenderSettings:
     seed: Annotated[int, Ge(0), Lt(2**32)] = 0
     integrator: Integrator = "path"
     filter: Literal["box"] = "box"
+
+    def __post_init__(self) -> None:
+        tuples_for_lists(self)
 
 
 @dataclass(eq=False, kw_only=True)

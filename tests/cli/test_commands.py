@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -102,6 +103,15 @@ def test_interrupt_keeps_the_picture(scene: Path) -> None:
     assert read_image(scene.parent / "i.exr")[0, 0] == pytest.approx([0.5, 0.6, 0.7], rel=1e-6)
 
 
+def test_caches_that_cannot_be_written_cost_nothing_but_time(scene: Path) -> None:
+    """PoCL hides its device without a cache folder; here the home is a file, so that root meets the same."""
+    (scene.parent / "home").write_text("")
+    environment = {key: value for key, value in os.environ.items() if key not in ("XDG_CACHE_HOME", "POCL_CACHE_DIR")}
+    result = subprocess.run([sys.executable, "-m", "clrt", "render", str(scene), "-q"], cwd=scene.parent, text=True,
+                            capture_output=True, env={**environment, "HOME": str(scene.parent / "home")})
+    assert (result.returncode, result.stdout) == (0, "ball.png\n"), result.stderr
+
+
 def test_six_mistakes_are_six_messages(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text("""
 [camera]
@@ -136,6 +146,8 @@ file = "nowhere.ply"
     (("render", "ball.toml", "--view", "srbg"), 2, ["srbg"]),
     (("render", "ball.toml", "--spp", "0"), 2, ["--spp"]),
     (("render", "ball.toml", "--time", "-1"), 2, ["time", "-1"]),
+    (("render", "ball.toml", "-o", "r.exr", "--reference", "r.exr"), 2, ["r.exr", "reference"]),
+    (("render", "ball.toml", "--size", "60000x60000"), 4, ["60000x60000", "bytes", "--size"]),
     (("compare", "ball.toml", "ball.toml"), 3, ["ball.toml"]),
 ])
 def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], code: int, words: list[str]) -> None:
@@ -192,3 +204,16 @@ def test_bench_rays_counts_the_hits_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "no.npz").write_text("no rays")
     failed = clrt("bench", "rays", "--mesh", "square.obj", "--rays", "no.npz", cwd=tmp_path)
     assert failed.returncode == 3 and "no.npz" in failed.stderr and "Traceback" not in failed.stderr
+
+
+def test_error_is_reached_and_not_far_passed(scene: Path) -> None:
+    scene.write_text(SCENE + '[[light]]\ntype = "point"\nposition = [0, 3, 1]\nintensity = [20, 20, 20]\n')
+    for error in (0.035, 0.02):
+        assert clrt("render", scene, "--error", error, "--report", "e.json", cwd=scene.parent).returncode == 0
+        assert 0.85 * error < json.loads((scene.parent / "e.json").read_text())["noise"] <= error
+
+
+def test_a_scene_without_light_says_so(tmp_path: Path) -> None:
+    (tmp_path / "dark.toml").write_text("[render]\nsize = [4, 4]\nspp = 1\n[[sphere]]\n")
+    assert "nothing shines" in clrt("render", "dark.toml", cwd=tmp_path).stderr
+    assert clrt("render", "dark.toml", "-q", cwd=tmp_path).stderr == ""

@@ -64,7 +64,7 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "faces dtype": (set_mesh(faces=np.zeros((1, 3), np.int64)), "faces has dtype int64; convert it"),
     "vertices dtype": (set_mesh(vertices=np.ones((42, 3))), "vertices has dtype float64"),
     "vertices shape": (set_mesh(vertices=np.ones((9, 2), np.float32), normals=None), "shape (9, 2); it must be"),
-    "vertices list": (set_mesh(vertices=[[0, 0, 0]], normals=None), "vertices is a list; write a numpy array"),
+    "vertices list": (set_mesh(vertices=[[0, 0, 0], [1]], normals=None), "vertices is a list; write a numpy array"),
     "no faces": (set_mesh(faces=np.zeros((0, 3), np.int32)), 'mesh[0] "ball": has no triangles'),
     "no mesh": (set_scene(meshes=["ball"]), 'mesh[0]: "ball" is no Mesh'),
     "material": (set_mesh(material=Diffuse(color=(0, 1.5, 0))), "mesh[0].material.color[1]: 1.5 is above 1"),
@@ -74,7 +74,7 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "sphere type": (set_scene(spheres=[Sphere(radius="1")]), 'sphere[0].radius: "1" is not a number'),  # type: ignore
     "light": (set_scene(lights=[light((0, 0, 0))]), "light[0].direction: [0, 0, 0] is no direction"),
     "light nan": (set_scene(lights=[light((0, NAN, 0))]), "light[0].direction[1]: nan is not a finite number"),
-    "light list": (set_scene(lights=[light([0, 1, 0])]), "light[0].direction: [0, 1, 0] is a list; write a tuple"),
+    "light text": (set_scene(lights=[light("up")]), 'light[0].direction: "up" is not a list; write the numbers'),
     "light short": (set_scene(lights=[light((0,))]), "light[0].direction: [0] has 1 entries; write 3"),
     "no light": (set_scene(lights=[Sphere()]), "is no light; write a PointLight or DirectionalLight"),
     "look_at": (set_scene(camera=Camera(position=(1, 2, 3), look_at=(1, 2, 3))), "camera.look_at: [1, 2, 3] is the"),
