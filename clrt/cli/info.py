@@ -26,7 +26,8 @@ def command(scene: Path, as_json: bool, lanes: str | None, triangle: str, builde
     tree = compiled.tree
     materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}
     report: dict[str, Any] = {
-        "scene": content.name,
+        "scene": content.name, "size": "x".join(map(str, content.render.size)), "spp": content.render.spp,
+        "max_depth": content.render.max_depth,
         "meshes": len(content.meshes), "triangles": sum(len(mesh.faces) for mesh in content.meshes),
         "spheres": len(content.spheres),
         "materials": dict(Counter(material.kernel for material in materials)),
@@ -43,7 +44,11 @@ def command(scene: Path, as_json: bool, lanes: str | None, triangle: str, builde
         return
     for name, value in report.items():
         if isinstance(value, dict):
-            value = "  ".join(f"{key} {part}" for key, part in value.items()) or "none"
+            value = "  ".join(f"{key} {_short(part)}" for key, part in value.items()) or "none"
         elif isinstance(value, list):
             value = " ".join(value)
-        click.echo(f"{name:13} {value}")
+        click.echo(f"{name:13} {_short(value)}")
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else f"{value:_}" if isinstance(value, int) else str(value)

@@ -61,8 +61,9 @@ def _parse(path: Path, suffix: str) -> dict[str, Any]:
     except SceneError:
         raise
     except Exception as error:  # trimesh's parsers raise whatever the damage leads to
-        raise SceneError(f"cannot be read as {suffix[1:].upper()} ({type(error).__name__}: {error}); "
-                         "export the model again") from error
+        # Faced with bytes it cannot place, trimesh asks for a library that guesses encodings: no news for the user.
+        detail = "" if isinstance(error, ImportError) else f" ({type(error).__name__}: {error})"
+        raise SceneError(f"cannot be read as {suffix[1:].upper()}{detail}; export the model again") from error
 
 
 def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:
