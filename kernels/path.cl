@@ -29,8 +29,10 @@ static inline real3 found_light(const Scene *scene, const Step *step, const Surf
 #if SKY
     if (ANY(escaped)) {
         real3 wi = choose(escaped, step->wi, vector(ZERO, ONE, ZERO));   // an idle lane's may be NaN, and so its texel
-        real weight = step->specular ? ONE : power_heuristic(step->pdf, sky_pdf(scene, wi));
-        L = choose(escaped, scale(sky_radiance(scene, wi), weight), L);
+        real sky_pdf;
+        real3 radiance = sky_radiance(scene, wi, &sky_pdf);
+        real weight = step->specular ? ONE : power_heuristic(step->pdf, sky_pdf);
+        L = choose(escaped, scale(radiance, weight), L);
     }
 #endif
     return L;

@@ -2,9 +2,8 @@
 // chosen by the surface are never worse for it.
 #include "light/interface.cl"
 
-static inline real3 sky_radiance(const Scene *scene, real3 wi) {
+static inline real3 sky_radiance(const Scene *scene, real3 wi, real *pdf) {
+    *pdf = ZERO;
     return (real3){(real)(scene->environment->color[0]), (real)(scene->environment->color[1]),
                    (real)(scene->environment->color[2])};
 }
-
-static inline real sky_pdf(const Scene *scene, real3 wi) { return ZERO; }

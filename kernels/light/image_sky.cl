@@ -47,16 +47,16 @@ static inline real3 sky_radiance_uv(const Scene *scene, real2 uv) {
     return (real3){r.all, g.all, b.all};
 }
 
-static inline real3 sky_radiance(const Scene *scene, real3 wi) { return sky_radiance_uv(scene, sky_uv(scene, wi)); }
-
 static inline real sky_pdf_at(const Scene *scene, ireal texel, real sin_theta) {
     real pdf = GATHER(real, scene->sky_texels, texel, .density) / (2.0f * PI * PI * sin_theta);
     return sin_theta > 0.0f ? pdf : ZERO;
 }
 
-static inline real sky_pdf(const Scene *scene, real3 wi) {
-    return scene->environment->probability
-         * sky_pdf_at(scene, sky_texel(scene, sky_uv(scene, wi)), sqrt(wi.x * wi.x + wi.z * wi.z));
+static inline real3 sky_radiance(const Scene *scene, real3 wi, real *pdf) {
+    real2 uv = sky_uv(scene, wi);
+    *pdf = scene->environment->probability
+         * sky_pdf_at(scene, sky_texel(scene, uv), sqrt(wi.x * wi.x + wi.z * wi.z));
+    return sky_radiance_uv(scene, uv);
 }
 
 static inline LightSample sky_light_sample(const Scene *scene, ireal index, real3 p, real2 u, ureal2 bits) {

@@ -164,7 +164,8 @@ kernel void probe_emitter(SCENE_PARAMETERS, uint n, global const float *in, glob
 // in: wi (3) -> out: radiance (3), the density with which light_sample chooses wi
 kernel void probe_sky(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
-    put3(out, n, 0, sky_radiance(&scene, ROW3(in, 0)));
-    put(out, n, 3, sky_pdf(&scene, ROW3(in, 0)));
+    real pdf;
+    put3(out, n, 0, sky_radiance(&scene, ROW3(in, 0), &pdf));
+    put(out, n, 3, pdf);
 }
 #endif
