@@ -105,7 +105,7 @@ def _bvh2(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
 
 
 def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
-    wide = collapse(_tree(builder, triangles, spheres, LANES, LANES), LANES)
+    wide = collapse(_tree(builder, triangles, spheres, LANES, LANES), LANES, LANES)
     leaf = wide.child < 0
     first, sphere, count = leaf_fields(wide.child[leaf])
     packs = _packs(triangles, wide.order, first[~sphere], count[~sphere])

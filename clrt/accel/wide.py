@@ -91,35 +91,67 @@ def leaf_fields(reference: IntArray) -> tuple[IntArray, BoolArray, IntArray]:
     return bits >> 4, (bits >> 3 & 1).astype(bool), (bits & 7) + 1
 
 
-def collapse(tree: Tree, width: int = 8) -> Wide:
-    """Open the child with the largest area until a node has `width` children or all of them are leaves.
+def collapse(tree: Tree, width: int = 8, pack: int = 1) -> Wide:
+    """The wide tree of least expected work that can be cut from the binary one, whose leaves stay as they are.
 
-    (Wald, Benthin, Boulos 2008, "Getting rid of packets".) All nodes of a level at once. The tree's leaves stay as they
-    are and must hold at most MAX_LEAF primitives. Raises SceneError for more than MAX_PRIMITIVES triangles or spheres.
+    Dynamic programming over the surface area heuristic (Ylitie, Karras, Laine 2017, "Efficient Incoherent Ray Traversal
+    on GPUs Through Compressed Wide BVHs", 3.1): against opening the largest child first it saves 6 to 13 % of the work.
+    Leaves hold at most MAX_LEAF primitives. Raises SceneError for more than MAX_PRIMITIVES triangles or spheres.
     """
     largest = max(tree.order.size, tree.sphere_order.size)
     if largest > MAX_PRIMITIVES:
         raise SceneError(f"{largest} primitives of one kind, but the layout bvh8 holds {MAX_PRIMITIVES}: use bvh2")
     if tree.count.max() > MAX_LEAF:
         raise ValueError(f"a leaf of {tree.count.max()} primitives; a leaf reference holds {MAX_LEAF}")
-    # Slots without a node hold -1, which finds the extra last entry here and in _wide.
-    area = np.append(np.where(tree.leaf, -1.0, half_area(tree.aabb_min, tree.aabb_max)), -1.0)
+    if tree.empty:
+        return _wide(tree, np.full((1, width), -1, np.int32))
+    opened, share = _plan(tree, width, pack)
+    interior = np.append(~tree.leaf, False)  # slots without a node hold -1, which finds the extra last entry
     slots, tops = [], np.zeros(1, np.int32)
-    while tops.size and not tree.empty:
-        slots.append(_open(tree, tops, area, width))
-        tops = slots[-1][area[slots[-1]] >= 0]
-    return _wide(tree, np.concatenate(slots) if slots else np.full((1, width), -1, np.int32))
+    while tops.size:
+        slots.append(_open(tree, tops, opened, share, width))
+        tops = slots[-1][interior[slots[-1]]]
+    return _wide(tree, np.concatenate(slots))
 
 
-def _open(tree: Tree, tops: IntArray, area: NDArray[np.float64], width: int) -> IntArray:
+def _plan(tree: Tree, width: int, pack: int) -> tuple[BoolArray, NDArray[np.int8]]:
+    """How to stand for each node's subtree with at most b roots, b = 0 … width.
+
+    opened: (n + 1, width + 1) bool, whether it pays to put the two children's roots in the node's place.
+    share: (n + 1, width + 1) int8, how many of the b roots are then the left child's.
+
+    Least cost with b roots: of a leaf its own; of a node opened, the best shares of b between its children; of a node
+    kept, which is one root, its area and what it costs opened with `width` roots.
+    """
+    area = half_area(tree.aabb_min, tree.aabb_max)
+    cost = np.repeat((area * intersections(tree.count, tree.spheres, pack))[:, None], width + 1, axis=1)
+    opened = np.zeros((len(area) + 1, width + 1), bool)
+    share = np.ones((len(area) + 1, width + 1), np.int8)
+    for level in reversed(list(tree.levels())):
+        nodes = level[~tree.leaf[level]]
+        left, right = cost[tree.left_first[nodes]], cost[tree.left_first[nodes] + 1]
+        best = np.full((len(nodes), width + 1), np.inf)
+        for b in range(2, width + 1):
+            splits = np.stack([left[:, k] + right[:, b - k] for k in range(1, b)])
+            share[nodes, b] = 1 + np.argmin(splits, axis=0)
+            best[:, b] = splits.min(axis=0)
+        kept = area[nodes] + best[:, width]
+        opened[nodes] = best < kept[:, None]
+        cost[nodes] = np.minimum(best, kept[:, None])
+    return opened, share
+
+
+def _open(tree: Tree, tops: IntArray, opened: BoolArray, share: NDArray[np.int8], width: int) -> IntArray:
     """The binary nodes, (k, width), that become the children of the wide nodes in place of `tops` (k,)."""
-    slots = np.full((len(tops), width), -1, np.int32)
-    slots[:, 0] = tops
+    slots, roots = np.full((len(tops), width), -1, np.int32), np.zeros((len(tops), width), np.intp)
+    slots[:, 0], roots[:, 0] = tops, width
     for used in range(1, width):
-        pick = np.argmax(area[slots], axis=1)
-        row = np.flatnonzero(area[slots[np.arange(len(tops)), pick]] >= 0)
-        left = tree.left_first[slots[row, pick[row]]]
-        slots[row, pick[row]], slots[row, used] = left, left + 1
+        pays = opened[slots, roots] if used > 1 else (slots >= 0) & ~np.append(tree.leaf, True)[slots]
+        pick = np.argmax(pays, axis=1)
+        row = np.flatnonzero(pays[np.arange(len(tops)), pick])
+        node, b = slots[row, pick[row]], roots[row, pick[row]]
+        slots[row, pick[row]], slots[row, used] = tree.left_first[node], tree.left_first[node] + 1
+        roots[row, pick[row]], roots[row, used] = share[node, b], b - share[node, b]
     return slots
 
 

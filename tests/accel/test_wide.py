@@ -1,8 +1,9 @@
-"""Collapsing keeps the leaves, opens the largest child first, and the stack bounds are exact."""
+"""Collapsing keeps the leaves, costs the least that it can, and the stack bounds are exact."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -47,33 +48,29 @@ def test_leaves_and_their_boxes_stay(count: int, width: int) -> None:
     assert (wide.aabb_min[unused] == np.inf).all() and (wide.aabb_max[unused] == -np.inf).all()
 
 
-def greedy_children(tree: Tree, top: int, width: int) -> list[int]:
-    """The rule for one node, one step at a time."""
+def least_cost(tree: Tree, width: int) -> float:
+    """By trying them all: every set of interior nodes, with the root, that keeps its members to `width` children."""
     area = half_area(tree.aabb_min, tree.aabb_max)
-    children = [top]
-    while len(children) < width:
-        inner = [node for node in children if tree.count[node] == 0]
-        if not inner:
-            break
-        largest = max(inner, key=lambda node: float(area[node]))
-        children.remove(largest)
-        children += [int(tree.left_first[largest]), int(tree.left_first[largest]) + 1]
-    return children
+    below = [int(node) for node in np.flatnonzero(~tree.leaf) if node]
+
+    def children(node: int, kept: set[int]) -> int:
+        """How many slots the subtree below `node` takes in its wide node."""
+        first = int(tree.left_first[node])
+        return sum(1 if tree.count[child] or child in kept else children(child, kept) for child in (first, first + 1))
+
+    leaves = float(np.sum(area[tree.leaf] * tree.count[tree.leaf]))
+    costs = [leaves + float(sum(area[list(kept)])) for size in range(len(below) + 1)
+             for kept in ({0, *chosen} for chosen in combinations(below, size))
+             if all(children(node, kept) <= width for node in kept)]
+    return min(costs) / float(area[0])
 
 
-def test_the_largest_child_is_opened_first() -> None:
-    tree = mixed_tree(500)
-    wide = collapse(tree)
-    tops = [0]
-    for node, slots in enumerate(wide.child):
-        children = greedy_children(tree, tops[node], 8)
-        assert len(children) == np.count_nonzero(slots != EMPTY)
-        boxes = zip(wide.aabb_min[node, slots != EMPTY].tolist(), wide.aabb_max[node, slots != EMPTY].tolist())
-        assert sorted(boxes) == sorted((tree.aabb_min[n].tolist(), tree.aabb_max[n].tolist()) for n in children)
-        by_box = {(tuple(tree.aabb_min[n]), tuple(tree.aabb_max[n])): n for n in children}
-        tops += [by_box[tuple(wide.aabb_min[node, slot]), tuple(wide.aabb_max[node, slot])]
-                 for slot in np.flatnonzero(wide.interior[node])]
-    assert len(tops) == len(wide.child)
+@pytest.mark.parametrize("width", [2, 3, 4, 8])
+@pytest.mark.parametrize("seed", range(6))
+def test_no_wide_tree_costs_less(seed: int, width: int) -> None:
+    triangles = soup(11, seed=seed)
+    tree = midpoint(triangles.min(axis=1), triangles.max(axis=1), 1)
+    assert collapse(tree, width).sah_cost() == pytest.approx(least_cost(tree, width), rel=1e-9)
 
 
 def binary_children(tree: Tree) -> Children:
