@@ -17,12 +17,9 @@ from ..probe import Probe
 
 Doubles = NDArray[np.float64]
 
-#: What is tried of each numeric field. A new material's field belongs here.
-NUMBERS: dict[str, tuple[Any, ...]] = {
-    "color": ((0.9, 0.5, 0.2),),
-    "metallic": (0.0, 0.5, 1.0),
-    "roughness": (0.01, 0.1, 0.3, 0.6, 1.0),
-}
+#: What is tried of fields that want more than the ends and the middle of their range.
+NUMBERS: dict[str, tuple[Any, ...]] = {"roughness": (0.01, 0.1, 0.3, 0.6, 1.0)}
+COLOR = (0.9, 0.5, 0.2)
 AZIMUTH = 1.0
 GRAZING = 2.0**-10      # its sine is 1 − 2^-21, a float32
 COSINES = (1.0, 0.6, 0.1, GRAZING)
@@ -33,11 +30,21 @@ def variants(kind: type[Material]) -> list[Material]:
     hints = get_type_hints(kind)
     names = [field.name for field in fields(kind) if field.name != "emission"]
     words = {name: found for name in names if (found := _words(hints[name]))}
-    numbers = {name: NUMBERS[name] for name in names if name not in words}
+    numbers = {name: NUMBERS.get(name) or _numbers(kind, name) for name in names if name not in words}
     grid = [dict(zip(numbers, values)) for values in itertools.product(*numbers.values())]
     choices = [{name: word} for name, found in words.items() for word in found]
     middle = {name: values[len(values) // 2] for name, values in numbers.items()}
     return [kind(**values) for values in grid] + [kind(**(middle | choice)) for choice in choices]
+
+
+def _numbers(kind: type[Material], name: str) -> tuple[Any, ...]:
+    """A color, or the ends and the middle of the range in the field's type; its default where it has no two ends."""
+    hint, default = get_type_hints(kind, include_extras=True)[name], getattr(kind(), name)
+    if isinstance(default, tuple):
+        return (COLOR,)
+    limits = [getattr(limit, end) for limit in get_args(hint)[1:] for end in ("ge", "gt", "le", "lt")
+              if hasattr(limit, end)]
+    return (min(limits), sum(limits) / 2, max(limits)) if len(limits) == 2 else (default,)
 
 
 def _words(hint: Any) -> list[str]:
