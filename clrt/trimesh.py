@@ -15,8 +15,8 @@ from .query import RayQuery
 
 Doubles = NDArray[np.float64]
 Indices = NDArray[np.int64]
-#: Rays of `contains_points` go both ways along this direction, which no sensible mesh has an edge in.
-PROBE = np.array([0.4395064455, 0.617598629942, 0.652231566745])
+#: Rays of `contains_points` go both ways along this direction, in which meshes made by hand have no edges or faces.
+PROBE = np.sqrt([1 / 6, 2 / 6, 3 / 6])
 
 
 class RayMeshIntersector:

@@ -1,7 +1,6 @@
 // Eight lanes' mask as bits: bit i is set where lane i is true (−1).
 //
-// One instruction where the compiler offers it, else a multiplication that gathers one bit of each byte; the
-// difference is a tenth of the whole traversal. The built-in any() of some CPU drivers costs more than either.
+// One instruction where the compiler offers it, else a multiplication that gathers one bit of each byte.
 
 #if defined(__AVX__) && !PORTABLE_MASK
 static inline uint mask_bits(int8 mask) { return (uint)__builtin_ia32_movmskps256(as_float8(mask)); }

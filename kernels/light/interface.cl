@@ -15,7 +15,7 @@
 
 typedef struct {
     real3 wi;
-    real3 radiance;     // arrives along wi if nothing is in between; divided by area-free density where `delta`
+    real3 radiance;     // arrives along wi if nothing is in between; the irradiance across wi where `delta`
     real pdf;           // per solid angle; 1 where `delta`
     real3 target;       // where the shadow ray ends, just before the light; meaningless where `infinite`
     ireal infinite, delta;

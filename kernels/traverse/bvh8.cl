@@ -1,9 +1,9 @@
 // An 8-wide tree for processors with vectors: a ray meets a node's eight boxes, or a pack of eight triangles, at once.
 //
-// The nearest child is entered, the others wait unsorted with their distances: as fast as a full sort (measured). The
-// host computed the stack's size for this very tree, so that it cannot overflow. A child reference >= 0 is a node,
-// < 0 is ~(first << 4 | sphere << 3 | count − 1), a pack of triangles or `count` spheres; empty slots have boxes
-// turned inside out.
+// The nearest child is entered, the others wait unsorted with their distances. The host computed the stack's size for
+// this very tree, so that it cannot overflow. A child reference >= 0 is a node, < 0 is
+// ~(first << 4 | sphere << 3 | count − 1), a pack of triangles or `count` spheres; empty slots have boxes turned
+// inside out.
 #include "geometry/box.cl"
 #include "traverse/leaf.cl"
 

@@ -13,26 +13,19 @@ typedef struct {
 #endif
 } LeafRay;
 
-typedef struct {
 #if TRIANGLES
-    TriangleRays triangles;
+typedef TriangleRays LeafRays;
+static inline LeafRays leaf_rays(real3 origin, real3 direction) { return triangle_rays(origin, direction); }
+#else
+typedef int LeafRays;   // a sphere's test needs nothing but the ray
+static inline LeafRays leaf_rays(real3 origin, real3 direction) { return 0; }
 #endif
-    int unused;
-} LeafRays;
-
-static inline LeafRays leaf_rays(real3 origin, real3 direction) {
-    LeafRays r;
-#if TRIANGLES
-    r.triangles = triangle_rays(origin, direction);
-#endif
-    return r;
-}
 
 static inline LeafRay leaf_ray(const LeafRays *rays, const Ray *ray, int lane) {
     LeafRay r;
     r.ray = *ray;
 #if TRIANGLES
-    r.triangle_ray = triangle_ray(&rays->triangles, ray, lane);
+    r.triangle_ray = triangle_ray(rays, ray, lane);
 #endif
     return r;
 }
