@@ -1,7 +1,7 @@
 """Records that host and device share. A numpy dtype is the definition; the C typedef is written from it.
 
-Fields are float32, int32 or uint32, alone or in arrays, in an order that needs no padding, and a record's size is a
-multiple of 16: then numpy, and every OpenCL compiler, lay it out alike.
+Fields are float32, int32, uint32 or uint8, alone or in arrays, in an order that needs no padding, and a record's size
+is a multiple of 16: then numpy, and every OpenCL compiler, lay it out alike.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-C_TYPES = {np.dtype("f4"): "float", np.dtype("i4"): "int", np.dtype("u4"): "uint"}
+C_TYPES = {np.dtype("f4"): "float", np.dtype("i4"): "int", np.dtype("u4"): "uint", np.dtype("u1"): "uchar"}
 
 
 def c_typedef(name: str, dtype: np.dtype[Any]) -> str:

@@ -13,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from clrt.accel.builders import BUILDERS
+from clrt.accel.cwbvh import CWBVH_NODE
 from clrt.accel.layouts import (BVH2_NODE, BVH8_NODE, LAYOUTS, LEAF_SPHERE, LEAF_TRIANGLE, TRIANGLE_PACK, Layout, pack,
                                 sphere_boxes)
 from clrt.accel.tree import FloatArray
@@ -126,6 +127,27 @@ def visit_bvh8(layout: Layout, reference: int, ray: Ray) -> Visit:
     return [], pack_record(record, ray)
 
 
+def visit_cwbvh(layout: Layout, reference: int, ray: Ray) -> Visit:
+    """References >= 0 are nodes, < 0 ~(first << 2 | count) leaves."""
+    if reference < 0:
+        first, count = ~reference >> 2, ~reference & 3
+        triangles = len(layout.buffers.get("leaf_triangles", ()))
+        if first >= triangles:
+            return [], sphere_records(layout.buffers["leaf_spheres"][first - triangles:][:count], ray)
+        return [], triangle_records(layout.buffers["leaf_triangles"][first:first + count], ray)
+    node = layout.buffers["nodes"][reference]
+    step = np.ldexp(1.0, node["exponent"].astype(int) - 127)
+    children, child = [], int(node["child"])
+    for slot, meta in enumerate(node["meta"].tolist()):
+        box = tuple(node["origin"].astype(np.float64) + node[side][:, slot] * step for side in ("lo", "hi"))
+        if node["imask"] >> slot & 1:
+            children.append((box, child))
+            child += 1
+        elif meta:
+            children.append((box, ~(int(node["primitive"]) + (meta & 31) << 2 | (meta >> 5).bit_count())))
+    return children, MISS
+
+
 def enters(box: Box, ray: Ray) -> bool:
     """Slabs in float64, near and far plane by the direction's sign, opened by far more than their rounding."""
     near, far = 0.0, np.inf
@@ -140,14 +162,14 @@ def enters(box: Box, ray: Ray) -> bool:
 
 
 def trace(layout: Layout, ray: Ray) -> Hit:
-    """Closest hit through the records, with a stack that may hold no more than the layout says."""
+    """Closest hit through the records, with a stack that may hold no more than the layout says; groups: test_cwbvh."""
     if layout.name == "list":
         readers = {"leaf_triangles": triangle_records, "leaf_spheres": sphere_records}
         return min([readers[name](records, ray) for name, records in layout.buffers.items()] + [MISS])
-    visit = {"bvh2": visit_bvh2, "bvh8": visit_bvh8}[layout.name]
+    visit = {"bvh2": visit_bvh2, "bvh8": visit_bvh8, "cwbvh": visit_cwbvh}[layout.name]
     stack, closest = [0], MISS
     while stack:
-        assert len(stack) <= layout.stack
+        assert len(stack) <= layout.stack or layout.name == "cwbvh"
         children, hit = visit(layout, stack.pop(), ray)
         closest = min(closest, hit)
         stack += [reference for box, reference in children if enters(box, ray)]
@@ -190,16 +212,19 @@ def test_siblings_of_a_binary_tree_share_a_cache_line() -> None:
 
 def test_a_tree_of_nothing_cannot_be_entered() -> None:
     """Neither at its root nor, if the root is not tested, at the root's children."""
-    binary, wide = (pack(name, "sah", *SCENES["nothing"]).buffers["nodes"] for name in ("bvh2", "bvh8"))
+    binary, wide, compressed = (pack(name, "sah", *SCENES["nothing"]).buffers["nodes"]
+                                for name in ("bvh2", "bvh8", "cwbvh"))
     first = binary["left_first"][0]
     assert (binary["count"] == 0).all()
     assert (binary["aabb_min"][[0, first, first + 1]] == np.inf).all()
     assert (binary["aabb_max"][[0, first, first + 1]] == -np.inf).all()
     assert (wide["lo"] == np.inf).all() and (wide["hi"] == -np.inf).all() and (wide["child"] == EMPTY).all()
+    assert not compressed["meta"].any() and not compressed["imask"].any()
+    assert (compressed["lo"] == 255).all() and (compressed["hi"] == 0).all()
 
 
 def test_records_have_the_sizes_that_the_device_expects() -> None:
-    sizes = {BVH2_NODE: 32, BVH8_NODE: 256, LEAF_TRIANGLE: 48, LEAF_SPHERE: 32, TRIANGLE_PACK: 320}
+    sizes = {BVH2_NODE: 32, BVH8_NODE: 256, LEAF_TRIANGLE: 48, LEAF_SPHERE: 32, TRIANGLE_PACK: 320, CWBVH_NODE: 80}
     assert all(dtype.itemsize == size for dtype, size in sizes.items())
 
 
@@ -223,7 +248,7 @@ def test_boxes_of_spheres_contain_them(balls: FloatArray) -> None:
                 assert Fraction(float(inner[0])) >= exact_low and Fraction(float(inner[1])) <= exact_high
 
 
-@pytest.mark.parametrize("layout, builder, message", [("bvh3", "sah", "'bvh3'.*list, bvh2, bvh8"),
+@pytest.mark.parametrize("layout, builder, message", [("bvh3", "sah", "'bvh3'.*list, bvh2, bvh8, cwbvh"),
                                                       ("bvh2", "shah", "'shah'.*sah, midpoint")])
 def test_unknown_names_are_refused(layout: str, builder: str, message: str) -> None:
     with pytest.raises(UsageError, match=message):

@@ -1,0 +1,111 @@
+// A compressed 8-wide tree for GPUs (Ylitie, Karras and Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through
+// Compressed Wide BVHs"): 80-byte nodes, whose boxes have eight bits a plane.
+//
+// What a ray enters of a node is one word: a bit each for the nodes (31 … 24) and for the primitives (23 … 0) below it.
+// Nodes stand in the order in which a ray of this octant passes their slots, so the next one is the highest bit and
+// nothing is sorted. A group is the index of the first and such bits; what is left of a group of nodes waits on a stack,
+// one group a level at most, whose size the host computed for this very tree, so that it cannot overflow.
+//
+// Watertight as geometry/box.cl is. A plane at p + q·step is seen from the ray at q·step + (p − origin): q·step is exact,
+// and the sum's rounding is within what box.cl keeps in hand. The roundings of p − origin, and of plane − p when the tree
+// was built, are below 3 units of p − origin, and 4 are padded. The product with 1/direction stays apart, which costs one
+// a plane, so that zeros and infinities mean here what they mean there.
+#include "geometry/box.cl"
+#include "traverse/leaf.cl"
+
+#define ORIGIN_PAD (4.0f * 5.9604645e-8f)
+
+typedef struct { float step[3], near[3], far[3]; } Grid;   // a node's: the step, and p − origin for near and far planes
+typedef struct { uint first, bits; } Group;
+
+static inline Grid node_grid(const SlabRay *ray, uint4 frame) {
+    Grid grid;
+    float p[3] = {as_float(frame.x), as_float(frame.y), as_float(frame.z)};
+    for (int axis = 0; axis < 3; ++axis) {
+        grid.step[axis] = as_float((frame.w >> 8 * axis & 0xff) << 23);
+        float base = p[axis] - ray->origin[axis];
+        float pad = (base < 0.0f ? -base : base) * (ray->backward[axis] ? -ORIGIN_PAD : ORIGIN_PAD);
+        grid.near[axis] = base - pad;
+        grid.far[axis] = base + pad;
+    }
+    return grid;
+}
+
+// Of four children of a node, a byte each in meta and in each axis of low and high, the bits of those that are entered.
+static inline uint enter_four(const SlabRay *ray, const Grid *grid, uint order, float t_max, uint meta,
+                              const uint low[3], const uint high[3]) {
+    float4 t_near = 0.0f, t_far = t_max;
+    for (int axis = 0; axis < 3; ++axis) {
+        uint near_bytes = ray->backward[axis] ? high[axis] : low[axis];
+        uint far_bytes = ray->backward[axis] ? low[axis] : high[axis];
+        float4 near = (convert_float4(as_uchar4(near_bytes)) * grid->step[axis] + grid->near[axis]) * ray->near[axis];
+        float4 far = (convert_float4(as_uchar4(far_bytes)) * grid->step[axis] + grid->far[axis]) * ray->far[axis];
+        t_near = fmax(near, t_near);   // these drop NaN, as box.cl's comparisons do, and are one instruction on GPUs
+        t_far = fmin(far, t_far);
+    }
+    // Of a node the low bits of meta are 24 + slot, whose order is the ray's; of a leaf less than 24, and stay.
+    uint nodes = (meta & meta << 1 & 0x10101010) >> 4;
+    uint4 place = convert_uint4(as_uchar4((meta ^ nodes * order) & 0x1f1f1f1f));
+    uint4 bits = convert_uint4(as_uchar4(meta >> 5 & 0x07070707)) << place & as_uint4(t_near <= t_far);
+    return bits.x | bits.y | bits.z | bits.w;
+}
+
+static inline void enter_node(const SlabRay *ray, global const Node *node, uint order, float t_max, Group *nodes,
+                              Group *primitives) {
+    global const uint4 *words = (global const uint4 *)node;
+    uint4 frame = words[0], links = words[1], a = words[2], b = words[3], c = words[4];
+    uint low[2][3] = {{a.x, a.z, b.x}, {a.y, a.w, b.y}}, high[2][3] = {{b.z, c.x, c.z}, {b.w, c.y, c.w}};
+    Grid grid = node_grid(ray, frame);
+    uint bits = enter_four(ray, &grid, order, t_max, links.z, low[0], high[0])
+              | enter_four(ray, &grid, order, t_max, links.w, low[1], high[1]);
+    *nodes = (Group){links.x, (bits & 0xff000000) | frame.w >> 24};   // which slots are nodes: where a child is from `first`
+    *primitives = (Group){links.y, bits & 0x00ffffff};
+}
+
+static inline void hit_primitive(const Scene *scene, const LeafRay *ray, int i, const bool stop_at_first, Hit *hit) {
+#if SPHERES
+    int sphere = i - scene->counts.triangles;
+#if TRIANGLES
+    if (sphere >= 0)
+#endif
+    {
+        hit_spheres(ray, scene->leaf_spheres + sphere, 1, hit);
+        return;
+    }
+#endif
+#if TRIANGLES
+    hit_triangles(ray, scene->leaf_triangles + i, stop_at_first, hit);
+#endif
+}
+
+typedef struct { LeafRays leaves; SlabRays slabs; } TreeRays;
+
+static inline TreeRays tree_rays(real3 origin, real3 direction) {
+    return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
+}
+
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first) {
+    LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
+    SlabRay slabs = slab_ray(&rays->slabs, ray, lane);
+    Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
+    uint order = (slabs.backward[0] ? 0 : 1) | (slabs.backward[1] ? 0 : 2) | (slabs.backward[2] ? 0 : 4);
+    Group waiting[STACK_SIZE];
+    Group nodes = {0, 0x80000000}, primitives;   // the root
+    int top = 0;
+    for (;;) {
+        uint highest = 31 - clz(nodes.bits);
+        nodes.bits ^= 1u << highest;
+        if (nodes.bits > 0x00ffffff) waiting[top++] = nodes;
+        uint slot = (highest - 24) ^ order;
+        uint node = nodes.first + popcount(nodes.bits & ((1u << slot) - 1));
+        enter_node(&slabs, scene->nodes + node, order, hit.t, &nodes, &primitives);
+        for (; primitives.bits; primitives.bits &= primitives.bits - 1) {
+            hit_primitive(scene, &leaf, primitives.first + first_bit(primitives.bits), stop_at_first, &hit);
+            if (stop_at_first && hit.primitive >= 0) return hit;
+        }
+        if (nodes.bits <= 0x00ffffff) {
+            if (top == 0) return hit;
+            nodes = waiting[--top];
+        }
+    }
+}
