@@ -1,0 +1,55 @@
+"""From primitives to the tree on a device: the builder is chosen, and where it runs."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from ..device.arrays import DeviceArray
+from ..device.open import Device
+from ..errors import UsageError
+from . import device_builder
+from .layouts import LANES, LEAF_SPHERE, Layout, Records, pack
+from .tree import FloatArray
+from .wide import Wide
+
+#: Builders that run on the device, by the passes of reinsertion that follow.
+DEVICE_BUILDERS = {"ploc": 0}
+#: From so many primitives on a device's tree is done before numpy's, kernels loaded from the cache included.
+LARGE = 1 << 14
+
+
+def build_tree(device: Device | None, layout: str, builder: str | None, triangles: FloatArray,
+               spheres: FloatArray | None = None) -> Layout:
+    """The tree over triangles (m, 3, 3) and spheres (s, 4), float32, finite, of sizes near 1.
+
+    builder: a name in BUILDERS or DEVICE_BUILDERS; None takes the fastest. Without a device, and for fewer than two
+    primitives, those on the device are stood in for by `sah`. Raises UsageError for unknown names and for
+    layouts that the builder cannot make.
+    """
+    spheres = np.zeros((0, 4), np.float32) if spheres is None else spheres
+    count = len(triangles) + len(spheres)
+    if builder is None:
+        builder = "ploc" if device and count >= LARGE and layout in device_builder.SHAPES else "sah"
+    if builder not in DEVICE_BUILDERS or device is None or count < 2:
+        return pack(layout, "sah" if builder in DEVICE_BUILDERS else builder, triangles, spheres)
+    if layout not in device_builder.SHAPES:
+        raise UsageError(f"the builder {builder} makes {', '.join(device_builder.SHAPES)}, not {layout}: "
+                         "take the builder sah")
+    start = time.perf_counter()
+    shape = device_builder.SHAPES[layout]
+    tree = device_builder.build_tree(device, shape, triangles, spheres)
+    records = dict(zip(("nodes", "packs", "leaf_spheres"), tree.arrays))
+    buffers = {name: DeviceArray(buffer, dtype, size) for (name, buffer), dtype, size
+               in zip(records.items(), (shape.node, shape.leaf, LEAF_SPHERE), tree.counts) if size}
+    seconds = time.perf_counter() - start
+    return Layout(layout, buffers, tree.stack, tree.counts[0], len(tree.level_sizes),
+                  _sah_cost(buffers["nodes"].read(device)), seconds, builder)
+
+
+def _sah_cost(nodes: Records) -> float:
+    """Of the tree with these nodes, as Wide.sah_cost."""
+    nothing = np.empty(0, np.int32)
+    low, high = nodes["lo"].transpose(0, 2, 1), nodes["hi"].transpose(0, 2, 1)
+    return Wide(low, high, nodes["child"], nothing, nothing).sah_cost(LANES)

@@ -1,0 +1,106 @@
+"""Data-parallel steps: kernels that work through `count` items, a block of consecutive ones in each work-item."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import DTypeLike, NDArray
+
+from .open import Device
+from .program import build, make_kernel
+
+#: Work-items a compute unit, and the fewest items that one of them gets.
+WORK_ITEMS = {"cpu": 16, "gpu": 512}
+SMALLEST_BLOCK = {"cpu": 256, "gpu": 16}
+
+
+class Blocks:
+    """The kernels of one program and the arrays that they share, all on one in-order queue.
+
+    Every kernel's first arguments are `uint count, uint block`; the program holds build/scan.cl. `peak_bytes` is the
+    most memory that its arrays took at a time. Launches are short, so waiting for them need not let signals through.
+    """
+
+    def __init__(self, device: Device, source: str) -> None:
+        self.device = device
+        self.program = build(device, source)
+        self.peak_bytes = 0
+        self._bytes = 0
+        self._kernels: dict[str, cl.Kernel] = {}
+        self._totals = self.empty(np.uint32, 4)
+
+    def empty(self, dtype: DTypeLike, count: int) -> cl.Buffer:
+        """An array of `count` elements, at least one, whose contents are not defined."""
+        array = cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, max(1, count) * np.dtype(dtype).itemsize)
+        self._bytes += array.size
+        self.peak_bytes = max(self.peak_bytes, self._bytes)
+        return array
+
+    def zeros(self, dtype: DTypeLike, count: int) -> cl.Buffer:
+        """An array of zeros."""
+        array = self.empty(dtype, count)
+        cl.enqueue_fill_buffer(self.device.queue, array, np.zeros(1, np.uint8), 0, array.size)
+        return array
+
+    def upload(self, values: NDArray[Any]) -> cl.Buffer:
+        """A copy of `values`."""
+        array = self.empty(values.dtype, values.size)
+        if values.size:
+            cl.enqueue_copy(self.device.queue, array, np.ascontiguousarray(values))
+        return array
+
+    def download(self, array: cl.Buffer, dtype: DTypeLike, count: int) -> NDArray[Any]:
+        """The first `count` elements of an array, once all that was asked for is done."""
+        values = np.empty(count, dtype)
+        if count:
+            cl.enqueue_copy(self.device.queue, values, array)
+        return values
+
+    def free(self, *arrays: cl.Buffer) -> None:
+        """Gives arrays back, after the launches that use them."""
+        for array in arrays:
+            self._bytes -= array.size
+            array.release()
+
+    def block(self, count: int) -> int:
+        """How many items each work-item gets."""
+        kind = "cpu" if self.device.info.type == "cpu" else "gpu"
+        return max(SMALLEST_BLOCK[kind], -(-count // (WORK_ITEMS[kind] * self.device.info.compute_units)))
+
+    def number(self, count: int) -> int:
+        """How many blocks there are."""
+        return -(-count // self.block(count))
+
+    def run(self, name: str, count: int, *arguments: Any) -> None:
+        """Launches kernel `name` over `count` items. Python's ints are passed as uint, floats as float."""
+        kernel, local = self._kernel(name), self.device.local_size
+        kernel.set_args(np.uint32(count), np.uint32(self.block(count)), *map(_scalar, arguments))
+        groups = -(-self.number(count) // local)
+        cl.enqueue_nd_range_kernel(self.device.queue, kernel, (groups * local,), (local,))
+
+    def scan(self, values: cl.Buffer, count: int, arrays: int = 1) -> NDArray[np.uint32]:
+        """Turns each of `arrays` arrays of `count` numbers, one after another in `values`, into what stood before it.
+
+        Returns the sums (arrays,), which are also in `totals`.
+        """
+        kernel, local = self._kernel("scan"), 1 if self.device.local_size == 1 else 256
+        kernel.set_args(values, np.uint32(count), self._totals, cl.LocalMemory(4 * local))  # type: ignore[arg-type]
+        cl.enqueue_nd_range_kernel(self.device.queue, kernel, (arrays * local,), (local,))
+        return self.download(self._totals, np.uint32, arrays)
+
+    @property
+    def totals(self) -> cl.Buffer:
+        """The sums of the last scan."""
+        return self._totals
+
+    def _kernel(self, name: str) -> cl.Kernel:
+        if name not in self._kernels:
+            self._kernels[name] = make_kernel(self.device, self.program, name)
+        return self._kernels[name]
+
+
+def _scalar(argument: Any) -> Any:
+    kinds = {int: np.uint32, float: np.float32}
+    return kinds[type(argument)](argument) if type(argument) in kinds else argument
