@@ -6,10 +6,15 @@ from pathlib import Path
 
 import click
 
+from .bench_peers import peers_command
+
 
 @click.group()
 def command() -> None:
-    """Measure this machine: rays."""
+    """Measure this machine: rays, peers."""
+
+
+command.add_command(peers_command)
 
 
 @command.command("rays")
@@ -17,13 +22,13 @@ def command() -> None:
 @click.option("--rays", type=click.Path(path_type=Path), metavar="FILE.npz",
               help="origins (n, 3), directions (n, 3), t_max (n,); default: a million rays all around.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
-@click.option("--layout", type=click.Choice(["bvh8", "bvh2", "list"]), help="Tree layout.")
+@click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "list"]), help="Tree layout.")
 @click.option("--triangle", type=click.Choice(["watertight", "moller_trumbore"]), default="watertight",
               show_default=True, help="Triangle test.")
-@click.option("--builder", type=click.Choice(["sah", "midpoint"]), default="sah", show_default=True, help="Builder.")
+@click.option("--builder", type=click.Choice(["ploc", "sah", "midpoint"]), help="Tree builder.")
 @click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
-def rays_command(mesh: Path, rays: Path | None, device: str | None, layout: str | None, triangle: str, builder: str,
-                 json_file: Path | None) -> None:
+def rays_command(mesh: Path, rays: Path | None, device: str | None, layout: str | None, triangle: str,
+                 builder: str | None, json_file: Path | None) -> None:
     """Rays a second through a mesh: kernels alone (mrays_…) and whole calls from Python (mrays_…_call)."""
     from ..output.files import check_target
     from ..output.report import write_report

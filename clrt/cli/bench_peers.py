@@ -1,0 +1,68 @@
+"""`clrt bench peers`: clrt beside other ray libraries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+@click.command("peers")
+@click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE", help="A model file; default: a bumpy ball.")
+@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--quick", is_flag=True, help="One scene and fewer rays.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+def peers_command(mesh: Path | None, device: str | None, quick: bool, json_file: Path | None) -> None:
+    """The same rays through clrt and other libraries, in turns.
+
+    Mrays/s, then how many times as fast clrt is, by the clock and (in brackets) by processor time. Embree, inside pip's
+    embreex, is called from C on all processors: singly or in packets of 8, in fast and in robust mode, without and
+    with its flag for coherent rays. Python libraries are measured by whole calls.
+    """
+    from ..output.files import check_target
+    from ..output.report import write_report
+    from ..study.peers import measure_peers, versions
+    from ..study.rays import load_triangles
+    from ..study.workloads import bumpy_ball
+
+    if json_file is not None:
+        check_target(json_file)
+    results = []
+    for result in measure_peers(*(load_triangles(mesh) if mesh else bumpy_ball()), quick=quick, device=device):
+        click.echo("\n".join(_lines(result)) + "\n")
+        results.append(result)
+    if json_file is not None:
+        write_report(json_file, {"mesh": mesh, "versions": versions(), "scenes": results})
+        click.echo(str(json_file))
+
+
+def _lines(result: Mapping[str, Any]) -> list[str]:
+    on_cpu = result["device_type"] == "cpu"
+    lines = [f"{result['scene']}: {result['triangles']} triangles; {result['device']}, {result['platform']}"]
+    lines += [f"  tree of {name:22}{tree['seconds']:8.2f} s {tree['bytes'] / 1e6:8.1f} MB"
+              for name, tree in result["trees"].items()]
+    hits = (f"{result['hits'][name]:9.2f} of{kind['clrt']['rays']:9}" for name, kind in result["kernels"].items())
+    lines.append(f"  {'part of rays that hit':24}{'  '.join(hits)}")
+    lines += _table("kernels alone", result["kernels"], on_cpu)
+    if "calls" in result:
+        lines += _table("whole calls from Python", result["calls"], on_cpu)
+    return lines + [f"  {name:24}{why}" for name, why in result["missing"].items()]
+
+
+def _table(title: str, kinds: Mapping[str, Any], on_cpu: bool) -> list[str]:
+    """A line for each contestant, a column for each kind of rays, and for how many of all rays the answers agree."""
+    lines = [f"  {title:24}" + "".join(f"{kind:>23}" for kind in kinds) + "    agrees"]
+    for name in next(iter(kinds.values())):
+        line = f"  {name:24}"
+        for kind in kinds.values():
+            row = kind[name]
+            line += f"{row['mrays']:9.3g}{_times(row['ratio']):>6}"
+            line += f" ({_times(row['cpu_ratio']):>5})" if on_cpu else " " * 8
+        lines.append(f"{line}{min(kind[name]['agrees'] for kind in kinds.values()):10.5f}")
+    return lines
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.2f}" if ratio < 100 else f"{ratio:.0f}" if ratio < 10_000 else f"{ratio / 1000:.0f}k"
