@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .device.discover import devices as devices
     from .errors import (ClrtError as ClrtError, DeviceError as DeviceError, KernelError as KernelError,
                          OutputError as OutputError, SceneError as SceneError, UsageError as UsageError)
+    from .instances import InstancedRayQuery as InstancedRayQuery
     from .output.compare import compare as compare
     from .output.image import Image as Image
     from .query import RayQuery as RayQuery
@@ -31,6 +32,7 @@ _HOME = {
     "api": ("load", "render"),
     "device.discover": ("devices",),
     "errors": ("ClrtError", "DeviceError", "KernelError", "OutputError", "SceneError", "UsageError"),
+    "instances": ("InstancedRayQuery",),
     "output.compare": ("compare",),
     "output.image": ("Image",),
     "query": ("RayQuery",),

@@ -1,6 +1,7 @@
-// Eight lanes' mask as bits: bit i is set where lane i is true (−1).
+// Eight lanes' masks as bits: bit i is set where lane i is true (−1). And what only CPUs have: one instruction for that,
+// one for putting lanes side by side, and prefetching; elsewhere the same is said in portable words.
 //
-// One instruction where the compiler offers it, else a multiplication that gathers one bit of each byte.
+// __AVX__ and the like are defined where a compiler makes code for such a processor directly.
 
 #if defined(__AVX__) && !PORTABLE_MASK
 static inline uint mask_bits(int8 mask) { return (uint)__builtin_ia32_movmskps256(as_float8(mask)); }
@@ -12,3 +13,35 @@ static inline uint mask_bits(int8 mask) {
 #endif
 
 static inline int first_bit(uint bits) { return 31 - (int)clz(bits & -bits); }
+
+// Writes the lanes whose bits are set to target[0], [1] …; up to target[7] anything may be overwritten.
+#if defined(__AVX512VL__) && !PORTABLE_MASK
+static inline void store_lanes(int8 lanes, uint bits, int *target) {
+    vstore8(__builtin_ia32_compresssi256_mask(lanes, lanes, (uchar)bits), 0, target);
+}
+#else
+static inline void store_lanes(int8 lanes, uint bits, int *target) {
+    int all[8];
+    vstore8(lanes, 0, all);
+    for (; bits; bits &= bits - 1) *target++ = all[first_bit(bits)];
+}
+#endif
+
+// The lane, of those whose bits are set, with the least number; all are >= 0, and at least one bit is set. Numbers that
+// differ in their last three bits only count as equal.
+static inline int least_lane(float8 numbers, uint bits) {
+    int8 number = (int8)(0, 1, 2, 3, 4, 5, 6, 7);
+    int8 used = (int8)((int)bits) << (31 - number) < 0;
+    int8 eight = used ? (as_int8(numbers) & ~7) | number : (int8)(0x7fffffff);
+    int4 four = eight.lo < eight.hi ? eight.lo : eight.hi;
+    int2 two = four.lo < four.hi ? four.lo : four.hi;
+    return (two.x < two.y ? two.x : two.y) & 7;
+}
+
+// Brings the cache lines of `bytes` from `address` on near; where that cannot be said, nothing.
+#if defined(__SSE2__) && !PORTABLE_MASK
+#define PREFETCH(address, bytes) for (int line = 0; line < (bytes); line += 64) \
+    __builtin_prefetch((global const char *)(address) + line);
+#else
+#define PREFETCH(address, bytes)
+#endif

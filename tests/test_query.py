@@ -20,9 +20,11 @@ ORIGINS = RNG.uniform(-2, 2, (3000, 3)).astype(np.float32)
 DIRECTIONS = (RNG.normal(size=(3000, 3)) * RNG.uniform(0.1, 10, (3000, 1))).astype(np.float32)
 
 
-@pytest.fixture(params=["bvh8", "bvh2", "list"])
+@pytest.fixture(params=["bvh8-1", "bvh8-16", "bvh2-1", "cwbvh-1", "list-1"])
 def soup(request: pytest.FixtureRequest, device: Device) -> clrt.RayQuery:
-    return clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout=request.param)
+    """In each layout, with so many rays of a work-item in flight."""
+    layout, in_flight = request.param.split("-")
+    return clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout=layout, in_flight=int(in_flight))
 
 
 def brute_force(origins: Doubles, directions: Doubles) -> tuple[Doubles, Doubles]:
@@ -64,6 +66,18 @@ def test_any_hit_agrees_with_closest_hit(soup: clrt.RayQuery) -> None:
     short = soup.closest_hit(ORIGINS, DIRECTIONS, limit)
     np.testing.assert_array_equal(short["primitive"], np.where(hits["t"] < limit, hits["primitive"], -1))
     assert np.isinf(short["t"][short["primitive"] < 0]).all()
+
+
+def test_all_hits_are_those_of_brute_force(soup: clrt.RayQuery) -> None:
+    t, depth = brute_force(ORIGINS.astype(np.float64), DIRECTIONS.astype(np.float64))
+    clear = np.flatnonzero((np.abs(depth) > 1e-5).all(axis=1))
+    index, hits = soup.all_hits(ORIGINS[clear], DIRECTIONS[clear], max_hits=len(FACES))
+    ray, primitive = np.nonzero(np.isfinite(t[clear]))
+    assert len(ray) > 4 * len(clear)
+    by_primitive = np.lexsort((hits["primitive"], index))
+    np.testing.assert_array_equal(index[by_primitive], ray)
+    np.testing.assert_array_equal(hits["primitive"][by_primitive], primitive)
+    assert (np.diff(hits["t"])[np.diff(index) == 0] >= 0).all()
 
 
 def test_chunks_and_order_do_not_matter(soup: clrt.RayQuery, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,11 +16,11 @@ KERNELS = sorted((HOUSE / "kernels").rglob("*.cl"))
 LONGEST = 300
 
 #: In order: a room imports only from itself and those before it. `clrt` itself is the public names alone.
-ROOMS = ["errors", "scene", "device", "accel", "query", "trimesh", "rendering", "output", "study", "api", "clrt", "cli",
-         "__main__"]
-KNOW_OPENCL = {"device", "query", "rendering"}
-#: Beyond the order: trees are built, and pictures written, without any device.
-NEVER = {"accel": {"device", "scene"}, "output": {"device", "accel", "query", "trimesh", "rendering"}}
+ROOMS = ["errors", "scene", "device", "accel", "query", "instances", "trimesh", "rendering", "output", "study", "api",
+         "clrt", "cli", "__main__"]
+KNOW_OPENCL = {"device", "accel", "query", "rendering"}
+#: Beyond the order: trees know nothing of scenes, and pictures are written without any device.
+NEVER = {"accel": {"scene"}, "output": {"device", "accel", "query", "trimesh", "rendering"}}
 
 
 def room(module: str) -> str:

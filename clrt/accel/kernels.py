@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
-from numpy.typing import NDArray
-
+from .build import DEVICE_BUILDERS
+from .builders import BUILDERS
 from .layouts import Layout
 
 #: Files of the tree layouts, and how many primitives of a leaf they test at a time.
-TREES = {"bvh8": ("traverse/bvh8.cl", 8), "bvh2": ("traverse/bvh2.cl", 1), "list": ("traverse/list.cl", 1)}
+TREES = {"bvh8": ("traverse/bvh8.cl", 8), "bvh2": ("traverse/bvh2.cl", 1), "cwbvh": ("traverse/cwbvh.cl", 1),
+         "list": ("traverse/list.cl", 1)}
+#: Builders by name.
+BUILDER_NAMES = [*DEVICE_BUILDERS, *BUILDERS]
 TRIANGLE_TESTS = {"watertight": "geometry/triangle_watertight.cl",
                   "moller_trumbore": "geometry/triangle_moller_trumbore.cl"}
-RECORDS = {"nodes": "Node", "packs": "Triangles", "leaf_triangles": "Triangles", "leaf_spheres": "LeafSphere"}
+RECORDS = {"nodes": "Node", "packs": "Triangles", "leaf_triangles": "Triangles", "leaf_spheres": "LeafSphere",
+           "instances": "Instance"}
 
 
-def tree_buffers(tree: Layout) -> dict[str, tuple[str, NDArray[Any]]]:
+def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
     """The tree's buffers with their C types."""
     return {name: (RECORDS[name], array) for name, array in tree.buffers.items()}
 
@@ -25,8 +29,10 @@ def tree_defines(tree: Layout) -> dict[str, int]:
     return {"WIDTH": TREES[tree.name][1], "STACK_SIZE": max(32, -(-tree.stack // 32) * 32)}
 
 
-def tree_files(layout: str, triangle: str, triangles: bool, spheres: bool) -> dict[str, list[str]]:
+def tree_files(layout: str, triangle: str, triangles: bool, spheres: bool,
+               instances: bool = False) -> dict[str, list[str]]:
     """What the includes of kernels/traverse stand for, in a scene that has triangles or spheres or neither."""
     return {"TREE": [TREES[layout][0]] if triangles or spheres else [],
             "TRIANGLE_TEST": [TRIANGLE_TESTS[triangle]] if triangles else [],
+            "UPPER_LEVEL": ["traverse/instance.cl"] if instances else [],
             "SPHERE_TEST": ["geometry/sphere.cl"] if spheres else []}

@@ -7,6 +7,7 @@ area stay in; they are never hit. A scene without triangles, or without spheres,
 - list: no tree; leaf_triangles and leaf_spheres in the order of the scene.
 - bvh2: nodes (BVH2_NODE), leaf_triangles and leaf_spheres in the order of the tree.
 - bvh8: nodes (BVH8_NODE), packs (one a triangle leaf), leaf_spheres in the order of the tree.
+- cwbvh: nodes (cwbvh.CWBVH_NODE), leaf_triangles and leaf_spheres in the order of the tree.
 
 A scene without any primitive has, in a tree layout, a root that no ray gets past: its children's boxes are inverted.
 See Wide for what that asks of the slab test.
@@ -15,16 +16,18 @@ See Wide for what that asks of the slab test.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
 from .builders import BUILDERS
+from .cwbvh import MAX_LEAF, compress
 from .tree import FloatArray, IntArray, Tree, join
-from .wide import collapse, leaf_fields, leaf_reference
+from .wide import Wide, collapse, leaf_fields, leaf_reference
 
 Records = NDArray[np.void]
 
@@ -49,19 +52,21 @@ LEAF_SIZES = {"sah": 4, "midpoint": 2}
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A scene's primitives and the tree over them, ready to be copied to a device.
+    """A scene's primitives and the tree over them, ready to be copied to a device or already there.
 
-    buffers: records by name. stack: entries that a traversal's stack needs (see Tree.stack_bound), 0 without a tree.
+    buffers: by name, records in an array of numpy's or, from a builder on the device, in a DeviceArray.
+    stack: entries that a traversal's stack needs (see Tree.stack_bound), 0 without a tree. builder: its name.
     depth and sah_cost are those of the tree that is traversed; build_seconds includes the packing.
     """
 
     name: str
-    buffers: dict[str, Records]
+    buffers: Mapping[str, Any]
     stack: int
     nodes: int
     depth: int
     sah_cost: float
     build_seconds: float = 0.0
+    builder: str = ""
 
     @property
     def bytes(self) -> int:
@@ -81,7 +86,7 @@ def pack(layout: str, builder: str, triangles: FloatArray, spheres: FloatArray) 
             raise UsageError(f"there is no {kind} {name!r}: take one of {', '.join(known)}")
     started = time.perf_counter()
     packed = LAYOUTS[layout](builder, triangles, spheres)
-    return replace(packed, build_seconds=time.perf_counter() - started)
+    return replace(packed, build_seconds=time.perf_counter() - started, builder=builder)
 
 
 def _list(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
@@ -110,16 +115,25 @@ def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     first, sphere, count = leaf_fields(wide.child[leaf])
     packs = _packs(triangles, wide.order, first[~sphere], count[~sphere])
     first[~sphere] = np.arange(len(packs))
-    nodes = np.zeros(len(wide.child), BVH8_NODE)
-    nodes["lo"], nodes["hi"] = wide.aabb_min.transpose(0, 2, 1), wide.aabb_max.transpose(0, 2, 1)
-    nodes["child"] = wide.child
-    nodes["child"][leaf] = leaf_reference(first, sphere, count)
+    child = wide.child.copy()
+    child[leaf] = leaf_reference(first, sphere, count)
+    nodes = wide_nodes(wide, child)
     buffers = _filled(packs=packs, leaf_spheres=_leaf_spheres(spheres, wide.sphere_order, len(triangles)))
     return Layout("bvh8", {"nodes": nodes} | buffers, stack=wide.stack_bound, nodes=len(nodes),
                   depth=wide.depth, sah_cost=wide.sah_cost(LANES))
 
 
-LAYOUTS: dict[str, Callable[[str, FloatArray, FloatArray], Layout]] = {"list": _list, "bvh2": _bvh2, "bvh8": _bvh8}
+def _cwbvh(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
+    # A leaf at the price of a node, whatever it holds: a third fewer nodes than at one a triangle, and no slower.
+    tree = compress(_tree(builder, triangles, spheres, MAX_LEAF, MAX_LEAF))
+    buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
+                      leaf_spheres=_leaf_spheres(spheres, tree.sphere_order, len(triangles)))
+    return Layout("cwbvh", {"nodes": tree.nodes} | buffers, stack=tree.stack, nodes=len(tree.nodes),
+                  depth=tree.wide.depth, sah_cost=tree.wide.sah_cost(MAX_LEAF))
+
+
+LAYOUTS: dict[str, Callable[[str, FloatArray, FloatArray], Layout]] = {"list": _list, "bvh2": _bvh2, "bvh8": _bvh8,
+                                                                       "cwbvh": _cwbvh}
 
 
 def _tree(builder: str, triangles: FloatArray, spheres: FloatArray, leaf_size: int, lanes: int) -> Tree:
@@ -127,7 +141,7 @@ def _tree(builder: str, triangles: FloatArray, spheres: FloatArray, leaf_size: i
     p0, p1, p2 = triangles.transpose(1, 0, 2)
     build = BUILDERS[builder]
     return join(build(np.minimum(np.minimum(p0, p1), p2), np.maximum(np.maximum(p0, p1), p2), leaf_size, lanes),
-                build(*sphere_boxes(spheres), LEAF_SIZES[builder], 1))
+                build(*sphere_boxes(spheres), min(LEAF_SIZES[builder], leaf_size), 1))
 
 
 def sphere_boxes(spheres: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -137,6 +151,14 @@ def sphere_boxes(spheres: FloatArray) -> tuple[FloatArray, FloatArray]:
     inside = np.nextafter(far, np.float32(0))
     low, high = (np.clip(edge, -inside, inside).astype(np.float32) for edge in (center - radius, center + radius))
     return np.nextafter(low, -far), np.nextafter(high, far)
+
+
+def wide_nodes(wide: Wide, child: IntArray) -> Records:
+    """Nodes of the layout bvh8 with the boxes of `wide` and references `child` (k, 8)."""
+    nodes = np.zeros(len(child), BVH8_NODE)
+    nodes["lo"], nodes["hi"] = wide.aabb_min.transpose(0, 2, 1), wide.aabb_max.transpose(0, 2, 1)
+    nodes["child"] = child
+    return nodes
 
 
 def _filled(**buffers: Records) -> dict[str, Records]:

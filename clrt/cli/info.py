@@ -16,7 +16,8 @@ from .options import tracing_options
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @tracing_options
-def command(scene: Path, as_json: bool, lanes: str | None, triangle: str, builder: str, layout: str | None) -> None:
+def command(scene: Path, as_json: bool, lanes: str | None, triangle: str, builder: str | None,
+            layout: str | None) -> None:
     """Show what SCENE contains and what is compiled for it; renders nothing and needs no device."""
     from ..rendering.compile import Choices, compile_scene
     from ..scene.file import load
@@ -33,8 +34,9 @@ def command(scene: Path, as_json: bool, lanes: str | None, triangle: str, builde
         "materials": dict(Counter(material.kernel for material in materials)),
         "lights": {"entries": int(compiled.counts["lights"][0]),
                    **Counter(type(light).kernel for light in content.lights)},
-        "tree": {"layout": tree.name, "builder": builder, "nodes": tree.nodes, "depth": tree.depth, "stack": tree.stack,
-                 "sah_cost": tree.sah_cost, "bytes": tree.bytes, "build_seconds": tree.build_seconds},
+        "tree": {"layout": tree.name, "builder": tree.builder, "nodes": tree.nodes, "depth": tree.depth,
+                 "stack": tree.stack, "sah_cost": tree.sah_cost, "bytes": tree.bytes,
+                 "build_seconds": tree.build_seconds},
         "features": compiled.features, "files": compiled.files, "kernel_bytes": len(compiled.source.encode()),
         "buffers": {name: array.nbytes for name, (_, array) in compiled.buffers.items()},
         "bytes": compiled.bytes,

@@ -41,8 +41,8 @@ from .progress import Goal, make_progress
 def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None, spp: int | None,
             seconds: float | None, error: float | None, depth: int | None, seed: int | None, devices: tuple[str, ...],
             integrator: str | None, reference: Path | None, report: Path | None, view: str, exposure: float,
-            progress_kind: str | None, print_kernel: bool, quiet: bool, lanes: str | None, triangle: str, builder: str,
-            layout: str | None) -> None:
+            progress_kind: str | None, print_kernel: bool, quiet: bool, lanes: str | None, triangle: str,
+            builder: str | None, layout: str | None) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
     from ..rendering.renderer import Renderer, check_stops
     from ..scene.file import load

@@ -55,9 +55,9 @@ def wait_for(event: cl.Event) -> None:
     Asking for an event's status starts nothing: a driver may hold commands back until their queue is flushed.
     """
     event.command_queue.flush()
-    pause = 1e-5
+    start, pause = time.perf_counter(), 1e-5
     while (status := event.command_execution_status) > cl.command_execution_status.COMPLETE:
         time.sleep(pause)
-        pause = min(2 * pause, 2e-3)
+        pause = max(1e-5, min(2e-3, (time.perf_counter() - start) / 50))
     if status < 0:
         raise DeviceError(f"the device stopped a launch with error {status}")

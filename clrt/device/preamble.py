@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..device.records import c_typedef
+from .records import c_typedef
 
-Buffers = Mapping[str, tuple[str, NDArray[Any]]]
+#: C type and array by name; arrays are numpy's or `DeviceArray`s.
+Buffers = Mapping[str, tuple[str, Any]]
 
 
 def scene_struct(buffers: Buffers) -> str:

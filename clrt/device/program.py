@@ -65,6 +65,11 @@ def compose(preamble: str, entry: str, choices: Mapping[str, Sequence[str]], fol
     return "\n".join(lines) + "\n"
 
 
+def files_of(source: str) -> list[str]:
+    """The kernel files that a composed text is made of."""
+    return re.findall(r'^#line 1 "(.+)"$', source, re.MULTILINE)
+
+
 def kernel_folder() -> Traversable:
     """Where the kernel files are: the installed package clrt.kernels, or the folder beside clrt in a source tree."""
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -10,10 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..accel.build import build_tree
 from ..accel.kernels import tree_buffers, tree_defines, tree_files
-from ..accel.layouts import Layout, pack
+from ..accel.layouts import Layout
+from ..device.open import Device
 from ..device.preamble import Buffers, defines, scene_struct, type_list, typedefs
-from ..device.program import compose
+from ..device.program import compose, files_of
 from ..scene.materials import MATERIALS, Material
 from ..scene.model import Camera, Scene
 from ..scene.scaling import scaled, unit_of
@@ -29,7 +30,7 @@ class Choices:
 
     lanes: int = 8
     layout: str = "bvh8"
-    builder: str = "sah"
+    builder: str | None = None
     triangle: str = "watertight"
 
 
@@ -52,7 +53,7 @@ class CompiledScene:
     @property
     def files(self) -> list[str]:
         """The kernel files that the program is made of."""
-        return re.findall(r'^#line 1 "(.+)"$', self.source, re.MULTILINE)
+        return files_of(self.source)
 
     @property
     def bytes(self) -> int:
@@ -60,14 +61,18 @@ class CompiledScene:
         return sum(array.nbytes for _, array in self.buffers.values())
 
 
-def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl") -> CompiledScene:
-    """Validates and packs `scene` for the kernel file `entry`; SceneError lists all that is wrong with it."""
+def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
+                  device: Device | None = None) -> CompiledScene:
+    """Validates and packs `scene` for the kernel file `entry`; SceneError lists all that is wrong with it.
+
+    device: where large trees are built, if given.
+    """
     validate(scene)
     unit = unit_of(scene)
     scene = scaled(scene, unit)
     triangles, normals = _geometry(scene)
     spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
-    tree = pack(choices.layout, choices.builder, triangles, spheres)
+    tree = build_tree(device, choices.layout, choices.builder, triangles, spheres)
     sky = pack_sky(scene.environment)
     emitters = pack_emitters(scene, triangles, sky, _radius(triangles, spheres))
     users = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]

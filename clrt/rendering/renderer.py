@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accel.builders import BUILDERS
-from ..accel.kernels import TREES, TRIANGLE_TESTS
+from ..accel.kernels import BUILDER_NAMES, TREES, TRIANGLE_TESTS
 from ..device.open import open_device
 from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
@@ -54,7 +53,7 @@ class Renderer:
 
     def __init__(self, scene: Scene, *, device: str | int | None = None, size: tuple[int, int] | None = None,
                  max_depth: int | None = None, seed: int | None = None, integrator: str | None = None,
-                 triangle: str = "watertight", builder: str = "sah", layout: str | None = None,
+                 triangle: str = "watertight", builder: str | None = None, layout: str | None = None,
                  lanes: int | None = None, on_phase: Callable[[str], None] = lambda phase: None) -> None:
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
@@ -63,7 +62,7 @@ class Renderer:
         choices = Choices(lanes or self.device.lanes, layout or self.device.layout, builder, triangle)
         _check(choices)
         on_phase("build")
-        self.compiled = compile_scene(self.scene, choices)
+        self.compiled = compile_scene(self.scene, choices, device=self.device)
         if not {"LIGHTS", "SKY"} & set(self.compiled.features):
             logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
         on_phase("compile")
@@ -144,10 +143,11 @@ class Renderer:
 
 def _check(choices: Choices) -> None:
     known: dict[str, Sequence[object]] = {"layout": list(TREES), "triangle": list(TRIANGLE_TESTS),
-                                          "builder": list(BUILDERS), "lanes": (1, 8, 16)}
+                                          "builder": [None, *BUILDER_NAMES], "lanes": (1, 8, 16)}
     for name, values in known.items():
         if (value := getattr(choices, name)) not in values:
-            raise UsageError(f"{name} {value!r} is unknown; choose from {', '.join(map(str, values))}")
+            named = ", ".join(str(known_value) for known_value in values if known_value is not None)
+            raise UsageError(f"{name} {value!r} is unknown; choose from {named}")
 
 
 def check_stops(spp: int | None, time: float | None, error: float | None) -> None:

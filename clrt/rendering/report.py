@@ -33,7 +33,7 @@ def tree_report(renderer: Renderer) -> dict[str, Any]:
     tree, counts = renderer.compiled.tree, renderer.compiled.counts[0]
     return {"triangles": int(counts["triangles"]), "spheres": int(counts["spheres"]), "instances": 0,
             "nodes": tree.nodes, "bytes": tree.bytes, "build_seconds": tree.build_seconds, "sah_cost": tree.sah_cost,
-            "layout": tree.name, "builder": renderer.compiled.choices.builder, "depth": tree.depth}
+            "layout": tree.name, "builder": tree.builder, "depth": tree.depth}
 
 
 def _version() -> str:

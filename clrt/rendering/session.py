@@ -10,6 +10,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
+from ..device.arrays import on_device
 from ..device.launch import Launches, wait_for
 from ..device.open import Device
 from ..device.program import BuiltProgram, build, make_kernel
@@ -39,11 +40,9 @@ class Session:
         self._launches = Launches(FIRST_LAUNCH_SAMPLES)
         width, height = size
         self._check_memory()
-        flags = cl.mem_flags
         try:
-            self._scene = [cl.Buffer(device.context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=array)
-                           for _, array in compiled.buffers.values()]
-            self._film = cl.Buffer(device.context, flags.READ_WRITE, width * height * PIXEL.itemsize)
+            self._scene = [on_device(device, array) for _, array in compiled.buffers.values()]
+            self._film = cl.Buffer(device.context, cl.mem_flags.READ_WRITE, width * height * PIXEL.itemsize)
             wait_for(cl.enqueue_fill_buffer(device.queue, self._film, np.zeros(1, np.uint8), 0, self._film.size))
         except cl.Error as error:
             raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes do not fit: {error}") from error

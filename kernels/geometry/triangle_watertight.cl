@@ -4,7 +4,10 @@
 // triangles at an edge see the same ones. The side of an edge is found by comparing its two products instead of
 // subtracting them: both triangles form the same two products, and no compiler can contract a comparison. Equal
 // products mean that the ray meets the edge, and count as inside on both sides, so no double precision is needed.
-// A hit closer than the rounding error of t is dropped (pbrt, 4th ed., 6.8.8): rays that leave a surface never meet it.
+//
+// t is a mean of the corners' t with weights of one sign, so it is right to rounding, and above 0, where all corners lie
+// ahead, however small or thin the triangle. Where some do not, a hit closer than the rounding error of t is dropped
+// (pbrt, 4th ed., 6.8.8): rays that leave a surface never meet it.
 #include "geometry/wide.cl"
 #include "vector.cl"
 
@@ -62,23 +65,23 @@ static inline WideHit intersect_triangles(const TriangleRay *ray, global const T
     wide u = u1 - u2, v = v1 - v2, w = w1 - w2;
     wide det = u + v + w;
     wide inverse = 1.0f / det;
-    wide max_z = wide_max3(WIDE_ABS(az), WIDE_ABS(bz), WIDE_ABS(cz));
-    az *= ray->sz;
-    bz *= ray->sz;
-    cz *= ray->sz;
-    result.t = (u * az + v * bz + w * cz) * inverse;
+    wide ta = az * ray->sz, tb = bz * ray->sz, tc = cz * ray->sz;
+    result.t = (u * ta + v * tb + w * tc) * inverse;
     result.hit = result.hit & (result.t > 0.0f) & (result.t <= t_max) & (det != 0.0f);
     if (!WIDE_ANY(result.hit)) return result;
     result.u = v * inverse;
     result.v = w * inverse;
 
+    wide_mask beside = result.hit & ((ta <= 0.0f) | (tb <= 0.0f) | (tc <= 0.0f));
+    if (!WIDE_ANY(beside)) return result;
     wide max_x = wide_max3(WIDE_ABS(ax), WIDE_ABS(bx), WIDE_ABS(cx));
     wide max_y = wide_max3(WIDE_ABS(ay), WIDE_ABS(by), WIDE_ABS(cy));
+    wide max_z = wide_max3(WIDE_ABS(az), WIDE_ABS(bz), WIDE_ABS(cz));
     wide max_e = wide_max3(WIDE_ABS(u), WIDE_ABS(v), WIDE_ABS(w));
     wide delta_x = GAMMA(5) * (max_x + max_z), delta_y = GAMMA(5) * (max_y + max_z);
     wide delta_e = 2.0f * (GAMMA(2) * max_x * max_y + delta_y * max_x + delta_x * max_y);
     max_z *= fabs(ray->sz);
     wide t_min = 3.0f * (GAMMA(3) * max_e * max_z + delta_e * max_z + GAMMA(3) * max_z * max_e) * WIDE_ABS(inverse);
-    result.hit = result.hit & (result.t > t_min);
+    result.hit = result.hit & ((result.t > t_min) | (beside == 0));
     return result;
 }

@@ -21,9 +21,21 @@ typedef struct {
 #if NEXT_HIT
     float after_t;                             // only hits behind this one count, by t and then by primitive
     int after_primitive;
+#if INSTANCES
+    int after_instance;
+#endif
+#endif
+#if INSTANCES
+    int instance;                              // in whose frame the ray is, or IN_WORLD
 #endif
 } Ray;
-typedef struct { float t, u, v; int primitive; } Hit;              // primitive < 0: nothing was hit
+typedef struct {
+    float t, u, v;
+    int primitive;                             // < 0: nothing was hit
+#if INSTANCES
+    int instance;
+#endif
+} Hit;
 typedef struct { wide t, u, v; wide_mask hit; } WideHit;
 
 static inline wide wide_max3(wide a, wide b, wide c) {

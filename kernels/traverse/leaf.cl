@@ -1,7 +1,7 @@
 // What a leaf holds and what happens there; the trees know only these two functions.
 //
-// Of several hits at the same t the lowest primitive wins, so the answer does not depend on the tree. `stop_at_first` is a
-// constant at every call: with it, the first hit found ends the search.
+// Of several hits at the same t the lowest primitive wins (of the lowest instance), so the answer does not depend on the
+// tree. `stop_at_first` is a constant at every call: with it, the first hit found ends the search.
 #include "geometry/wide.cl"
 #include TRIANGLE_TEST
 #include SPHERE_TEST
@@ -30,11 +30,27 @@ static inline LeafRay leaf_ray(const LeafRays *rays, const Ray *ray, int lane) {
     return r;
 }
 
+static inline bool comes_before(int instance, int primitive, int other_instance, int other_primitive) {
+    return instance < other_instance || (instance == other_instance && primitive < other_primitive);
+}
+
+#if INSTANCES
+#define HIT(ray, t, u, v, primitive) ((Hit){t, u, v, primitive, (ray)->instance})
+#define INSTANCE_OF(item) ((item)->instance)
+#define AFTER_INSTANCE(ray) ((ray)->after_instance)
+#else
+#define HIT(ray, t, u, v, primitive) ((Hit){t, u, v, primitive})
+#define INSTANCE_OF(item) 0
+#define AFTER_INSTANCE(ray) 0
+#endif
+
 static inline void keep_closest(const Ray *ray, Hit *hit, float t, float u, float v, int primitive) {
 #if NEXT_HIT
-    if (t < ray->after_t || (t == ray->after_t && primitive <= ray->after_primitive)) return;
+    if (t < ray->after_t || (t == ray->after_t && !comes_before(AFTER_INSTANCE(ray), ray->after_primitive,
+                                                               INSTANCE_OF(ray), primitive))) return;
 #endif
-    if (t < hit->t || (t == hit->t && primitive < hit->primitive)) *hit = (Hit){t, u, v, primitive};
+    if (t < hit->t || (t == hit->t && comes_before(INSTANCE_OF(ray), primitive, INSTANCE_OF(hit), hit->primitive)))
+        *hit = HIT(ray, t, u, v, primitive);
 }
 
 #if TRIANGLES

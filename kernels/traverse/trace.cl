@@ -4,7 +4,7 @@
 #include "vector.cl"
 #include TREE
 
-typedef struct { real t, u, v; ireal primitive; } Hits;   // primitive < 0: nothing was hit
+typedef struct { real t, u, v; ireal primitive, instance; } Hits;   // primitive < 0: nothing was hit
 
 #if PRIMITIVES
 static inline Ray one_ray(const real3 *origin, const real3 *direction, const real *t_max, int lane) {
@@ -19,6 +19,12 @@ static inline Ray one_ray(const real3 *origin, const real3 *direction, const rea
 #if NEXT_HIT
     ray.after_t = 0.0f;
     ray.after_primitive = -1;
+#if INSTANCES
+    ray.after_instance = -1;
+#endif
+#endif
+#if INSTANCES
+    ray.instance = IN_WORLD;
 #endif
     return ray;
 }
@@ -38,10 +44,11 @@ static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction
 #endif
 ) {
     RealLanes t, u, v;
-    IntLanes primitive, enabled;
+    IntLanes primitive, instance, enabled;
     t.all = (real)(INFINITY);
     u.all = v.all = ZERO;
     primitive.all = (ireal)(-1);
+    instance.all = (ireal)(0);
 #if PRIMITIVES
     enabled.all = active & is_ray(origin, direction);
     TreeRays rays = tree_rays(origin, direction);
@@ -51,15 +58,19 @@ static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction
 #if NEXT_HIT
         ray.after_t = LANE(after->t, lane);
         ray.after_primitive = LANE_INT(after->primitive, lane);
+#if INSTANCES
+        ray.after_instance = LANE_INT(after->instance, lane);
+#endif
 #endif
         Hit hit = traverse(scene, &rays, &ray, lane, false);
         t.lane[lane] = hit.t;
         u.lane[lane] = hit.u;
         v.lane[lane] = hit.v;
         primitive.lane[lane] = hit.primitive;
+        instance.lane[lane] = INSTANCE_OF(&hit);
     }
 #endif
-    return (Hits){t.all, u.all, v.all, primitive.all};
+    return (Hits){t.all, u.all, v.all, primitive.all, instance.all};
 }
 
 // Which active lanes meet anything with 0 < t < t_max.

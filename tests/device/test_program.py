@@ -10,9 +10,11 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
+import clrt
+from clrt.accel.device_builder import SHAPES, _source
 from clrt.device import cache, program
 from clrt.device.open import Device
-from clrt.device.program import build, compose
+from clrt.device.program import build, compose, files_of
 from clrt.errors import KernelError
 from clrt.rendering.compile import Choices, compile_scene
 from clrt.scene.materials import MATERIALS
@@ -75,10 +77,15 @@ def test_a_kernel_file_opens_with_what_it_is(name: str) -> None:
     assert re.match(r"// \S", (KERNELS / name).read_text(encoding="utf-8"))
 
 
-def test_every_kernel_file_is_used() -> None:
-    """By some scene, with some choice."""
-    used: set[str] = set()
-    for layout in ("bvh8", "bvh2", "list"):
+def test_every_kernel_file_is_used(device: Device) -> None:
+    """By some scene, with some choice, by ray queries, or by the builder."""
+    corners = np.zeros((3, 3), np.float32)
+    pooled = clrt.InstancedRayQuery([(corners, [[0, 1, 2]])], [0], [np.eye(3, 4)], device=device.info.index,
+                                    layout="bvh8")
+    used = set(files_of(pooled.source("closest_hit")))
+    for shape in SHAPES.values():
+        used |= set(files_of(_source(shape, True, True)))
+    for layout in ("bvh8", "bvh2", "cwbvh", "list"):
         for triangle in ("watertight", "moller_trumbore"):
             choices = Choices(layout=layout, triangle=triangle)
             for environment in (everything().environment, Environment(color=(1.0, 1.0, 1.0))):

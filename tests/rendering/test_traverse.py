@@ -21,8 +21,8 @@ from . import rays
 
 Doubles = NDArray[np.float64]
 HOUSE = Path(__file__).parents[2]
-LAYOUTS = ("bvh8", "bvh2", "list")
-TREES = (("bvh8", "sah"), ("bvh8", "midpoint"), ("bvh2", "sah"), ("bvh2", "midpoint"))
+LAYOUTS = ("bvh8", "bvh2", "cwbvh", "list")
+TREES = tuple(product(("bvh8", "bvh2", "cwbvh"), ("sah", "midpoint")))
 
 
 def mesh(corners: NDArray[np.float32]) -> Mesh:
@@ -44,7 +44,7 @@ def random_rays(count: int, seed: int) -> tuple[Doubles, Doubles]:
 closed_sphere = cache(lambda: rays.icosphere(6))
 
 
-@pytest.mark.parametrize("layout", ["bvh8", "bvh2"])
+@pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh"])
 @pytest.mark.parametrize("offset", [0.0, 1000.0])
 def test_closed_mesh_has_no_cracks(device: Device, layout: str, offset: float) -> None:
     """From inside 81 920 triangles towards their vertices, edges and faces: not one of 10^6 rays gets out."""

@@ -1,0 +1,73 @@
+// A ray against eight boxes at once, by slabs with one multiplication-addition a plane.
+//
+// A plane's t is plane·inverse + shift, inverse = 1/direction and shift = −origin·inverse. With u = 2^-24 the division
+// costs 1 u of t, the sum 1 u of t, and the product in `shift` 1 u of |shift|. Near planes are pulled in and far planes
+// pushed out by 4 u of t, folded into inverse and shift, and by 4 u of |shift| (Ize 2013, "Robust BVH Ray Traversal",
+// JCGT 2(2), for the sum of a difference): so no box is missed that the exact ray enters at t >= 0.
+//
+// A direction's component below 1/STEEPEST, or zero, counts as that small: t is then off, but for all planes of the axis
+// alike, so only on which side of them the origin lies has a meaning. SIDE pads it by 1e-8 lengths, so that an origin on
+// a plane is on its inner side. Where numbers overflow a NaN comes out, which the comparisons drop: inside again.
+// Flat boxes are kept since near == far counts as a hit. Directions are of a length near 1.
+#include "vector.cl"
+
+#define BOX_PAD (4.0f * UNIT_ROUNDOFF)
+#define STEEPEST 1e36f
+#define SIDE 1e28f
+
+typedef struct {
+    float near[3], far[3], near_shift[3], far_shift[3];
+    int near_row[3];   // where in a node's bounds (lo x, y, z, hi x, y, z, eight floats each) an axis' near planes begin
+} BoxRay;
+
+typedef struct { real near[3], far[3], near_shift[3], far_shift[3]; ireal near_row[3]; } BoxRays;   // of all lanes
+
+static inline BoxRays box_rays(real3 origin, real3 direction) {
+    BoxRays r;
+#define INVERT(axis, o, d) { \
+        real inverse = 1.0f / d; \
+        ireal steep = !(absolute(inverse) < STEEPEST); \
+        inverse = steep ? copysign((real)(STEEPEST), inverse) : inverse; \
+        r.near[axis] = inverse * (1.0f - BOX_PAD); \
+        r.far[axis] = inverse * (1.0f + BOX_PAD); \
+        real near_shift = -o * r.near[axis], far_shift = -o * r.far[axis]; \
+        real side = steep ? (real)(SIDE) : ZERO; \
+        r.near_shift[axis] = near_shift - (absolute(near_shift) * BOX_PAD + side); \
+        r.far_shift[axis] = far_shift + (absolute(far_shift) * BOX_PAD + side); \
+        r.near_row[axis] = inverse < 0.0f ? (ireal)(8 * axis + 24) : (ireal)(8 * axis); \
+    }
+    INVERT(0, origin.x, direction.x)
+    INVERT(1, origin.y, direction.y)
+    INVERT(2, origin.z, direction.z)
+    return r;
+}
+
+static inline BoxRay box_ray(const BoxRays *rays, int lane) {
+    BoxRay r;
+    for (int axis = 0; axis < 3; ++axis) {
+        r.near[axis] = LANE(rays->near[axis], lane);
+        r.far[axis] = LANE(rays->far[axis], lane);
+        r.near_shift[axis] = LANE(rays->near_shift[axis], lane);
+        r.far_shift[axis] = LANE(rays->far_shift[axis], lane);
+        r.near_row[axis] = LANE_INT(rays->near_row[axis], lane);
+    }
+    return r;
+}
+
+// The bits of the boxes entered at 0 <= t <= t_max, and where. bounds: six rows as above.
+static inline uint enter_boxes(const BoxRay *ray, global const float *bounds, float t_max, float8 *entry) {
+    float8 t_near = 0.0f, t_far = t_max;
+#define SLAB(axis) { \
+        float8 near_plane = vload8(0, bounds + ray->near_row[axis]); \
+        float8 far_plane = vload8(0, bounds + (16 * axis + 24) - ray->near_row[axis]); \
+        float8 near = fma(near_plane, (float8)(ray->near[axis]), (float8)(ray->near_shift[axis])); \
+        float8 far = fma(far_plane, (float8)(ray->far[axis]), (float8)(ray->far_shift[axis])); \
+        t_near = near > t_near ? near : t_near; \
+        t_far = far < t_far ? far : t_far; \
+    }
+    SLAB(0)
+    SLAB(1)
+    SLAB(2)
+    *entry = t_near;
+    return mask_bits(t_near <= t_far);
+}

@@ -1,0 +1,101 @@
+// The kernels of query.cl for processors on which it pays to keep many rays in flight: a work-item answers SHARE rays.
+#include "query_rays.cl"
+#include "traverse/pool.cl"
+
+#if STOP_AT_FIRST
+typedef uchar Answer;
+#else
+typedef RayHit Answer;
+#endif
+
+// The rays that take off next: LANES of the work-item's share, prepared together.
+typedef struct {
+    Rays rays;
+    TreeRays tree;
+    uint next, lane;   // the host's index of the next ray and its lane
+} Departures;
+
+static inline Answer answer(const Hit *hit, float to_t) {
+#if STOP_AT_FIRST
+    return hit->primitive >= 0;
+#else
+    return ray_hit(hit->t, hit->u, hit->v, hit->primitive, INSTANCE_OF(hit), to_t);
+#endif
+}
+
+static inline void load_departures(Departures *d, QUERY_RAYS, float unit, uint end) {
+    d->rays = load_rays(origins, directions, t_max, unit, d->next, end);
+    d->tree = tree_rays(d->rays.origin, d->rays.direction);
+    d->lane = 0;
+}
+
+// Sends the next ray off in the place `f`, false if none is left. Rays that cannot hit anything are answered at once.
+static inline bool depart(Departures *d, QUERY_RAYS, float unit, uint end, global Answer *answers, Flight *f) {
+    while (d->next < end) {
+        if (d->lane == LANES) load_departures(d, origins, directions, t_max, unit, end);
+        uint lane = d->lane++, index = d->next++;
+        if (LANE_INT(d->rays.valid, lane)) {
+            Ray ray = one_ray(&d->rays.origin, &d->rays.direction, &d->rays.t_max, lane);
+            take_off(f, &d->tree, &ray, lane, index, LANE(d->rays.to_t, lane));
+            return true;
+        }
+        Hit miss = {0.0f, 0.0f, 0.0f, -1};
+        answers[index] = answer(&miss, 1.0f);
+    }
+    return false;
+}
+
+// The places of the flights that are at nodes and of those that are at leaves.
+typedef struct { int at_nodes[POOL + 1], at_leaves[POOL + 1], nodes, leaves; } Round;
+
+static inline void list_flight(Round *round, int place, int reference) {
+    bool leaf = reference < 0;
+    round->at_nodes[round->nodes] = place;
+    round->at_leaves[round->leaves] = place;
+    round->nodes += !leaf;
+    round->leaves += leaf;
+}
+
+// Where a flight goes on: what it needs there is fetched. One that is done is answered, and the next ray departs.
+#define GO_ON(to) { \
+        f->reference = to; \
+        if (f->reference == DONE) { \
+            answers[f->index] = answer(&f->hit, f->to_t); \
+            if (!depart(&departures, origins, directions, t_max, unit, end, answers, f)) continue; \
+        } \
+        fetch(&scene, f->reference); \
+        list_flight(then, place, f->reference); \
+    }
+
+__attribute__((vec_type_hint(real)))
+kernel void QUERY_NAME(SCENE_PARAMETERS, QUERY_RAYS, global Answer *answers, float unit, uint count) {
+    Scene scene = SCENE_ARGUMENTS;
+    Flight flights[POOL];
+    Round rounds[2], *now = rounds, *then = rounds + 1;
+    Departures departures;
+    departures.next = (uint)get_global_id(0) * SHARE;
+    departures.lane = LANES;
+    uint end = departures.next + SHARE < count ? departures.next + SHARE : count;
+    then->nodes = then->leaves = 0;
+    for (int place = 0; place < POOL; ++place) {
+        Flight *f = flights + place;
+        if (!depart(&departures, origins, directions, t_max, unit, end, answers, f)) break;
+        list_flight(then, place, 0);
+    }
+    while (then->nodes + then->leaves > 0) {
+        Round *done = now;
+        now = then;
+        then = done;
+        then->nodes = then->leaves = 0;
+        for (int i = 0; i < now->nodes; ++i) {
+            int place = now->at_nodes[i];
+            Flight *f = flights + place;
+            GO_ON(visit_node(&scene, f, STOP_AT_FIRST))
+        }
+        for (int i = 0; i < now->leaves; ++i) {
+            int place = now->at_leaves[i];
+            Flight *f = flights + place;
+            GO_ON(visit_leaf(&scene, f, STOP_AT_FIRST))
+        }
+    }
+}

@@ -1,0 +1,132 @@
+"""InstancedRayQuery: the hits of the same triangles baked into the world, whatever the transforms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import clrt
+from clrt.device.open import Device
+
+Doubles = NDArray[np.float64]
+RNG = np.random.default_rng(11)
+MESHES = [(RNG.uniform(-1, 1, (3 * n, 3)).astype(np.float32), np.arange(3 * n, dtype=np.int32).reshape(-1, 3))
+          for n in (60, 1, 9)]
+RAYS = 1500
+
+
+def transforms(rng: np.random.Generator, kind: str, count: int) -> Doubles:
+    """(count, 3, 4): turned, stretched, mirrored or nearly flattened."""
+    turned = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
+    scale = {"turned": np.ones((count, 1, 3)), "stretched": rng.uniform(0.1, 3, (count, 1, 3)),
+             "mirrored": rng.choice([-1.0, 1.0], (count, 1, 3)), "flat": np.tile([1.0, 1.0, 1e-5], (count, 1, 1)),
+             "tiny": np.full((count, 1, 3), 1e-4)}[kind]
+    return np.concatenate([turned * scale, rng.uniform(-4, 4, (count, 3, 1))], axis=2)
+
+
+def baked(mesh: NDArray[Any], to_world: Doubles) -> tuple[Doubles, NDArray[np.intp]]:
+    """(m, 3, 3) corners in the world, and (m, 2) instance and primitive of each."""
+    corners = [MESHES[index][0].astype(np.float64) @ matrix[:, :3].T + matrix[:, 3]
+               for index, matrix in zip(mesh, to_world)]
+    names = [(i, primitive) for i, index in enumerate(mesh) for primitive in range(len(MESHES[index][1]))]
+    return np.concatenate(corners).reshape(-1, 3, 3), np.array(names)
+
+
+def aimed(rng: np.random.Generator, corners: Doubles) -> tuple[Doubles, Doubles]:
+    """Rays through points well inside triangles of the world, from all around."""
+    weights = rng.dirichlet([4, 4, 4], RAYS)
+    targets = np.einsum("nk,nkj->nj", weights, corners[rng.integers(0, len(corners), RAYS)])
+    origins = rng.normal(size=(RAYS, 3)) * 6
+    return origins, targets - origins
+
+
+def brute_force(corners: Doubles, origins: Doubles, directions: Doubles) -> tuple[Doubles, Doubles]:
+    """(n, m) float64: t of each ray at each triangle, inf outside, and how far inside a hit lies, in barycentrics."""
+    p0, e1, e2 = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(e1, e2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        det = -(directions @ normal.T)
+        s = origins[:, None] - p0
+        t = np.einsum("nmj,mj->nm", s, normal) / det
+        m = np.cross(s, directions[:, None])
+        u, v = np.einsum("nmj,mj->nm", m, e2) / det, -np.einsum("nmj,mj->nm", m, e1) / det
+    depth = np.where(t > 0, np.minimum(np.minimum(u, v), 1 - u - v), -np.inf)
+    return np.where(depth >= 0, t, np.inf), depth
+
+
+@pytest.mark.parametrize("in_flight", [1, 16])
+@pytest.mark.parametrize("kind", ["turned", "stretched", "mirrored", "flat", "tiny"])
+def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, in_flight: int) -> None:
+    rng = np.random.default_rng(3)
+    mesh = rng.integers(0, 3, 12)
+    to_world = transforms(rng, kind, 12)
+    corners, names = baked(mesh, to_world)
+    origins, directions = aimed(rng, corners)
+    origins, directions = origins.astype(np.float32), directions.astype(np.float32)
+    t, depth = brute_force(corners, origins.astype(np.float64), directions.astype(np.float64))
+    nearest, first = t.min(axis=1), t.argmin(axis=1)
+    second = np.partition(t, 1, axis=1)[:, 1]
+    normal = np.cross(corners[first, 1] - corners[first, 0], corners[first, 2] - corners[first, 0])
+    grazing = np.abs((normal * directions).sum(1)) < 0.05 * np.linalg.norm(normal, axis=1) * np.linalg.norm(directions,
+                                                                                                            axis=1)
+    # Of a tiny mesh far away the ray is known only to a hundredth of its size.
+    clear = (np.abs(depth) > (0.03 if kind == "tiny" else 1e-3)).all(axis=1) & (second > 1.001 * nearest) & ~grazing
+    assert clear.sum() > 50
+    query = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout="bvh8", in_flight=in_flight)
+    hits = query.closest_hit(origins, directions)
+    hit = np.isfinite(nearest)
+    expected = np.where(hit[:, None], names[first], -1)
+    np.testing.assert_array_equal(np.stack([hits["instance"], hits["primitive"]], axis=1)[clear], expected[clear])
+    np.testing.assert_allclose(hits["t"][clear], nearest[clear], rtol=2e-3 if kind == "flat" else 1e-4, atol=1e-6)
+    np.testing.assert_array_equal(query.any_hit(origins, directions)[clear], hit[clear])
+
+
+def test_all_hits_of_instances_that_coincide(device: Device) -> None:
+    """Equal t: the lowest instance first, then the lowest primitive; each once."""
+    triangle = (np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], np.float32), np.array([[0, 1, 2], [0, 1, 2]], np.int32))
+    same = np.tile(np.eye(3, 4), (3, 1, 1))
+    query = clrt.InstancedRayQuery([triangle], [0, 0, 0], same, device=device.info.index, layout="bvh8")
+    ray, hits = query.all_hits([0, 0, 2], [0, 0, -1])
+    assert hits["instance"].tolist() == [0, 0, 1, 1, 2, 2] and hits["primitive"].tolist() == [0, 1] * 3
+    assert query.closest_hit([0, 0, 2], [0, 0, -1])["instance"].tolist() == [0]
+
+
+def test_ten_thousand_instances_cost_the_memory_of_one(device: Device) -> None:
+    """A grid of them: the ray down each cell hits its own; the tree below is stored once."""
+    side = 100
+    cells = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)
+    to_world = np.tile(np.eye(3, 4), (side * side, 1, 1))
+    to_world[:, :2, 3] = 3 * cells
+    blanket = (np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32),
+               np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    query = clrt.InstancedRayQuery([blanket], np.zeros(side * side, int), to_world, device=device.info.index,
+                                   layout="bvh8")
+    origins = np.concatenate([3 * cells + [0.3, 0.2], np.ones((side * side, 1))], axis=1)
+    hits = query.closest_hit(origins, [0, 0, -1])
+    np.testing.assert_array_equal(hits["instance"], np.arange(side * side))
+    np.testing.assert_allclose(hits["t"], 1, rtol=1e-6)
+    assert len(query.tree.buffers["packs"]) == 1
+    assert not query.any_hit(origins + [1.5, 1.5, 0], [0, 0, -1]).any()
+
+
+def test_nothing_to_hit(device: Device) -> None:
+    empty = (np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
+    for mesh, meshes in (([], MESHES), ([0, 0], [empty])):
+        query = clrt.InstancedRayQuery(meshes, np.array(mesh, int), np.tile(np.eye(3, 4), (len(mesh), 1, 1)),
+                                       device=device.info.index, layout="bvh8")
+        hits = query.closest_hit([0, 0, 0], [[0, 0, 1], [1, 1, 1]])
+        assert hits["instance"].tolist() == hits["primitive"].tolist() == [-1, -1]
+
+
+@pytest.mark.parametrize("mesh, matrix, message", [
+    ([3], np.eye(3, 4), r"mesh\[0\] = 3: there are 3 meshes"),
+    ([0], np.diag([1.0, 1.0, 0.0]) @ np.eye(3, 4), r"transforms\[0\].*flattens the mesh"),
+    ([0], np.full((3, 4), np.nan), r"transforms\[0\].*not finite"),
+    ([0.5], np.eye(3, 4), "whole numbers"),
+])
+def test_mistakes_are_named(device: Device, mesh: list[Any], matrix: Doubles, message: str) -> None:
+    with pytest.raises(clrt.SceneError, match=message):
+        clrt.InstancedRayQuery(MESHES, mesh, matrix[None], device=device.info.index)
