@@ -7,17 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .accel.two_level import build_two_levels
+from .accel.layouts import Layout
+from .accel.two_level import TwoLevels
 from .device.open import open_device
 from .errors import SceneError
-from .query import IN_FLIGHT, RayQuery, corners
+from .query import TreeQuery
+from .scene.mesh_arrays import mesh_arrays
 from .scene.scaling import unit_for
 
+Doubles = NDArray[np.float64]
 #: A transform is singular if it makes a unit of volume smaller than this, measured in its own longest column.
 SINGULAR = 1e-12
 
 
-class InstancedRayQuery(RayQuery):
+class InstancedRayQuery(TreeQuery):
     """Instances to shoot rays at; everything else as in `RayQuery`, with the hit's `instance` (int32, −1) beside it.
 
     meshes: pairs of vertices (n, 3) float32 and faces (m, 3) int32. mesh: (k,) which of them each instance is.
@@ -28,26 +31,51 @@ class InstancedRayQuery(RayQuery):
 
     def __init__(self, meshes: Sequence[tuple[ArrayLike, ArrayLike]], mesh: ArrayLike, transforms: ArrayLike, *,
                  device: str | int | None = None, layout: str | None = None, builder: str | None = None,
-                 triangle: str = "watertight", in_flight: int = IN_FLIGHT) -> None:
-        triangles = [corners(vertices, faces) for vertices, faces in meshes]
-        index, to_world = _checked(len(triangles), mesh, transforms)
-        unit = unit_for(_size(triangles, index, to_world))
-        to_world = to_world * np.array([1, 1, 1, unit])
+                 triangle: str = "watertight", in_flight: int | None = None) -> None:
+        triangles = [points[faces] for points, faces in (mesh_arrays(*each) for each in meshes)]
+        self._mesh = _indices(mesh, len(triangles))
+        self._extents = np.array([np.abs(mesh_corners).reshape(-1, 3).max(axis=0, initial=0)
+                                  for mesh_corners in triangles], np.float64).reshape(-1, 3)
+        self._units = np.array([unit_for(largest) for largest in self._extents.max(axis=1).tolist()])
+        to_world = _matrices(transforms, len(self._mesh))
         opened = open_device(device)
-        scaled = [(corner * np.float64(unit)).astype(np.float32) for corner in triangles]
-        tree = build_two_levels(opened, layout or opened.layout, builder, scaled, index, to_world)
-        self._prepare(opened, tree, sum(map(len, triangles)), unit, triangle, in_flight)
+        self._levels = TwoLevels(opened, layout or opened.layout, builder,
+                                 [(mesh_corners * unit).astype(np.float32)
+                                  for mesh_corners, unit in zip(triangles, self._units)], self._mesh)
+        tree, unit = self._placed(to_world)
+        super().__init__(opened, tree, sum(map(len, triangles)), unit, triangle, in_flight)
+
+    def move(self, transforms: ArrayLike) -> None:
+        """Puts the same instances elsewhere: transforms (k, 3, 4) as before, SceneError likewise.
+
+        The trees of the meshes stay; what is built anew is the small one over the instances.
+        """
+        self._use(*self._placed(_matrices(transforms, len(self._mesh))))
+
+    def _placed(self, to_world: Doubles) -> tuple[Layout, float]:
+        """The tree, and the unit of the world's lengths. Those of each mesh have one of their own."""
+        reach = np.einsum("kij,kj->ki", np.abs(to_world[..., :3]), self._extents[self._mesh]) + np.abs(to_world[..., 3])
+        unit = unit_for(float(reach.max(initial=0)))
+        scaled = unit * to_world
+        scaled[..., :3] /= self._units[self._mesh][:, None, None]
+        return self._levels.place(scaled), unit
 
 
-def _checked(meshes: int, mesh: ArrayLike, transforms: ArrayLike) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    index, to_world = np.asarray(mesh), np.asarray(transforms, np.float64)
-    if index.ndim != 1 or index.dtype.kind not in "iu" or to_world.shape != (len(index), 3, 4):
-        raise SceneError(f"mesh {index.shape} {index.dtype} and transforms {to_world.shape} must have shapes (k,), of "
-                         "whole numbers, and (k, 3, 4)")
+def _indices(mesh: ArrayLike, meshes: int) -> NDArray[np.int32]:
+    index = np.asarray(mesh)
+    if index.ndim != 1 or (index.size and index.dtype.kind not in "iu"):
+        raise SceneError(f"mesh {index.shape} {index.dtype} must have the shape (k,), of whole numbers")
     outside = (index < 0) | (index >= meshes)
     if outside.any():
         first = int(np.argmax(outside))
         raise SceneError(f"mesh[{first}] = {index[first]}: there are {meshes} meshes")
+    return index.astype(np.int32)
+
+
+def _matrices(transforms: ArrayLike, instances: int) -> Doubles:
+    to_world = np.asarray(transforms, np.float64)
+    if to_world.shape != (instances, 3, 4):
+        raise SceneError(f"transforms {to_world.shape} must have the shape ({instances}, 3, 4), one an instance")
     with np.errstate(all="ignore"):
         length = np.linalg.norm(to_world[..., :3], axis=1).max(axis=1, initial=0)
         volume = np.abs(np.linalg.det(to_world[..., :3] / np.maximum(length, 1e-300)[:, None, None]))
@@ -56,11 +84,4 @@ def _checked(meshes: int, mesh: ArrayLike, transforms: ArrayLike) -> tuple[NDArr
         first = int(np.argmax(bad))
         raise SceneError(f"transforms[{first}] = {to_world[first].tolist()} is not finite or flattens the mesh; "
                          "repair it")
-    return index.astype(np.int32), to_world
-
-
-def _size(triangles: Sequence[NDArray[np.float32]], index: NDArray[np.int32], to_world: NDArray[np.float64]) -> float:
-    """The largest coordinate that an instance can have in the world."""
-    extents = np.array([np.abs(corner).reshape(-1, 3).max(axis=0, initial=0) for corner in triangles]).reshape(-1, 3)
-    reach = np.einsum("kij,kj->ki", np.abs(to_world[..., :3]), extents[index]) + np.abs(to_world[..., 3])
-    return float(reach.max(initial=0))
+    return to_world

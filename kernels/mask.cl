@@ -27,12 +27,10 @@ static inline void store_lanes(int8 lanes, uint bits, int *target) {
 }
 #endif
 
-// The lane, of those whose bits are set, with the least number; all are >= 0, and at least one bit is set. Numbers that
-// differ in their last three bits only count as equal.
-static inline int least_lane(float8 numbers, uint bits) {
-    int8 number = (int8)(0, 1, 2, 3, 4, 5, 6, 7);
-    int8 used = (int8)((int)bits) << (31 - number) < 0;
-    int8 eight = used ? (as_int8(numbers) & ~7) | number : (int8)(0x7fffffff);
+// The lane, of those in the mask, with the least number; all are >= 0. Numbers that differ in their last three bits only
+// count as equal. 7 where the mask is empty.
+static inline int least_lane(float8 numbers, int8 mask) {
+    int8 eight = mask ? (as_int8(numbers) & ~7) | (int8)(0, 1, 2, 3, 4, 5, 6, 7) : (int8)(0x7fffffff);
     int4 four = eight.lo < eight.hi ? eight.lo : eight.hi;
     int2 two = four.lo < four.hi ? four.lo : four.hi;
     return (two.x < two.y ? two.x : two.y) & 7;

@@ -1,5 +1,14 @@
-// Ray queries over arrays: one work-item answers LANES rays.
+// Ray queries over arrays: one work-item answers LANES rays, one by one or, where the host says so, together.
 #include "query_rays.cl"
+#include PACKETS
+
+#if PACKET_RAYS
+#define CLOSEST_HIT closest_hit_coherent
+#define ANY_HIT any_hit_coherent
+#else
+#define CLOSEST_HIT closest_hit
+#define ANY_HIT any_hit
+#endif
 
 static inline void store_hits(global RayHit *hits, const Rays *rays, uint first, uint count, const Hits *found) {
     for (uint lane = 0; lane < LANES && first + lane < count; ++lane) {
@@ -30,7 +39,7 @@ kernel void query_closest_hit(SCENE_PARAMETERS, QUERY_RAYS, global RayHit *hits,
     uint first = (uint)get_global_id(0) * LANES;
     if (first >= count) return;
     Rays rays = load_rays(origins, directions, t_max, unit, first, count);
-    Hits found = closest_hit(&scene, rays.origin, rays.direction, rays.t_max, rays.valid);
+    Hits found = CLOSEST_HIT(&scene, rays.origin, rays.direction, rays.t_max, rays.valid);
     store_hits(hits, &rays, first, count, &found);
 }
 
@@ -40,7 +49,7 @@ kernel void query_any_hit(SCENE_PARAMETERS, QUERY_RAYS, global uchar *blocked, f
     uint first = (uint)get_global_id(0) * LANES;
     if (first >= count) return;
     Rays rays = load_rays(origins, directions, t_max, unit, first, count);
-    ireal found = any_hit(&scene, rays.origin, rays.direction, rays.t_max, rays.valid);
+    ireal found = ANY_HIT(&scene, rays.origin, rays.direction, rays.t_max, rays.valid);
     for (uint lane = 0; lane < LANES && first + lane < count; ++lane) blocked[first + lane] = LANE_INT(found, lane) != 0;
 }
 #endif

@@ -11,7 +11,7 @@ typedef RayHit Answer;
 // The rays that take off next: LANES of the work-item's share, prepared together.
 typedef struct {
     Rays rays;
-    TreeRays tree;
+    FlightRays flights;
     uint next, lane;   // the host's index of the next ray and its lane
 } Departures;
 
@@ -23,20 +23,20 @@ static inline Answer answer(const Hit *hit, float to_t) {
 #endif
 }
 
-static inline void load_departures(Departures *d, QUERY_RAYS, float unit, uint end) {
+__attribute__((noinline)) static void load_departures(Departures *d, QUERY_RAYS, float unit, uint end) {
     d->rays = load_rays(origins, directions, t_max, unit, d->next, end);
-    d->tree = tree_rays(d->rays.origin, d->rays.direction);
+    d->flights = flight_rays(d->rays.origin, d->rays.direction);
     d->lane = 0;
 }
 
 // Sends the next ray off in the place `f`, false if none is left. Rays that cannot hit anything are answered at once.
-static inline bool depart(Departures *d, QUERY_RAYS, float unit, uint end, global Answer *answers, Flight *f) {
+__attribute__((always_inline)) static inline bool depart(Departures *d, QUERY_RAYS, float unit, uint end, global Answer *answers, Flight *f) {
     while (d->next < end) {
         if (d->lane == LANES) load_departures(d, origins, directions, t_max, unit, end);
         uint lane = d->lane++, index = d->next++;
         if (LANE_INT(d->rays.valid, lane)) {
             Ray ray = one_ray(&d->rays.origin, &d->rays.direction, &d->rays.t_max, lane);
-            take_off(f, &d->tree, &ray, lane, index, LANE(d->rays.to_t, lane));
+            take_off(f, &d->flights, &ray, lane, index, LANE(d->rays.to_t, lane));
             return true;
         }
         Hit miss = {0.0f, 0.0f, 0.0f, -1};

@@ -16,6 +16,9 @@ RNG = np.random.default_rng(11)
 MESHES = [(RNG.uniform(-1, 1, (3 * n, 3)).astype(np.float32), np.arange(3 * n, dtype=np.int32).reshape(-1, 3))
           for n in (60, 1, 9)]
 RAYS = 1500
+LAYOUTS = ["bvh8", "bvh2", "cwbvh"]
+#: Where the leaves of each are.
+LEAVES = {"bvh8": "packs", "bvh2": "leaf_triangles", "cwbvh": "leaf_triangles"}
 
 
 def transforms(rng: np.random.Generator, kind: str, count: int) -> Doubles:
@@ -57,9 +60,9 @@ def brute_force(corners: Doubles, origins: Doubles, directions: Doubles) -> tupl
     return np.where(depth >= 0, t, np.inf), depth
 
 
-@pytest.mark.parametrize("in_flight", [1, 16])
+@pytest.mark.parametrize("layout, in_flight", [("bvh8", 1), ("bvh8", 16), ("bvh2", 1), ("cwbvh", 1)])
 @pytest.mark.parametrize("kind", ["turned", "stretched", "mirrored", "flat", "tiny"])
-def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, in_flight: int) -> None:
+def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, layout: str, in_flight: int) -> None:
     rng = np.random.default_rng(3)
     mesh = rng.integers(0, 3, 12)
     to_world = transforms(rng, kind, 12)
@@ -75,7 +78,7 @@ def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, in_fl
     # Of a tiny mesh far away the ray is known only to a hundredth of its size.
     clear = (np.abs(depth) > (0.03 if kind == "tiny" else 1e-3)).all(axis=1) & (second > 1.001 * nearest) & ~grazing
     assert clear.sum() > 50
-    query = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout="bvh8", in_flight=in_flight)
+    query = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout, in_flight=in_flight)
     hits = query.closest_hit(origins, directions)
     hit = np.isfinite(nearest)
     expected = np.where(hit[:, None], names[first], -1)
@@ -84,17 +87,57 @@ def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, in_fl
     np.testing.assert_array_equal(query.any_hit(origins, directions)[clear], hit[clear])
 
 
-def test_all_hits_of_instances_that_coincide(device: Device) -> None:
+@pytest.mark.parametrize("lanes", [1, 8])
+def test_layouts_agree_to_the_last_bit(device: Device, lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where many instances overlap, so that a ray comes back to the upper level many times."""
+    monkeypatch.setattr(Device, "lanes", lanes)
+    rng = np.random.default_rng(7)
+    mesh = rng.integers(0, 3, 300)
+    to_world = np.concatenate([transforms(rng, kind, 100) for kind in ("turned", "stretched", "mirrored")])
+    origins, targets = rng.uniform(-8, 8, (2, 4000, 3)).astype(np.float32)
+    answers = []
+    for layout, in_flight in (("bvh8", 1), ("bvh8", 16), ("bvh2", 1), ("cwbvh", 1)):
+        query = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout,
+                                       in_flight=in_flight)
+        answers.append((query.closest_hit(origins, targets - origins), query.any_hit(origins, targets - origins, 0.7),
+                        *query.all_hits(origins[:200], (targets - origins)[:200])))
+    assert (answers[0][0]["primitive"] >= 0).mean() > 0.5 and 0.3 < answers[0][1].mean() < 0.9
+    for others in answers[1:]:
+        for answer, other in zip(answers[0], others):
+            np.testing.assert_array_equal(answer, other)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("mesh_size, world_size", [(1e-20, 1.0), (1e15, 1.0), (1.0, 1e-20), (1e15, 1e15)])
+def test_sizes_do_not_matter(device: Device, layout: str, mesh_size: float, world_size: float) -> None:
+    """Neither of the meshes nor of the world that transforms put them in: sizes of powers of two change no bit."""
+    mesh_size, world_size = (2.0 ** round(np.log2(size)) for size in (mesh_size, world_size))
+    rng = np.random.default_rng(5)
+    mesh, to_world = rng.integers(0, 3, 20), transforms(rng, "stretched", 20)
+    origins, targets = rng.uniform(-8, 8, (2, 1000, 3)).astype(np.float32)
+    plain = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout)
+    scaled = clrt.InstancedRayQuery([(vertices * np.float32(mesh_size), faces) for vertices, faces in MESHES], mesh,
+                                    world_size * to_world * [*[1 / mesh_size] * 3, 1], device=device.info.index,
+                                    layout=layout)
+    hits = plain.closest_hit(origins, targets - origins)
+    assert (hits["primitive"] >= 0).mean() > 0.2
+    origins, targets = origins * np.float32(world_size), targets * np.float32(world_size)
+    np.testing.assert_array_equal(scaled.closest_hit(origins, targets - origins), hits)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_all_hits_of_instances_that_coincide(device: Device, layout: str) -> None:
     """Equal t: the lowest instance first, then the lowest primitive; each once."""
     triangle = (np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], np.float32), np.array([[0, 1, 2], [0, 1, 2]], np.int32))
     same = np.tile(np.eye(3, 4), (3, 1, 1))
-    query = clrt.InstancedRayQuery([triangle], [0, 0, 0], same, device=device.info.index, layout="bvh8")
+    query = clrt.InstancedRayQuery([triangle], [0, 0, 0], same, device=device.info.index, layout=layout)
     ray, hits = query.all_hits([0, 0, 2], [0, 0, -1])
     assert hits["instance"].tolist() == [0, 0, 1, 1, 2, 2] and hits["primitive"].tolist() == [0, 1] * 3
     assert query.closest_hit([0, 0, 2], [0, 0, -1])["instance"].tolist() == [0]
 
 
-def test_ten_thousand_instances_cost_the_memory_of_one(device: Device) -> None:
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_ten_thousand_instances_cost_the_memory_of_one(device: Device, layout: str) -> None:
     """A grid of them: the ray down each cell hits its own; the tree below is stored once."""
     side = 100
     cells = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)
@@ -103,20 +146,21 @@ def test_ten_thousand_instances_cost_the_memory_of_one(device: Device) -> None:
     blanket = (np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32),
                np.array([[0, 1, 2], [0, 2, 3]], np.int32))
     query = clrt.InstancedRayQuery([blanket], np.zeros(side * side, int), to_world, device=device.info.index,
-                                   layout="bvh8")
+                                   layout=layout)
     origins = np.concatenate([3 * cells + [0.3, 0.2], np.ones((side * side, 1))], axis=1)
     hits = query.closest_hit(origins, [0, 0, -1])
     np.testing.assert_array_equal(hits["instance"], np.arange(side * side))
     np.testing.assert_allclose(hits["t"], 1, rtol=1e-6)
-    assert len(query.tree.buffers["packs"]) == 1
+    assert len(query.tree.buffers[LEAVES[layout]]) == (1 if layout == "bvh8" else 2)
     assert not query.any_hit(origins + [1.5, 1.5, 0], [0, 0, -1]).any()
 
 
-def test_nothing_to_hit(device: Device) -> None:
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_nothing_to_hit(device: Device, layout: str) -> None:
     empty = (np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
-    for mesh, meshes in (([], MESHES), ([0, 0], [empty])):
+    for mesh, meshes in (([], MESHES), ([], []), ([0, 0], [empty]), ([0, 0], [empty, *MESHES])):
         query = clrt.InstancedRayQuery(meshes, np.array(mesh, int), np.tile(np.eye(3, 4), (len(mesh), 1, 1)),
-                                       device=device.info.index, layout="bvh8")
+                                       device=device.info.index, layout=layout)
         hits = query.closest_hit([0, 0, 0], [[0, 0, 1], [1, 1, 1]])
         assert hits["instance"].tolist() == hits["primitive"].tolist() == [-1, -1]
 
@@ -130,3 +174,8 @@ def test_nothing_to_hit(device: Device) -> None:
 def test_mistakes_are_named(device: Device, mesh: list[Any], matrix: Doubles, message: str) -> None:
     with pytest.raises(clrt.SceneError, match=message):
         clrt.InstancedRayQuery(MESHES, mesh, matrix[None], device=device.info.index)
+
+
+def test_a_layout_without_an_upper_level_is_refused(device: Device) -> None:
+    with pytest.raises(clrt.UsageError, match="list.*bvh2, bvh8, cwbvh"):
+        clrt.InstancedRayQuery(MESHES, [0], [np.eye(3, 4)], device=device.info.index, layout="list")

@@ -19,7 +19,8 @@ def test_wheel_holds_every_module_and_kernel(tmp_path: Path) -> None:
                    check=True, capture_output=True)
     (wheel,) = tmp_path.glob("*.whl")
     packed = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
-    modules = {str(file.relative_to(ROOT)) for file in (ROOT / "clrt").rglob("*.py")} | {"clrt/py.typed"}
+    modules = {str(file.relative_to(ROOT)) for pattern in ("*.py", "*.c", "py.typed")
+               for file in (ROOT / "clrt").rglob(pattern)}
     kernels = {f"clrt/{file.relative_to(ROOT)}" for pattern in ("*.cl", "__init__.py")
                for file in (ROOT / "kernels").rglob(pattern)}
     assert packed == modules | kernels

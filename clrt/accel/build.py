@@ -45,7 +45,8 @@ def build_tree(device: Device | None, layout: str, builder: str | None, triangle
                in zip(records.items(), (shape.node, shape.leaf, LEAF_SPHERE), tree.counts) if size}
     seconds = time.perf_counter() - start
     return Layout(layout, buffers, tree.stack, tree.counts[0], len(tree.level_sizes),
-                  _sah_cost(buffers["nodes"].read(device)), seconds, builder)
+                  _sah_cost(buffers["nodes"].read(device)), seconds, builder, tuple(tree.level_sizes),
+                  tree.peak_bytes)
 
 
 def _sah_cost(nodes: Records) -> float:

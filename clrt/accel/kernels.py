@@ -11,12 +11,15 @@ from .layouts import Layout
 #: Files of the tree layouts, and how many primitives of a leaf they test at a time.
 TREES = {"bvh8": ("traverse/bvh8.cl", 8), "bvh2": ("traverse/bvh2.cl", 1), "cwbvh": ("traverse/cwbvh.cl", 1),
          "list": ("traverse/list.cl", 1)}
+#: How their rays come to instances.
+UPPER_LEVELS = {"bvh8": "traverse/instance.cl", "bvh2": "traverse/slab_instance.cl",
+                "cwbvh": "traverse/slab_instance.cl"}
 #: Builders by name.
 BUILDER_NAMES = [*DEVICE_BUILDERS, *BUILDERS]
 TRIANGLE_TESTS = {"watertight": "geometry/triangle_watertight.cl",
                   "moller_trumbore": "geometry/triangle_moller_trumbore.cl"}
 RECORDS = {"nodes": "Node", "packs": "Triangles", "leaf_triangles": "Triangles", "leaf_spheres": "LeafSphere",
-           "instances": "Instance"}
+           "instances": "Instance", "visits": "Visits"}
 
 
 def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
@@ -25,8 +28,12 @@ def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
 
 
 def tree_defines(tree: Layout) -> dict[str, int]:
-    """WIDTH, and a STACK_SIZE that this tree's traversal cannot exceed, in steps of 32 so that trees share programs."""
-    return {"WIDTH": TREES[tree.name][1], "STACK_SIZE": max(32, -(-tree.stack // 32) * 32)}
+    """WIDTH, and a STACK_SIZE that this tree's traversal cannot exceed, in steps of 32 so that trees share programs.
+
+    And COUNT_VISITS, if there is a buffer to count in (kernels/traverse/visits.cl).
+    """
+    defines = {"WIDTH": TREES[tree.name][1], "STACK_SIZE": max(32, -(-tree.stack // 32) * 32)}
+    return defines | ({"COUNT_VISITS": 1} if "visits" in tree.buffers else {})
 
 
 def tree_files(layout: str, triangle: str, triangles: bool, spheres: bool,
@@ -34,5 +41,5 @@ def tree_files(layout: str, triangle: str, triangles: bool, spheres: bool,
     """What the includes of kernels/traverse stand for, in a scene that has triangles or spheres or neither."""
     return {"TREE": [TREES[layout][0]] if triangles or spheres else [],
             "TRIANGLE_TEST": [TRIANGLE_TESTS[triangle]] if triangles else [],
-            "UPPER_LEVEL": ["traverse/instance.cl"] if instances else [],
+            "UPPER_LEVEL": [UPPER_LEVELS[layout]] if instances else [],
             "SPHERE_TEST": ["geometry/sphere.cl"] if spheres else []}

@@ -57,6 +57,8 @@ class Layout:
     buffers: by name, records in an array of numpy's or, from a builder on the device, in a DeviceArray.
     stack: entries that a traversal's stack needs (see Tree.stack_bound), 0 without a tree. builder: its name.
     depth and sah_cost are those of the tree that is traversed; build_seconds includes the packing.
+    level_sizes: how many nodes each level has, from the root, if they stand level by level in `nodes`; else ().
+    peak_bytes: the most that a builder on the device had there at a time, 0 for one in numpy.
     """
 
     name: str
@@ -67,6 +69,8 @@ class Layout:
     sah_cost: float
     build_seconds: float = 0.0
     builder: str = ""
+    level_sizes: tuple[int, ...] = ()
+    peak_bytes: int = 0
 
     @property
     def bytes(self) -> int:
@@ -97,16 +101,10 @@ def _list(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
 
 def _bvh2(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     tree = _tree(builder, triangles, spheres, LEAF_SIZES[builder], 1)
-    links = np.where(tree.leaf, tree.left_first, tree.left_first + (tree.left_first > 0))
-    nodes = np.zeros(1 + len(tree.count), BVH2_NODE)
-    for name, values in (("aabb_min", tree.aabb_min), ("aabb_max", tree.aabb_max), ("left_first", links),
-                         ("count", np.where(tree.spheres, -tree.count, tree.count))):
-        nodes[name][0], nodes[name][2:] = values[0], values[1:]
-    nodes[1]["aabb_min"], nodes[1]["aabb_max"] = np.inf, -np.inf
     buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
                       leaf_spheres=_leaf_spheres(spheres, tree.sphere_order, len(triangles)))
-    return Layout("bvh2", {"nodes": nodes} | buffers, stack=tree.stack_bound, nodes=len(tree.count),
-                  depth=tree.depth, sah_cost=tree.sah_cost())
+    return Layout("bvh2", {"nodes": bvh2_nodes(tree)} | buffers, stack=tree.stack_bound, nodes=len(tree.count),
+                  depth=tree.depth, sah_cost=tree.sah_cost(), level_sizes=_level_sizes(tree))
 
 
 def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
@@ -120,7 +118,7 @@ def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     nodes = wide_nodes(wide, child)
     buffers = _filled(packs=packs, leaf_spheres=_leaf_spheres(spheres, wide.sphere_order, len(triangles)))
     return Layout("bvh8", {"nodes": nodes} | buffers, stack=wide.stack_bound, nodes=len(nodes),
-                  depth=wide.depth, sah_cost=wide.sah_cost(LANES))
+                  depth=wide.depth, sah_cost=wide.sah_cost(LANES), level_sizes=_level_sizes(wide))
 
 
 def _cwbvh(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
@@ -151,6 +149,23 @@ def sphere_boxes(spheres: FloatArray) -> tuple[FloatArray, FloatArray]:
     inside = np.nextafter(far, np.float32(0))
     low, high = (np.clip(edge, -inside, inside).astype(np.float32) for edge in (center - radius, center + radius))
     return np.nextafter(low, -far), np.nextafter(high, far)
+
+
+def _level_sizes(tree: Tree | Wide) -> tuple[int, ...]:
+    levels = list(tree.levels())
+    nodes = np.concatenate(levels)
+    return tuple(map(len, levels)) if np.array_equal(nodes, np.arange(len(nodes))) else ()
+
+
+def bvh2_nodes(tree: Tree) -> Records:
+    """Nodes of the layout bvh2."""
+    links = np.where(tree.leaf, tree.left_first, tree.left_first + (tree.left_first > 0))
+    nodes = np.zeros(1 + len(tree.count), BVH2_NODE)
+    for name, values in (("aabb_min", tree.aabb_min), ("aabb_max", tree.aabb_max), ("left_first", links),
+                         ("count", np.where(tree.spheres, -tree.count, tree.count))):
+        nodes[name][0], nodes[name][2:] = values[0], values[1:]
+    nodes[1]["aabb_min"], nodes[1]["aabb_max"] = np.inf, -np.inf
+    return nodes
 
 
 def wide_nodes(wide: Wide, child: IntArray) -> Records:

@@ -12,42 +12,79 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.arrays import DeviceArray
+from ..device.arrays import DeviceArray, empty_array, on_host
 from ..device.open import Device
 from ..device.records import record
 from ..errors import UsageError
 from .build import build_tree
-from .builders import BUILDERS
-from .layouts import LANES, Layout, Records, wide_nodes
+from .layouts import Layout
 from .tree import FloatArray, IntArray
-from .wide import EMPTY, collapse
+from .upper_level import FORMS, upper_level
 
 Doubles = NDArray[np.float64]
 
 #: to_object: rows of the transform from the world to the mesh's frame. root: the mesh's, in the array of all nodes.
-INSTANCE = record(to_object="(3,4)f4", root="i4", pad="3i4")
+#: index: the host's of the instance.
+INSTANCE = record(to_object="(3,4)f4", root="i4", index="i4", pad="2i4")
 #: Rounding of a coordinate's way to the object's frame and back: three products, their sum, the matrix itself.
 TRANSFORM_ROUNDING = 8 * 2.0**-24
 
 
-def build_two_levels(device: Device, layout: str, builder: str | None, meshes: Sequence[FloatArray], mesh: IntArray,
-                     to_world: Doubles) -> Layout:
-    """The two levels over instances: (k,) indices of `meshes`, (k, 3, 4) transforms to the world, not singular.
+class TwoLevels:
+    """Trees of meshes on a device, and above them the tree over instances, which can be made anew.
 
-    meshes: triangles (m, 3, 3) each, all of sizes near 1. Raises UsageError for a layout that has no upper level.
+    meshes: triangles (m, 3, 3) each, all of sizes near 1. mesh: (k,) int32 indices of `meshes`, one an instance.
+    The upper level comes first in the array of nodes, in room for the largest one of so many instances.
+    Raises UsageError for a layout that has no upper level.
     """
-    if layout != "bvh8":
-        raise UsageError(f"the layout {layout} has no instances: take bvh8")
-    start = time.perf_counter()
-    trees = [build_tree(device, layout, builder, triangles) for triangles in meshes]
-    boxes = np.array([_bounds(_on_host(device, tree.buffers["nodes"])) for tree in trees]).reshape(-1, 2, 3)
-    present = np.flatnonzero(np.isfinite(boxes[mesh]).all(axis=(1, 2)))
-    upper = _upper_level(world_boxes(boxes[mesh[present]], to_world[present]), present.astype(np.int32))
-    first = len(upper.buffers["nodes"]) + np.cumsum([0] + [tree.nodes for tree in trees])
-    buffers = _joined(device, upper, trees)
-    buffers["instances"] = _instances(to_world, first[mesh])
-    return replace(upper, buffers=buffers, stack=upper.stack + 1 + max((tree.stack for tree in trees), default=0),
-                   nodes=len(buffers["nodes"]), build_seconds=time.perf_counter() - start)
+
+    def __init__(self, device: Device, layout: str, builder: str | None, meshes: Sequence[FloatArray],
+                 mesh: IntArray) -> None:
+        if layout not in FORMS:
+            raise UsageError(f"the layout {layout} has no instances: take one of {', '.join(FORMS)}")
+        start = time.perf_counter()
+        self._device, self._form, self._mesh = device, FORMS[layout], mesh
+        self._boxes = np.array([_box(triangles) for triangles in meshes]).reshape(-1, 2, 3)
+        trees = [build_tree(device, layout, builder, triangles) for triangles in meshes]
+        self._stack = max((tree.stack for tree in trees), default=0)
+        self._depth = max((tree.depth for tree in trees), default=0)
+        self._nodes = sum(tree.nodes for tree in trees)
+        self._buffers, self._roots = self._joined(trees)
+        self._seconds = time.perf_counter() - start
+
+    def place(self, to_world: Doubles) -> Layout:
+        """The tree with the instances where transforms to the world (k, 3, 4), none singular, put them.
+
+        Its buffers are those of the tree before, rewritten. build_seconds: of the lower level and this upper one.
+        """
+        start = time.perf_counter()
+        upper, order = upper_level(self._form, *world_boxes(self._boxes[self._mesh], to_world))
+        instances = np.zeros(len(order), INSTANCE)
+        instances["to_object"], instances["index"] = inverse(to_world)[order], order
+        instances["root"] = self._roots[self._mesh[order]]
+        self._buffers["nodes"].write(self._device, upper.buffers["nodes"])
+        self._buffers["instances"].write(self._device, instances)
+        # On the stack: what waits in the upper level, LEAVE, and what waits in the lower one.
+        return replace(upper, buffers=self._buffers, stack=upper.stack + 1 + self._stack,
+                       nodes=upper.nodes + self._nodes, depth=upper.depth + self._depth,
+                       build_seconds=self._seconds + time.perf_counter() - start)
+
+    def _joined(self, trees: Sequence[Layout]) -> tuple[dict[str, DeviceArray], NDArray[np.int64]]:
+        """The buffers, with the trees' records one tree after another, and where their roots are, (m,)."""
+        device, form = self._device, self._form
+        first_node = form.room(len(self._mesh)) + _starts([len(tree.buffers["nodes"]) for tree in trees])
+        first_leaf = _starts([len(tree.buffers.get(form.leaves, ())) for tree in trees])
+        buffers = {"nodes": empty_array(device, form.node, first_node[-1])}
+        if first_leaf[-1]:
+            buffers[form.leaves] = empty_array(device, form.leaf, first_leaf[-1])
+        for tree, node, leaf in zip(trees, first_node, first_leaf):
+            nodes = on_host(device, tree.buffers["nodes"]).copy()
+            form.shift(nodes, node, leaf)
+            buffers["nodes"].write(device, nodes, node)
+            if form.leaves in tree.buffers:
+                buffers[form.leaves].write(device, tree.buffers[form.leaves], leaf)
+        buffers["instances"] = empty_array(device, INSTANCE, len(self._mesh))
+        return buffers, first_node[:-1]
 
 
 def world_boxes(boxes: Doubles, to_world: Doubles) -> tuple[FloatArray, FloatArray]:
@@ -68,43 +105,12 @@ def inverse(transforms: Doubles) -> Doubles:
     return np.concatenate([linear, -linear @ transforms[..., 3:]], axis=-1)
 
 
-def _upper_level(boxes: tuple[FloatArray, FloatArray], instances: IntArray) -> Layout:
-    """The tree over boxes; each of its leaves is one of `instances`."""
-    wide = collapse(BUILDERS["sah"](*boxes, 1, 1), LANES)
-    leaf = wide.child < 0
-    child = wide.child.copy()
-    child[leaf] = ~(instances[wide.order[~child[leaf] >> 4]] << 4)
-    return Layout("bvh8", {"nodes": wide_nodes(wide, child)}, wide.stack_bound, len(child), wide.depth, wide.sah_cost())
+def _box(triangles: FloatArray) -> FloatArray:
+    """The box of a mesh (2, 3); of an empty one a point, whose tree no ray gets into."""
+    points = triangles.reshape(-1, 3)
+    return np.stack([points.min(axis=0), points.max(axis=0)]) if len(points) else np.zeros((2, 3), np.float32)
 
 
-def _joined(device: Device, upper: Layout, trees: Sequence[Layout]) -> dict[str, Records | DeviceArray]:
-    """One array of nodes, the upper level's first, and one of packs, with the references moved accordingly."""
-    nodes, packs = [_on_host(device, upper.buffers["nodes"])], []
-    first_node, first_pack = len(nodes[0]), 0
-    for tree in trees:
-        own = _on_host(device, tree.buffers["nodes"]).copy()
-        child = own["child"]
-        child[child < 0] -= np.int32(first_pack << 4)
-        child[(child >= 0) & (child != EMPTY)] += np.int32(first_node)
-        nodes.append(own)
-        first_node += len(own)
-        if "packs" in tree.buffers:
-            packs.append(_on_host(device, tree.buffers["packs"]))
-            first_pack += len(packs[-1])
-    joined: dict[str, Records | DeviceArray] = {"nodes": np.concatenate(nodes)}
-    return joined | ({"packs": np.concatenate(packs)} if packs else {})
-
-
-def _instances(to_world: Doubles, roots: NDArray[np.integer]) -> Records:
-    records = np.zeros(max(1, len(to_world)), INSTANCE)  # no buffer is empty
-    records["to_object"][:len(roots)], records["root"][:len(roots)] = inverse(to_world), roots
-    return records
-
-
-def _bounds(nodes: Records) -> Doubles:
-    """The box of a tree (2, 3), infinite for an empty one."""
-    return np.array([nodes["lo"][0].min(axis=1), nodes["hi"][0].max(axis=1)], np.float64)
-
-
-def _on_host(device: Device, array: Records | DeviceArray) -> Records:
-    return array.read(device) if isinstance(array, DeviceArray) else array
+def _starts(sizes: Sequence[int]) -> NDArray[np.int64]:
+    """Where each of some ranges starts if they lie one after another, and where the last one ends."""
+    return np.cumsum([0, *sizes], dtype=np.int64)

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from .tables import race_table
+
 
 @click.command("peers")
 @click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE", help="A model file; default: a bumpy ball.")
@@ -45,24 +47,7 @@ def _lines(result: Mapping[str, Any]) -> list[str]:
               for name, tree in result["trees"].items()]
     hits = (f"{result['hits'][name]:9.2f} of{kind['clrt']['rays']:9}" for name, kind in result["kernels"].items())
     lines.append(f"  {'part of rays that hit':24}{'  '.join(hits)}")
-    lines += _table("kernels alone", result["kernels"], on_cpu)
+    lines += race_table("kernels alone", result["kernels"], on_cpu)
     if "calls" in result:
-        lines += _table("whole calls from Python", result["calls"], on_cpu)
+        lines += race_table("whole calls from Python", result["calls"], on_cpu)
     return lines + [f"  {name:24}{why}" for name, why in result["missing"].items()]
-
-
-def _table(title: str, kinds: Mapping[str, Any], on_cpu: bool) -> list[str]:
-    """A line for each contestant, a column for each kind of rays, and for how many of all rays the answers agree."""
-    lines = [f"  {title:24}" + "".join(f"{kind:>23}" for kind in kinds) + "    agrees"]
-    for name in next(iter(kinds.values())):
-        line = f"  {name:24}"
-        for kind in kinds.values():
-            row = kind[name]
-            line += f"{row['mrays']:9.3g}{_times(row['ratio']):>6}"
-            line += f" ({_times(row['cpu_ratio']):>5})" if on_cpu else " " * 8
-        lines.append(f"{line}{min(kind[name]['agrees'] for kind in kinds.values()):10.5f}")
-    return lines
-
-
-def _times(ratio: float) -> str:
-    return f"{ratio:.2f}" if ratio < 100 else f"{ratio:.0f}" if ratio < 10_000 else f"{ratio / 1000:.0f}k"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pyopencl as cl
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from .open import Device
 
@@ -35,9 +35,35 @@ class DeviceArray:
             cl.enqueue_copy(device.queue, values, self.buffer)
         return values
 
+    def write(self, device: Device, values: NDArray[Any] | DeviceArray, first: int = 0) -> None:
+        """Puts `values`, of the same dtype, over the elements from `first` on."""
+        offset = first * self.dtype.itemsize
+        if not len(values):
+            return
+        if isinstance(values, DeviceArray):
+            cl.enqueue_copy(device.queue, self.buffer, values.buffer, byte_count=values.nbytes, dst_offset=offset)
+        else:
+            cl.enqueue_copy(device.queue, self.buffer, np.ascontiguousarray(values), dst_offset=offset)
+
+
+def empty_array(device: Device, dtype: DTypeLike, size: int) -> DeviceArray:
+    """A new array whose elements are not defined."""
+    kind = np.dtype(dtype)
+    return DeviceArray(cl.Buffer(device.context, cl.mem_flags.READ_WRITE, max(1, size) * kind.itemsize), kind, size)
+
 
 def on_device(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
-    """The buffer of a device array, or a new one with a copy of a numpy array; kernels may only read it."""
+    """The buffer of a device array, or a new one with a copy of a numpy array."""
     if isinstance(array, DeviceArray):
         return array.buffer
-    return cl.Buffer(device.context, cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR, hostbuf=array)
+    return cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=array)
+
+
+def resident(device: Device, array: NDArray[Any] | DeviceArray) -> DeviceArray:
+    """The device array itself, or a new one with a copy of a numpy array."""
+    return array if isinstance(array, DeviceArray) else DeviceArray(on_device(device, array), array.dtype, len(array))
+
+
+def on_host(device: Device, array: NDArray[Any] | DeviceArray) -> NDArray[Any]:
+    """A copy of a device array, or the numpy array itself."""
+    return array.read(device) if isinstance(array, DeviceArray) else array

@@ -9,11 +9,14 @@ import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 
 from .open import Device
+from .pages import advise_huge_pages
 from .program import build, make_kernel
 
 #: Work-items a compute unit, and the fewest items that one of them gets.
 WORK_ITEMS = {"cpu": 16, "gpu": 512}
 SMALLEST_BLOCK = {"cpu": 256, "gpu": 16}
+#: Work-items of a scan, at most, as in build/scan.cl.
+SCAN_ITEMS = 256
 
 
 class Blocks:
@@ -34,6 +37,8 @@ class Blocks:
     def empty(self, dtype: DTypeLike, count: int) -> cl.Buffer:
         """An array of `count` elements, at least one, whose contents are not defined."""
         array = cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, max(1, count) * np.dtype(dtype).itemsize)
+        if self.device.info.type == "cpu":
+            advise_huge_pages(self.device.queue, array)
         self._bytes += array.size
         self.peak_bytes = max(self.peak_bytes, self._bytes)
         return array
@@ -41,7 +46,7 @@ class Blocks:
     def zeros(self, dtype: DTypeLike, count: int) -> cl.Buffer:
         """An array of zeros."""
         array = self.empty(dtype, count)
-        cl.enqueue_fill_buffer(self.device.queue, array, np.zeros(1, np.uint8), 0, array.size)
+        cl.enqueue_fill_buffer(self.device.queue, array, np.zeros(1, np.uint32), 0, array.size)
         return array
 
     def upload(self, values: NDArray[Any]) -> cl.Buffer:
@@ -85,8 +90,8 @@ class Blocks:
 
         Returns the sums (arrays,), which are also in `totals`.
         """
-        kernel, local = self._kernel("scan"), 1 if self.device.local_size == 1 else 256
-        kernel.set_args(values, np.uint32(count), self._totals, cl.LocalMemory(4 * local))  # type: ignore[arg-type]
+        kernel, local = self._kernel("scan"), 1 if self.device.local_size == 1 else SCAN_ITEMS
+        kernel.set_args(values, np.uint32(count), self._totals)
         cl.enqueue_nd_range_kernel(self.device.queue, kernel, (arrays * local,), (local,))
         return self.download(self._totals, np.uint32, arrays)
 

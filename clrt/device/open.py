@@ -33,8 +33,8 @@ class Device:
 
     @property
     def layout(self) -> str:
-        """The tree layout that suits the device: eight boxes at a time where there are vectors, else two."""
-        return "bvh8" if self.info.type == "cpu" else "bvh2"
+        """The tree layout that suits the device: eight boxes at a time where there are vectors, else compressed."""
+        return "bvh8" if self.info.type == "cpu" else "cwbvh"
 
 
 def open_device(selector: str | int | None = None) -> Device:

@@ -19,7 +19,7 @@ from ..query import RayQuery
 from .embree import EmbreeRays, EmbreeScene
 from .libraries import LIBRARIES, Call, clrt
 from .race import Contestant, race
-from .rays import Floats
+from .rays import Floats, Run
 from .workloads import Faces, Mesh, Workload, closed_room, rotated_copies, subdivide, workloads
 
 #: Of Embree: robust scene, width of packets, rays said to be coherent.
@@ -87,16 +87,8 @@ def _measure_kernels(scene: Mesh, query: RayQuery, kinds: list[Workload]) -> dic
 
 
 def _kernel_contestants(query: RayQuery, embree: dict[bool, EmbreeScene], kind: Workload) -> dict[str, Contestant]:
-    """clrt's processor time is that of all threads but this one, which hands rays over and waits."""
-    ask = query.any_hit if kind.any_hit else query.closest_hit
-    ours: NDArray[Any] = ask(*kind.rays)
-    count = len(ours)
-
-    def run() -> tuple[float, float]:
-        kernel, others = query.kernel_seconds, time.process_time() - time.thread_time()
-        ask(*kind.rays)
-        return query.kernel_seconds - kernel, time.process_time() - time.thread_time() - others
-
+    run = Run(query, query.any_hit if kind.any_hit else query.closest_hit, kind.rays)
+    ours, count = run.answers, len(kind.rays[2])
     contestants = {"clrt": Contestant(run, count)}
     for name, (robust, width, coherent) in EMBREE.items() if embree else ():
         rays = EmbreeRays(embree[robust], kind.rays, any_hit=kind.any_hit, width=width, coherent=coherent)

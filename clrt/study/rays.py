@@ -19,24 +19,42 @@ Floats = NDArray[np.float32]
 Rays = tuple[Floats, Floats, Floats]
 
 
+class Run:
+    """Calls of one method of a query with the same rays. answers: those of a first call, to warm up; calls: the seconds
+    of each call after it, numpy arrays in and out."""
+
+    def __init__(self, query: RayQuery, ask: Callable[..., NDArray[Any]], rays: Rays) -> None:
+        self._query, self._ask, self._rays = query, ask, rays
+        self.answers = ask(*rays)
+        self.calls: list[float] = []
+
+    def __call__(self) -> tuple[float, float]:
+        """Seconds of the kernels, and processor seconds of all threads but this, which hands rays over and waits."""
+        kernel, others, start = self._query.kernel_seconds, _others(), time.perf_counter()
+        self._ask(*self._rays)
+        self.calls.append(time.perf_counter() - start)
+        return self._query.kernel_seconds - kernel, _others() - others
+
+
 def measure_rays(vertices: Floats, faces: NDArray[np.int32], rays: Rays, *, repeats: int = 7,
                  **options: Any) -> dict[str, Any]:
-    """The figures of `clrt bench rays`: medians of `repeats` calls after one to warm up.
+    """The figures of `clrt bench rays` with rays from a file: medians of `repeats` calls after one to warm up.
 
     vertices: (n, 3); faces: (m, 3); rays: origins (k, 3), directions (k, 3), t_max (k,). options: see RayQuery.
     """
     start = time.perf_counter()
     query = RayQuery(vertices, faces, **options)
     build_seconds = time.perf_counter() - start
-    closest, any_ = (_timed(query, call, rays, repeats) for call in (query.closest_hit, query.any_hit))
+    closest, any_ = Run(query, query.closest_hit, rays), Run(query, query.any_hit, rays)
+    kernels = [median(run()[0] for _ in range(repeats)) for run in (closest, any_)]
     count = len(rays[2]) / 1e6
     return {"device": query.device.info.name, "platform": query.device.info.platform, "layout": query.tree.name,
             "triangles": len(faces), "rays": len(rays[2]),
             "build_seconds": build_seconds, "tree_seconds": query.tree.build_seconds, "sah_cost": query.tree.sah_cost,
             "bytes_per_triangle": query.tree.bytes / max(1, len(faces)),
-            "mrays_closest": count / closest["kernel"], "mrays_any": count / any_["kernel"],
-            "mrays_closest_call": count / closest["call"], "mrays_any_call": count / any_["call"],
-            "hits": int(np.count_nonzero(query.closest_hit(*rays)["primitive"] >= 0))}
+            "mrays_closest": count / kernels[0], "mrays_any": count / kernels[1],
+            "mrays_closest_call": count / median(closest.calls), "mrays_any_call": count / median(any_.calls),
+            "hits": int(np.count_nonzero(closest.answers["primitive"] >= 0))}
 
 
 def load_rays(path: Path) -> Rays:
@@ -73,13 +91,18 @@ def scattered_rays(vertices: Floats, count: int = 1 << 20, seed: int = 0) -> Ray
             np.full(count, np.inf, np.float32))
 
 
-def _timed(query: RayQuery, call: Callable[..., Any], rays: Rays, repeats: int) -> dict[str, float]:
-    """Median seconds of whole calls and of their kernels."""
-    call(*rays)
-    seconds: dict[str, list[float]] = {"call": [], "kernel": []}
-    for _ in range(repeats):
-        kernel, start = query.kernel_seconds, time.perf_counter()
-        call(*rays)
-        seconds["call"].append(time.perf_counter() - start)
-        seconds["kernel"].append(query.kernel_seconds - kernel)
-    return {name: median(values) for name, values in seconds.items()}
+def every(step: int, rays: Rays) -> Rays:
+    """One ray of `step`."""
+    origins, directions, t_max = (np.ascontiguousarray(array[::step]) for array in rays)
+    return origins, directions, t_max
+
+
+def differing(expected: NDArray[Any], answers: NDArray[Any]) -> NDArray[np.bool_]:
+    """(n,) Which records are not the same bits."""
+    one, other = (np.ascontiguousarray(each).view(np.uint8).reshape(len(answers), -1) for each in (expected, answers))
+    return np.asarray((one != other).any(axis=1))
+
+
+def _others() -> float:
+    """Processor seconds of this process, without this thread's."""
+    return time.process_time() - time.thread_time()

@@ -14,7 +14,7 @@ kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global con
         uint place[2] = {first_pack + places[count + i], first_sphere + places[2 * count + i]};
         for (int s = 0; s < CHILDREN; ++s) {
             int below = slots[CHILDREN * i + s];
-            Box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+            Box box = NO_BOX;
             int reference = EMPTY;
             if (below != EMPTY) {
                 box = node_box(&primitives, binary, below);
@@ -29,10 +29,12 @@ kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global con
                     ++child;
                 }
             }
-            for (int k = 0; k < 3; ++k) {
-                node->lo[k][s] = box.lo[k];
-                node->hi[k][s] = box.hi[k];
-            }
+            node->lo[0][s] = box.lo.x;
+            node->lo[1][s] = box.lo.y;
+            node->lo[2][s] = box.lo.z;
+            node->hi[0][s] = box.hi.x;
+            node->hi[1][s] = box.hi.y;
+            node->hi[2][s] = box.hi.z;
             node->child[s] = reference;
             node->pad[s] = 0;
         }

@@ -4,8 +4,8 @@
 #if SPHERES
 static inline void write_spheres(const Primitives *primitives, const int *members, int count, global LeafSphere *leaf) {
     for (int i = 0; i < count; ++i) {
-        global const float *s = primitives->spheres + 4 * (members[i] - (int)primitives->triangle_count);
-        leaf[i] = (LeafSphere){{s[0], s[1], s[2]}, s[3], members[i], {0, 0, 0}};
+        global const float *s = primitives->shapes + SHAPE * members[i];
+        leaf[i] = (LeafSphere){{s[0], s[1], s[2]}, s[3], (int)primitives->ids[members[i]], {0, 0, 0}};
     }
 }
 #endif
@@ -15,20 +15,22 @@ static inline void write_spheres(const Primitives *primitives, const int *member
 static inline void write_triangles(const Primitives *primitives, const int *members, int count, global Triangles *pack) {
     for (int lane = 0; lane < PACK; ++lane) {
         bool used = lane < count;
-        global const float *p = primitives->triangles + 9 * (used ? members[lane] : 0);
+        int member = members[used ? lane : 0];
+        global const float *p = primitives->shapes + SHAPE * member;
         for (int k = 0; k < 3; ++k) {
             pack->p0[k][lane] = used ? p[k] : NAN;
             pack->p1[k][lane] = used ? p[k + 3] : NAN;
             pack->p2[k][lane] = used ? p[k + 6] : NAN;
         }
-        pack->primitive[lane] = used ? members[lane] : -1;
+        pack->primitive[lane] = used ? (int)primitives->ids[member] : -1;
     }
 }
 #elif TRIANGLES
 static inline void write_triangles(const Primitives *primitives, const int *members, int count, global Triangles *leaf) {
     for (int i = 0; i < count; ++i) {
-        global const float *p = primitives->triangles + 9 * members[i];
-        leaf[i] = (Triangles){{p[0], p[1], p[2]}, members[i], {p[3], p[4], p[5]}, 0, {p[6], p[7], p[8]}, 0};
+        global const float *p = primitives->shapes + SHAPE * members[i];
+        leaf[i] = (Triangles){{p[0], p[1], p[2]}, (int)primitives->ids[members[i]], {p[3], p[4], p[5]}, 0,
+                              {p[6], p[7], p[8]}, 0};
     }
 }
 #endif

@@ -1,21 +1,28 @@
 // Primitives in the order of a space-filling curve: Morton codes of their boxes' centres, 21 bits an axis.
 #include "build/primitives.cl"
+#include "build/sort.cl"
 
-// Twice the centres' bounds over each block: low in partial[0 … 2], high in partial[3 … 5].
-kernel void centre_bounds(uint count, uint block, PRIMITIVE_PARAMETERS, global float *partial) {
-    Primitives primitives = PRIMITIVE_ARGUMENTS;
+#define SCENE_PARAMETERS global const float *triangles, global const float *spheres, uint triangle_count
+
+// The nine or four floats of primitive i of the scene.
+static inline global const float *scene_shape(global const float *triangles, global const float *spheres,
+                                              uint triangle_count, uint i) {
+    return i < triangle_count ? triangles + SHAPE * i : spheres + 4 * (i - triangle_count);
+}
+
+static inline float3 twice_centre(Box box) { return box.lo + box.hi; }
+
+// Bounds of twice the centres in each block: low in partial[0 … 2], high in partial[3 … 5].
+kernel void centre_bounds(uint count, uint block, SCENE_PARAMETERS, global float *partial) {
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
     if (first >= count) return;
-    Box bounds = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    Box bounds = NO_BOX;
     for (uint i = first; i < end; ++i) {
-        Box box = primitive_box(&primitives, i), centre;
-        for (int k = 0; k < 3; ++k) centre.lo[k] = centre.hi[k] = box.lo[k] + box.hi[k];
-        bounds = box_union(bounds, centre);
+        float3 centre = twice_centre(shape_box(scene_shape(triangles, spheres, triangle_count, i), i >= triangle_count));
+        bounds = box_union(bounds, (Box){centre, centre});
     }
-    for (int k = 0; k < 3; ++k) {
-        partial[6 * get_global_id(0) + k] = bounds.lo[k];
-        partial[6 * get_global_id(0) + 3 + k] = bounds.hi[k];
-    }
+    vstore3(bounds.lo, 2 * get_global_id(0), partial);
+    vstore3(bounds.hi, 2 * get_global_id(0) + 1, partial);
 }
 
 // The 21 bits of x, three places apart.
@@ -28,19 +35,25 @@ static inline ulong spread(uint x) {
     return (s | s << 2) & 0x1249249249249249UL;
 }
 
-kernel void morton_codes(uint count, uint block, PRIMITIVE_PARAMETERS, float low_x, float low_y, float low_z, float scale,
+kernel void morton_codes(uint count, uint block, SCENE_PARAMETERS, float low_x, float low_y, float low_z, float scale,
                          global ulong *codes, global uint *order) {
-    Primitives primitives = PRIMITIVE_ARGUMENTS;
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
-    float low[3] = {low_x, low_y, low_z};
+    float3 low = (float3)(low_x, low_y, low_z);
     for (uint i = first; i < end; ++i) {
-        Box box = primitive_box(&primitives, i);
-        ulong code = 0;
-        for (int k = 0; k < 3; ++k) {
-            float cell = (box.lo[k] + box.hi[k] - low[k]) * scale;
-            code |= spread(cell < 2097151.0f ? (uint)cell : 2097151u) << (2 - k);
-        }
-        codes[i] = code;
+        Box box = shape_box(scene_shape(triangles, spheres, triangle_count, i), i >= triangle_count);
+        float3 cell = (twice_centre(box) - low) * scale;
+        uint3 c = convert_uint3(cell < 2097151.0f ? cell : (float3)(2097151.0f));
+        codes[i] = spread(c.x) << 2 | spread(c.y) << 1 | spread(c.z);
         order[i] = i;
+    }
+}
+
+// The scene's primitives `ids`, one after another.
+kernel void gather_shapes(uint count, uint block, SCENE_PARAMETERS, global const uint *ids, global float *shapes) {
+    uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
+    for (uint i = first; i < end; ++i) {
+        uint floats = SPHERES && ids[i] >= triangle_count ? 4 : SHAPE;
+        global const float *shape = scene_shape(triangles, spheres, triangle_count, ids[i]);
+        for (uint k = 0; k < floats; ++k) shapes[SHAPE * i + k] = shape[k];
     }
 }

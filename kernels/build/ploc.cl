@@ -1,179 +1,148 @@
 // A binary tree from the bottom up: parallel locally-ordered clustering (Meister and Bittner 2018, "Parallel
 // Locally-Ordered Clustering for Bounding Volume Hierarchy Construction"; rounds as in Benthin et al. 2022, "PLOC++").
 //
-// Clusters lie in Morton order. In each round every cluster looks RADIUS places to both sides for the one that makes the
-// smallest box with it, and those that chose each other become one. Boxes of clusters are six rows of floats (lo x, y,
-// z, hi x, y, z), `pitch` apart, with RADIUS infinite boxes before the first and after the last.
-#include "build/morton.cl"
-#include "build/sort.cl"
+// Clusters lie in Morton order. In each round every cluster looks RADIUS places to both sides for its nearest, and those
+// that are nearest to each other become one. A cluster is a column of seven rows, `pitch` apart: its box (lo x, y, z, hi
+// x, y, z), and as an integer its node << 4 | the number of its primitives, at most MANY; ~p stands for primitive p.
+// RADIUS columns that are far from everything precede the first cluster and follow the last.
+#include "build/primitives.cl"
 #include "mask.cl"
 
 #define RADIUS 8
-#define FEW 32   // so few clusters are joined by a single work-item
+#define FAR 4e18f
+#define MANY 15
+#define CLUSTER(node, count) ((int)((uint)(node) << 4) | (int)(count))
+#define NODE(cluster) ((cluster) >> 4)
 
-typedef struct { global float *boxes; global int *nodes; uint pitch; } Clusters;
+// How far apart two clusters are: the area of their common box, less what their own areas save. Where both fit into one
+// leaf its price replaces theirs; above, three quarters made the cheapest trees of those that were tried.
+#define SAVED_IN_LEAF 0.9f
+#define SAVED_ABOVE 0.75f
 
-static inline Box cluster_box(const Clusters *clusters, uint i) {
-    Box box;
-    for (int k = 0; k < 3; ++k) {
-        box.lo[k] = clusters->boxes[k * clusters->pitch + RADIUS + i];
-        box.hi[k] = clusters->boxes[(k + 3) * clusters->pitch + RADIUS + i];
-    }
-    return box;
+static inline Box cluster_box(global const float *clusters, uint pitch, uint i) {
+    clusters += RADIUS + i;
+    return (Box){{clusters[0], clusters[pitch], clusters[2 * pitch]},
+                 {clusters[3 * pitch], clusters[4 * pitch], clusters[5 * pitch]}};
 }
 
-static inline void put_cluster(const Clusters *clusters, uint i, Box box, int node) {
-    for (int k = 0; k < 3; ++k) {
-        clusters->boxes[k * clusters->pitch + RADIUS + i] = box.lo[k];
-        clusters->boxes[(k + 3) * clusters->pitch + RADIUS + i] = box.hi[k];
-    }
-    clusters->nodes[i] = node;
+static inline int cluster_node(global const float *clusters, uint pitch, uint i) {
+    return ((global const int *)clusters)[6 * pitch + RADIUS + i];
 }
 
-static inline void put_margin(const Clusters *clusters, uint row) {
-    for (uint i = row; i < row + RADIUS; ++i) {
-        for (int k = 0; k < 3; ++k) {
-            clusters->boxes[k * clusters->pitch + i] = -INFINITY;
-            clusters->boxes[(k + 3) * clusters->pitch + i] = INFINITY;
-        }
-    }
+static inline void put_cluster(global float *clusters, uint pitch, int i, Box box, int node) {
+    clusters += RADIUS + i;
+    clusters[0] = box.lo.x;
+    clusters[pitch] = box.lo.y;
+    clusters[2 * pitch] = box.lo.z;
+    clusters[3 * pitch] = box.hi.x;
+    clusters[4 * pitch] = box.hi.y;
+    clusters[5 * pitch] = box.hi.z;
+    ((global int *)clusters)[6 * pitch] = node;
 }
 
-static inline void join_clusters(global BinaryNode *nodes, global int *parents, uint node, Box box, int left, int right,
-                                 uint interior) {
-    for (int k = 0; k < 3; ++k) {
-        nodes[node].lo[k] = box.lo[k];
-        nodes[node].hi[k] = box.hi[k];
-    }
-    nodes[node].left = left;
-    nodes[node].right = right;
-    parents[left >= 0 ? left : (int)interior + ~left] = node;
-    parents[right >= 0 ? right : (int)interior + ~right] = node;
+static inline void put_margins(global float *clusters, uint pitch, int count) {
+    Box far = {(float3)(FAR), (float3)(FAR)};
+    for (int i = -RADIUS; i < RADIUS; ++i) put_cluster(clusters, pitch, i < 0 ? i : count + i, far, MANY);
 }
 
-kernel void first_clusters(uint count, uint block, PRIMITIVE_PARAMETERS, global const uint *order,
-                           global float *boxes, global int *cluster_nodes, uint pitch) {
+kernel void first_clusters(uint count, uint block, PRIMITIVE_PARAMETERS, global float *clusters, uint pitch) {
     Primitives primitives = PRIMITIVE_ARGUMENTS;
-    Clusters clusters = {boxes, cluster_nodes, pitch};
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
-    if (first == 0) put_margin(&clusters, 0);
-    if (first < count && end == count) put_margin(&clusters, RADIUS + count);
-    for (uint i = first; i < end; ++i) put_cluster(&clusters, i, primitive_box(&primitives, order[i]), ~(int)order[i]);
+    if (first == 0) put_margins(clusters, pitch, count);
+    for (uint i = first; i < end; ++i) put_cluster(clusters, pitch, i, primitive_box(&primitives, i), CLUSTER(~i, 1));
 }
 
-// Half areas of the boxes around `box` and each of the eight clusters in `row`.
-static inline float8 joint_areas(global const float *boxes, uint pitch, uint row, Box box) {
-    float8 size[3];
-    for (int k = 0; k < 3; ++k) {
-        float8 lo = vload8(0, boxes + k * pitch + row), hi = vload8(0, boxes + (k + 3) * pitch + row);
-        size[k] = (hi > box.hi[k] ? hi : (float8)(box.hi[k])) - (lo < box.lo[k] ? lo : (float8)(box.lo[k]));
-    }
-    return fma(size[0], size[1] + size[2], size[1] * size[2]);
+// Distances from a cluster to the eight in columns from `row` on.
+static inline float8 distances(global const float *row, uint pitch, Box box, float area, int size) {
+    float8 lo_x = vload8(0, row), lo_y = vload8(0, row + pitch), lo_z = vload8(0, row + 2 * pitch);
+    float8 hi_x = vload8(0, row + 3 * pitch), hi_y = vload8(0, row + 4 * pitch), hi_z = vload8(0, row + 5 * pitch);
+    int8 sizes = vload8(0, (global const int *)(row + 6 * pitch)) & MANY;
+    float8 x = hi_x - lo_x, y = hi_y - lo_y, z = hi_z - lo_z;
+    float8 areas = fma(x, y + z, y * z) + area;
+    x = (hi_x > box.hi.x ? hi_x : (float8)(box.hi.x)) - (lo_x < box.lo.x ? lo_x : (float8)(box.lo.x));
+    y = (hi_y > box.hi.y ? hi_y : (float8)(box.hi.y)) - (lo_y < box.lo.y ? lo_y : (float8)(box.lo.y));
+    z = (hi_z > box.hi.z ? hi_z : (float8)(box.hi.z)) - (lo_z < box.lo.z ? lo_z : (float8)(box.lo.z));
+    float8 saved = PACK > 1 ? (sizes + size <= LEAF_SIZE ? (float8)(SAVED_IN_LEAF) : (float8)(SAVED_ABOVE)) : SAVED_ABOVE;
+    return fma(-saved, areas, fma(x, y + z, y * z));
 }
 
-// The best partner of each cluster. Of equal ones the first by the exclusive or of both indices: that is an order of all
-// pairs, so the best pair of all chooses itself, and where all are equal neighbours pair up.
-kernel void nearest_clusters(uint count, uint block, global const float *boxes, uint pitch, global uint *nearest) {
+// Where each cluster's nearest is: the difference of their indices. Of equally near ones the first by the exclusive or of
+// both indices: that is an order of all pairs, so the nearest pair of all chooses itself, and where all are equal
+// neighbours pair up.
+kernel void nearest_clusters(uint count, uint block, global const float *clusters, uint pitch, global char *nearest) {
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
-    Clusters clusters = {(global float *)boxes, 0, pitch};
     for (uint i = first; i < end; ++i) {
-        Box box = cluster_box(&clusters, i);
-        float8 before = joint_areas(boxes, pitch, i, box), after = joint_areas(boxes, pitch, i + RADIUS + 1, box);
+        Box box = cluster_box(clusters, pitch, i);
+        float area = half_area(box);
+        int size = cluster_node(clusters, pitch, i) & MANY;
+        float8 before = distances(clusters + i, pitch, box, area, size);
+        float8 after = distances(clusters + i + RADIUS + 1, pitch, box, area, size);
         float8 eight = before < after ? before : after;
         float4 four = eight.lo < eight.hi ? eight.lo : eight.hi;
         float2 two = four.lo < four.hi ? four.lo : four.hi;
         float least = two.x < two.y ? two.x : two.y;
         uint equal = mask_bits(before == least) | mask_bits(after == least) << RADIUS;
-        uint best = 0, smallest = 0xffffffff;
+        uint smallest = 0xffffffff;
         for (; equal; equal &= equal - 1) {
-            uint slot = first_bit(equal), other = i - RADIUS + slot + (slot >= RADIUS);
-            if (other < count && (other ^ i) < smallest) {
-                smallest = other ^ i;
-                best = other;
-            }
+            int slot = first_bit(equal), step = slot - RADIUS + (slot >= RADIUS);
+            uint order = (i + step) ^ i;
+            nearest[i] = order < smallest ? step : nearest[i];
+            smallest = order < smallest ? order : smallest;
         }
-        nearest[i] = best;
     }
 }
 
 // Neighbours by index, whatever their boxes: the rounds that this serves halve the clusters.
-kernel void pair_clusters(uint count, uint block, global uint *nearest) {
+kernel void pair_clusters(uint count, uint block, global char *nearest) {
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
-    for (uint i = first; i < end; ++i) nearest[i] = (i ^ 1) < count ? i ^ 1 : i;
+    for (uint i = first; i < end; ++i) nearest[i] = (i ^ 1) < count ? (int)(i ^ 1) - (int)i : 0;
+}
+
+// The step to the cluster that i is joined with, 0 if it stays alone.
+static inline int partner(global const char *nearest, uint i) {
+    int step = nearest[i];
+    return nearest[i + step] == -step ? step : 0;
 }
 
 // In each block: counts[block] clusters that stay, counts[blocks + block] pairs that are joined.
-kernel void count_pairs(uint count, uint block, global const uint *nearest, global uint *counts) {
+kernel void count_pairs(uint count, uint block, global const char *nearest, global uint *counts) {
     uint me = get_global_id(0), blocks = (count + block - 1) / block;
     if (me >= blocks) return;
     uint first = me * block, end = first + block < count ? first + block : count;
     uint stay = 0, pairs = 0;
     for (uint i = first; i < end; ++i) {
-        uint other = nearest[i];
-        bool mutual = other != i && nearest[other] == i;
-        stay += !(mutual && other < i);
-        pairs += mutual && i < other;
+        int step = partner(nearest, i);
+        stay += step >= 0;
+        pairs += step > 0;
     }
     counts[me] = stay;
     counts[blocks + me] = pairs;
 }
 
 // The clusters of the next round; new nodes are numbered from `node` on.
-kernel void join_pairs(uint count, uint block, global const uint *nearest, global const uint *offsets,
-                       global const uint *totals, global const float *boxes, global const int *cluster_nodes, uint pitch,
-                       global float *next_boxes, global int *next_nodes, global BinaryNode *nodes, global int *parents,
-                       uint node, uint interior) {
+kernel void join_pairs(uint count, uint block, global const char *nearest, global const uint *offsets,
+                       global const uint *totals, global const float *clusters, uint pitch, global float *next,
+                       uint next_pitch, global BinaryNode *nodes, uint node) {
     uint me = get_global_id(0), blocks = (count + block - 1) / block;
     if (me >= blocks) return;
     uint first = me * block, end = first + block < count ? first + block : count;
-    Clusters now = {(global float *)boxes, (global int *)cluster_nodes, pitch}, next = {next_boxes, next_nodes, pitch};
     uint place = offsets[me];
     node += offsets[blocks + me];
-    if (me == 0) {
-        put_margin(&next, 0);
-        put_margin(&next, RADIUS + totals[0]);
-    }
+    if (me == 0) put_margins(next, next_pitch, totals[0]);
     for (uint i = first; i < end; ++i) {
-        uint other = nearest[i];
-        bool mutual = other != i && nearest[other] == i;
-        if (!mutual) put_cluster(&next, place++, cluster_box(&now, i), cluster_nodes[i]);
-        if (mutual && i < other) {
-            Box box = box_union(cluster_box(&now, i), cluster_box(&now, other));
-            join_clusters(nodes, parents, node, box, cluster_nodes[i], cluster_nodes[other], interior);
-            put_cluster(&next, place++, box, (int)node++);
+        int step = partner(nearest, i);
+        if (step < 0) continue;
+        Box box = cluster_box(clusters, pitch, i);
+        int left = cluster_node(clusters, pitch, i);
+        if (step > 0) {
+            int right = cluster_node(clusters, pitch, i + step), size = (left & MANY) + (right & MANY);
+            box = box_union(box, cluster_box(clusters, pitch, i + step));
+            vstore3(box.lo, 0, nodes[node].lo);
+            vstore3(box.hi, 0, nodes[node].hi);
+            nodes[node].left = NODE(left);
+            nodes[node].right = NODE(right);
+            left = CLUSTER(node++, size < MANY ? size : MANY);
         }
+        put_cluster(next, next_pitch, place++, box, left);
     }
-}
-
-// The last FEW clusters, or fewer: the pair with the smallest box of all, again and again.
-kernel void join_few(uint count, uint block, global float *boxes, global int *cluster_nodes, uint pitch,
-                     global BinaryNode *nodes, global int *parents, uint node, uint interior) {
-    if (get_global_id(0) > 0) return;
-    Clusters clusters = {boxes, cluster_nodes, pitch};
-    Box box[FEW];
-    int left[FEW];
-    for (uint i = 0; i < count; ++i) {
-        box[i] = cluster_box(&clusters, i);
-        left[i] = cluster_nodes[i];
-    }
-    for (; count > 1; --count) {
-        uint a = 0, b = 1;
-        float least = INFINITY;
-        for (uint i = 0; i < count; ++i) {
-            for (uint j = i + 1; j < count; ++j) {
-                float area = half_area(box_union(box[i], box[j]));
-                if (area < least) {
-                    least = area;
-                    a = i;
-                    b = j;
-                }
-            }
-        }
-        box[a] = box_union(box[a], box[b]);
-        join_clusters(nodes, parents, node, box[a], left[a], left[b], interior);
-        left[a] = (int)node++;
-        box[b] = box[count - 1];
-        left[b] = left[count - 1];
-    }
-    parents[node - 1] = -1;
 }

@@ -42,16 +42,15 @@ static inline TriangleRay triangle_ray(const TriangleRays *rays, const Ray *ray,
                          LANE(rays->ox, lane), LANE(rays->oy, lane), LANE(rays->oz, lane)};
 }
 
-static inline WideHit intersect_triangles(const TriangleRay *ray, global const Triangles *leaf, float t_max) {
-    wide az = LOAD_WIDE(leaf->p0[ray->kz]) - ray->oz;
-    wide bz = LOAD_WIDE(leaf->p1[ray->kz]) - ray->oz;
-    wide cz = LOAD_WIDE(leaf->p2[ray->kz]) - ray->oz;
-    wide ax = fma((wide)(-ray->sx), az, LOAD_WIDE(leaf->p0[ray->kx]) - ray->ox);
-    wide ay = fma((wide)(-ray->sy), az, LOAD_WIDE(leaf->p0[ray->ky]) - ray->oy);
-    wide bx = fma((wide)(-ray->sx), bz, LOAD_WIDE(leaf->p1[ray->kx]) - ray->ox);
-    wide by = fma((wide)(-ray->sy), bz, LOAD_WIDE(leaf->p1[ray->ky]) - ray->oy);
-    wide cx = fma((wide)(-ray->sx), cz, LOAD_WIDE(leaf->p2[ray->kx]) - ray->ox);
-    wide cy = fma((wide)(-ray->sy), cz, LOAD_WIDE(leaf->p2[ray->ky]) - ray->oy);
+typedef struct { wide sx, sy, sz, ox, oy, oz; } ShearedRay;
+
+// Corners with permuted components, one triangle in each lane against one ray, or one for all lanes against a ray in each.
+static inline WideHit intersect_sheared(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray,
+                                        wide t_max) {
+    wide az = p0[2] - ray->oz, bz = p1[2] - ray->oz, cz = p2[2] - ray->oz;
+    wide ax = fma(-ray->sx, az, p0[0] - ray->ox), ay = fma(-ray->sy, az, p0[1] - ray->oy);
+    wide bx = fma(-ray->sx, bz, p1[0] - ray->ox), by = fma(-ray->sy, bz, p1[1] - ray->oy);
+    wide cx = fma(-ray->sx, cz, p2[0] - ray->ox), cy = fma(-ray->sy, cz, p2[1] - ray->oy);
 
     wide u1 = cx * by, u2 = cy * bx;
     wide v1 = ax * cy, v2 = ay * cx;
@@ -80,8 +79,16 @@ static inline WideHit intersect_triangles(const TriangleRay *ray, global const T
     wide max_e = wide_max3(WIDE_ABS(u), WIDE_ABS(v), WIDE_ABS(w));
     wide delta_x = GAMMA(5) * (max_x + max_z), delta_y = GAMMA(5) * (max_y + max_z);
     wide delta_e = 2.0f * (GAMMA(2) * max_x * max_y + delta_y * max_x + delta_x * max_y);
-    max_z *= fabs(ray->sz);
+    max_z *= WIDE_ABS(ray->sz);
     wide t_min = 3.0f * (GAMMA(3) * max_e * max_z + delta_e * max_z + GAMMA(3) * max_z * max_e) * WIDE_ABS(inverse);
     result.hit = result.hit & ((result.t > t_min) | (beside == 0));
     return result;
+}
+
+static inline WideHit intersect_triangles(const TriangleRay *ray, global const Triangles *leaf, float t_max) {
+    ShearedRay sheared = {ray->sx, ray->sy, ray->sz, ray->ox, ray->oy, ray->oz};
+    wide p0[3] = {LOAD_WIDE(leaf->p0[ray->kx]), LOAD_WIDE(leaf->p0[ray->ky]), LOAD_WIDE(leaf->p0[ray->kz])};
+    wide p1[3] = {LOAD_WIDE(leaf->p1[ray->kx]), LOAD_WIDE(leaf->p1[ray->ky]), LOAD_WIDE(leaf->p1[ray->kz])};
+    wide p2[3] = {LOAD_WIDE(leaf->p2[ray->kx]), LOAD_WIDE(leaf->p2[ray->ky]), LOAD_WIDE(leaf->p2[ray->kz])};
+    return intersect_sheared(p0, p1, p2, &sheared, t_max);
 }

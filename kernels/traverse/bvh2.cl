@@ -2,9 +2,11 @@
 //
 // Both children are tested at their parent; the nearer is entered, the farther waits with its distance on a stack
 // whose size the host computed for this very tree, so that it cannot overflow. count = 0 is an interior node,
-// count > 0 a leaf of triangles, count < 0 of spheres; first is the left child or the leaf's first primitive.
+// count > 0 a leaf of triangles, count < 0 of spheres; first is the left child or the leaf's first primitive, in the
+// upper level of two its instance.
 #include "geometry/box.cl"
 #include "traverse/leaf.cl"
+#include UPPER_LEVEL
 
 static inline float enter_box(const SlabRay *ray, global const Node *node, float t_max) {
     float t_near = 0.0f, t_far = t_max;
@@ -26,7 +28,10 @@ static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int first, i
     }
 #endif
 #if TRIANGLES
-    for (int i = first; i < first + count; ++i) hit_triangles(ray, scene->leaf_triangles + i, stop_at_first, hit);
+    for (int i = first; i < first + count; ++i) {
+        VISIT(tests);
+        hit_triangles(ray, scene->leaf_triangles + i, stop_at_first, hit);
+    }
 #endif
 }
 
@@ -47,6 +52,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     for (;;) {
         int count = scene->nodes[node].count, first = scene->nodes[node].left_first;
         if (count == 0) {
+            VISIT(nodes);
             float left = enter_box(&slabs, scene->nodes + first, hit.t);
             float right = enter_box(&slabs, scene->nodes + first + 1, hit.t);
             bool left_first = left <= right;
@@ -60,12 +66,28 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
                 continue;
             }
         } else {
+#if INSTANCES
+            if (in_world(&leaf)) {
+                waiting[top] = LEAVE;
+                distance[top++] = -INFINITY;
+                node = enter_instance(scene, ray, first, &leaf, &slabs);
+                continue;
+            }
+#endif
             hit_leaf(scene, &leaf, first, count, stop_at_first, &hit);
             if (stop_at_first && hit.primitive >= 0) return hit;
         }
         do {
             if (top == 0) return hit;
             node = waiting[--top];
+#if INSTANCES
+            if (node == LEAVE) {
+                leaf = leaf_ray(&rays->leaves, ray, lane);
+                slabs = slab_ray(&rays->slabs, ray, lane);
+            }
+        } while (distance[top] > hit.t || node == LEAVE);
+#else
         } while (distance[top] > hit.t);
+#endif
     }
 }

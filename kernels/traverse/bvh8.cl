@@ -1,10 +1,10 @@
 // An 8-wide tree for processors with vectors: a ray meets a node's eight boxes, or a pack of eight triangles, at once.
 //
-// The nearest child is entered, the others wait unsorted with their distances; who only asks whether there is a hit needs
-// neither. What will be visited later is fetched early. The host computed the stack's size for this very tree, so that it
-// cannot overflow. A child reference >= 0 is a node, < 0 is ~(first << 4 | sphere << 3 | count − 1), a pack of
-// triangles or `count` spheres; in the upper level of two it is an instance. Empty slots have boxes turned inside out.
-#include "geometry/boxes.cl"
+// The nearest child is entered, the others wait unsorted with their distances. The host computed the stack's size for
+// this very tree, so that it cannot overflow. A child reference >= 0 is a node, < 0 is
+// ~(first << 4 | sphere << 3 | count − 1), a pack of triangles or `count` spheres, and in the upper level of two an
+// instance; empty slots have boxes turned inside out.
+#include "geometry/box.cl"
 #include "traverse/leaf.cl"
 #include UPPER_LEVEL
 
@@ -20,86 +20,51 @@ static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int referenc
     }
 #endif
 #if TRIANGLES
+    VISIT(tests);
     hit_triangles(ray, scene->packs + (leaf >> 4), stop_at_first, hit);
 #endif
 }
 
-static inline void fetch(const Scene *scene, int reference) {
-    global const void *node = scene->nodes + reference;
-#if TRIANGLES
-    node = reference < 0 ? (global const void *)(scene->packs + (~reference >> 4)) : node;
-#endif
-    PREFETCH(node, 5 * 64)
+// Tests the eight boxes of a node; returns the bits of those entered and where.
+static inline uint enter_boxes(const SlabRay *ray, global const Node *node, float t_max, float *entry) {
+    float8 t_near = 0.0f, t_far = t_max;
+    global const float *low = node->lo[0], *high = node->hi[0];
+#define SLAB(axis) { \
+        float8 near = (vload8(axis, ray->backward[axis] ? high : low) - ray->origin[axis]) * ray->near[axis]; \
+        float8 far = (vload8(axis, ray->backward[axis] ? low : high) - ray->origin[axis]) * ray->far[axis]; \
+        t_near = near > t_near ? near : t_near; \
+        t_far = far < t_far ? far : t_far; \
+    }
+    SLAB(0)
+    SLAB(1)
+    SLAB(2)
+    vstore8(t_near, 0, entry);
+    return mask_bits(t_near <= t_far);
 }
 
-typedef struct { LeafRays leaves; BoxRays boxes; } TreeRays;   // of all lanes
-typedef struct { BoxRay boxes; LeafRay leaf; } TreeRay;
+typedef struct { LeafRays leaves; SlabRays slabs; } TreeRays;
 
 static inline TreeRays tree_rays(real3 origin, real3 direction) {
-    return (TreeRays){leaf_rays(origin, direction), box_rays(origin, direction)};
+    return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
 }
 
-static inline TreeRay tree_ray(const TreeRays *rays, const Ray *ray, int lane) {
-    return (TreeRay){box_ray(&rays->boxes, lane), leaf_ray(&rays->leaves, ray, lane)};
-}
-
+__attribute__((always_inline)) static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first) {
+    LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
+    SlabRay slabs = slab_ray(&rays->slabs, ray, lane);
 #if INSTANCES
-static inline bool in_world(const TreeRay *ray) { return ray->leaf.ray.instance == IN_WORLD; }
-
-// The ray in the frame of the instance that a leaf of the upper level stands for, and the root of its tree.
-static inline TreeRay enter_instance(const Scene *scene, const TreeRay *world, int reference, int *root) {
-    int index = ~reference >> 4;
-    Ray ray = object_ray(&world->leaf.ray, scene->instances, index);
-    TreeRays rays = tree_rays(broadcast(ray.origin), broadcast(ray.direction));
-    *root = scene->instances[index].root;
-    return tree_ray(&rays, &ray, 0);
-}
+    const LeafRay world_leaf = leaf;
+    const SlabRay world_slabs = slabs;
 #endif
-
-static inline Hit any_of_all(const Scene *scene, const TreeRay *world) {
-    TreeRay ray = *world;
-    Hit hit = {ray.leaf.ray.t_max, 0.0f, 0.0f, -1};
-    int waiting[STACK_SIZE + 8], top = 1;   // store_lanes may write over eight more
-    waiting[0] = 0;
-    while (top > 0 && hit.primitive < 0) {
-        int reference = waiting[--top];
-#if INSTANCES
-        if (reference == LEAVE) {
-            ray = *world;
-            continue;
-        }
-        if (reference < 0 && in_world(&ray)) {
-            waiting[top++] = LEAVE;
-            ray = enter_instance(scene, world, reference, waiting + top++);
-            continue;
-        }
-#endif
-        if (reference >= 0) {
-            global const Node *node = scene->nodes + reference;
-            float8 entry;
-            uint entered = enter_boxes(&ray.boxes, node->lo[0], hit.t, &entry);
-            store_lanes(vload8(0, node->child), entered, waiting + top);
-            top += popcount(entered);
-        } else {
-            hit_leaf(scene, &ray.leaf, reference, true, &hit);
-        }
-    }
-    return hit;
-}
-
-static inline Hit closest_of_all(const Scene *scene, const TreeRay *world) {
-    TreeRay ray = *world;
-    Hit hit = {ray.leaf.ray.t_max, 0.0f, 0.0f, -1};
+    Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
     int waiting[STACK_SIZE];
     float distance[STACK_SIZE];
     int top = 0, reference = 0;
     for (;;) {
         if (reference >= 0) {
+            VISIT(nodes);
             global const Node *node = scene->nodes + reference;
-            float8 entries;
-            uint entered = enter_boxes(&ray.boxes, node->lo[0], hit.t, &entries);
             float entry[8];
-            vstore8(entries, 0, entry);
+            uint entered = enter_boxes(&slabs, node, hit.t, entry);
             if (entered) {
                 int nearest = first_bit(entered);
                 entered &= entered - 1;
@@ -110,7 +75,6 @@ static inline Hit closest_of_all(const Scene *scene, const TreeRay *world) {
                     int farther = nearer ? nearest : child;
                     nearest = nearer ? child : nearest;
                     waiting[top] = node->child[farther];
-                    fetch(scene, waiting[top]);
                     distance[top++] = entry[farther];
                 }
                 reference = node->child[nearest];
@@ -118,29 +82,31 @@ static inline Hit closest_of_all(const Scene *scene, const TreeRay *world) {
             }
         } else {
 #if INSTANCES
-            if (in_world(&ray)) {
+            if (leaf.ray.instance == IN_WORLD) {
+                Ray object = object_ray(ray, scene->instances, ~reference >> 4);
+                TreeRays object_rays = tree_rays(broadcast(object.origin), broadcast(object.direction));
+                leaf = leaf_ray(&object_rays.leaves, &object, 0);
+                slabs = slab_ray(&object_rays.slabs, &object, 0);
                 waiting[top] = LEAVE;
                 distance[top++] = -INFINITY;
-                ray = enter_instance(scene, world, reference, &reference);
+                reference = scene->instances[object.instance].root;
                 continue;
             }
 #endif
-            hit_leaf(scene, &ray.leaf, reference, false, &hit);
+            hit_leaf(scene, &leaf, reference, stop_at_first, &hit);
+            if (stop_at_first && hit.primitive >= 0) return hit;
         }
-        do {
+        for (;;) {
             if (top == 0) return hit;
             reference = waiting[--top];
 #if INSTANCES
-            if (reference == LEAVE) ray = *world;
-        } while (distance[top] > hit.t || reference == LEAVE);
-#else
-        } while (distance[top] > hit.t);
+            if (reference == LEAVE) {
+                leaf = world_leaf;
+                slabs = world_slabs;
+                continue;
+            }
 #endif
+            if (distance[top] <= hit.t) break;
+        }
     }
-}
-
-__attribute__((always_inline)) static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane,
-                                                          const bool stop_at_first) {
-    TreeRay world = tree_ray(rays, ray, lane);
-    return stop_at_first ? any_of_all(scene, &world) : closest_of_all(scene, &world);
 }

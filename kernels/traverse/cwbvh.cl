@@ -5,6 +5,8 @@
 // Nodes stand in the order in which a ray of this octant passes their slots, so the next one is the highest bit and
 // nothing is sorted. A group is the index of the first and such bits; what is left of a group of nodes waits on a stack,
 // one group a level at most, whose size the host computed for this very tree, so that it cannot overflow.
+// In the upper level of two a node's primitives are instances: they wait as a group, too, and what is left of it,
+// below an instance's tree on the stack, says LEAVE.
 //
 // Watertight as geometry/box.cl is. A plane at p + q·step is seen from the ray at q·step + (p − origin): q·step is exact,
 // and the sum's rounding is within what box.cl keeps in hand. The roundings of p − origin, and of plane − p when the tree
@@ -12,6 +14,7 @@
 // a plane, so that zeros and infinities mean here what they mean there.
 #include "geometry/box.cl"
 #include "traverse/leaf.cl"
+#include UPPER_LEVEL
 
 #define ORIGIN_PAD (4.0f * 5.9604645e-8f)
 
@@ -74,6 +77,7 @@ static inline void hit_primitive(const Scene *scene, const LeafRay *ray, int i, 
     }
 #endif
 #if TRIANGLES
+    VISIT(tests);
     hit_triangles(ray, scene->leaf_triangles + i, stop_at_first, hit);
 #endif
 }
@@ -98,7 +102,15 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
         if (nodes.bits > 0x00ffffff) waiting[top++] = nodes;
         uint slot = (highest - 24) ^ order;
         uint node = nodes.first + popcount(nodes.bits & ((1u << slot) - 1));
+        VISIT(nodes);
         enter_node(&slabs, scene->nodes + node, order, hit.t, &nodes, &primitives);
+#if INSTANCES
+        if (in_world(&leaf) && primitives.bits) {
+            if (nodes.bits > 0x00ffffff) waiting[top++] = nodes;
+            waiting[top++] = primitives;
+            nodes.bits = primitives.bits = 0;
+        }
+#endif
         for (; primitives.bits; primitives.bits &= primitives.bits - 1) {
             hit_primitive(scene, &leaf, primitives.first + first_bit(primitives.bits), stop_at_first, &hit);
             if (stop_at_first && hit.primitive >= 0) return hit;
@@ -107,5 +119,21 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
             if (top == 0) return hit;
             nodes = waiting[--top];
         }
+#if INSTANCES
+        while (nodes.bits <= 0x00ffffff) {   // instances: the first is entered, or all have been seen
+            if (nodes.bits) {
+                int place = nodes.first + first_bit(nodes.bits);
+                nodes.bits &= nodes.bits - 1;
+                waiting[top++] = nodes;
+                nodes = (Group){enter_instance(scene, ray, place, &leaf, &slabs), 0x80000000};
+            } else {
+                leaf = leaf_ray(&rays->leaves, ray, lane);
+                slabs = slab_ray(&rays->slabs, ray, lane);
+                if (top == 0) return hit;
+                nodes = waiting[--top];
+            }
+            order = (slabs.backward[0] ? 0 : 1) | (slabs.backward[1] ? 0 : 2) | (slabs.backward[2] ? 0 : 4);
+        }
+#endif
     }
 }

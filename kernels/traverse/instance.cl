@@ -7,14 +7,16 @@
 #define LEAVE 0x7ffffffe
 #define IN_WORLD -1
 
-static inline Ray object_ray(const Ray *world, global const Instance *instances, int index) {
-    global const Instance *instance = instances + index;
+// With explicit fma there is nothing left to contract: all layouts and devices see the same ray.
+static inline Ray object_ray(const Ray *world, global const Instance *instances, int place) {
+    global const Instance *instance = instances + place;
+    const float *d = world->direction, *o = world->origin;
     Ray ray = *world;
     for (int k = 0; k < 3; ++k) {
         global const float *row = instance->to_object[k];
-        ray.direction[k] = row[0] * world->direction[0] + row[1] * world->direction[1] + row[2] * world->direction[2];
-        ray.origin[k] = row[0] * world->origin[0] + row[1] * world->origin[1] + row[2] * world->origin[2] + row[3];
+        ray.direction[k] = fma(row[0], d[0], fma(row[1], d[1], row[2] * d[2]));
+        ray.origin[k] = fma(row[0], o[0], fma(row[1], o[1], fma(row[2], o[2], row[3])));
     }
-    ray.instance = index;
+    ray.instance = instance->index;
     return ray;
 }

@@ -3,11 +3,17 @@
 // Of several hits at the same t the lowest primitive wins (of the lowest instance), so the answer does not depend on the
 // tree. `stop_at_first` is a constant at every call: with it, the first hit found ends the search.
 #include "geometry/wide.cl"
+#include "traverse/visits.cl"
 #include TRIANGLE_TEST
 #include SPHERE_TEST
 
+// Triangles alone need the ray only in the form of their test.
+#define WHOLE_RAY (SPHERES || NEXT_HIT || INSTANCES)
+
 typedef struct {
+#if WHOLE_RAY
     Ray ray;
+#endif
 #if TRIANGLES
     TriangleRay triangle_ray;
 #endif
@@ -23,7 +29,9 @@ static inline LeafRays leaf_rays(real3 origin, real3 direction) { return 0; }
 
 static inline LeafRay leaf_ray(const LeafRays *rays, const Ray *ray, int lane) {
     LeafRay r;
+#if WHOLE_RAY
     r.ray = *ray;
+#endif
 #if TRIANGLES
     r.triangle_ray = triangle_ray(rays, ray, lane);
 #endif
@@ -35,21 +43,23 @@ static inline bool comes_before(int instance, int primitive, int other_instance,
 }
 
 #if INSTANCES
-#define HIT(ray, t, u, v, primitive) ((Hit){t, u, v, primitive, (ray)->instance})
-#define INSTANCE_OF(item) ((item)->instance)
-#define AFTER_INSTANCE(ray) ((ray)->after_instance)
+#define HIT(ray, t, u, v, primitive) ((Hit){t, u, v, primitive, (ray)->ray.instance})
+#define INSTANCE_OF(hit) ((hit)->instance)
+#define RAYS_INSTANCE(ray) ((ray)->ray.instance)
+#define AFTER_INSTANCE(ray) ((ray)->ray.after_instance)
 #else
 #define HIT(ray, t, u, v, primitive) ((Hit){t, u, v, primitive})
-#define INSTANCE_OF(item) 0
+#define RAYS_INSTANCE(ray) 0
+#define INSTANCE_OF(hit) 0
 #define AFTER_INSTANCE(ray) 0
 #endif
 
-static inline void keep_closest(const Ray *ray, Hit *hit, float t, float u, float v, int primitive) {
+static inline void keep_closest(const LeafRay *ray, Hit *hit, float t, float u, float v, int primitive) {
 #if NEXT_HIT
-    if (t < ray->after_t || (t == ray->after_t && !comes_before(AFTER_INSTANCE(ray), ray->after_primitive,
-                                                               INSTANCE_OF(ray), primitive))) return;
+    if (t < ray->ray.after_t || (t == ray->ray.after_t && !comes_before(AFTER_INSTANCE(ray), ray->ray.after_primitive,
+                                                                       RAYS_INSTANCE(ray), primitive))) return;
 #endif
-    if (t < hit->t || (t == hit->t && comes_before(INSTANCE_OF(ray), primitive, INSTANCE_OF(hit), hit->primitive)))
+    if (t < hit->t || (t == hit->t && comes_before(RAYS_INSTANCE(ray), primitive, INSTANCE_OF(hit), hit->primitive)))
         *hit = HIT(ray, t, u, v, primitive);
 }
 
@@ -58,7 +68,7 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
     WideHit found = intersect_triangles(&ray->triangle_ray, leaf, hit->t);
     if (!WIDE_ANY(found.hit)) return;
 #if WIDTH == 1
-    keep_closest(&ray->ray, hit, found.t, found.u, found.v, leaf->primitive);
+    keep_closest(ray, hit, found.t, found.u, found.v, leaf->primitive);
 #else
     if (stop_at_first) {
         if (WIDE_ANY(found.hit & (found.t < hit->t))) hit->primitive = 0;
@@ -67,7 +77,7 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
     const float *t = (const float *)&found.t, *u = (const float *)&found.u, *v = (const float *)&found.v;
     for (uint inside = mask_bits(found.hit); inside; inside &= inside - 1) {
         int i = first_bit(inside);
-        keep_closest(&ray->ray, hit, t[i], u[i], v[i], leaf->primitive[i]);
+        keep_closest(ray, hit, t[i], u[i], v[i], leaf->primitive[i]);
     }
 #endif
 }
@@ -78,7 +88,7 @@ static inline void hit_spheres(const LeafRay *ray, global const LeafSphere *sphe
     for (int i = 0; i < count; ++i) {
         float t;
         if (intersect_sphere(&ray->ray, spheres + i, hit->t, &t))
-            keep_closest(&ray->ray, hit, t, 0.0f, 0.0f, spheres[i].primitive);
+            keep_closest(ray, hit, t, 0.0f, 0.0f, spheres[i].primitive);
     }
 }
 #endif

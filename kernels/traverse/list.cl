@@ -8,8 +8,10 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     LeafRay leaf = leaf_ray(rays, ray, lane);
     Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
 #if TRIANGLES
-    for (int i = 0; i < scene->counts.triangles && !(stop_at_first && hit.primitive >= 0); ++i)
+    for (int i = 0; i < scene->counts.triangles && !(stop_at_first && hit.primitive >= 0); ++i) {
+        VISIT(tests);
         hit_triangles(&leaf, scene->leaf_triangles + i, stop_at_first, &hit);
+    }
 #endif
 #if SPHERES
     if (!(stop_at_first && hit.primitive >= 0)) hit_spheres(&leaf, scene->leaf_spheres, scene->counts.spheres, &hit);

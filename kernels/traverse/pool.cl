@@ -3,25 +3,45 @@
 // POOL rays take turns, a step each: a node or a leaf, and while the others have theirs, what a ray needs next is fetched.
 // A ray that is done leaves its place to the next one. Steps are without branches where that can be; rays at nodes and
 // rays at leaves are listed apart, so that a step's kind need not be guessed.
+#include "geometry/boxes.cl"
 #include "traverse/bvh8.cl"
 
 #define DONE 0x7fffffff
 
+typedef struct { LeafRays leaves; BoxRays boxes; } FlightRays;   // of all lanes
+typedef struct { BoxRay boxes; LeafRay leaf; } FlightRay;
+
+static inline FlightRays flight_rays(real3 origin, real3 direction) {
+    return (FlightRays){leaf_rays(origin, direction), box_rays(origin, direction)};
+}
+
+static inline FlightRay flight_ray(const FlightRays *rays, const Ray *ray, int lane) {
+    return (FlightRay){box_ray(&rays->boxes, lane), leaf_ray(&rays->leaves, ray, lane)};
+}
+
+static inline void fetch(const Scene *scene, int reference) {
+    global const void *node = scene->nodes + reference;
+#if TRIANGLES
+    node = reference < 0 ? (global const void *)(scene->packs + (~reference >> 4)) : node;
+#endif
+    PREFETCH(node, 5 * 64)
+}
+
 typedef struct {
-    TreeRay ray;
+    FlightRay ray;
     Hit hit;
     int reference, top;
     uint index;     // the host's of the ray, and what its t is multiplied by
     float to_t;
 #if INSTANCES
-    TreeRay world;
+    FlightRay world;
 #endif
     int waiting[1 + STACK_SIZE + 8];   // the first says DONE and is never too far; store_lanes may write over eight more
     float distance[1 + STACK_SIZE + 8];
 } Flight;
 
-static inline void take_off(Flight *f, const TreeRays *rays, const Ray *ray, int lane, uint index, float to_t) {
-    f->ray = tree_ray(rays, ray, lane);
+static inline void take_off(Flight *f, const FlightRays *rays, const Ray *ray, int lane, uint index, float to_t) {
+    f->ray = flight_ray(rays, ray, lane);
 #if INSTANCES
     f->world = f->ray;
 #endif
@@ -51,32 +71,35 @@ static inline int next_waiting(Flight *f, const bool stop_at_first) {
 }
 
 static inline int visit_node(const Scene *scene, Flight *f, const bool stop_at_first) {
+    VISIT(nodes);
     global const Node *node = scene->nodes + f->reference;
     float8 entry;
-    uint entered = enter_boxes(&f->ray.boxes, node->lo[0], f->hit.t, &entry);
+    int8 mask = enter_eight(&f->ray.boxes, node->lo[0], f->hit.t, &entry);
+    uint entered = mask_bits(mask);
     int8 children = vload8(0, node->child);
-    int *waiting = f->waiting + f->top;
+    int top = f->top;
     if (stop_at_first) {
-        store_lanes(children, entered, waiting);
-        f->top += popcount(entered);
+        store_lanes(children, entered, f->waiting + top);
+        f->top = top + (int)popcount(entered);
         return next_waiting(f, true);
     }
-    int nearest = least_lane(entry, entered);
+    int nearest = least_lane(entry, mask);
     uint others = entered & ~(1u << nearest);
-    store_lanes(children, others, waiting);
-    store_lanes(as_int8(entry), others, (int *)(f->distance + f->top));
-    f->top += popcount(others);
+    store_lanes(children, others, f->waiting + top);
+    store_lanes(as_int8(entry), others, (int *)(f->distance + top));
+    f->top = top + (int)popcount(others);
     return entered ? node->child[nearest] : next_waiting(f, false);
 }
 
 static inline int visit_leaf(const Scene *scene, Flight *f, const bool stop_at_first) {
 #if INSTANCES
-    if (in_world(&f->ray)) {
+    if (f->ray.leaf.ray.instance == IN_WORLD) {
+        Ray object = object_ray(&f->world.leaf.ray, scene->instances, ~f->reference >> 4);
+        FlightRays rays = flight_rays(broadcast(object.origin), broadcast(object.direction));
+        f->ray = flight_ray(&rays, &object, 0);
         f->waiting[f->top] = LEAVE;
         f->distance[f->top++] = -INFINITY;
-        int root;
-        f->ray = enter_instance(scene, &f->world, f->reference, &root);
-        return root;
+        return scene->instances[object.instance].root;
     }
 #endif
     hit_leaf(scene, &f->ray.leaf, f->reference, stop_at_first, &f->hit);

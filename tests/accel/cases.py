@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clrt.accel.tree import FloatArray
+from clrt.scene.scaling import unit_for
 
 
 def soup(count: int, size: float = 0.1, seed: int = 0) -> FloatArray:
@@ -65,3 +66,18 @@ NASTY: dict[str, FloatArray] = {
     "offset_1e30": soup(300, 1e-3) * np.float32(1e25) + np.float32(1e30),
     "denormal": soup(500) * np.float32(1e-42),
 }
+
+
+def scaled(triangles: FloatArray) -> FloatArray:
+    """As scenes are packed: brought near 1 by a power of two."""
+    return (triangles * np.float64(unit_for(float(np.abs(triangles).max())))).astype(np.float32)
+
+
+NO_SPHERES = spheres(0)
+#: Triangles and spheres, at least two in all, as a device's builder gets them.
+SCENES: dict[str, tuple[FloatArray, FloatArray]] = {
+    name: (scaled(triangles), NO_SPHERES) for name, triangles in NASTY.items() if len(triangles) > 1}
+SCENES |= {
+    "eight": (soup(8), NO_SPHERES), "nine": (soup(9), NO_SPHERES), "blocks": (soup(20_000, 0.01), spheres(37)),
+    "mixed": (soup(600), spheres(300)), "one_of_each": (soup(1), spheres(1)), "spheres": (soup(0), spheres(700)),
+    "equal_spheres": (soup(0), np.repeat(spheres(3), 50, axis=0))}

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from clrt.accel.builders import BUILDERS, binned_sah
+from clrt.accel.builders import BUILDERS, sah
 from clrt.accel.cwbvh import MAX_LEAF, Records, compress, octant_slots, quantise
 from clrt.accel.layouts import Layout, pack, sphere_boxes
 from clrt.accel.tree import FloatArray
@@ -218,7 +218,7 @@ def test_stack_bound_is_what_a_walk_to_some_node_takes(count: int, seed: int, si
 def test_no_order_of_visits_passes_the_bound(case: str) -> None:
     """Whatever is entered, in any order: by slots from either end, and by chance."""
     corners, rng = NASTY[case], np.random.default_rng(1)
-    tree = compress(binned_sah(corners.min(axis=1), corners.max(axis=1), MAX_LEAF))
+    tree = compress(sah(corners.min(axis=1), corners.max(axis=1), MAX_LEAF))
     orders: list[Callable[[Group], int]] = [min, max, *[lambda group: int(rng.choice(group))] * 8]
     most = [fullest(tree.nodes, choose, enters) for choose in orders
             for enters in (lambda: True, lambda: bool(rng.random() < 0.8))]

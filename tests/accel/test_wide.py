@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clrt.accel.builders import BUILDERS, binned_sah, midpoint
+from clrt.accel.builders import BUILDERS, midpoint, sah
 from clrt.accel.tree import IntArray, Tree, empty_tree, half_area, join
 from clrt.accel.wide import EMPTY, MAX_PRIMITIVES, Wide, collapse, leaf_fields
 from clrt.errors import SceneError
@@ -22,7 +22,7 @@ Children = list[list[int]]  # of every node; a leaf is -1
 
 def mixed_tree(count: int, seed: int = 0) -> Tree:
     triangles, balls = soup(count, seed=seed), spheres(count // 3, seed)
-    return join(binned_sah(triangles.min(axis=1), triangles.max(axis=1), 8, 8),
+    return join(sah(triangles.min(axis=1), triangles.max(axis=1), 8, 8),
                 midpoint(balls[:, :3] - balls[:, 3:], balls[:, :3] + balls[:, 3:]))
 
 
@@ -120,7 +120,7 @@ def test_stack_bounds_are_exact(count: int, seed: int, builder: str, leaf_size: 
 @pytest.mark.parametrize("case", ["exponential", "teapot_in_a_stadium", "long_diagonals", "duplicates"])
 def test_no_order_of_visits_passes_the_bound(case: str) -> None:
     triangles = NASTY[case]
-    wide = collapse(binned_sah(triangles.min(axis=1), triangles.max(axis=1), 8, 8))
+    wide = collapse(sah(triangles.min(axis=1), triangles.max(axis=1), 8, 8))
     children, rng = wide_children(wide), np.random.default_rng(1)
     fullest = 0
     for _ in range(20):

@@ -11,7 +11,8 @@ import pyopencl as cl
 import pytest
 
 import clrt
-from clrt.accel.device_builder import SHAPES, _source
+from clrt.accel import refit
+from clrt.accel.device_builder import SHAPES, program_source
 from clrt.device import cache, program
 from clrt.device.open import Device
 from clrt.device.program import build, compose, files_of
@@ -78,13 +79,17 @@ def test_a_kernel_file_opens_with_what_it_is(name: str) -> None:
 
 
 def test_every_kernel_file_is_used(device: Device) -> None:
-    """By some scene, with some choice, by ray queries, or by the builder."""
+    """By some scene, with some choice, by ray queries, by the builder, or to refit a tree."""
     corners = np.zeros((3, 3), np.float32)
-    pooled = clrt.InstancedRayQuery([(corners, [[0, 1, 2]])], [0], [np.eye(3, 4)], device=device.info.index,
-                                    layout="bvh8")
-    used = set(files_of(pooled.source("closest_hit")))
+    used: set[str] = set()
+    for layout, in_flight in (("bvh8", 16), ("bvh2", 1)):
+        query = clrt.InstancedRayQuery([(corners, [[0, 1, 2]])], [0], [np.eye(3, 4)], device=device.info.index,
+                                       layout=layout)
+        used |= set(files_of(query.source("closest_hit", in_flight)))
+    for layout in refit.RECIPES:
+        used |= set(files_of(refit.program_source(layout)))
     for shape in SHAPES.values():
-        used |= set(files_of(_source(shape, True, True)))
+        used |= set(files_of(program_source(shape, True, True, True)))
     for layout in ("bvh8", "bvh2", "cwbvh", "list"):
         for triangle in ("watertight", "moller_trumbore"):
             choices = Choices(layout=layout, triangle=triangle)

@@ -1,0 +1,78 @@
+"""Primitives brought into the order of a space-filling curve on the device (kernels/build/morton.cl, sort.cl)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pyopencl as cl
+
+from ..device.blocks import Blocks
+from .tree import FloatArray
+
+CODE_BITS, DIGIT_BITS = 63, 8
+#: Cells along the longest extent of the centres, less one.
+CELLS = (1 << CODE_BITS // 3) - 1
+#: Floats of a primitive.
+SHAPE = 9
+
+
+@dataclass(frozen=True, eq=False)
+class Primitives:
+    """Triangles and spheres on the device, neighbours close together.
+
+    shapes: (count, 9) float32, corners, or centre and radius. ids: (count,) uint32, their numbers in the scene, whose
+    triangles come first.
+    """
+
+    shapes: cl.Buffer
+    ids: cl.Buffer
+    triangle_count: int
+    count: int
+
+    @property
+    def arguments(self) -> Sequence[cl.Buffer | int]:
+        """What stands for PRIMITIVE_PARAMETERS."""
+        return self.shapes, self.ids, self.triangle_count
+
+
+def sort_primitives(work: Blocks, triangles: FloatArray, spheres: FloatArray) -> Primitives:
+    """Triangles (m, 3, 3) and spheres (s, 4), float32, along a Morton curve through the centres of their boxes."""
+    count = len(triangles) + len(spheres)
+    scene = work.upload(triangles), work.upload(spheres), len(triangles)
+    low, extent = _centre_bounds(work, scene, count)
+    scale = min(CELLS / extent, float(np.finfo(np.float32).max)) if extent > 0 else 0.0
+    codes, ids = work.empty(np.uint64, count), work.empty(np.uint32, count)
+    work.run("morton_codes", count, *scene, *low.tolist(), scale, codes, ids)
+    codes, ids = radix_sort(work, codes, ids, count)
+    work.free(codes)
+    shapes = work.empty(np.float32, SHAPE * count)
+    work.run("gather_shapes", count, *scene, ids, shapes)
+    work.free(*scene[:2])
+    return Primitives(shapes, ids, len(triangles), count)
+
+
+def radix_sort(work: Blocks, codes: cl.Buffer, values: cl.Buffer, count: int) -> tuple[cl.Buffer, cl.Buffer]:
+    """Codes, uint64 below 2^CODE_BITS, in order, with their values, uint32; stable. Frees the arrays that it takes."""
+    blocks = work.number(count)
+    digits = work.empty(np.uint32, blocks << DIGIT_BITS)
+    other_codes, other_values = work.empty(np.uint64, count), work.empty(np.uint32, count)
+    for shift in range(0, CODE_BITS, DIGIT_BITS):
+        work.run("count_digits", count, codes, shift, digits)
+        work.scan(digits, blocks << DIGIT_BITS)
+        work.run("move_digits", count, codes, values, shift, digits, other_codes, other_values)
+        codes, values, other_codes, other_values = other_codes, other_values, codes, values
+    work.free(other_codes, other_values, digits)
+    return codes, values
+
+
+def _centre_bounds(work: Blocks, scene: tuple[cl.Buffer, cl.Buffer, int], count: int) -> tuple[FloatArray, float]:
+    """Twice the lowest centre (3,) float32, and twice the largest extent of the centres."""
+    blocks = work.number(count)
+    partial = work.empty(np.float32, 6 * blocks)
+    work.run("centre_bounds", count, *scene, partial)
+    bounds = work.download(partial, np.float32, 6 * blocks).reshape(-1, 6)
+    work.free(partial)
+    low, high = bounds[:, :3].min(axis=0), bounds[:, 3:].max(axis=0)
+    return low, float((high - low).max())

@@ -1,0 +1,68 @@
+"""Trees whose vertices move: new boxes from the leaves up, in a tree that stays as it is (kernels/build/refit.cl)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..device.arrays import empty_array, on_device
+from ..device.blocks import Blocks
+from ..device.open import Device
+from ..device.preamble import defines, typedefs
+from ..device.program import compose
+from .layouts import BVH2_NODE, BVH8_NODE, LEAF_TRIANGLE, TRIANGLE_PACK, Layout
+from .tree import FloatArray, IntArray
+from .wide import EMPTY
+
+
+class Recipe(NamedTuple):
+    """How a layout is refitted. file: refits a level; node, leaf: its records; leaves: the buffer of leaves.
+
+    gap: unused nodes between the root and the level below it.
+    """
+
+    file: str
+    node: np.dtype[np.void]
+    leaf: np.dtype[np.void]
+    leaves: str
+    gap: int
+
+
+RECIPES = {"bvh8": Recipe("build/refit_bvh8.cl", BVH8_NODE, TRIANGLE_PACK, "packs", 0),
+           "bvh2": Recipe("build/refit_bvh2.cl", BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", 1)}
+
+
+def can_refit(tree: Layout) -> bool:
+    """Whether there is a way: a layout of RECIPES, its nodes level by level, and triangles in it, no spheres."""
+    return (tree.name in RECIPES and bool(tree.level_sizes) and RECIPES[tree.name].leaves in tree.buffers
+            and "leaf_spheres" not in tree.buffers)
+
+
+class Refitter:
+    """Refits one tree, whose buffers are on the device, over faces (m, 3) int32 and n vertices."""
+
+    def __init__(self, device: Device, tree: Layout, faces: IntArray, vertices: int) -> None:
+        self._device, self._recipe = device, RECIPES[tree.name]
+        self._work = Blocks(device, program_source(tree.name))
+        self._levels = tree.level_sizes
+        self._faces, self._vertices = on_device(device, faces), empty_array(device, np.float32, 3 * vertices)
+        self._tree = [tree.buffers[name].buffer for name in ("nodes", self._recipe.leaves)]
+
+    def refit(self, vertices: FloatArray) -> None:
+        """Writes new boxes and corners into the tree's buffers. vertices: (n, 3), finite, in the tree's unit."""
+        self._vertices.write(self._device, vertices.reshape(-1))
+        end = sum(self._levels)
+        for level in reversed(range(len(self._levels))):
+            first = end - self._levels[level]
+            self._work.run("refit_level", self._levels[level], first + self._recipe.gap * (level > 0),
+                           self._vertices.buffer, self._faces, *self._tree)
+            end = first
+
+
+def program_source(layout: str) -> str:
+    """The program that refits trees of a layout."""
+    recipe = RECIPES[layout]
+    preamble = [defines({"EMPTY": EMPTY, "TRIANGLES": 1, "SPHERES": 0}),
+                typedefs({"Node": recipe.node, "Triangles": recipe.leaf})]
+    return compose("\n".join(preamble), recipe.file, {})

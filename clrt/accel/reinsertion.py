@@ -1,0 +1,85 @@
+"""Better binary trees on the device: subtrees are put in where they belong (kernels/build/reinsert.cl, levels.cl)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyopencl as cl
+
+from ..device.blocks import Blocks
+from ..device.records import record
+from .morton import Primitives
+from .ploc import BINARY_NODE, BinaryTree
+
+MOVE = record(moved="i4", target="i4", pivot="i4", gain="f4")
+#: Of so many nodes from the root down the children are tried at other places: one of ten.
+TOPMOST = 10
+#: How often moves that others kept from being made compete again.
+ROUNDS = 3
+STEPS = 5
+#: Trees that are less deep may become so deep.
+DEEP = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Leveled:
+    """A tree in the order of its levels, root last, with the parents of all nodes and then all primitives.
+
+    parents: (nodes + primitives,) uint32. levels: (nodes,) uint32, depth | height << 16.
+    """
+
+    tree: BinaryTree
+    parents: cl.Buffer
+    levels: cl.Buffer
+
+
+def reinsert(work: Blocks, primitives: Primitives, tree: BinaryTree, passes: int) -> BinaryTree:
+    """The tree after some passes, in each of which subtrees are moved to where the sum of areas falls. Frees `tree`.
+
+    A pass never raises the sum. Leaves come to lie at most 1.5 times as deep as they did, or as DEEP.
+    """
+    leveled = _level(work, primitives, tree)
+    deepest = max(DEEP, len(leveled.tree.rounds))
+    for _ in range(passes):
+        _move(work, primitives, leveled, deepest)
+        work.free(leveled.parents, leveled.levels)
+        leveled = _level(work, primitives, leveled.tree)
+    work.free(leveled.parents, leveled.levels)
+    return leveled.tree
+
+
+def _level(work: Blocks, primitives: Primitives, tree: BinaryTree) -> Leveled:
+    """A tree whose boxes and whose order may be wrong, but whose root is its last node; it is freed."""
+    root, listed = tree.count - 1, work.empty(np.uint32, tree.count)
+    nodes, levels = work.empty(BINARY_NODE, tree.count), work.empty(np.uint32, tree.count)
+    parents = work.empty(np.uint32, tree.count + primitives.count)
+    sizes: list[int] = []
+    below = 1
+    while below:
+        counts = work.empty(np.uint32, work.number(below))
+        work.run("count_below", below, tree.nodes, root, listed, sum(sizes), counts)
+        inner = int(work.scan(counts, work.number(below))[0])
+        work.run("write_binary_level", below, tree.nodes, root, listed, sum(sizes), len(sizes), counts, nodes, parents,
+                 levels)
+        work.free(counts)
+        sizes.append(below)
+        below = inner
+    work.free(tree.nodes, listed)
+    sizes.reverse()
+    for first, count in zip(np.cumsum([0, *sizes]), sizes):
+        work.run("refit_nodes", count, *primitives.arguments, nodes, int(first), levels)
+    return Leveled(BinaryTree(nodes, sizes), parents, levels)
+
+
+def _move(work: Blocks, primitives: Primitives, leveled: Leveled, deepest: int) -> None:
+    """Finds moves and makes those that win over others; the boxes are then wrong."""
+    tree = leveled.tree
+    places, count = tree.count + primitives.count, 2 * -(-tree.count // TOPMOST)
+    arguments = tree.nodes, leveled.parents, leveled.levels, tree.count - 1
+    moves, gains, owners = work.empty(MOVE, count), work.zeros(np.uint32, places), work.zeros(np.uint32, places)
+    work.run("find_moves", count, *primitives.arguments, *arguments, deepest, moves)
+    for step in range(ROUNDS * STEPS):
+        work.run("match_moves", count, *arguments, step % STEPS, moves, gains, owners)
+    work.run("make_moves", count, *arguments, moves)
+    work.free(moves, gains, owners)

@@ -1,0 +1,90 @@
+"""The upper level of two: a tree over boxes whose leaves are instances, in each layout that has one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from .builders import BUILDERS
+from .cwbvh import CWBVH_NODE, compress
+from .layouts import (BVH2_NODE, BVH8_NODE, LANES, LEAF_TRIANGLE, TRIANGLE_PACK, Layout, Records, bvh2_nodes,
+                      wide_nodes)
+from .tree import FloatArray, IntArray, Tree
+from .wide import EMPTY, collapse
+
+
+class Form(NamedTuple):
+    """What two levels ask of a layout.
+
+    node, leaf: its records. leaves: the buffer of leaves. room: the most nodes of a tree over so many instances.
+    pack: the tree whose leaves hold an instance each, and which instance a leaf's number stands for, (k,).
+    shift: adds to all references to nodes and to leaf records, in place.
+    """
+
+    node: np.dtype[np.void]
+    leaf: np.dtype[np.void]
+    leaves: str
+    room: Callable[[int], int]
+    pack: Callable[[Tree], tuple[Layout, IntArray]]
+    shift: Callable[[Records, int, int], None]
+
+
+def upper_level(form: Form, aabb_min: FloatArray, aabb_max: FloatArray) -> tuple[Layout, IntArray]:
+    """The tree over k instances' boxes (k, 3), with the buffer `nodes` alone, and its order as in Form.pack."""
+    tree = BUILDERS["sah"](aabb_min, aabb_max, 1, 1)
+    leaves = tree.left_first.copy()
+    leaves[tree.leaf] = tree.order[leaves[tree.leaf]]
+    return form.pack(replace(tree, left_first=leaves, order=np.arange(len(tree.order), dtype=np.int32)))
+
+
+def _bvh2(tree: Tree) -> tuple[Layout, IntArray]:
+    layout = Layout("bvh2", {"nodes": bvh2_nodes(tree)}, tree.stack_bound, len(tree.count), tree.depth, tree.sah_cost())
+    return layout, tree.order
+
+
+def _bvh8(tree: Tree) -> tuple[Layout, IntArray]:
+    wide = collapse(tree, LANES)
+    layout = Layout("bvh8", {"nodes": wide_nodes(wide, wide.child)}, wide.stack_bound, len(wide.child), wide.depth,
+                    wide.sah_cost())
+    return layout, wide.order
+
+
+def _cwbvh(tree: Tree) -> tuple[Layout, IntArray]:
+    packed = compress(tree)
+    # One more on the stack: while a node's instances are visited, all nodes below it wait.
+    layout = Layout("cwbvh", {"nodes": packed.nodes}, packed.stack + 1, len(packed.nodes), packed.wide.depth,
+                    packed.wide.sah_cost())
+    return layout, packed.order
+
+
+def _shift_bvh2(nodes: Records, first_node: int, first_leaf: int) -> None:
+    nodes["left_first"] += np.where(nodes["count"] == 0, np.int32(first_node), np.int32(first_leaf))
+
+
+def _shift_bvh8(nodes: Records, first_node: int, first_leaf: int) -> None:
+    child = nodes["child"]
+    leaf, interior = child < 0, (child >= 0) & (child != EMPTY)
+    child[leaf] -= np.int32(first_leaf << 4)
+    child[interior] += np.int32(first_node)
+
+
+def _shift_cwbvh(nodes: Records, first_node: int, first_leaf: int) -> None:
+    nodes["child"] += np.uint32(first_node)
+    nodes["primitive"] += np.uint32(first_leaf)
+
+
+def _wide_room(instances: int) -> int:
+    return max(1, instances - 1)  # the root, and nodes of at least two children
+
+
+def _binary_room(instances: int) -> int:
+    return max(2, 2 * instances)  # with the unused node 1; even, so that siblings below stay side by side
+
+
+#: By layout.
+FORMS = {"bvh2": Form(BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", _binary_room, _bvh2, _shift_bvh2),
+         "bvh8": Form(BVH8_NODE, TRIANGLE_PACK, "packs", _wide_room, _bvh8, _shift_bvh8),
+         "cwbvh": Form(CWBVH_NODE, LEAF_TRIANGLE, "leaf_triangles", _wide_room, _cwbvh, _shift_cwbvh)}

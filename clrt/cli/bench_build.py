@@ -1,0 +1,73 @@
+"""`clrt bench build`: trees by the number of triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .tables import race_table
+
+
+@click.command("build")
+@click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE", help="A model file; default: a bumpy ball.")
+@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--quick", is_flag=True, help="Up to 16 thousand triangles instead of 10 million.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+def build_command(mesh: Path | None, device: str | None, quick: bool, json_file: Path | None) -> None:
+    """Trees over 10 thousand to 10 million triangles: the mesh in a closed room, simplified or subdivided.
+
+    What builders take and what their trees cost a ray (Embree beside them, where pip's embreex is installed); then rays
+    a second by size, with the line a + b·log2(triangles) that fits the time of a ray; then what a new process takes
+    from arrays to first answers.
+    """
+    from ..output.files import check_target
+    from ..output.report import write_report
+    from ..study.build import measure_build
+    from ..study.rays import load_triangles
+    from ..study.workloads import bumpy_ball
+
+    if json_file is not None:
+        check_target(json_file)
+    figures: dict[str, Any] = {"mesh": mesh, "sizes": []}
+    lines = {"size": _builder_lines, "rays": _ray_lines, "fresh": _fresh_lines}
+    for part, result in measure_build(*(load_triangles(mesh) if mesh else bumpy_ball()), quick=quick, device=device):
+        click.echo("\n".join(lines[part](result)) + "\n")
+        figures |= {"sizes": figures["sizes"] + [result]} if part == "size" else {part: result}
+    if json_file is not None:
+        write_report(json_file, figures)
+        click.echo(str(json_file))
+
+
+def _builder_lines(result: Mapping[str, Any]) -> list[str]:
+    lines = [f"{result['triangles']} triangles; {result['device']}, {result['platform']}",
+             f"  {result['layout'] + ' of':12}" + "".join(f"{title:>12}" for title, _, _ in BUILDER_COLUMNS)]
+    for name, row in result["builders"].items():
+        lines.append(f"  {name:12}" + "".join(
+            f"{row[key]:{form}}" if row.get(key) is not None else " " * 12 for _, key, form in BUILDER_COLUMNS))
+    return lines
+
+
+BUILDER_COLUMNS = [("seconds", "seconds", "12.4f"), ("first call", "first_seconds", "12.4f"),
+                   ("Mtri/s", "mtriangles", "12.3f"), ("B/triangle", "bytes_per_triangle", "12.1f"),
+                   ("peak B/tri", "peak_bytes_per_triangle", "12.1f"), ("SAH cost", "sah_cost", "12.2f"),
+                   ("to sah's", "cost_ratio", "12.3f"), ("depth", "depth", "12"), ("stack", "stack", "12")]
+
+
+def _ray_lines(result: Mapping[str, Any]) -> list[str]:
+    lines = race_table("triangles", result["kinds"], result["device_type"] == "cpu", agrees=False)
+    lines.append("  seconds of a ray = a + b·log2(triangles)")
+    return lines + [f"  {kind:12} a = {1e9 * fit['a']:8.1f} ns, b = {1e9 * fit['b']:6.2f} ns, R² = {fit['r2']:.3f}"
+                    for kind, fit in result["fits"].items()]
+
+
+def _fresh_lines(result: Mapping[str, Any]) -> list[str]:
+    lines = [f"  {'a new process':24}{'tree, s':>10}{'from arrays':>13}{'first call':>12}{'peak, MB':>10}"]
+    names = {"compiled": "kernels compiled", "cached": "kernels cached", "largest": "the largest mesh"}
+    for name, row in result.items():
+        peak = f"{row['peak_bytes'] / 1e6:10.0f}" if row["peak_bytes"] else f"{'?':>10}"
+        lines.append(f"  {names[name]:24}{row['tree_seconds']:10.3f}{row['build_seconds']:13.3f}"
+                     f"{row['answer_seconds']:12.3f}{peak}")
+    return lines

@@ -1,0 +1,56 @@
+"""`clrt bench hits`: how many answers differ between trees, builders and devices, and from float64."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+@click.command("hits")
+@click.option("--device", metavar="SEL", help="See `clrt devices`; default: all of them.")
+@click.option("--quick", is_flag=True, help="Smaller meshes and fewer rays.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+def hits_command(device: str | None, quick: bool, json_file: Path | None) -> None:
+    """The same rays through every tree, builder and device: how many answers are not the same bits.
+
+    A million rays a mesh: random ones, and ones aimed at vertices, at edges and along the axes. Then how many of the
+    answers are wrong by float64.
+    """
+    from ..device.discover import devices
+    from ..output.files import check_target
+    from ..output.report import write_report
+    from ..study.hits import measure_hits
+
+    if json_file is not None:
+        check_target(json_file)
+    found, results = devices(), []
+    for each in found:
+        click.echo(f"device {each['index']}: {each['name']} ({each['platform']}, {each['driver']})")
+    for result in measure_hits(quick=quick, device=device):
+        click.echo("\n" + "\n".join(_lines(result)))
+        results.append(result)
+    if json_file is not None:
+        write_report(json_file, {"devices": found, "meshes": results})
+        click.echo(str(json_file))
+
+
+def _lines(result: Mapping[str, Any]) -> list[str]:
+    """A line for each way: of how many rays each kind differs from the first line."""
+    title = f"  {'device layout builder      in flight':40}{'rays':>9}"
+    lines = [f"{result['mesh']}: {result['triangles']} triangles, {result['rays']} rays",
+             title + "".join(f"{kind:>10}" for kind in result["kinds"])]
+    for way in result["ways"]:
+        line = f"  {way['device']:<6} {way['layout']:6} {way['builder']:12} {way['in_flight']:9}    "
+        lines.append(line + (way["error"] if "error" in way else f"{way['rays']:9}" + "".join(
+            f"{count:10}" for count in way["differ"].values())))
+    if "exact" in result:
+        exact = result["exact"]
+        lines.append(f"  by float64: {exact['wrong']} of {exact['rays']} wrong, {exact['decided']} of them with one "
+                     "possible triangle")
+        if result["escaped"] is not None:
+            lines.append(f"  rays from the inside that hit nothing: {result['escaped']}")
+        lines.append(f"  hits on triangles without an area: {result['flat']}")
+    return lines

@@ -1,0 +1,73 @@
+"""`clrt bench rays`: rays a second through one mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+@click.command("rays")
+@click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE", help="A model file; default: a bumpy ball.")
+@click.option("--rays", type=click.Path(path_type=Path), metavar="FILE.npz",
+              help="origins (n, 3), directions (n, 3), t_max (n,); default: four kinds, in a closed room.")
+@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "list"]),
+              help="Tree layout; default: all of them or, with --rays, the device's.")
+@click.option("--triangle", type=click.Choice(["watertight", "moller_trumbore"]), default="watertight",
+              show_default=True, help="Triangle test.")
+@click.option("--builder", type=click.Choice(["ploc", "sah", "midpoint"]), help="Tree builder.")
+@click.option("--quick", is_flag=True, help="Fewer rays, and a smaller ball.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+def rays_command(mesh: Path | None, rays: Path | None, quick: bool, json_file: Path | None, **options: Any) -> None:
+    """Rays a second through a mesh, in kernels alone and in whole calls from Python.
+
+    With --rays, those of the file: for their closest hits and for any hit. Without, from a camera, on from their hits
+    and to two lights, by every tree layout in turns: Mrays/s of kernels; how many times as fast the first line is, by
+    the clock and by processor time; Mrays/s of whole calls; nodes and leaf tests (of a triangle or a pack of eight) a
+    ray; how many answers are not the same bits.
+    """
+    from ..output.files import check_target
+    from ..output.report import write_report
+    from ..study.layouts import measure_layouts
+    from ..study.rays import load_rays, load_triangles, measure_rays
+    from ..study.workloads import bumpy_ball
+
+    if rays is not None and mesh is None:
+        raise click.UsageError("--rays needs the mesh that they are for: add --mesh FILE")
+    if json_file is not None:
+        check_target(json_file)
+    triangles = load_triangles(mesh) if mesh else bumpy_ball(5 if quick else 7)
+    if rays is not None:
+        result = measure_rays(*triangles, load_rays(rays), repeats=3 if quick else 7, **options)
+        lines = [f"{name:20} {value:.6g}" if isinstance(value, float) else f"{name:20} {value}"
+                 for name, value in result.items()]
+    else:
+        result = measure_layouts(*triangles, quick=quick, **options)
+        lines = _lines(result)
+    click.echo("\n".join(lines))
+    if json_file is not None:
+        write_report(json_file, result)
+        click.echo(str(json_file))
+
+
+def _lines(result: Mapping[str, Any]) -> list[str]:
+    trees, kinds = result["trees"], result["kinds"]
+    lines = [f"{result['triangles']} triangles in a closed room; {result['device']}, {result['platform']}",
+             f"  {'tree':24}{'builder':>12}{'seconds':>10}{'B/triangle':>12}{'SAH cost':>10}{'depth':>7}{'stack':>7}"]
+    lines += [f"  {name:24}{tree['builder']:>12}{tree['tree_seconds']:10.3f}{tree['bytes_per_triangle']:12.1f}"
+              f"{tree['sah_cost']:10.2f}{tree['depth']:7}{tree['stack']:7}" for name, tree in trees.items()]
+    for kind, rows in kinds.items():
+        hits = next(iter(rows.values()))["hits"]
+        lines.append(f"  {f'{kind}: {hits:.0%} hit':24}" + "".join(f"{title:>12}" for title, _, _ in COLUMNS))
+        lines += [f"  {name:24}" + "".join(f"{row[key]:{form}}" for _, key, form in COLUMNS)
+                  for name, row in rows.items()]
+    return lines
+
+
+#: `slower`: how many times as fast the first line is, by the clock and by processor time.
+COLUMNS = [("rays", "rays", "12"), ("Mrays/s", "mrays", "12.3g"), ("slower", "ratio", "12.2f"),
+           ("in CPU time", "cpu_ratio", "12.2f"), ("calls", "mrays_call", "12.3g"), ("nodes", "nodes", "12.2f"),
+           ("leaf tests", "tests", "12.2f"), ("differ", "differ", "12")]

@@ -1,0 +1,144 @@
+"""Building trees: seconds, quality and memory by the number of triangles, and what the trees are worth to rays."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from ..accel.build import build_tree
+from ..accel.builders import BUILDERS
+from ..accel.kernels import BUILDER_NAMES
+from ..accel.layouts import Layout
+from ..device.open import Device, open_device
+from ..errors import UsageError
+from ..query import RayQuery
+from ..scene.scaling import unit_for
+from .embree import EmbreeScene
+from .fit import fit_logarithm
+from .fresh import measure_fresh
+from .race import Contestant, race
+from .rays import Floats, Run
+from .resize import resized
+from .workloads import Faces, Mesh, Workload, closed_room, workloads
+
+#: Numbers of triangles, two to a decade.
+SIZES, QUICK_SIZES = [round(10 ** (k / 2)) for k in range(8, 15)], [1_000, 4_000, 16_000]
+#: Most triangles for builders in numpy, which take some 15 s for a million.
+MOST_IN_NUMPY = 1_100_000
+REFERENCE, EMBREE = "sah", "embree"
+#: After a first call each builds so often or, where that would last longer, for so many seconds.
+ROUNDS, SECONDS = 5, 15.0
+KINDS = ("primary", "bounce", "shadow")
+RAYS, QUICK_RAYS = (512, 512), (64, 64)
+
+
+def measure_build(vertices: Floats, faces: Faces, *, quick: bool = False,
+                  device: str | int | None = None) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The figures of `clrt bench build`, part by part, for the mesh in a closed room. vertices: (n, 3); faces: (m, 3).
+
+    size: see `measure_builders`, for each number of triangles; rays: see `measure_growth`; fresh: `measure_fresh`, by
+    the first builder that makes the largest size, of the smallest one, with an empty cache of programs (`compiled`) and
+    once more (`cached`), and of the `largest`.
+    """
+    opened = open_device(device)
+    queries: dict[int, RayQuery] = {}
+    kinds: dict[int, list[Workload]] = {}
+    smallest = None
+    for size in QUICK_SIZES if quick else SIZES:
+        scene = closed_room(*resized(vertices, faces, size))
+        built = measure_builders(scene, opened)
+        yield "size", built
+        query = RayQuery(*scene, device=device)
+        rays = workloads(*scene, vertices, query.closest_hit, QUICK_RAYS if quick else RAYS)
+        queries[len(scene[1])], kinds[len(scene[1])] = query, [kind for kind in rays if kind.name in KINDS]
+        largest = scene, kinds[len(scene[1])][0].rays
+        smallest = smallest or largest
+    yield "rays", measure_growth(queries, kinds)
+    del query
+    queries.clear()
+    options = {"device": device, "builder": next(iter(built["builders"]))}
+    with TemporaryDirectory() as cache:
+        fresh = {name: measure_fresh(*(smallest or largest), Path(cache), **options) for name in ("compiled", "cached")}
+    yield "fresh", fresh | {"largest": measure_fresh(*largest, **options)}
+
+
+def measure_builders(scene: Mesh, device: Device) -> dict[str, Any]:
+    """Of one mesh `builders`: those that make the device's layout, and Embree where it is installed.
+
+    seconds (median), first_seconds (of the first call, with all that it prepares), mtriangles (a second),
+    bytes_per_triangle (that stay); not of Embree: peak_bytes_per_triangle (that a builder on the device has there at a
+    time), sah_cost, cost_ratio (to REFERENCE's), nodes, depth, stack.
+    """
+    triangles = scene[0][scene[1]]
+    triangles *= np.float32(unit_for(float(np.abs(triangles).max())))
+    figures, builds = {}, {}
+    for name, build in _builds(scene, triangles, device).items():
+        start = time.perf_counter()
+        try:
+            seconds, facts = build()
+        except UsageError:
+            continue    # not every builder makes every layout, and Embree may be missing
+        builds[name] = build
+        figures[name] = {"seconds": seconds, "first_seconds": time.perf_counter() - start, **facts}
+    for name, seconds in _in_turns(builds).items():
+        figures[name] |= {"seconds": seconds, "mtriangles": 1e-6 * len(triangles) / seconds}
+        if REFERENCE in figures and name != EMBREE:
+            figures[name]["cost_ratio"] = figures[name]["sah_cost"] / figures[REFERENCE]["sah_cost"]
+    return {"device": device.info.name, "platform": device.info.platform, "triangles": len(triangles),
+            "layout": device.layout, "builders": figures}
+
+
+Build = Callable[[], tuple[float, dict[str, Any]]]
+
+
+def _builds(scene: Mesh, triangles: Floats, device: Device) -> dict[str, Build]:
+    """Each builds a tree once: its seconds, and what else there is to say of it."""
+    def ours(name: str) -> tuple[float, dict[str, Any]]:
+        tree = build_tree(device, device.layout, name, triangles)
+        return tree.build_seconds, _facts(tree, len(triangles))
+
+    def embree() -> tuple[float, dict[str, Any]]:
+        tree = EmbreeScene(*scene)
+        tree.close()
+        return tree.build_seconds, {"bytes_per_triangle": tree.bytes / len(triangles)}
+
+    names = [name for name in BUILDER_NAMES if name not in BUILDERS or len(triangles) <= MOST_IN_NUMPY]
+    return {**{name: partial(ours, name) for name in names}, EMBREE: embree}
+
+
+def _facts(tree: Layout, count: int) -> dict[str, Any]:
+    return {"sah_cost": tree.sah_cost, "nodes": tree.nodes, "depth": tree.depth, "stack": tree.stack,
+            "bytes_per_triangle": tree.bytes / count, "peak_bytes_per_triangle": tree.peak_bytes / count or None}
+
+
+def _in_turns(builds: dict[str, Build]) -> dict[str, float]:
+    """Median seconds of each."""
+    taken: dict[str, list[float]] = {name: [] for name in builds}
+    for _ in range(ROUNDS):
+        for name, build in builds.items():
+            if sum(taken[name]) < SECONDS:
+                taken[name].append(build()[0])
+    return {name: median(seconds) for name, seconds in taken.items()}
+
+
+def measure_growth(queries: dict[int, RayQuery], kinds: dict[int, list[Workload]]) -> dict[str, Any]:
+    """Rays through trees of different sizes, in turns. queries, kinds: by the number of triangles.
+
+    kinds: for each kind of rays what `race` returns for each number; fits: for each kind `fit_logarithm` of the seconds
+    that a ray takes.
+    """
+    races, fits = {}, {}
+    for each in zip(*kinds.values()):
+        runs = {size: Run(query, query.any_hit if kind.any_hit else query.closest_hit, kind.rays)
+                for (size, query), kind in zip(queries.items(), each)}
+        name = each[0].name
+        races[name] = race({str(size): Contestant(run, len(run.answers)) for size, run in runs.items()}, ROUNDS)
+        fits[name] = fit_logarithm(list(queries), [1e-6 / row["mrays"] for row in races[name].values()])
+    return {"device_type": next(iter(queries.values())).device.info.type, "kinds": races, "fits": fits}

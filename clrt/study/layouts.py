@@ -1,0 +1,75 @@
+"""Tree layouts side by side: the same rays through the same triangles, in turns; the answers must be the same bits."""
+
+from __future__ import annotations
+
+import time
+from statistics import median
+from typing import Any
+
+import numpy as np
+
+from ..query import IN_FLIGHT, RayQuery
+from .race import Contestant, race
+from .rays import Floats, Run, differing, every
+from .visits import visits_a_ray
+from .workloads import Faces, Workload, closed_room, workloads
+
+#: Layout and rays in flight.
+CONTESTANTS: dict[str, tuple[str, int | None]] = {
+    f"bvh8, {IN_FLIGHT} in flight": ("bvh8", IN_FLIGHT), "bvh8, 1 in flight": ("bvh8", 1), "bvh2": ("bvh2", None),
+    "cwbvh": ("cwbvh", None), "list": ("list", None)}
+SIZE, QUICK_SIZE = (800, 800), (128, 128)
+#: Rays times triangles for a list, which gets as many of all rays, evenly.
+LIST_TESTS = 1 << 24
+COUNTED = 16
+ROUNDS, QUICK_ROUNDS = 7, 3
+
+
+def measure_layouts(vertices: Floats, faces: Faces, *, layout: str | None = None, builder: str | None = None,
+                    quick: bool = False, **options: Any) -> dict[str, Any]:
+    """The figures of `clrt bench rays` without rays from a file: the mesh in a closed room, see `workloads`.
+
+    vertices: (n, 3); faces: (m, 3); layout: this one alone; builder: for layouts other than lists; options: see
+    RayQuery. trees: of each contestant; kinds: for each kind of rays what `race` returns of each contestant, and
+    mrays_call: whole calls from Python; hits: the part of its rays that hit; differ: for how many of its rays the
+    answer is not bit by bit the first contestant's; nodes, tests: see `visits_a_ray`, of every COUNTED-th ray.
+    """
+    scene = closed_room(vertices, faces)
+    chosen = CONTESTANTS if layout is None else {layout: (layout, None)}
+    trees, queries = {}, {}
+    for name, (each, in_flight) in chosen.items():
+        start = time.perf_counter()
+        queries[name] = RayQuery(*scene, layout=each, builder=None if each == "list" else builder, in_flight=in_flight,
+                                 **options)
+        trees[name] = _tree(queries[name], time.perf_counter() - start, len(scene[1]))
+    first = next(iter(queries.values()))
+    kinds = workloads(*scene, vertices, first.closest_hit, QUICK_SIZE if quick else SIZE)
+    return {"device": first.device.info.name, "platform": first.device.info.platform,
+            "device_type": first.device.info.type, "triangles": len(scene[1]), "trees": trees,
+            "kinds": {kind.name: _measure(queries, kind, len(scene[1]), QUICK_ROUNDS if quick else ROUNDS)
+                      for kind in kinds}}
+
+
+def _tree(query: RayQuery, seconds: float, triangles: int) -> dict[str, Any]:
+    """build_seconds: of the query, from arrays to the tree on the device; tree_seconds: of the tree."""
+    tree = query.tree
+    return {"layout": tree.name, "builder": tree.builder, "build_seconds": seconds, "tree_seconds": tree.build_seconds,
+            "nodes": tree.nodes, "depth": tree.depth, "stack": tree.stack, "sah_cost": tree.sah_cost,
+            "bytes_per_triangle": tree.bytes / triangles}
+
+
+def _measure(queries: dict[str, RayQuery], kind: Workload, triangles: int, rounds: int) -> dict[str, dict[str, Any]]:
+    few = -(-len(kind.rays[2]) * triangles // LIST_TESTS)
+    steps = {name: few if query.tree.name == "list" else 1 for name, query in queries.items()}
+    runs = {name: Run(query, query.any_hit if kind.any_hit else query.closest_hit, every(steps[name], kind.rays))
+            for name, query in queries.items()}
+    result = race({name: Contestant(run, len(run.answers)) for name, run in runs.items()}, rounds)
+    expected = next(iter(runs.values())).answers
+    for name, run in runs.items():
+        answers, counted = run.answers, every(max(steps[name], COUNTED), kind.rays)
+        differ = int(np.count_nonzero(differing(expected[::steps[name]], answers)))
+        result[name] |= {"mrays_call": 1e-6 * len(answers) / median(run.calls), "differ": differ,
+                         "agrees": 1 - differ / len(answers),
+                         "hits": float(np.mean(answers if kind.any_hit else answers["primitive"] >= 0)),
+                         **visits_a_ray(queries[name], counted, any_hit=kind.any_hit)}
+    return result

@@ -1,0 +1,31 @@
+"""How much of a tree rays visit, counted by their own traversal (kernels/traverse/visits.cl)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..device.records import record
+from ..query import TreeQuery
+from .rays import Rays
+
+#: nodes: those whose children's boxes are met; tests: of what is in leaves, a triangle or a pack of eight.
+VISITS = record(nodes="u4", tests="u4", pad="2u4")
+
+
+class _Counting(TreeQuery):
+    """A query that answers as another one does, and counts; up to 2^32 visits."""
+
+    def __init__(self, query: TreeQuery) -> None:
+        tree = replace(query.tree, buffers={**query.tree.buffers, "visits": np.zeros(1, VISITS)})
+        super().__init__(query.device, tree, int(query._counts["triangles"][0]), query.unit, query._triangle,
+                         query._in_flight)
+
+
+def visits_a_ray(query: TreeQuery, rays: Rays, *, any_hit: bool) -> dict[str, float]:
+    """`nodes` and `tests` a ray, for closest hits or for any hit."""
+    counting = _Counting(query)
+    (counting.any_hit if any_hit else counting.closest_hit)(*rays)
+    counted = counting.tree.buffers["visits"].read(query.device)[0]
+    return {name: int(counted[name]) / len(rays[2]) for name in ("nodes", "tests")}

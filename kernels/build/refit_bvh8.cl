@@ -1,0 +1,47 @@
+// Refits one level of the layout bvh8 (clrt/accel/layouts.py), whose leaves are packs of eight triangles.
+#include "build/refit.cl"
+
+static inline void store_lane(global float rows[3][8], int lane, float3 v) {
+    rows[0][lane] = v.x;
+    rows[1][lane] = v.y;
+    rows[2][lane] = v.z;
+}
+
+// Unused lanes, which come last, keep their corners of NaN.
+static inline Box refit_pack(global const float *vertices, global const int *faces, global Triangles *pack) {
+    Box box = NO_BOX;
+    for (int lane = 0; lane < 8 && pack->primitive[lane] >= 0; ++lane) {
+        Corners corners = face_corners(vertices, faces, pack->primitive[lane]);
+        store_lane(pack->p0, lane, corners.p0);
+        store_lane(pack->p1, lane, corners.p1);
+        store_lane(pack->p2, lane, corners.p2);
+        box = box_union(box, corners_box(corners));
+    }
+    return box;
+}
+
+static inline float least(float8 a) {
+    float4 four = a.lo < a.hi ? a.lo : a.hi;
+    float2 two = four.lo < four.hi ? four.lo : four.hi;
+    return two.x < two.y ? two.x : two.y;
+}
+
+// Around all children; boxes of unused slots are turned inside out.
+static inline Box node_bounds(global const Node *node) {
+    return (Box){(float3)(least(vload8(0, node->lo[0])), least(vload8(0, node->lo[1])), least(vload8(0, node->lo[2]))),
+                 -(float3)(least(-vload8(0, node->hi[0])), least(-vload8(0, node->hi[1])), least(-vload8(0, node->hi[2])))};
+}
+
+kernel void refit_level(uint count, uint block, REFIT_PARAMETERS) {
+    uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
+    for (uint i = first; i < end; ++i) {
+        global Node *node = nodes + first_node + i;
+        for (int slot = 0; slot < 8; ++slot) {
+            int child = node->child[slot];
+            if (child == EMPTY) continue;
+            Box box = child < 0 ? refit_pack(vertices, faces, leaves + (~child >> 4)) : node_bounds(nodes + child);
+            store_lane(node->lo, slot, box.lo);
+            store_lane(node->hi, slot, box.hi);
+        }
+    }
+}

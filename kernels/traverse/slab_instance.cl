@@ -1,0 +1,17 @@
+// Instances in the trees whose boxes are met by geometry/box.cl: a ray in an instance's frame, ready for its tree.
+#include "geometry/box.cl"
+#include "traverse/leaf.cl"
+#include "traverse/instance.cl"
+
+static inline bool in_world(const LeafRay *ray) { return ray->ray.instance == IN_WORLD; }
+
+// Takes the ray into the frame of the instance at `place`; returns the root of its tree.
+static inline int enter_instance(const Scene *scene, const Ray *world, int place, LeafRay *leaf, SlabRay *slabs) {
+    Ray ray = object_ray(world, scene->instances, place);
+    real3 origin = broadcast(ray.origin), direction = broadcast(ray.direction);
+    LeafRays leaves = leaf_rays(origin, direction);
+    SlabRays all = slab_rays(direction);
+    *leaf = leaf_ray(&leaves, &ray, 0);
+    *slabs = slab_ray(&all, &ray, 0);
+    return scene->instances[place].root;
+}

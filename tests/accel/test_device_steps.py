@@ -1,0 +1,95 @@
+"""The steps of the builder on every device: sums, sort, curve, clusters, and the plan of the wide tree."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from clrt.accel.device_builder import SHAPES, Shape, program_source
+from clrt.accel.layouts import sphere_boxes
+from clrt.accel.morton import CODE_BITS, radix_sort, sort_primitives
+from clrt.accel.ploc import SLOW
+from clrt.accel.tree import half_area
+from clrt.device.blocks import Blocks
+from clrt.device.open import Device
+
+from .cases import SCENES
+from .device_trees import Binary, binary, built
+
+
+@pytest.mark.parametrize("case", SCENES)
+def test_clusters_form_a_tree_of_bounded_depth(device: Device, case: str) -> None:
+    """A round that joins fewer than one in SLOW is followed by one that joins half."""
+    tree = binary(device, *SCENES[case])
+    tree.check()
+    most = max(2 * math.log2(len(tree.sphere)), math.log(len(tree.sphere)) / -math.log(1 - 1 / SLOW))
+    assert len(tree.rounds) <= most + 3
+
+
+def least_work(tree: Binary, shape: Shape) -> float:
+    """Work of the best wide tree that can be cut out of the binary one; with packs, what fits into a leaf is one."""
+    count = len(tree.sphere)
+    area = np.concatenate([half_area(tree.low, tree.high), half_area(tree.nodes["lo"], tree.nodes["hi"])])
+    size, balls = np.ones(2 * count - 1, np.intp), np.concatenate([tree.sphere, np.zeros(count - 1, np.intp)])
+    cost = np.repeat(area[:, None], shape.children + 1, axis=1)
+    for node, (a, b) in enumerate(tree.below, start=count):
+        size[node], balls[node] = size[a] + size[b], balls[a] + balls[b]
+        fits = size[node] <= shape.leaf_size and balls[node] in (0, size[node]) and node < 2 * count - 2
+        leaf = area[node] * (size[node] if balls[node] else math.ceil(size[node] / shape.pack)) if fits else np.inf
+        best = [min(cost[a, k] + cost[b, many - k] for k in range(1, many)) for many in range(2, shape.children + 1)]
+        opened = area[node] + best[-1]
+        cost[node] = leaf if fits and shape.pack > 1 else min(leaf, opened)
+        if not (fits and shape.pack > 1):
+            cost[node, 2:] = np.minimum(best, cost[node, 1])
+    return float(opened / area[-1])
+
+
+@pytest.mark.parametrize("case", ["nine", "mixed", "long_diagonals", "duplicates", "teapot_in_a_stadium"])
+def test_no_wide_tree_over_the_same_clusters_costs_less(device: Device, case: str) -> None:
+    expected = least_work(binary(device, *SCENES[case]), SHAPES["bvh8"])
+    assert built(device, case).wide.sah_cost(8) == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("count", [1, 200, 5000])
+@pytest.mark.parametrize("bits", [0, 1, 20, CODE_BITS])
+def test_codes_are_sorted_and_equal_ones_stay_in_order(device: Device, bits: int, count: int) -> None:
+    work = Blocks(device, program_source(SHAPES["bvh8"], True, False, False))
+    codes = np.random.default_rng(bits).integers(1 << bits, size=count, dtype=np.uint64)
+    sorted_codes, values = radix_sort(work, work.upload(codes), work.upload(np.arange(count, dtype=np.uint32)), count)
+    order = np.argsort(codes, kind="stable")
+    np.testing.assert_array_equal(work.download(sorted_codes, np.uint64, count), codes[order])
+    np.testing.assert_array_equal(work.download(values, np.uint32, count), order)
+
+
+@pytest.mark.parametrize("count, arrays", [(1, 1), (300, 3), (70_001, 2)])
+def test_sums_of_what_stands_before(device: Device, count: int, arrays: int) -> None:
+    work = Blocks(device, program_source(SHAPES["bvh8"], True, False, False))
+    values = np.random.default_rng(0).integers(1000, size=(arrays, count), dtype=np.uint32)
+    array = work.upload(values)
+    sums = work.scan(array, count, arrays)
+    np.testing.assert_array_equal(sums, values.sum(axis=1))
+    np.testing.assert_array_equal(work.download(array, np.uint32, values.size).reshape(values.shape),
+                                  np.cumsum(values, axis=1) - values)
+
+
+@pytest.mark.parametrize("case", ["mixed", "flat_grid", "points"])
+def test_primitives_follow_the_morton_curve(device: Device, case: str) -> None:
+    triangles, balls = SCENES[case]
+    ball_low, ball_high = sphere_boxes(balls)
+    twice = np.concatenate([triangles.min(axis=1) + triangles.max(axis=1), ball_low + ball_high])
+    extent = np.ptp(twice, axis=0).max()
+    cell = (twice - twice.min(axis=0)) * np.float32((2**21 - 1) / extent if extent else 0)
+    place = np.arange(21, dtype=np.uint64)[:, None]
+    bits = np.minimum(cell, 2**21 - 1).astype(np.uint64)[:, None] >> place & np.uint64(1)
+    code = (bits << np.arange(63, dtype=np.uint64).reshape(21, 3)[:, ::-1]).sum(axis=(1, 2))
+    order = np.argsort(code, kind="stable")
+
+    work = Blocks(device, program_source(SHAPES["bvh8"], True, len(balls) > 0, False))
+    primitives = sort_primitives(work, triangles, balls)
+    np.testing.assert_array_equal(work.download(primitives.ids, np.uint32, primitives.count), order)
+    shapes = work.download(primitives.shapes, np.float32, 9 * primitives.count).reshape(-1, 9)
+    sphere = order >= len(triangles)
+    np.testing.assert_array_equal(shapes[~sphere], triangles.reshape(-1, 9)[order[~sphere]])
+    np.testing.assert_array_equal(shapes[sphere, :4], balls[order[sphere] - len(triangles)])

@@ -1,0 +1,88 @@
+"""`clrt bench`: the fields that other programs read, and the tables."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+CORNER = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def bench(*arguments: str, cwd: Path) -> tuple[dict[str, Any], str]:
+    """The figures and what was printed."""
+    (cwd / "corner.obj").write_text(CORNER)
+    done = subprocess.run([sys.executable, "-m", "clrt", "bench", *arguments, "--quick", "--json", "out.json"], cwd=cwd,
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return json.loads((cwd / "out.json").read_text()), done.stdout
+
+
+def test_rays_of_a_file(tmp_path: Path) -> None:
+    """From (9, 9, 9) at the corner of a tetrahedron, and away from it."""
+    origins = np.full((2000, 3), 9, np.float32)
+    directions = np.where(np.arange(2000)[:, None] % 4 == 0, -1, 1) * np.array([1, 0.99, 0.98], np.float32)
+    np.savez(tmp_path / "rays.npz", origins=origins, directions=directions, t_max=np.full(2000, np.inf, np.float32))
+    figures, printed = bench("rays", "--mesh", "corner.obj", "--rays", "rays.npz", "--layout", "bvh2", cwd=tmp_path)
+    assert {"build_seconds", "mrays_closest", "mrays_any", "mrays_closest_call", "mrays_any_call", "hits",
+            "bytes_per_triangle"} <= set(figures)
+    assert figures["hits"] == 500 and (figures["layout"], figures["triangles"]) == ("bvh2", 4)
+    assert figures["mrays_closest"] >= figures["mrays_closest_call"] > 0 and "mrays_any_call" in printed
+
+
+def test_rays_of_four_kinds(tmp_path: Path) -> None:
+    figures, printed = bench("rays", "--mesh", "corner.obj", cwd=tmp_path)
+    assert figures["triangles"] == 16
+    assert list(figures["kinds"]) == ["primary", "bounce", "shadow", "occluded"]
+    for kind, rows in figures["kinds"].items():
+        assert set(rows) == set(figures["trees"]) >= {"bvh2", "cwbvh", "list"}
+        assert all({"mrays", "mrays_call", "ratio", "cpu_ratio", "differ", "hits", "rays"} <= set(row)
+                   for row in rows.values())
+        assert not any(row["differ"] for row in rows.values()) and f"{kind}: " in printed
+    assert all({"build_seconds", "tree_seconds", "bytes_per_triangle", "sah_cost", "builder"} <= set(tree)
+               for tree in figures["trees"].values())
+
+
+def test_trees_by_size(tmp_path: Path) -> None:
+    figures, printed = bench("build", "--mesh", "corner.obj", cwd=tmp_path)
+    sizes = [size["triangles"] for size in figures["sizes"]]
+    assert sizes == [4 * 4**k + 12 for k in (4, 5, 6)], "the tetrahedron, subdivided, in its room"
+    for size in figures["sizes"]:
+        assert {"sah", "midpoint"} <= set(size["builders"])
+        assert all({"seconds", "first_seconds", "mtriangles", "bytes_per_triangle"} <= set(row)
+                   for row in size["builders"].values())
+    assert list(figures["rays"]["kinds"]) == list(figures["rays"]["fits"]) == ["primary", "bounce", "shadow"]
+    assert all(set(fit) == {"a", "b", "r2"} for fit in figures["rays"]["fits"].values())
+    assert list(figures["fresh"]) == ["compiled", "cached", "largest"]
+    assert all({"tree_seconds", "build_seconds", "answer_seconds", "peak_bytes"} <= set(row)
+               for row in figures["fresh"].values())
+    assert f"{sizes[-1]} triangles" in printed and "R² = " in printed
+
+
+def test_hits_that_must_be_the_same(tmp_path: Path) -> None:
+    figures, printed = bench("hits", "--device", "cpu", cwd=tmp_path)
+    assert [mesh["mesh"] for mesh in figures["meshes"]] == ["icosphere", "bumpy ball", "soup"]
+    for mesh in figures["meshes"]:
+        assert {way["layout"] for way in mesh["ways"]} >= {"bvh8", "bvh2", "cwbvh", "list"}
+        assert all(list(way["differ"]) == mesh["kinds"] for way in mesh["ways"]) and mesh["rays"] == 4 * 4096
+        assert f"by float64: {mesh['exact']['wrong']} of {mesh['exact']['rays']} wrong" in printed
+    assert [mesh["escaped"] for mesh in figures["meshes"]] == [0, 0, None]
+    assert {"index", "platform", "driver"} <= set(figures["devices"][0])
+
+
+@pytest.mark.parametrize(("arguments", "code", "words"), [
+    (("rays", "--rays", "r.npz"), 2, ["--rays", "--mesh"]),
+    (("build", "--mesh", "missing.ply"), 3, ["missing.ply"]),
+    (("hits", "--device", "nonesuch"), 4, ["nonesuch"]),
+    (("build", "--json", "no/such/b.json"), 6, ["no/such"]),
+])
+def test_mistakes_end_in_one_message(tmp_path: Path, arguments: tuple[str, ...], code: int, words: list[str]) -> None:
+    command = [sys.executable, "-m", "clrt", "bench", *arguments]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == code and "Traceback" not in done.stderr
+    assert all(word in done.stderr for word in words), done.stderr

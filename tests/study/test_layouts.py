@@ -1,0 +1,38 @@
+"""Layouts side by side: all of them, on the same rays, with the same answers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import clrt
+from clrt.device.open import Device
+from clrt.study.layouts import measure_layouts
+from clrt.study.shapes import icosphere
+from clrt.study.workloads import closed_room
+
+BALL = icosphere(4)
+
+
+@pytest.mark.parametrize("builder", [None, "midpoint"])
+def test_all_layouts_answer_alike(device: Device, builder: str | None) -> None:
+    result = measure_layouts(*BALL, quick=True, device=device.info.index, builder=builder)
+    names = ["bvh8, 16 in flight", "bvh8, 1 in flight", "bvh2", "cwbvh", "list"]
+    assert list(result["trees"]) == names and result["triangles"] == 5120 + 12
+    assert list(result["kinds"]) == ["primary", "bounce", "shadow", "occluded"]
+    for kind, rows in result["kinds"].items():
+        assert list(rows) == names and all(row["differ"] == 0 and row["agrees"] == 1 for row in rows.values())
+        assert all(row["mrays"] > 0 and row["mrays_call"] > 0 for row in rows.values())
+        assert rows["list"]["rays"] < rows["bvh2"]["rays"] <= 128 * 128, "a list gets fewer"
+        for row in rows.values():
+            assert row["hits"] == 1 if kind in ("primary", "bounce") else 0 < row["hits"] <= 1
+    for name, tree in result["trees"].items():
+        query = clrt.RayQuery(*closed_room(*BALL), device=device.info.index, layout=tree["layout"],
+                              builder=builder if name != "list" else None)
+        assert tree["bytes_per_triangle"] * 5132 == pytest.approx(query.tree.bytes)
+        assert (tree["builder"], tree["sah_cost"]) == (query.tree.builder, query.tree.sah_cost)
+
+
+def test_one_layout_alone(device: Device) -> None:
+    result = measure_layouts(*BALL, quick=True, device=device.info.index, layout="bvh2", triangle="moller_trumbore")
+    assert list(result["trees"]) == ["bvh2"] and np.isclose(result["kinds"]["primary"]["bvh2"]["ratio"], 1)
