@@ -11,7 +11,7 @@ from .accel.layouts import Layout
 from .accel.two_level import TwoLevels
 from .device.open import open_device
 from .errors import SceneError
-from .query import TreeQuery
+from .tree_query import TreeQuery
 from .scene.mesh_arrays import mesh_arrays
 from .scene.scaling import unit_for
 
@@ -21,17 +21,18 @@ SINGULAR = 1e-12
 
 
 class InstancedRayQuery(TreeQuery):
-    """Instances to shoot rays at; everything else as in `RayQuery`, with the hit's `instance` (int32, −1) beside it.
+    """Instances to shoot rays at, as in `TreeQuery`, with the hit's `instance` (int32, −1) beside the others.
 
     meshes: pairs of vertices (n, 3) float32 and faces (m, 3) int32. mesh: (k,) which of them each instance is.
     transforms: (k, 3, 4), rows of an affine map from the mesh's frame to the world; mirrored and non-uniform ones too.
+    device, layout, builder, triangle: as in `RayQuery`; the layout list has no instances.
     `primitive` counts in the instance's mesh. Of hits at the same t the lowest instance comes first.
     Raises SceneError for other shapes, indices out of range and transforms that are not finite or singular.
     """
 
     def __init__(self, meshes: Sequence[tuple[ArrayLike, ArrayLike]], mesh: ArrayLike, transforms: ArrayLike, *,
                  device: str | int | None = None, layout: str | None = None, builder: str | None = None,
-                 triangle: str = "watertight", in_flight: int | None = None) -> None:
+                 triangle: str = "watertight", traversal: str | None = None) -> None:
         triangles = [points[faces] for points, faces in (mesh_arrays(*each) for each in meshes)]
         self._mesh = _indices(mesh, len(triangles))
         self._extents = np.array([np.abs(mesh_corners).reshape(-1, 3).max(axis=0, initial=0)
@@ -43,7 +44,7 @@ class InstancedRayQuery(TreeQuery):
                                  [(mesh_corners * unit).astype(np.float32)
                                   for mesh_corners, unit in zip(triangles, self._units)], self._mesh)
         tree, unit = self._placed(to_world)
-        super().__init__(opened, tree, sum(map(len, triangles)), unit, triangle, in_flight)
+        super().__init__(opened, tree, sum(map(len, triangles)), unit, triangle, traversal)
 
     def move(self, transforms: ArrayLike) -> None:
         """Puts the same instances elsewhere: transforms (k, 3, 4) as before, SceneError likewise.

@@ -60,9 +60,10 @@ def brute_force(corners: Doubles, origins: Doubles, directions: Doubles) -> tupl
     return np.where(depth >= 0, t, np.inf), depth
 
 
-@pytest.mark.parametrize("layout, in_flight", [("bvh8", 1), ("bvh8", 16), ("bvh2", 1), ("cwbvh", 1)])
+@pytest.mark.parametrize("layout, traversal", [("bvh8", "single"), ("bvh8", "pool"), ("bvh2", None), ("cwbvh", None)])
 @pytest.mark.parametrize("kind", ["turned", "stretched", "mirrored", "flat", "tiny"])
-def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, layout: str, in_flight: int) -> None:
+def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, layout: str,
+                                                traversal: str | None) -> None:
     rng = np.random.default_rng(3)
     mesh = rng.integers(0, 3, 12)
     to_world = transforms(rng, kind, 12)
@@ -78,7 +79,8 @@ def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, layou
     # Of a tiny mesh far away the ray is known only to a hundredth of its size.
     clear = (np.abs(depth) > (0.03 if kind == "tiny" else 1e-3)).all(axis=1) & (second > 1.001 * nearest) & ~grazing
     assert clear.sum() > 50
-    query = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout, in_flight=in_flight)
+    query = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout,
+                                   traversal=traversal)
     hits = query.closest_hit(origins, directions)
     hit = np.isfinite(nearest)
     expected = np.where(hit[:, None], names[first], -1)
@@ -96,9 +98,9 @@ def test_layouts_agree_to_the_last_bit(device: Device, lanes: int, monkeypatch: 
     to_world = np.concatenate([transforms(rng, kind, 100) for kind in ("turned", "stretched", "mirrored")])
     origins, targets = rng.uniform(-8, 8, (2, 4000, 3)).astype(np.float32)
     answers = []
-    for layout, in_flight in (("bvh8", 1), ("bvh8", 16), ("bvh2", 1), ("cwbvh", 1)):
+    for layout, traversal in (("bvh8", "single"), ("bvh8", "pool"), ("bvh2", None), ("cwbvh", None)):
         query = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout,
-                                       in_flight=in_flight)
+                                       traversal=traversal)
         answers.append((query.closest_hit(origins, targets - origins), query.any_hit(origins, targets - origins, 0.7),
                         *query.all_hits(origins[:200], (targets - origins)[:200])))
     assert (answers[0][0]["primitive"] >= 0).mean() > 0.5 and 0.3 < answers[0][1].mean() < 0.9

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
-from clrt import query
+from clrt import tree_query
 from clrt.device.open import Device
 
 Doubles = NDArray[np.float64]
@@ -20,11 +20,11 @@ ORIGINS = RNG.uniform(-2, 2, (3000, 3)).astype(np.float32)
 DIRECTIONS = (RNG.normal(size=(3000, 3)) * RNG.uniform(0.1, 10, (3000, 1))).astype(np.float32)
 
 
-@pytest.fixture(params=["bvh8-1", "bvh8-16", "bvh2-1", "cwbvh-1", "list-1"])
+@pytest.fixture(params=["bvh8-single", "bvh8-packet", "bvh8-pool", "bvh2-single", "cwbvh-single", "list-single"])
 def soup(request: pytest.FixtureRequest, device: Device) -> clrt.RayQuery:
-    """In each layout, with so many rays of a work-item in flight."""
-    layout, in_flight = request.param.split("-")
-    return clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout=layout, in_flight=int(in_flight))
+    """In each layout, by each traversal."""
+    layout, traversal = request.param.split("-")
+    return clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout=layout, traversal=traversal)
 
 
 def brute_force(origins: Doubles, directions: Doubles) -> tuple[Doubles, Doubles]:
@@ -80,11 +80,29 @@ def test_all_hits_are_those_of_brute_force(soup: clrt.RayQuery) -> None:
     assert (np.diff(hits["t"])[np.diff(index) == 0] >= 0).all()
 
 
+def test_coherent_rays_meet_the_same_by_all_traversals(device: Device) -> None:
+    """A fan of rays from one point, and parallel ones, single rays astray among them; bit by bit."""
+    y, x = np.mgrid[-1:1:90j, -1:1:91j].reshape(2, -1)
+    fan = np.stack([x, y, np.full(len(x), -1.5)], axis=1)
+    fan[::97] *= -1
+    parallel = np.tile([0.1, 0.2, -1.0], (len(x), 1))
+    origins = np.concatenate([np.tile([0.1, 0.2, 3.0], (len(x), 1)), np.stack([x, y, np.full(len(x), 2.0)], axis=1)])
+    rays = origins, np.concatenate([fan, parallel]), RNG.uniform(1, 4, len(origins))
+    queries = [clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout="bvh8", traversal=traversal)
+               for traversal in (*tree_query.TRAVERSALS, None)]
+    first, *others = [each.closest_hit(*rays) for each in queries]
+    assert (first["primitive"] >= 0).mean() > 0.3
+    for hits in others:
+        np.testing.assert_array_equal(hits, first)
+    for each in queries:
+        np.testing.assert_array_equal(each.any_hit(*rays), first["primitive"] >= 0)
+
+
 def test_chunks_and_order_do_not_matter(soup: clrt.RayQuery, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = soup.closest_hit(ORIGINS, DIRECTIONS)
     order = RNG.permutation(len(ORIGINS))
     np.testing.assert_array_equal(soup.closest_hit(ORIGINS[order], DIRECTIONS[order]), whole[order])
-    monkeypatch.setattr(query, "CHUNK", 257)
+    monkeypatch.setattr(tree_query, "CHUNK", 257)
     np.testing.assert_array_equal(soup.closest_hit(ORIGINS, DIRECTIONS), whole)
 
 

@@ -27,7 +27,7 @@ ORIGINS = RNG.uniform(-3, 8, (3000, 3)).astype(np.float32)
 DIRECTIONS = (VERTICES[RNG.integers(0, len(VERTICES), 3000)] - ORIGINS
               + RNG.normal(0, 0.3, (3000, 3))).astype(np.float32)
 CORNERS = ("p0", "p1", "p2")
-TREES = [("bvh8", "ploc"), ("bvh8", "sah"), ("bvh2", "sah"), ("bvh2", "midpoint")]
+TREES = [("bvh8", "ploc"), ("bvh8", "sah"), ("bvh2", "ploc"), ("bvh2", "sah"), ("bvh2", "midpoint")]
 
 
 def query(device: Device, vertices: Floats, tree: tuple[str, str]) -> clrt.RayQuery:
@@ -96,8 +96,9 @@ def test_wide_boxes_are_those_of_what_is_below(device: Device, builder: str) -> 
         np.testing.assert_array_equal(found[row, :, :, slot], box(corners))
 
 
-def test_binary_boxes_are_those_of_what_is_below(device: Device) -> None:
-    refitted = query(device, VERTICES, ("bvh2", "sah"))
+@pytest.mark.parametrize("builder", ["ploc", "sah"])
+def test_binary_boxes_are_those_of_what_is_below(device: Device, builder: str) -> None:
+    refitted = query(device, VERTICES, ("bvh2", builder))
     refitted.refit(SHUFFLED)
     nodes, leaves = read(refitted)["nodes"], read(refitted)["leaf_triangles"]
     corners = np.stack([leaves[name] for name in CORNERS], axis=1)

@@ -18,6 +18,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,8 @@ class Layout:
 
     buffers: by name, records in an array of numpy's or, from a builder on the device, in a DeviceArray.
     stack: entries that a traversal's stack needs (see Tree.stack_bound), 0 without a tree. builder: its name.
-    depth and sah_cost are those of the tree that is traversed; build_seconds includes the packing.
+    depth and sah_cost are those of the tree that is traversed; build_seconds includes the packing. work: sah_cost, or
+    what finds it, for trees that lie on a device.
     level_sizes: how many nodes each level has, from the root, if they stand level by level in `nodes`; else ().
     peak_bytes: the most that a builder on the device had there at a time, 0 for one in numpy.
     """
@@ -66,11 +68,16 @@ class Layout:
     stack: int
     nodes: int
     depth: int
-    sah_cost: float
+    work: float | Callable[[], float]
     build_seconds: float = 0.0
     builder: str = ""
     level_sizes: tuple[int, ...] = ()
     peak_bytes: int = 0
+
+    @cached_property
+    def sah_cost(self) -> float:
+        """Expected work of a ray that meets the root's box, see Tree.sah_cost."""
+        return self.work() if callable(self.work) else self.work
 
     @property
     def bytes(self) -> int:
@@ -96,7 +103,7 @@ def pack(layout: str, builder: str, triangles: FloatArray, spheres: FloatArray) 
 def _list(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     buffers = _filled(leaf_triangles=_leaf_triangles(triangles, np.arange(len(triangles), dtype=np.int32)),
                       leaf_spheres=_leaf_spheres(spheres, np.arange(len(spheres), dtype=np.int32), len(triangles)))
-    return Layout("list", buffers, stack=0, nodes=0, depth=0, sah_cost=float(len(triangles) + len(spheres)))
+    return Layout("list", buffers, stack=0, nodes=0, depth=0, work=float(len(triangles) + len(spheres)))
 
 
 def _bvh2(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
@@ -104,7 +111,7 @@ def _bvh2(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
                       leaf_spheres=_leaf_spheres(spheres, tree.sphere_order, len(triangles)))
     return Layout("bvh2", {"nodes": bvh2_nodes(tree)} | buffers, stack=tree.stack_bound, nodes=len(tree.count),
-                  depth=tree.depth, sah_cost=tree.sah_cost(), level_sizes=_level_sizes(tree))
+                  depth=tree.depth, work=tree.sah_cost(), level_sizes=_level_sizes(tree))
 
 
 def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
@@ -118,7 +125,7 @@ def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     nodes = wide_nodes(wide, child)
     buffers = _filled(packs=packs, leaf_spheres=_leaf_spheres(spheres, wide.sphere_order, len(triangles)))
     return Layout("bvh8", {"nodes": nodes} | buffers, stack=wide.stack_bound, nodes=len(nodes),
-                  depth=wide.depth, sah_cost=wide.sah_cost(LANES), level_sizes=_level_sizes(wide))
+                  depth=wide.depth, work=wide.sah_cost(LANES), level_sizes=_level_sizes(wide))
 
 
 def _cwbvh(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
@@ -127,7 +134,7 @@ def _cwbvh(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
                       leaf_spheres=_leaf_spheres(spheres, tree.sphere_order, len(triangles)))
     return Layout("cwbvh", {"nodes": tree.nodes} | buffers, stack=tree.stack, nodes=len(tree.nodes),
-                  depth=tree.wide.depth, sah_cost=tree.wide.sah_cost(MAX_LEAF))
+                  depth=tree.wide.depth, work=tree.wide.sah_cost(MAX_LEAF))
 
 
 LAYOUTS: dict[str, Callable[[str, FloatArray, FloatArray], Layout]] = {"list": _list, "bvh2": _bvh2, "bvh8": _bvh8,

@@ -39,11 +39,11 @@ def hits_command(device: str | None, quick: bool, json_file: Path | None) -> Non
 
 def _lines(result: Mapping[str, Any]) -> list[str]:
     """A line for each way: of how many rays each kind differs from the first line."""
-    title = f"  {'device layout builder      in flight':40}{'rays':>9}"
+    title = f"  {'device layout builder      traversal':40}{'rays':>9}"
     lines = [f"{result['mesh']}: {result['triangles']} triangles, {result['rays']} rays",
              title + "".join(f"{kind:>10}" for kind in result["kinds"])]
     for way in result["ways"]:
-        line = f"  {way['device']:<6} {way['layout']:6} {way['builder']:12} {way['in_flight']:9}    "
+        line = f"  {way['device']:<6} {way['layout']:6} {way['builder']:12} {way['traversal']:9}    "
         lines.append(line + (way["error"] if "error" in way else f"{way['rays']:9}" + "".join(
             f"{count:10}" for count in way["differ"].values())))
     if "exact" in result:

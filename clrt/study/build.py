@@ -30,7 +30,7 @@ from .workloads import Faces, Mesh, Workload, closed_room, workloads
 
 #: Numbers of triangles, two to a decade.
 SIZES, QUICK_SIZES = [round(10 ** (k / 2)) for k in range(8, 15)], [1_000, 4_000, 16_000]
-#: Most triangles for builders in numpy, which take some 15 s for a million.
+#: Most triangles for builders in numpy, which take up to half a minute for a million.
 MOST_IN_NUMPY = 1_100_000
 REFERENCE, EMBREE = "sah", "embree"
 #: After a first call each builds so often or, where that would last longer, for so many seconds.

@@ -1,4 +1,4 @@
-"""Whether answers depend on what they must not (the tree's layout and builder, the rays in flight, the device), and
+"""Whether answers depend on what they must not (the tree's layout and builder, the traversal, the device), and
 whether float64 says the same."""
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ..accel.kernels import BUILDER_NAMES, TREES
 from ..device.discover import choose, find_devices
 from ..errors import ClrtError, UsageError
-from ..query import IN_FLIGHT, RayQuery
+from ..query import RayQuery
+from ..tree_query import TRAVERSALS
 from .aimed import all_rays, rays_of_kinds
 from .exact import UNDECIDED, areas, closest_bounds
 from .rays import Rays, differing, every
@@ -51,7 +52,7 @@ class Way(NamedTuple):
     device: int
     layout: str
     builder: str
-    in_flight: int
+    traversal: str
 
 
 def measure_hits(*, quick: bool = False, device: str | int | None = None) -> Iterator[dict[str, Any]]:
@@ -103,12 +104,12 @@ def _ways(devices: list[int]) -> Iterator[Way]:
     for device in devices:
         for layout in TREES:
             for builder in ("sah",) if layout == "list" else BUILDER_NAMES:
-                for in_flight in (IN_FLIGHT, 1) if layout == "bvh8" else (1,):
-                    yield Way(device, layout, builder, in_flight)
+                for traversal in TRAVERSALS if layout == "bvh8" else ("single",):
+                    yield Way(device, layout, builder, traversal)
 
 
 def _answers(mesh: Mesh, way: Way, rays: Rays) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    query = RayQuery(*mesh, device=way.device, layout=way.layout, builder=way.builder, in_flight=way.in_flight)
+    query = RayQuery(*mesh, device=way.device, layout=way.layout, builder=way.builder, traversal=way.traversal)
     return query.closest_hit(*rays), query.any_hit(*rays)
 
 

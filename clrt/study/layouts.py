@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ..query import IN_FLIGHT, RayQuery
+from ..query import RayQuery
+from ..tree_query import TRAVERSALS
 from .race import Contestant, race
 from .rays import Floats, Run, differing, every
 from .visits import visits_a_ray
 from .workloads import Faces, Workload, closed_room, workloads
 
-#: Layout and rays in flight.
-CONTESTANTS: dict[str, tuple[str, int | None]] = {
-    f"bvh8, {IN_FLIGHT} in flight": ("bvh8", IN_FLIGHT), "bvh8, 1 in flight": ("bvh8", 1), "bvh2": ("bvh2", None),
-    "cwbvh": ("cwbvh", None), "list": ("list", None)}
+#: Layout and traversal.
+CONTESTANTS: dict[str, tuple[str, str | None]] = {
+    **{f"bvh8, {traversal}": ("bvh8", traversal) for traversal in TRAVERSALS},
+    "bvh2": ("bvh2", None), "cwbvh": ("cwbvh", None), "list": ("list", None)}
 SIZE, QUICK_SIZE = (800, 800), (128, 128)
 #: Rays times triangles for a list, which gets as many of all rays, evenly.
 LIST_TESTS = 1 << 24
@@ -37,9 +38,9 @@ def measure_layouts(vertices: Floats, faces: Faces, *, layout: str | None = None
     scene = closed_room(vertices, faces)
     chosen = CONTESTANTS if layout is None else {layout: (layout, None)}
     trees, queries = {}, {}
-    for name, (each, in_flight) in chosen.items():
+    for name, (each, traversal) in chosen.items():
         start = time.perf_counter()
-        queries[name] = RayQuery(*scene, layout=each, builder=None if each == "list" else builder, in_flight=in_flight,
+        queries[name] = RayQuery(*scene, layout=each, builder=None if each == "list" else builder, traversal=traversal,
                                  **options)
         trees[name] = _tree(queries[name], time.perf_counter() - start, len(scene[1]))
     first = next(iter(queries.values()))

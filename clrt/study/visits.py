@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..device.records import record
-from ..query import TreeQuery
+from ..tree_query import TreeQuery
 from .rays import Rays
 
 #: nodes: those whose children's boxes are met; tests: of what is in leaves, a triangle or a pack of eight.
@@ -20,7 +20,7 @@ class _Counting(TreeQuery):
     def __init__(self, query: TreeQuery) -> None:
         tree = replace(query.tree, buffers={**query.tree.buffers, "visits": np.zeros(1, VISITS)})
         super().__init__(query.device, tree, int(query._counts["triangles"][0]), query.unit, query._triangle,
-                         query._in_flight)
+                         query._traversal)
 
 
 def visits_a_ray(query: TreeQuery, rays: Rays, *, any_hit: bool) -> dict[str, float]:

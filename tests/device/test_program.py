@@ -82,10 +82,10 @@ def test_every_kernel_file_is_used(device: Device) -> None:
     """By some scene, with some choice, by ray queries, by the builder, or to refit a tree."""
     corners = np.zeros((3, 3), np.float32)
     used: set[str] = set()
-    for layout, in_flight in (("bvh8", 16), ("bvh2", 1)):
+    for layout, traversal in (("bvh8", "pool"), ("bvh8", "packet"), ("bvh2", "single")):
         query = clrt.InstancedRayQuery([(corners, [[0, 1, 2]])], [0], [np.eye(3, 4)], device=device.info.index,
                                        layout=layout)
-        used |= set(files_of(query.source("closest_hit", in_flight)))
+        used |= set(files_of(query.source("closest_hit", traversal)))
     for layout in refit.RECIPES:
         used |= set(files_of(refit.program_source(layout)))
     for shape in SHAPES.values():
@@ -96,7 +96,7 @@ def test_every_kernel_file_is_used(device: Device) -> None:
             for environment in (everything().environment, Environment(color=(1.0, 1.0, 1.0))):
                 scene = everything()
                 scene.environment = environment
-                used |= set(compile_scene(scene, choices).files) | set(compile_scene(scene, choices, "query.cl").files)
+                used |= set(compile_scene(scene, choices).files)
     assert sorted(used) == FILES
 
 

@@ -11,6 +11,7 @@ from clrt.study.aimed import all_rays, rays_of_kinds
 from clrt.study.hits import Case, Effort, measure_case
 from clrt.study.rays import differing
 from clrt.study.shapes import icosphere, soup
+from clrt.tree_query import HIT
 
 EFFORT = Effort(rays=300, subdivisions=0, soup=0, list_tests=1 << 17, exact_tests=1 << 18)
 CASES = {"icosphere": Case("icosphere", icosphere(2), True), "soup": Case("soup", soup(500), False)}
@@ -20,10 +21,10 @@ CASES = {"icosphere": Case("icosphere", icosphere(2), True), "soup": Case("soup"
 def test_nothing_differs_and_every_way_is_taken(device: Device, name: str) -> None:
     case = CASES[name]
     result = measure_case(case, [device.info.index, device.info.index], EFFORT)
-    ways = {(way["layout"], way["builder"], way["in_flight"]) for way in result["ways"]}
-    trees = {(layout, builder, 1) for layout in ("bvh8", "bvh2", "cwbvh") for builder in ("sah", "midpoint")}
-    trees |= {("bvh8", builder, 16) for builder in ("ploc", "sah", "midpoint")}
-    assert ways >= trees | {("list", "sah", 1), ("bvh8", "ploc", 1)}
+    ways = {(way["layout"], way["builder"], way["traversal"]) for way in result["ways"]}
+    trees = {(layout, builder, "single") for layout in ("bvh8", "bvh2", "cwbvh") for builder in ("sah", "midpoint")}
+    trees |= {("bvh8", builder, way) for builder in ("ploc", "sah", "midpoint") for way in ("packet", "pool")}
+    assert ways >= trees | {("list", "sah", "single"), ("bvh8", "ploc", "single")}
     assert len(result["ways"]) == 2 * len(ways) and not any("error" in way for way in result["ways"])
     assert all(way["differ"] == {"random": 0, "vertices": 0, "edges": 0, "axes": 0} for way in result["ways"])
     few = {way["rays"] for way in result["ways"] if way["layout"] == "list"}
@@ -43,7 +44,7 @@ def test_hits_through_holes_are_counted(device: Device) -> None:
 
 
 def test_differing_counts_bits() -> None:
-    one = np.zeros(6, clrt.query.HIT)
+    one = np.zeros(6, HIT)
     one["t"][3] = np.nan
     other = one.copy()
     other["t"][0], other["u"][1], other["primitive"][2] = -0.0, 1e-45, 7

@@ -17,7 +17,7 @@ BALL = icosphere(4)
 @pytest.mark.parametrize("builder", [None, "midpoint"])
 def test_all_layouts_answer_alike(device: Device, builder: str | None) -> None:
     result = measure_layouts(*BALL, quick=True, device=device.info.index, builder=builder)
-    names = ["bvh8, 16 in flight", "bvh8, 1 in flight", "bvh2", "cwbvh", "list"]
+    names = ["bvh8, single", "bvh8, packet", "bvh8, pool", "bvh2", "cwbvh", "list"]
     assert list(result["trees"]) == names and result["triangles"] == 5120 + 12
     assert list(result["kinds"]) == ["primary", "bounce", "shadow", "occluded"]
     for kind, rows in result["kinds"].items():

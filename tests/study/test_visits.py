@@ -51,11 +51,11 @@ def boxes(query: clrt.RayQuery) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any
     return low, high, (child >= 0) & (child != EMPTY), child < 0
 
 
-@pytest.mark.parametrize(("layout", "in_flight"), [("bvh8", 16), ("bvh8", 1), ("bvh2", 1)])
+@pytest.mark.parametrize(("layout", "traversal"), [("bvh8", "pool"), ("bvh8", "single"), ("bvh2", "single")])
 @pytest.mark.parametrize("any_hit", [False, True])
-def test_rays_that_hit_nothing_visit_what_they_enter(device: Device, layout: str, in_flight: int,
+def test_rays_that_hit_nothing_visit_what_they_enter(device: Device, layout: str, traversal: str,
                                                      any_hit: bool) -> None:
-    query = clrt.RayQuery(*BALL, device=device.info.index, layout=layout, builder="sah", in_flight=in_flight)
+    query = clrt.RayQuery(*BALL, device=device.info.index, layout=layout, builder="sah", traversal=traversal)
     assert query.unit == 1
     low, high, nodes, tests = boxes(query)
     rays = past_the_ball(4000)
@@ -83,6 +83,6 @@ def test_lists_test_all_up_to_the_first_that_blocks(device: Device) -> None:
 
 def test_counting_changes_no_other_program(device: Device) -> None:
     query = clrt.RayQuery(*BALL, device=device.info.index)
-    before = query.source("closest_hit", 1)
+    before = query.source("closest_hit", "single")
     visits_a_ray(query, past_the_ball(10), any_hit=False)
-    assert query.source("closest_hit", 1) == before and "#define COUNT_VISITS" not in before
+    assert query.source("closest_hit", "single") == before and "#define COUNT_VISITS" not in before
