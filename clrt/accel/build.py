@@ -10,9 +10,8 @@ from ..device.arrays import DeviceArray
 from ..device.open import Device
 from ..errors import UsageError
 from . import device_builder
-from .layouts import LANES, LEAF_SPHERE, Layout, Records, pack
+from .layouts import LEAF_SPHERE, Layout, pack
 from .tree import FloatArray
-from .wide import Wide
 
 #: Builders that run on the device, by the passes of reinsertion that follow.
 DEVICE_BUILDERS = {"ploc": 0}
@@ -40,17 +39,9 @@ def build_tree(device: Device | None, layout: str, builder: str | None, triangle
     start = time.perf_counter()
     shape = device_builder.SHAPES[layout]
     tree = device_builder.build_tree(device, shape, triangles, spheres)
-    records = dict(zip(("nodes", "packs", "leaf_spheres"), tree.arrays))
-    buffers = {name: DeviceArray(buffer, dtype, size) for (name, buffer), dtype, size
-               in zip(records.items(), (shape.node, shape.leaf, LEAF_SPHERE), tree.counts) if size}
+    names, dtypes = ("nodes", shape.leaves, "leaf_spheres"), (shape.node, shape.leaf, LEAF_SPHERE)
+    buffers = {name: DeviceArray(buffer, dtype, size)
+               for name, buffer, dtype, size in zip(names, tree.arrays, dtypes, tree.counts) if size}
     seconds = time.perf_counter() - start
-    return Layout(layout, buffers, tree.stack, tree.counts[0], len(tree.level_sizes),
-                  _sah_cost(buffers["nodes"].read(device)), seconds, builder, tuple(tree.level_sizes),
-                  tree.peak_bytes)
-
-
-def _sah_cost(nodes: Records) -> float:
-    """Of the tree with these nodes, as Wide.sah_cost."""
-    nothing = np.empty(0, np.int32)
-    low, high = nodes["lo"].transpose(0, 2, 1), nodes["hi"].transpose(0, 2, 1)
-    return Wide(low, high, nodes["child"], nothing, nothing).sah_cost(LANES)
+    return Layout(layout, buffers, tree.stack, tree.nodes, tree.depth, tree.sah_cost, seconds, builder,
+                  tuple(tree.level_sizes), tree.peak_bytes)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pyopencl as cl
@@ -11,11 +15,13 @@ from ..device.blocks import Blocks
 from ..device.open import Device
 from ..device.preamble import defines, typedefs
 from ..device.program import compose
-from .layouts import BVH8_NODE, LEAF_SPHERE, TRIANGLE_PACK
+from ..device.records import record
+from .cwbvh import CWBVH_NODE, MAX_LEAF, SLOTS
+from .layouts import BVH2_NODE, BVH8_NODE, LANES, LEAF_SIZES, LEAF_SPHERE, LEAF_TRIANGLE, TRIANGLE_PACK
 from .morton import Primitives, sort_primitives
 from .ploc import BINARY_NODE, BinaryTree, cluster
 from .reinsertion import MOVE, reinsert
-from .tree import FloatArray
+from .tree import FloatArray, half_area
 from .wide import EMPTY
 
 
@@ -24,6 +30,8 @@ class Shape:
     """What a layout asks of the builder. writer: the file that writes its records, `node` and `leaf`.
 
     children: of a node. leaf_size: most primitives of a leaf. pack: triangles that are intersected at the price of one.
+    leaves: the buffer of triangles' records. records: how many a node takes, and how many there are besides.
+    compressed: children stand in their octants' slots, leaves of a node are of one kind, nodes below one wait as one.
     """
 
     writer: str
@@ -32,32 +40,35 @@ class Shape:
     pack: int
     node: np.dtype[np.void]
     leaf: np.dtype[np.void]
+    leaves: str
+    records: tuple[int, int] = (1, 0)
+    compressed: bool = False
 
 
-SHAPES = {"bvh8": Shape("build/bvh8.cl", 8, 8, 8, BVH8_NODE, TRIANGLE_PACK)}
+#: What makes shares of the scene's sides and area out of a box's: the factors, and what to add where it has none.
+WORLD = record(per_side="3f4", per_area="f4", no_side="3f4", no_area="f4")
 
-
-@dataclass(frozen=True, eq=False)
-class Level:
-    """`count` nodes of the wide tree: their slots, and the places of what is in them.
-
-    records: how many nodes below, leaf records of triangles and spheres they take.
-    """
-
-    count: int
-    slots: cl.Buffer
-    places: cl.Buffer
-    records: tuple[int, int, int]
+SHAPES = {
+    "bvh8": Shape("build/bvh8.cl", LANES, LANES, LANES, BVH8_NODE, TRIANGLE_PACK, "packs"),
+    "bvh2": Shape("build/bvh2.cl", 2, LEAF_SIZES["sah"], 1, BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", (2, 2)),
+    "cwbvh": Shape("build/cwbvh.cl", SLOTS, MAX_LEAF, MAX_LEAF, CWBVH_NODE, LEAF_TRIANGLE, "leaf_triangles",
+                   compressed=True)}
 
 
 @dataclass(frozen=True, eq=False)
 class DeviceTree:
-    """Records on the device, with their numbers: nodes, leaf records of triangles, spheres. level_sizes: (d,)."""
+    """Records on the device, with their numbers: nodes, leaf records of triangles, spheres.
+
+    nodes, depth, stack, sah_cost, level_sizes: as in Layout; the cost counts records where no box has an area.
+    """
 
     arrays: tuple[cl.Buffer, cl.Buffer, cl.Buffer]
     counts: tuple[int, int, int]
-    level_sizes: list[int]
+    nodes: int
+    depth: int
     stack: int
+    sah_cost: float
+    level_sizes: list[int]
     peak_bytes: int
 
 
@@ -72,63 +83,107 @@ def build_tree(device: Device, shape: Shape, triangles: FloatArray, spheres: Flo
     tree = cluster(work, primitives)
     if reinsertions:
         tree = reinsert(work, primitives, tree, reinsertions)
-    plans = _plan(work, shape, primitives, tree)
-    levels, stack = _open(work, shape, primitives, tree, plans)
-    return _write(work, shape, primitives, tree, plans, levels, stack)
+    plan = _plan(work, shape, primitives, tree)
+    levels, stack, cost = _open(work, shape, plan)
+    return _write(work, shape, plan, levels, stack, cost)
 
 
 def program_source(shape: Shape, triangles: bool, spheres: bool, reinsertions: bool) -> str:
     """The builder's program, for scenes with triangles, with spheres, and for trees that are made better."""
     values = {"CHILDREN": shape.children, "LEAF_SIZE": shape.leaf_size, "PACK": shape.pack, "EMPTY": EMPTY,
-              "TRIANGLES": int(triangles), "SPHERES": int(spheres)}
-    records = {"BinaryNode": BINARY_NODE, "Move": MOVE, "Node": shape.node, "Triangles": shape.leaf,
+              "LANES": math.prod(shape.leaf["primitive"].shape), "TRIANGLES": int(triangles), "SPHERES": int(spheres),
+              "GROUPS": int(shape.compressed), "ONE_KIND": int(shape.compressed and triangles and spheres)}
+    records = {"BinaryNode": BINARY_NODE, "Move": MOVE, "World": WORLD, "Node": shape.node, "Triangles": shape.leaf,
                "LeafSphere": LEAF_SPHERE}
-    files = {"REINSERTION": ["build/reinsert.cl"] if reinsertions else [], "WRITER": [shape.writer]}
+    files = {"REINSERTION": ["build/reinsert.cl"] if reinsertions else [],
+             "SLOTS": ["build/slots_octant.cl" if shape.compressed else "build/slots.cl"], "WRITER": [shape.writer]}
     return compose("\n".join([defines(values), typedefs(records)]), "build/builder.cl", files)
 
 
-def _plan(work: Blocks, shape: Shape, primitives: Primitives, tree: BinaryTree) -> cl.Buffer:
-    """(nodes,) uint32: which nodes stay, become leaves or are opened."""
-    plans, costs = work.empty(np.uint32, tree.count), work.empty(np.float32, tree.count * (shape.children - 1))
-    node = 0
-    for count in tree.rounds:
-        work.run("plan_nodes", count, *primitives.arguments, tree.nodes, node, tree.count - 1, plans, costs)
-        node += count
-    work.free(costs)
-    return plans
+class _Plan(NamedTuple):
+    """A binary tree, and which of its nodes stay, become leaves or are opened. area: half the root's."""
+
+    primitives: Primitives
+    tree: BinaryTree
+    plans: cl.Buffer
+    area: float
+
+    @property
+    def arguments(self) -> Sequence[cl.Buffer | int]:
+        """What the kernels of a level begin with."""
+        return *self.primitives.arguments, self.tree.nodes, self.plans
 
 
-def _open(work: Blocks, shape: Shape, primitives: Primitives, tree: BinaryTree,
-          plans: cl.Buffer) -> tuple[list[Level], int]:
-    """The wide tree's levels, and the most entries on a traversal's stack."""
-    most = work.upload(np.zeros(1, np.int32))
-    above = np.full(shape.children, EMPTY, np.int32)
-    above[0] = tree.count - 1
-    levels = [Level(1, work.upload(above), work.upload(np.zeros(3, np.uint32)), (1, 0, 0))]
-    waiting = work.upload(np.zeros(1, np.int32))
+@dataclass(frozen=True, eq=False)
+class _Level:
+    """`count` nodes of the wide tree: what is in them, its places, and how many entries wait on a stack above them.
+
+    records: how many nodes below, leaf records of triangles and spheres they take.
+    """
+
+    count: int
+    slots: cl.Buffer
+    places: cl.Buffer
+    waiting: cl.Buffer
+    records: tuple[int, int, int]
+
+    @property
+    def arrays(self) -> tuple[cl.Buffer, cl.Buffer, cl.Buffer]:
+        """All that is on the device."""
+        return self.slots, self.places, self.waiting
+
+
+def _plan(work: Blocks, shape: Shape, primitives: Primitives, tree: BinaryTree) -> _Plan:
+    """By rounds, each of which needs those before; a tree's last node is its root."""
+    root, world = tree.count - 1, np.zeros(1, WORLD)
+    top = work.download(tree.nodes, BINARY_NODE, 1, root)
+    size, area = top["hi"] - top["lo"], half_area(top["lo"], top["hi"])
+    for per, none, whole in (("per_side", "no_side", size), ("per_area", "no_area", area)):
+        world[per], world[none] = np.divide(1, whole, out=np.zeros_like(whole), where=whole > 0), whole == 0
+    plans, least = work.empty(np.uint32, tree.count), work.empty(np.float32, tree.count)
+    costs = work.empty(np.float32, tree.count * (shape.children - 1))
+    for first, count in zip(itertools.accumulate(tree.rounds, initial=0), tree.rounds):
+        work.run("plan_nodes", count, *primitives.arguments, tree.nodes, first, root, world[0], plans, costs, least)
+    work.free(costs, least)
+    return _Plan(primitives, tree, plans, float(area[0]))
+
+
+def _open(work: Blocks, shape: Shape, plan: _Plan) -> tuple[list[_Level], int, float]:
+    """The wide tree's levels, the most entries on a traversal's stack, and the tree's work, its root's area being 1.
+
+    It begins with a node above the root.
+    """
+    slots = np.full(shape.children, EMPTY, np.int32)
+    slots[0] = plan.tree.count - 1
+    nothing, most, areas = np.zeros(3, np.uint32), work.upload(np.zeros(1, np.int32)), 0.0
+    levels = [_Level(1, work.upload(slots), work.upload(nothing), work.upload(nothing), (1, 0, 0))]
     while below := levels[-1].records[0]:
-        slots, places = work.empty(np.int32, below * shape.children), work.empty(np.uint32, 3 * below)
-        work.run("open_level", levels[-1].count, *primitives.arguments, tree.nodes, plans, levels[-1].slots,
-                 levels[-1].places, waiting, below, slots, places, next_waiting := work.empty(np.int32, below), most)
-        work.free(waiting)
-        inner, triangles, spheres = map(int, work.scan(places, below, 3))
-        levels.append(Level(below, slots, places, (inner, triangles, spheres)))
-        waiting = next_waiting
-    work.free(waiting, levels[0].slots, levels[0].places)
-    return levels[1:], int(work.download(most, np.int32, 1)[0])
+        above, places, blocks = levels[-1], work.empty(np.uint32, 3 * below), work.number(levels[-1].count)
+        children, waiting = work.empty(np.int32, below * shape.children), work.empty(np.int32, below)
+        partial = work.empty(np.float32, blocks)
+        work.run("open_level", above.count, *plan.arguments, *above.arrays, below, children, places, waiting, most,
+                 partial)
+        nodes, triangles, spheres = map(int, work.scan(places, below, 3))
+        areas += float(work.download(partial, np.float32, blocks).sum(dtype=np.float64))
+        levels.append(_Level(below, children, places, waiting, (nodes, triangles, spheres)))
+        work.free(partial)
+    work.free(*levels[0].arrays)
+    return levels[1:], int(work.download(most, np.int32, 1)[0]), areas / plan.area if plan.area else math.inf
 
 
-def _write(work: Blocks, shape: Shape, primitives: Primitives, tree: BinaryTree, plans: cl.Buffer,
-           levels: list[Level], stack: int) -> DeviceTree:
+def _write(work: Blocks, shape: Shape, plan: _Plan, levels: list[_Level], stack: int, cost: float) -> DeviceTree:
     """Nodes and leaves, level by level."""
-    counts = (sum(level.count for level in levels), sum(level.records[1] for level in levels),
-              sum(level.records[2] for level in levels))
+    sizes, records = [level.count for level in levels], [level.records for level in levels]
+    each, besides = shape.records
+    counts = sum(sizes) * each + besides, sum(r[1] for r in records), sum(r[2] for r in records)
     arrays = work.empty(shape.node, counts[0]), work.empty(shape.leaf, counts[1]), work.empty(LEAF_SPHERE, counts[2])
-    first = [0, 0, 0]
+    node = triangle = sphere = 0
     for level in levels:
-        work.run("write_level", level.count, *primitives.arguments, tree.nodes, plans, level.slots, level.places,
-                 first[0], first[0] + level.count, first[1], first[2], *arrays)
-        first = [first[0] + level.count, first[1] + level.records[1], first[2] + level.records[2]]
-        work.free(level.slots, level.places)
-    work.free(tree.nodes, plans, primitives.shapes, primitives.ids)
-    return DeviceTree(arrays, counts, [level.count for level in levels], stack, work.peak_bytes)
+        work.run("write_level", level.count, *plan.arguments, level.slots, level.places, node, node + level.count,
+                 triangle, sphere, *arrays)
+        node, triangle, sphere = node + level.count, triangle + level.records[1], sphere + level.records[2]
+        work.free(*level.arrays)
+    work.free(plan.tree.nodes, plan.plans, plan.primitives.shapes, plan.primitives.ids)
+    level_sizes = [1] * (besides > 0) + [each * size for size in sizes]
+    cost = cost if math.isfinite(cost) else float(sum(sizes) + counts[1] + counts[2])
+    return DeviceTree(arrays, counts, sum(level_sizes), len(sizes), stack, cost, level_sizes, work.peak_bytes)

@@ -56,11 +56,11 @@ class Blocks:
             cl.enqueue_copy(self.device.queue, array, np.ascontiguousarray(values))
         return array
 
-    def download(self, array: cl.Buffer, dtype: DTypeLike, count: int) -> NDArray[Any]:
-        """The first `count` elements of an array, once all that was asked for is done."""
+    def download(self, array: cl.Buffer, dtype: DTypeLike, count: int, first: int = 0) -> NDArray[Any]:
+        """`count` elements of an array, once all that was asked for is done."""
         values = np.empty(count, dtype)
         if count:
-            cl.enqueue_copy(self.device.queue, values, array)
+            cl.enqueue_copy(self.device.queue, values, array, src_offset=first * values.itemsize)
         return values
 
     def free(self, *arrays: cl.Buffer) -> None:

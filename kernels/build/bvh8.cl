@@ -1,41 +1,35 @@
 // Writes nodes and leaves of the layout bvh8 (clrt/accel/layouts.py, kernels/traverse/bvh8.cl) for one level.
 #include "build/leaves.cl"
 
-// first_node, next_node: the first node of this level and of the next. first_pack, first_sphere: of this level.
+static inline void write_lane(global float (*rows)[CHILDREN], int lane, float3 v) {
+    rows[0][lane] = v.x;
+    rows[1][lane] = v.y;
+    rows[2][lane] = v.z;
+}
+
+// first_node, next_node: the first node of this level and of the next. The other two: its first records.
 kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *binary,
-                        global const uint *plans, global const int *slots, global const uint *places, uint first_node,
-                        uint next_node, uint first_pack, uint first_sphere, global Node *nodes, global Triangles *packs,
-                        global LeafSphere *leaf_spheres) {
+                        global const uint *plans, global const int *slots, global const uint *places, PLACE_PARAMETERS,
+                        global Node *nodes, global Triangles *triangles, global LeafSphere *leaf_spheres) {
     Primitives primitives = PRIMITIVE_ARGUMENTS;
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
     for (uint i = first; i < end; ++i) {
         global Node *node = nodes + first_node + i;
-        uint child = next_node + places[i];
-        uint place[2] = {first_pack + places[count + i], first_sphere + places[2 * count + i]};
+        Places next = PLACES(i);
+        Content contents[CHILDREN];
+        contents_of(&primitives, plans, slots + CHILDREN * i, contents);
         for (int s = 0; s < CHILDREN; ++s) {
-            int below = slots[CHILDREN * i + s];
+            Content content = contents[s];
             Box box = NO_BOX;
-            int reference = EMPTY;
-            if (below != EMPTY) {
-                box = node_box(&primitives, binary, below);
-                Content content = content_of(&primitives, plans, below);
-                reference = (int)child;
-                if (content.leaf) {
-                    uint leaf = place[content.sphere];
-                    write_leaf(&primitives, binary, below, content, leaf, packs, leaf_spheres);
-                    reference = ~(int)(leaf << 4 | (uint)content.sphere << 3 | (content.count - 1));
-                    place[content.sphere] += content.units;
-                } else {
-                    ++child;
-                }
+            int child = EMPTY;
+            if (content.count > 0) {
+                box = node_box(&primitives, binary, content.node);
+                child = (int)fill_slot(&primitives, binary, content, &next, triangles, leaf_spheres);
+                if (content.leaf) child = ~(child << 4 | content.sphere << 3 | (int)(content.count - 1));
             }
-            node->lo[0][s] = box.lo.x;
-            node->lo[1][s] = box.lo.y;
-            node->lo[2][s] = box.lo.z;
-            node->hi[0][s] = box.hi.x;
-            node->hi[1][s] = box.hi.y;
-            node->hi[2][s] = box.hi.z;
-            node->child[s] = reference;
+            write_lane(node->lo, s, box.lo);
+            write_lane(node->hi, s, box.hi);
+            node->child[s] = child;
             node->pad[s] = 0;
         }
     }

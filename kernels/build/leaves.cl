@@ -10,10 +10,10 @@ static inline void write_spheres(const Primitives *primitives, const int *member
 }
 #endif
 
-#if TRIANGLES && PACK == 8
+#if TRIANGLES && LANES == 8
 // Unused lanes get corners of NaN, which no ray hits, and primitive −1.
 static inline void write_triangles(const Primitives *primitives, const int *members, int count, global Triangles *pack) {
-    for (int lane = 0; lane < PACK; ++lane) {
+    for (int lane = 0; lane < LANES; ++lane) {
         bool used = lane < count;
         int member = members[used ? lane : 0];
         global const float *p = primitives->shapes + SHAPE * member;
@@ -35,15 +35,25 @@ static inline void write_triangles(const Primitives *primitives, const int *memb
 }
 #endif
 
-// Writes the leaf under binary node `node` from record `first` of its kind on.
-static inline void write_leaf(const Primitives *primitives, global const BinaryNode *nodes, int node, Content content,
-                              uint first, global Triangles *packs, global LeafSphere *leaf_spheres) {
+// Where the next wide node below a level goes, and the next records of triangles and spheres.
+typedef struct { uint node, triangle, sphere; } Places;
+
+#define PLACE_PARAMETERS uint first_node, uint next_node, uint first_triangle, uint first_sphere
+#define PLACES(i) {next_node + places[i], first_triangle + places[count + (i)], first_sphere + places[2 * count + (i)]}
+
+// Takes the place of what stands in a slot; writes the records of a leaf.
+static inline uint fill_slot(const Primitives *primitives, global const BinaryNode *nodes, Content content, Places *next,
+                             global Triangles *triangles, global LeafSphere *leaf_spheres) {
+    if (!content.leaf) return next->node++;
     int members[LEAF_SIZE];
-    int count = leaf_primitives(nodes, node, members);
+    int count = leaf_primitives(nodes, content.node, members);
+    uint first = content.sphere ? next->sphere : next->triangle;
 #if SPHERES
     if (content.sphere) write_spheres(primitives, members, count, leaf_spheres + first);
 #endif
 #if TRIANGLES
-    if (!content.sphere) write_triangles(primitives, members, count, packs + first);
+    if (!content.sphere) write_triangles(primitives, members, count, triangles + first);
 #endif
+    *(content.sphere ? &next->sphere : &next->triangle) += content.units;
+    return first;
 }

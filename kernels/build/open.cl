@@ -1,22 +1,33 @@
 // The wide tree's nodes, level by level from the root, as the plans say; each level is one range of consecutive nodes.
 #include "build/collapse.cl"
+#include SLOTS
 
-// What stands in a slot: a wide node, a leaf of triangles or one of spheres. `units`: leaf records that it takes.
-typedef struct { bool leaf, sphere; uint count, units; } Content;
+// What stands in a slot: a wide node, a leaf of triangles, one of spheres, or nothing, whose count is 0. `units`: the
+// leaf records that it takes.
+typedef struct { int node; bool leaf, sphere; uint count, units; } Content;
 
-static inline Content content_of(const Primitives *primitives, global const uint *plans, int node) {
-    uint plan = plan_of(primitives, plans, node), count = COUNT(plan);
-    bool sphere = (plan & HAS_SPHERES) != 0;
-    return (Content){(plan & IS_LEAF) != 0, sphere, count, sphere || PACK == 1 ? count : 1};
+static inline void contents_of(const Primitives *primitives, global const uint *plans, global const int *slots,
+                               Content *contents) {
+    bool triangles = false;
+    for (int s = 0; s < CHILDREN; ++s) {
+        int node = slots[s];
+        uint plan = node == EMPTY ? 0 : plan_of(primitives, plans, node), count = COUNT(plan);
+        bool leaf = (plan & IS_LEAF) != 0, sphere = (plan & HAS_SPHERES) != 0;
+        contents[s] = (Content){node, leaf, sphere, count, sphere ? count : (count + LANES - 1) / LANES};
+        triangles |= leaf && !sphere;
+    }
+#if ONE_KIND
+    // A node with leaves of both kinds: those of spheres come into nodes of their own.
+    for (int s = 0; s < CHILDREN; ++s) contents[s].leaf = contents[s].leaf && !(triangles && contents[s].sphere);
+#endif
 }
 
-// The binary nodes that become the children of a wide one in place of `top`, and how many they are.
-static inline int open_node(global const BinaryNode *nodes, global const uint *plans, int top, int *slot) {
-    int roots[CHILDREN], used = 2;
-    slot[0] = nodes[top].left;
-    slot[1] = nodes[top].right;
-    roots[0] = SHARE(plans[top], CHILDREN);
-    roots[1] = CHILDREN - roots[0];
+// The binary nodes that become the children of a wide one in place of `top`; EMPTY in slots that are not used.
+static inline void open_node(const Primitives *primitives, global const BinaryNode *nodes, global const uint *plans,
+                             int top, global int *slots) {
+    int slot[CHILDREN], roots[CHILDREN], used = 1;
+    slot[0] = top;
+    roots[0] = CHILDREN;
     for (int s = 0; s < used;) {
         int node = slot[s], b = roots[s], share = node < 0 || b < 2 ? 0 : SHARE(plans[node], b);
         if (share == 0) {
@@ -28,42 +39,64 @@ static inline int open_node(global const BinaryNode *nodes, global const uint *p
         slot[used] = nodes[node].right;
         roots[used++] = b - share;
     }
-    return used;
+    put_in_slots(primitives, nodes, top, slot, used, slots);
 }
 
-// The level below `count` wide nodes. slots: [CHILDREN] a node, binary nodes, EMPTY at the end. places[0]: the first
-// wide child of each. waiting: entries on a traversal's stack when it comes to a node. All three are filled in for the
-// `below` children; places[0], [1], [2], each with `below` entries, with how many wide nodes and records of triangles
-// and spheres each of them needs. most[0]: the most entries on the stack after a node has pushed its children.
+typedef struct { int children; uint nodes, triangles, spheres; } Needs;
+
+// How many children a node has, and how many wide nodes and leaf records they take.
+static inline Needs needs_of(const Content *contents) {
+    Needs needs = {0, 0, 0, 0};
+    for (int s = 0; s < CHILDREN; ++s) {
+        Content c = contents[s];
+        needs.children += c.count > 0;
+        needs.nodes += c.count > 0 && !c.leaf;
+        needs.triangles += c.leaf && !c.sphere ? c.units : 0;
+        needs.spheres += c.leaf && c.sphere ? c.units : 0;
+    }
+    return needs;
+}
+
+static inline float leaf_area(const Primitives *primitives, global const BinaryNode *nodes, Content c) {
+    return c.leaf ? half_area(node_box(primitives, nodes, c.node)) * tests_of(c.sphere, c.count) : 0.0f;
+}
+
+// Opens the nodes below `count` wide ones. slots: [CHILDREN] a node, of binary nodes and EMPTY. places: first the place
+// of each one's first wide child. waiting: entries on a traversal's stack when it comes to a node; with GROUPS, the
+// nodes below one are one entry. All three are filled in for the `below` children, of places three times as many: how
+// many wide nodes, records of triangles and of spheres each of them needs. most[0]: the most entries on the stack. work,
+// of each block: the areas of nodes, and of leaves for each intersection.
 kernel void open_level(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *nodes,
                        global const uint *plans, global const int *slots, global const uint *places,
                        global const int *waiting, uint below, global int *next_slots, global uint *next_places,
-                       global int *next_waiting, global int *most) {
+                       global int *next_waiting, global int *most, global float *work) {
     Primitives primitives = PRIMITIVE_ARGUMENTS;
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
     int fullest = 0;
+    float areas = 0.0f;
     for (uint i = first; i < end; ++i) {
+        Content above[CHILDREN], contents[CHILDREN];
+        contents_of(&primitives, plans, slots + CHILDREN * i, above);
+        Needs needs = needs_of(above);
+        int left = waiting[i] + (GROUPS ? needs.nodes > 1 : needs.children - 1);
         uint child = places[i];
-        int used = 0;
-        while (used < CHILDREN && slots[CHILDREN * i + used] != EMPTY) ++used;
-        for (int s = 0; s < used; ++s) {
-            int top = slots[CHILDREN * i + s];
-            if (content_of(&primitives, plans, top).leaf) continue;
-            int slot[CHILDREN], children = open_node(nodes, plans, top, slot);
-            uint need[3] = {0, 0, 0};
-            for (int k = 0; k < CHILDREN; ++k) {
-                next_slots[CHILDREN * child + k] = k < children ? slot[k] : EMPTY;
-                if (k >= children) continue;
-                Content c = content_of(&primitives, plans, slot[k]);
-                need[c.leaf ? 1 + c.sphere : 0] += c.leaf ? c.units : 1;
-            }
-            for (int k = 0; k < 3; ++k) next_places[k * below + child] = need[k];
-            int left = waiting[i] + used - 1;
+        for (int s = 0; s < CHILDREN; ++s) {
+            if (above[s].count == 0 || above[s].leaf) continue;
+            open_node(&primitives, nodes, plans, above[s].node, next_slots + CHILDREN * child);
+            contents_of(&primitives, plans, next_slots + CHILDREN * child, contents);
+            needs = needs_of(contents);
+            next_places[child] = needs.nodes;
+            next_places[below + child] = needs.triangles;
+            next_places[2 * below + child] = needs.spheres;
             next_waiting[child++] = left;
-            fullest = left + children > fullest ? left + children : fullest;
+            int entries = left + (GROUPS ? 0 : needs.children);
+            fullest = entries > fullest ? entries : fullest;
+            areas += half_area(node_box(&primitives, nodes, above[s].node));
+            for (int k = 0; k < CHILDREN; ++k) areas += leaf_area(&primitives, nodes, contents[k]);
         }
     }
     if (fullest > 0) atomic_max(most, fullest);
+    if (first < count) work[get_global_id(0)] = areas;
 }
 
 // The primitives of a leaf's subtree, from left to right.

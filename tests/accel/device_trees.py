@@ -2,57 +2,69 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
-import pyopencl as cl
 from numpy.typing import NDArray
 
-from clrt.accel.device_builder import SHAPES, DeviceTree, build_tree, program_source
-from clrt.accel.layouts import BVH8_NODE, LEAF_SPHERE, TRIANGLE_PACK, sphere_boxes
+from clrt.accel.build import build_tree
+from clrt.accel.device_builder import SHAPES, program_source
+from clrt.accel.layouts import Layout, sphere_boxes
 from clrt.accel.morton import sort_primitives
 from clrt.accel.ploc import BINARY_NODE, cluster
 from clrt.accel.reinsertion import reinsert
-from clrt.accel.tree import FloatArray, half_area
-from clrt.accel.wide import Wide, leaf_fields, leaf_reference
+from clrt.accel.tree import FloatArray, Tree, half_area
+from clrt.accel.wide import EMPTY, Wide, leaf_fields, leaf_reference
+from clrt.device.arrays import on_host
 from clrt.device.blocks import Blocks
 from clrt.device.open import Device
 
 from .cases import SCENES
-
-Records = NDArray[np.void]
-
-
-@dataclass(frozen=True)
-class Built:
-    """A tree of the layout bvh8 and its records; `wide.order` lists the packs' eight lanes one after another."""
-
-    tree: DeviceTree
-    nodes: Records
-    packs: Records
-    spheres: Records
-    first_sphere: int
-
-    @cached_property
-    def wide(self) -> Wide:
-        child = self.nodes["child"].copy()
-        first, sphere, count = leaf_fields(child[child < 0])
-        child[child < 0] = leaf_reference(np.where(sphere, first, 8 * first).astype(np.int32), sphere, count)
-        return Wide(self.nodes["lo"].transpose(0, 2, 1), self.nodes["hi"].transpose(0, 2, 1), child,
-                    self.packs["primitive"].ravel(), self.spheres["primitive"] - np.int32(self.first_sphere))
+from .test_cwbvh import boxes_below, children_of, leaves_of
 
 
 @lru_cache(maxsize=None)
-def built(device: Device, case: str) -> Built:
-    triangles, balls = SCENES[case]
-    tree = build_tree(device, SHAPES["bvh8"], triangles, balls)
-    records = [np.empty(count, dtype) for count, dtype in zip(tree.counts, (BVH8_NODE, TRIANGLE_PACK, LEAF_SPHERE))]
-    for values, array in zip(records, tree.arrays):
-        if len(values):
-            cl.enqueue_copy(device.queue, values, array)
-    nodes, packs, leaf_spheres = records
-    return Built(tree, nodes, packs, leaf_spheres, len(triangles))
+def built(device: Device, layout: str, case: str) -> Layout:
+    """The tree over a scene, with its buffers on the host."""
+    tree = build_tree(device, layout, "ploc", *SCENES[case])
+    return replace(tree, buffers={name: on_host(device, array) for name, array in tree.buffers.items()})
+
+
+def wide_tree(device: Device, layout: str, case: str) -> Wide:
+    """Of the layouts bvh8, where a leaf's first lane counts, and cwbvh, where primitives do as the records number them.
+
+    Boxes of cwbvh are those of what is below each slot.
+    """
+    tree, triangle_count = built(device, layout, case), len(SCENES[case][0])
+    nodes, order = tree.buffers["nodes"], np.empty(0, np.int32)
+    if layout == "cwbvh":
+        child = np.full((len(nodes), 8), EMPTY, np.int32)
+        for index, node in enumerate(nodes):
+            for slot, below in children_of(node):
+                child[index, slot] = below
+            for slot, start, size in leaves_of(node):
+                child[index, slot] = ~(start << 4 | (start >= triangle_count) << 3 | size - 1)
+        return Wide(*boxes_below(tree), child, np.zeros(1, np.int32), order)
+    child = nodes["child"].copy()
+    first, sphere, count = leaf_fields(child[child < 0])
+    child[child < 0] = leaf_reference(np.where(sphere, first, 8 * first).astype(np.int32), sphere, count)
+    if "packs" in tree.buffers:
+        order = tree.buffers["packs"]["primitive"].ravel()
+    balls = tree.buffers["leaf_spheres"]["primitive"] if "leaf_spheres" in tree.buffers else order[:0]
+    return Wide(nodes["lo"].transpose(0, 2, 1), nodes["hi"].transpose(0, 2, 1), child, order,
+                balls - np.int32(triangle_count))
+
+
+def binary_tree(device: Device, case: str) -> Tree:
+    """Of the layout bvh2; leaves of spheres are as those of triangles, and come after them in `order`."""
+    buffers, triangle_count = built(device, "bvh2", case).buffers, len(SCENES[case][0])
+    nodes = np.delete(buffers["nodes"], 1)
+    shift = np.where(nodes["count"] == 0, -1, np.where(nodes["count"] < 0, triangle_count, 0))
+    leaves = [buffers[name]["primitive"] for name in ("leaf_triangles", "leaf_spheres") if name in buffers]
+    order = np.concatenate(leaves)
+    return Tree(nodes["aabb_min"], nodes["aabb_max"], (nodes["left_first"] + shift).astype(np.int32),
+                np.abs(nodes["count"]), np.zeros(len(nodes), bool), order, order[:0])
 
 
 @dataclass(frozen=True)
@@ -95,9 +107,10 @@ class Binary:
             np.testing.assert_array_equal(self.nodes[side], union.reduce(boxes[below], axis=1))
 
 
-def binary(device: Device, triangles: FloatArray, balls: FloatArray, passes: int = 0) -> Binary:
-    """The binary tree after some passes of reinsertion."""
-    work = Blocks(device, program_source(SHAPES["bvh8"], len(triangles) > 0, len(balls) > 0, passes > 0))
+def binary(device: Device, layout: str, case: str, passes: int = 0) -> Binary:
+    """The binary tree over a scene for a layout, after some passes of reinsertion."""
+    triangles, balls = SCENES[case]
+    work = Blocks(device, program_source(SHAPES[layout], len(triangles) > 0, len(balls) > 0, passes > 0))
     primitives = sort_primitives(work, triangles, balls)
     tree = cluster(work, primitives)
     tree = reinsert(work, primitives, tree, passes) if passes else tree

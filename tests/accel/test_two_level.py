@@ -93,11 +93,12 @@ MOST: dict[str, Callable[[Records, int, int, int], int]] = {"bvh2": most_bvh2, "
 
 
 @pytest.mark.parametrize("kinds", [1, len(MESHES)])
+@pytest.mark.parametrize("builder", ["ploc", "sah"])
 @pytest.mark.parametrize("layout", FORMS)
-def test_stacks_hold_and_all_is_reached(device: Device, layout: str, kinds: int) -> None:
+def test_stacks_hold_and_all_is_reached(device: Device, layout: str, builder: str, kinds: int) -> None:
     """Of one mesh the bound is tight but for what stays in registers; of several the deepest may not be the lowest."""
     mesh = np.arange(60, dtype=np.int32) % kinds
-    tree = TwoLevels(device, layout, None, MESHES[:kinds], mesh).place(in_a_row(len(mesh)))
+    tree = TwoLevels(device, layout, builder, MESHES[:kinds], mesh).place(in_a_row(len(mesh)))
     records = Records(device, tree)
     most = MOST[layout](records, 0, WORLD, 0)
     assert sorted(records.seen) == [(i, p) for i, m in enumerate(mesh) for p in range(len(MESHES[m]))]

@@ -1,0 +1,39 @@
+// Writes nodes and leaves of the layout bvh2 (clrt/accel/layouts.py, kernels/traverse/bvh2.cl) for one level.
+//
+// A record stands in the one above its own: those of the two children of wide node w are 2 w + 2 and 2 w + 3. Records 0
+// and 1 are the root's and an unused one.
+#include "build/leaves.cl"
+
+static inline void write_node(global Node *node, Box box, int left_first, int count) {
+    vstore3(box.lo, 0, node->aabb_min);
+    vstore3(box.hi, 0, node->aabb_max);
+    node->left_first = left_first;
+    node->count = count;
+}
+
+// first_node, next_node: the first node of this level and of the next. The other two: its first records.
+kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *binary,
+                        global const uint *plans, global const int *slots, global const uint *places, PLACE_PARAMETERS,
+                        global Node *nodes, global Triangles *triangles, global LeafSphere *leaf_spheres) {
+    Primitives primitives = PRIMITIVE_ARGUMENTS;
+    uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
+    for (uint i = first; i < end; ++i) {
+        uint children = 2 * (first_node + i + 1);
+        Places next = PLACES(i);
+        Content contents[CHILDREN];
+        contents_of(&primitives, plans, slots + CHILDREN * i, contents);
+        Box around = NO_BOX;
+        for (int s = 0; s < CHILDREN; ++s) {
+            Content content = contents[s];
+            Box box = node_box(&primitives, binary, content.node);
+            int place = (int)fill_slot(&primitives, binary, content, &next, triangles, leaf_spheres);
+            int many = content.sphere ? -(int)content.count : (int)content.count;
+            write_node(nodes + children + s, box, content.leaf ? place : 2 * (place + 1), content.leaf ? many : 0);
+            around = box_union(around, box);
+        }
+        if (children == 2) {
+            write_node(nodes, around, 2, 0);
+            write_node(nodes + 1, NO_BOX, 0, 0);
+        }
+    }
+}
