@@ -14,7 +14,7 @@ from .layouts import LEAF_SPHERE, Layout, pack
 from .tree import FloatArray
 
 #: Builders that run on the device, by the passes of reinsertion that follow.
-DEVICE_BUILDERS = {"ploc": 0}
+DEVICE_BUILDERS = {"ploc": 0, "reinsertion": 2}
 #: From so many primitives on a device's tree is done before numpy's, kernels loaded from the cache included.
 LARGE = 1 << 14
 
@@ -38,7 +38,7 @@ def build_tree(device: Device | None, layout: str, builder: str | None, triangle
                          "take the builder sah")
     start = time.perf_counter()
     shape = device_builder.SHAPES[layout]
-    tree = device_builder.build_tree(device, shape, triangles, spheres)
+    tree = device_builder.build_tree(device, shape, triangles, spheres, DEVICE_BUILDERS[builder])
     names, dtypes = ("nodes", shape.leaves, "leaf_spheres"), (shape.node, shape.leaf, LEAF_SPHERE)
     buffers = {name: DeviceArray(buffer, dtype, size)
                for name, buffer, dtype, size in zip(names, tree.arrays, dtypes, tree.counts) if size}

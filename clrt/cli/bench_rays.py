@@ -18,7 +18,7 @@ import click
               help="Tree layout; default: all of them or, with --rays, the device's.")
 @click.option("--triangle", type=click.Choice(["watertight", "moller_trumbore"]), default="watertight",
               show_default=True, help="Triangle test.")
-@click.option("--builder", type=click.Choice(["ploc", "sah", "midpoint"]), help="Tree builder.")
+@click.option("--builder", type=click.Choice(["ploc", "reinsertion", "sah", "midpoint"]), help="Tree builder.")
 @click.option("--quick", is_flag=True, help="Fewer rays, and a smaller ball.")
 @click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
 def rays_command(mesh: Path | None, rays: Path | None, quick: bool, json_file: Path | None, **options: Any) -> None:

@@ -29,7 +29,7 @@ def tracing_options(command: F) -> F:
         click.option("--lanes", type=click.Choice(["1", "8", "16"]), help="Paths a work-item."),
         click.option("--triangle", type=click.Choice(["watertight", "moller_trumbore"]), default="watertight",
                      show_default=True, help="Triangle test."),
-        click.option("--builder", type=click.Choice(["ploc", "sah", "midpoint"]),
+        click.option("--builder", type=click.Choice(["ploc", "reinsertion", "sah", "midpoint"]),
                      help="Tree builder; default: sah for small scenes, ploc on the device for large ones."),
         click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "list"]),
                      help="Tree layout; list is no tree."),

@@ -23,7 +23,7 @@ def test_nothing_differs_and_every_way_is_taken(device: Device, name: str) -> No
     result = measure_case(case, [device.info.index, device.info.index], EFFORT)
     ways = {(way["layout"], way["builder"], way["traversal"]) for way in result["ways"]}
     trees = {(layout, builder, "single") for layout in ("bvh8", "bvh2", "cwbvh") for builder in ("sah", "midpoint")}
-    trees |= {("bvh8", builder, way) for builder in ("ploc", "sah", "midpoint") for way in ("packet", "pool")}
+    trees |= {("bvh8", builder, way) for builder in ("ploc", "reinsertion", "sah") for way in ("packet", "pool")}
     assert ways >= trees | {("list", "sah", "single"), ("bvh8", "ploc", "single")}
     assert len(result["ways"]) == 2 * len(ways) and not any("error" in way for way in result["ways"])
     assert all(way["differ"] == {"random": 0, "vertices": 0, "edges": 0, "axes": 0} for way in result["ways"])
