@@ -84,8 +84,8 @@ def build_tree(device: Device, shape: Shape, triangles: FloatArray, spheres: Flo
     if reinsertions:
         tree = reinsert(work, primitives, tree, reinsertions)
     plan = _plan(work, shape, primitives, tree)
-    levels, stack, cost = _open(work, shape, plan)
-    return _write(work, shape, plan, levels, stack, cost)
+    levels, stack = _open(work, shape, plan)
+    return _write(work, shape, plan, levels, stack)
 
 
 def program_source(shape: Shape, triangles: bool, spheres: bool, reinsertions: bool) -> str:
@@ -140,7 +140,7 @@ def _plan(work: Blocks, shape: Shape, primitives: Primitives, tree: BinaryTree) 
     size, area = top["hi"] - top["lo"], half_area(top["lo"], top["hi"])
     for per, none, whole in (("per_side", "no_side", size), ("per_area", "no_area", area)):
         world[per], world[none] = np.divide(1, whole, out=np.zeros_like(whole), where=whole > 0), whole == 0
-    plans, least = work.empty(np.uint32, tree.count), work.empty(np.float32, tree.count)
+    plans, least = work.empty(np.uint32, tree.count), work.empty(np.float32, 2 * tree.count)
     costs = work.empty(np.float32, tree.count * (shape.children - 1))
     for first, count in zip(itertools.accumulate(tree.rounds, initial=0), tree.rounds):
         work.run("plan_nodes", count, *primitives.arguments, tree.nodes, first, root, world[0], plans, costs, least)
@@ -148,42 +148,39 @@ def _plan(work: Blocks, shape: Shape, primitives: Primitives, tree: BinaryTree) 
     return _Plan(primitives, tree, plans, float(area[0]))
 
 
-def _open(work: Blocks, shape: Shape, plan: _Plan) -> tuple[list[_Level], int, float]:
-    """The wide tree's levels, the most entries on a traversal's stack, and the tree's work, its root's area being 1.
-
-    It begins with a node above the root.
-    """
+def _open(work: Blocks, shape: Shape, plan: _Plan) -> tuple[list[_Level], int]:
+    """The wide tree's levels, and the most entries on a traversal's stack. It begins with a node above the root."""
     slots = np.full(shape.children, EMPTY, np.int32)
     slots[0] = plan.tree.count - 1
-    nothing, most, areas = np.zeros(3, np.uint32), work.upload(np.zeros(1, np.int32)), 0.0
+    nothing, most = np.zeros(3, np.uint32), work.zeros(np.int32, 1)
     levels = [_Level(1, work.upload(slots), work.upload(nothing), work.upload(nothing), (1, 0, 0))]
     while below := levels[-1].records[0]:
-        above, places, blocks = levels[-1], work.empty(np.uint32, 3 * below), work.number(levels[-1].count)
+        above, places = levels[-1], work.empty(np.uint32, 3 * below)
         children, waiting = work.empty(np.int32, below * shape.children), work.empty(np.int32, below)
-        partial = work.empty(np.float32, blocks)
-        work.run("open_level", above.count, *plan.arguments, *above.arrays, below, children, places, waiting, most,
-                 partial)
-        nodes, triangles, spheres = map(int, work.scan(places, below, 3))
-        areas += float(work.download(partial, np.float32, blocks).sum(dtype=np.float64))
+        work.run("open_level", above.count, *plan.arguments, *above.arrays, below, children, places, waiting, most)
+        work.scan(places, below, 3)
+        nodes, triangles, spheres = work.sums(3)
         levels.append(_Level(below, children, places, waiting, (nodes, triangles, spheres)))
-        work.free(partial)
     work.free(*levels[0].arrays)
-    return levels[1:], int(work.download(most, np.int32, 1)[0]), areas / plan.area if plan.area else math.inf
+    return levels[1:], int(work.download(most, np.int32, 1)[0])
 
 
-def _write(work: Blocks, shape: Shape, plan: _Plan, levels: list[_Level], stack: int, cost: float) -> DeviceTree:
+def _write(work: Blocks, shape: Shape, plan: _Plan, levels: list[_Level], stack: int) -> DeviceTree:
     """Nodes and leaves, level by level."""
     sizes, records = [level.count for level in levels], [level.records for level in levels]
     each, besides = shape.records
     counts = sum(sizes) * each + besides, sum(r[1] for r in records), sum(r[2] for r in records)
     arrays = work.empty(shape.node, counts[0]), work.empty(shape.leaf, counts[1]), work.empty(LEAF_SPHERE, counts[2])
+    blocks = max(map(work.number, sizes))
+    areas = work.zeros(np.float32, blocks)
     node = triangle = sphere = 0
     for level in levels:
         work.run("write_level", level.count, *plan.arguments, level.slots, level.places, node, node + level.count,
-                 triangle, sphere, *arrays)
+                 triangle, sphere, *arrays, areas)
         node, triangle, sphere = node + level.count, triangle + level.records[1], sphere + level.records[2]
         work.free(*level.arrays)
-    work.free(plan.tree.nodes, plan.plans, plan.primitives.shapes, plan.primitives.ids)
+    area = plan.area + float(work.download(areas, np.float32, blocks).sum(dtype=np.float64))
+    work.free(areas, plan.tree.nodes, plan.plans, plan.primitives.shapes, plan.primitives.ids)
+    cost = area / plan.area if plan.area else float(sum(sizes) + counts[1] + counts[2])
     level_sizes = [1] * (besides > 0) + [each * size for size in sizes]
-    cost = cost if math.isfinite(cost) else float(sum(sizes) + counts[1] + counts[2])
     return DeviceTree(arrays, counts, sum(level_sizes), len(sizes), stack, cost, level_sizes, work.peak_bytes)

@@ -37,20 +37,32 @@ class Primitives:
         return self.shapes, self.ids, self.triangle_count
 
 
+Scene = tuple[cl.Buffer, cl.Buffer, int]  # triangles, spheres, and how many triangles there are
+
+
 def sort_primitives(work: Blocks, triangles: FloatArray, spheres: FloatArray) -> Primitives:
     """Triangles (m, 3, 3) and spheres (s, 4), float32, along a Morton curve through the centres of their boxes."""
     count = len(triangles) + len(spheres)
-    scene = work.upload(triangles), work.upload(spheres), len(triangles)
+    scene = work.lend(triangles), work.lend(spheres), len(triangles)
+    try:
+        ids = _morton_order(work, scene, count)
+        shapes = work.empty(np.float32, SHAPE * count)
+        work.run("gather_shapes", count, *scene, ids, shapes)
+    finally:
+        work.finish()
+    work.free(*scene[:2])
+    return Primitives(shapes, ids, len(triangles), count)
+
+
+def _morton_order(work: Blocks, scene: Scene, count: int) -> cl.Buffer:
+    """(count,) uint32, numbers of the primitives."""
     low, extent = _centre_bounds(work, scene, count)
     scale = min(CELLS / extent, float(np.finfo(np.float32).max)) if extent > 0 else 0.0
     codes, ids = work.empty(np.uint64, count), work.empty(np.uint32, count)
     work.run("morton_codes", count, *scene, *low.tolist(), scale, codes, ids)
     codes, ids = radix_sort(work, codes, ids, count)
     work.free(codes)
-    shapes = work.empty(np.float32, SHAPE * count)
-    work.run("gather_shapes", count, *scene, ids, shapes)
-    work.free(*scene[:2])
-    return Primitives(shapes, ids, len(triangles), count)
+    return ids
 
 
 def radix_sort(work: Blocks, codes: cl.Buffer, values: cl.Buffer, count: int) -> tuple[cl.Buffer, cl.Buffer]:
@@ -67,7 +79,7 @@ def radix_sort(work: Blocks, codes: cl.Buffer, values: cl.Buffer, count: int) ->
     return codes, values
 
 
-def _centre_bounds(work: Blocks, scene: tuple[cl.Buffer, cl.Buffer, int], count: int) -> tuple[FloatArray, float]:
+def _centre_bounds(work: Blocks, scene: Scene, count: int) -> tuple[FloatArray, float]:
     """Twice the lowest centre (3,) float32, and twice the largest extent of the centres."""
     blocks = work.number(count)
     partial = work.empty(np.float32, 6 * blocks)

@@ -44,13 +44,11 @@ def cluster(work: Blocks, primitives: Primitives) -> BinaryTree:
     rounds: list[int] = []
     forced = False
     while clusters > 1:
-        if forced:
-            work.run("pair_clusters", clusters, nearest)
-        else:
-            work.run("nearest_clusters", clusters, *now, nearest)
+        work.run("nearest_clusters", clusters, *now, int(forced), nearest)
         offsets = work.empty(np.uint32, 2 * work.number(clusters))
         work.run("count_pairs", clusters, nearest, offsets)
-        stay, joined = map(int, work.scan(offsets, work.number(clusters), 2))
+        work.scan(offsets, work.number(clusters), 2)
+        stay, joined = work.sums(2)
         later = later or _columns(work, stay)
         work.run("join_pairs", clusters, nearest, offsets, work.totals, *now, *later, nodes, sum(rounds))
         work.free(offsets)

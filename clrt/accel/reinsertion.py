@@ -59,12 +59,12 @@ def _level(work: Blocks, primitives: Primitives, tree: BinaryTree) -> Leveled:
     while below:
         counts = work.empty(np.uint32, work.number(below))
         work.run("count_below", below, tree.nodes, root, listed, sum(sizes), counts)
-        inner = int(work.scan(counts, work.number(below))[0])
+        work.scan(counts, work.number(below))
         work.run("write_binary_level", below, tree.nodes, root, listed, sum(sizes), len(sizes), counts, nodes, parents,
                  levels)
         work.free(counts)
         sizes.append(below)
-        below = inner
+        (below,) = work.sums()
     work.free(tree.nodes, listed)
     sizes.reverse()
     for first, count in zip(np.cumsum([0, *sizes]), sizes):

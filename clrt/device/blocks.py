@@ -15,8 +15,8 @@ from .program import build, make_kernel
 #: Work-items a compute unit, and the fewest items that one of them gets.
 WORK_ITEMS = {"cpu": 16, "gpu": 512}
 SMALLEST_BLOCK = {"cpu": 256, "gpu": 16}
-#: Work-items of a scan, at most, as in build/scan.cl.
-SCAN_ITEMS = 256
+#: Work-items that scan together where that pays, as in build/scan.cl, and what they get at least.
+SCAN_ITEMS, SCAN_PART = 256, 8192
 
 
 class Blocks:
@@ -39,9 +39,7 @@ class Blocks:
         array = cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, max(1, count) * np.dtype(dtype).itemsize)
         if self.device.info.type == "cpu":
             advise_huge_pages(self.device.queue, array)
-        self._bytes += array.size
-        self.peak_bytes = max(self.peak_bytes, self._bytes)
-        return array
+        return self._counted(array)
 
     def zeros(self, dtype: DTypeLike, count: int) -> cl.Buffer:
         """An array of zeros."""
@@ -55,6 +53,17 @@ class Blocks:
         if values.size:
             cl.enqueue_copy(self.device.queue, array, np.ascontiguousarray(values))
         return array
+
+    def lend(self, values: NDArray[Any]) -> cl.Buffer:
+        """What kernels may read `values` from until `finish`: on a CPU the array itself, elsewhere a copy."""
+        if self.device.info.type != "cpu" or not values.size:
+            return self.upload(values)
+        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
+        return self._counted(cl.Buffer(self.device.context, flags, hostbuf=np.ascontiguousarray(values)))
+
+    def finish(self) -> None:
+        """Waits for all that was asked for."""
+        self.device.queue.finish()
 
     def download(self, array: cl.Buffer, dtype: DTypeLike, count: int, first: int = 0) -> NDArray[Any]:
         """`count` elements of an array, once all that was asked for is done."""
@@ -85,20 +94,38 @@ class Blocks:
         groups = -(-self.number(count) // local)
         cl.enqueue_nd_range_kernel(self.device.queue, kernel, (groups * local,), (local,))
 
-    def scan(self, values: cl.Buffer, count: int, arrays: int = 1) -> NDArray[np.uint32]:
+    def scan(self, values: cl.Buffer, count: int, arrays: int = 1) -> None:
         """Turns each of `arrays` arrays of `count` numbers, one after another in `values`, into what stood before it.
 
-        Returns the sums (arrays,), which are also in `totals`.
+        The sums of all are in `totals` then.
         """
+        parts = 1 if self.device.local_size == 1 else -(-count // SCAN_PART)
+        if parts == 1:
+            return self._scan(values, count, arrays, 1, self._totals)
+        sums = self.empty(np.uint32, arrays * parts)
+        self._scan(values, count, arrays, parts, sums)
+        self._scan(sums, parts, arrays, 1, self._totals)
+        self.run("add_before", arrays * count, values, count, parts, sums)
+        self.free(sums)
+
+    def sums(self, arrays: int = 1) -> list[int]:
+        """What the last scan's `totals` are."""
+        return [int(total) for total in self.download(self._totals, np.uint32, arrays)]
+
+    def _scan(self, values: cl.Buffer, count: int, arrays: int, parts: int, totals: cl.Buffer) -> None:
         kernel, local = self._kernel("scan"), 1 if self.device.local_size == 1 else SCAN_ITEMS
-        kernel.set_args(values, np.uint32(count), self._totals)
-        cl.enqueue_nd_range_kernel(self.device.queue, kernel, (arrays * local,), (local,))
-        return self.download(self._totals, np.uint32, arrays)
+        kernel.set_args(values, np.uint32(count), np.uint32(parts), totals)
+        cl.enqueue_nd_range_kernel(self.device.queue, kernel, (arrays * parts * local,), (local,))
 
     @property
     def totals(self) -> cl.Buffer:
         """The sums of the last scan."""
         return self._totals
+
+    def _counted(self, array: cl.Buffer) -> cl.Buffer:
+        self._bytes += array.size
+        self.peak_bytes = max(self.peak_bytes, self._bytes)
+        return array
 
     def _kernel(self, name: str) -> cl.Kernel:
         if name not in self._kernels:

@@ -11,15 +11,14 @@ static inline void write_node(global Node *node, Box box, int left_first, int co
     node->count = count;
 }
 
-// first_node, next_node: the first node of this level and of the next. The other two: its first records.
-kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *binary,
-                        global const uint *plans, global const int *slots, global const uint *places, PLACE_PARAMETERS,
-                        global Node *nodes, global Triangles *triangles, global LeafSphere *leaf_spheres) {
+kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
     Primitives primitives = PRIMITIVE_ARGUMENTS;
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
+    float areas = 0.0f;
     for (uint i = first; i < end; ++i) {
         uint children = 2 * (first_node + i + 1);
         Places next = PLACES(i);
+        prefetch_slots(binary, plans, slots, i, end);
         Content contents[CHILDREN];
         contents_of(&primitives, plans, slots + CHILDREN * i, contents);
         Box around = NO_BOX;
@@ -30,10 +29,12 @@ kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global con
             int many = content.sphere ? -(int)content.count : (int)content.count;
             write_node(nodes + children + s, box, content.leaf ? place : 2 * (place + 1), content.leaf ? many : 0);
             around = box_union(around, box);
+            areas += visited_area(box, content);
         }
         if (children == 2) {
             write_node(nodes, around, 2, 0);
             write_node(nodes + 1, NO_BOX, 0, 0);
         }
     }
+    if (first < count) work[get_global_id(0)] += areas;
 }

@@ -7,15 +7,14 @@ static inline void write_lane(global float (*rows)[CHILDREN], int lane, float3 v
     rows[2][lane] = v.z;
 }
 
-// first_node, next_node: the first node of this level and of the next. The other two: its first records.
-kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *binary,
-                        global const uint *plans, global const int *slots, global const uint *places, PLACE_PARAMETERS,
-                        global Node *nodes, global Triangles *triangles, global LeafSphere *leaf_spheres) {
+kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
     Primitives primitives = PRIMITIVE_ARGUMENTS;
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
+    float areas = 0.0f;
     for (uint i = first; i < end; ++i) {
         global Node *node = nodes + first_node + i;
         Places next = PLACES(i);
+        prefetch_slots(binary, plans, slots, i, end);
         Content contents[CHILDREN];
         contents_of(&primitives, plans, slots + CHILDREN * i, contents);
         for (int s = 0; s < CHILDREN; ++s) {
@@ -24,6 +23,7 @@ kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global con
             int child = EMPTY;
             if (content.count > 0) {
                 box = node_box(&primitives, binary, content.node);
+                areas += visited_area(box, content);
                 child = (int)fill_slot(&primitives, binary, content, &next, triangles, leaf_spheres);
                 if (content.leaf) child = ~(child << 4 | content.sphere << 3 | (int)(content.count - 1));
             }
@@ -33,4 +33,5 @@ kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global con
             node->pad[s] = 0;
         }
     }
+    if (first < count) work[get_global_id(0)] += areas;
 }

@@ -49,24 +49,19 @@ typedef struct {
     Primitives primitives;
     global const BinaryNode *nodes;
     global uint *plans;
-    global float *costs, *least;
+    global float *costs;
+    global float2 *least;
     World world;
 } Planned;
 
-static inline float leaf_cost(const Planned *tree, int node) {
-    float met = chance(node_box(&tree->primitives, tree->nodes, node), &tree->world);
-    uint plan = plan_of(&tree->primitives, tree->plans, node);
-    return fma(met, tests_of((plan & HAS_SPHERES) != 0, COUNT(plan)), 0.0f);
-}
-
-static inline float least_cost(const Planned *tree, int node) {
-    return node >= 0 ? tree->least[node] : leaf_cost(tree, node);
+static inline float2 leaf_costs(const Planned *tree, int node) {
+    return node >= 0 ? tree->least[node] : (float2)(chance(primitive_box(&tree->primitives, ~node), &tree->world));
 }
 
 // cost[b] with at most b = 1 … CHILDREN − 1 roots.
 static inline void costs_of(const Planned *tree, int node, float *cost) {
     bool whole = (plan_of(&tree->primitives, tree->plans, node) & WHOLE) != 0;
-    float leaf = whole ? leaf_cost(tree, node) : 0.0f;
+    float leaf = whole ? leaf_costs(tree, node).x : 0.0f;
     for (int b = 1; b < CHILDREN; ++b) cost[b] = whole ? leaf : tree->costs[(CHILDREN - 1) * node + b - 1];
 }
 
@@ -97,8 +92,8 @@ static inline uint plan_node(const Planned *tree, int node, int root) {
     bool may_be_leaf = node != root && fits_leaf(plan);
     if (may_be_leaf) leaf = fma(met, tests_of((plan & HAS_SPHERES) != 0, count), 0.0f);
     if (PACK > 1 && may_be_leaf) {
-        float opened = least_cost(tree, left) + least_cost(tree, right);
-        tree->least[node] = opened < leaf ? opened : leaf;
+        float opened = leaf_costs(tree, left).y + leaf_costs(tree, right).y;
+        tree->least[node] = (float2)(leaf, opened < leaf ? opened : leaf);
         if (opened >= (1.0f - WORTHWHILE) * leaf) return plan | IS_LEAF | WHOLE;
     }
     float best[CHILDREN + 1];
@@ -114,14 +109,28 @@ static inline uint plan_node(const Planned *tree, int node, int root) {
         tree->costs[(CHILDREN - 1) * node + b - 1] = opened ? best[b] : best[1];
         if (opened) plan |= shares[b] << 3 * (b - 2);
     }
-    if (PACK > 1 && may_be_leaf) tree->least[node] = best[CHILDREN - 1] < best[1] ? best[CHILDREN - 1] : best[1];
+    if (PACK > 1 && may_be_leaf) tree->least[node].y = best[CHILDREN - 1] < best[1] ? best[CHILDREN - 1] : best[1];
     return plan | shares[CHILDREN] << 3 * (CHILDREN - 2);
+}
+
+#define AHEAD_PLANS 8   // nodes whose children are on their way
+
+static inline void prefetch_planned(const Planned *tree, int node) {
+    if (node < 0) return;
+    PREFETCH(tree->plans + node, 4)
+    PREFETCH(tree->least + node, 8)
 }
 
 // Plans of `count` nodes from `node` on, whose children have theirs.
 kernel void plan_nodes(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *nodes, uint node,
-                       uint root, const World world, global uint *plans, global float *costs, global float *least) {
+                       uint root, const World world, global uint *plans, global float *costs, global float2 *least) {
     Planned tree = {PRIMITIVE_ARGUMENTS, nodes, plans, costs, least, world};
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
-    for (uint i = node + first; i < node + end; ++i) plans[i] = plan_node(&tree, i, root);
+    for (uint i = node + first; i < node + end; ++i) {
+        if (i + AHEAD_PLANS < node + end) {
+            prefetch_planned(&tree, nodes[i + AHEAD_PLANS].left);
+            prefetch_planned(&tree, nodes[i + AHEAD_PLANS].right);
+        }
+        plans[i] = plan_node(&tree, i, root);
+    }
 }

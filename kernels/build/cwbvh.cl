@@ -26,15 +26,14 @@ static inline void put_lane(float (*rows)[CHILDREN], int lane, float3 v) {
     rows[2][lane] = v.z;
 }
 
-// first_node, next_node: the first node of this level and of the next. The other two: its first records.
-kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *binary,
-                        global const uint *plans, global const int *slots, global const uint *places, PLACE_PARAMETERS,
-                        global Node *nodes, global Triangles *triangles, global LeafSphere *leaf_spheres) {
+kernel void write_level(uint count, uint block, LEVEL_PARAMETERS) {
     Primitives primitives = PRIMITIVE_ARGUMENTS;
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
+    float areas = 0.0f;
     for (uint i = first; i < end; ++i) {
         global Node *node = nodes + first_node + i;
         Places next = PLACES(i);
+        prefetch_slots(binary, plans, slots, i, end);
         Content contents[CHILDREN];
         contents_of(&primitives, plans, slots + CHILDREN * i, contents);
         float lo[3][CHILDREN], hi[3][CHILDREN];
@@ -49,6 +48,7 @@ kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global con
             if (content.count > 0) {
                 box = node_box(&primitives, binary, content.node);
                 around = box_union(around, box);
+                areas += visited_area(box, content);
                 fill_slot(&primitives, binary, content, &next, triangles, leaf_spheres);
                 node->meta[s] = content.leaf ? ((1u << content.count) - 1) << 5 | leaf_place : 1u << 5 | (24u + s);
                 leaf_place += content.leaf ? content.count : 0;
@@ -64,4 +64,5 @@ kernel void write_level(uint count, uint block, PRIMITIVE_PARAMETERS, global con
         write_axis(node, 1, lo[1], hi[1], around.lo.y, around.hi.y);
         write_axis(node, 2, lo[2], hi[2], around.lo.z, around.hi.z);
     }
+    if (first < count) work[get_global_id(0)] += areas;
 }

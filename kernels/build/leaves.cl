@@ -35,10 +35,19 @@ static inline void write_triangles(const Primitives *primitives, const int *memb
 }
 #endif
 
-// Where the next wide node below a level goes, and the next records of triangles and spheres.
+// The area of what stands in a slot, a leaf's once for each intersection: what a visit costs, by the surface area heuristic.
+static inline float visited_area(Box box, Content content) {
+    return half_area(box) * (content.leaf ? tests_of(content.sphere, content.count) : 1.0f);
+}
+
+// Where the next wide node below a level goes, and the next records of triangles and spheres. Levels start at first_node
+// and next_node, the records of this one at first_triangle and first_sphere. work: areas by block, summed over levels.
 typedef struct { uint node, triangle, sphere; } Places;
 
-#define PLACE_PARAMETERS uint first_node, uint next_node, uint first_triangle, uint first_sphere
+#define LEVEL_PARAMETERS PRIMITIVE_PARAMETERS, global const BinaryNode *binary, global const uint *plans, \
+                         global const int *slots, global const uint *places, uint first_node, uint next_node, \
+                         uint first_triangle, uint first_sphere, global Node *nodes, global Triangles *triangles, \
+                         global LeafSphere *leaf_spheres, global float *work
 #define PLACES(i) {next_node + places[i], first_triangle + places[count + (i)], first_sphere + places[2 * count + (i)]}
 
 // Takes the place of what stands in a slot; writes the records of a leaf.

@@ -42,6 +42,18 @@ static inline void open_node(const Primitives *primitives, global const BinaryNo
     put_in_slots(primitives, nodes, top, slot, used, slots);
 }
 
+// Of the nodes that the next wide node holds the children, and of those that the one after it holds they themselves.
+static inline void prefetch_slots(global const BinaryNode *nodes, global const uint *plans, global const int *slots,
+                                  uint i, uint end) {
+    if (i + 2 >= end) return;
+    for (int s = 0; s < CHILDREN; ++s) {
+        int node = slots[CHILDREN * (i + 2) + s];
+        prefetch_children(nodes, slots[CHILDREN * (i + 1) + s]);
+        prefetch_node(nodes, node);
+        if ((uint)node < EMPTY) { PREFETCH(plans + node, 4) }
+    }
+}
+
 typedef struct { int children; uint nodes, triangles, spheres; } Needs;
 
 // How many children a node has, and how many wide nodes and leaf records they take.
@@ -57,24 +69,19 @@ static inline Needs needs_of(const Content *contents) {
     return needs;
 }
 
-static inline float leaf_area(const Primitives *primitives, global const BinaryNode *nodes, Content c) {
-    return c.leaf ? half_area(node_box(primitives, nodes, c.node)) * tests_of(c.sphere, c.count) : 0.0f;
-}
-
 // Opens the nodes below `count` wide ones. slots: [CHILDREN] a node, of binary nodes and EMPTY. places: first the place
 // of each one's first wide child. waiting: entries on a traversal's stack when it comes to a node; with GROUPS, the
 // nodes below one are one entry. All three are filled in for the `below` children, of places three times as many: how
-// many wide nodes, records of triangles and of spheres each of them needs. most[0]: the most entries on the stack. work,
-// of each block: the areas of nodes, and of leaves for each intersection.
+// many wide nodes, records of triangles and of spheres each of them needs. most[0]: the most entries on the stack.
 kernel void open_level(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *nodes,
                        global const uint *plans, global const int *slots, global const uint *places,
                        global const int *waiting, uint below, global int *next_slots, global uint *next_places,
-                       global int *next_waiting, global int *most, global float *work) {
+                       global int *next_waiting, global int *most) {
     Primitives primitives = PRIMITIVE_ARGUMENTS;
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
     int fullest = 0;
-    float areas = 0.0f;
     for (uint i = first; i < end; ++i) {
+        prefetch_slots(nodes, plans, slots, i, end);
         Content above[CHILDREN], contents[CHILDREN];
         contents_of(&primitives, plans, slots + CHILDREN * i, above);
         Needs needs = needs_of(above);
@@ -91,12 +98,9 @@ kernel void open_level(uint count, uint block, PRIMITIVE_PARAMETERS, global cons
             next_waiting[child++] = left;
             int entries = left + (GROUPS ? 0 : needs.children);
             fullest = entries > fullest ? entries : fullest;
-            areas += half_area(node_box(&primitives, nodes, above[s].node));
-            for (int k = 0; k < CHILDREN; ++k) areas += leaf_area(&primitives, nodes, contents[k]);
         }
     }
     if (fullest > 0) atomic_max(most, fullest);
-    if (first < count) work[get_global_id(0)] = areas;
 }
 
 // The primitives of a leaf's subtree, from left to right.

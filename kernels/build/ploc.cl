@@ -68,10 +68,15 @@ static inline float8 distances(global const float *row, uint pitch, Box box, flo
 
 // Where each cluster's nearest is: the difference of their indices. Of equally near ones the first by the exclusive or of
 // both indices: that is an order of all pairs, so the nearest pair of all chooses itself, and where all are equal
-// neighbours pair up.
-kernel void nearest_clusters(uint count, uint block, global const float *clusters, uint pitch, global char *nearest) {
+// neighbours pair up. With `forced` they do, whatever their boxes: rounds of that kind halve the clusters.
+kernel void nearest_clusters(uint count, uint block, global const float *clusters, uint pitch, uint forced,
+                             global char *nearest) {
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
     for (uint i = first; i < end; ++i) {
+        if (forced) {
+            nearest[i] = (i ^ 1) < count ? (int)(i ^ 1) - (int)i : 0;
+            continue;
+        }
         Box box = cluster_box(clusters, pitch, i);
         float area = half_area(box);
         int size = cluster_node(clusters, pitch, i) & MANY;
@@ -82,20 +87,14 @@ kernel void nearest_clusters(uint count, uint block, global const float *cluster
         float2 two = four.lo < four.hi ? four.lo : four.hi;
         float least = two.x < two.y ? two.x : two.y;
         uint equal = mask_bits(before == least) | mask_bits(after == least) << RADIUS;
-        uint smallest = 0xffffffff;
+        uint first_of_equal = 0xffffffff;
         for (; equal; equal &= equal - 1) {
-            int slot = first_bit(equal), step = slot - RADIUS + (slot >= RADIUS);
-            uint order = (i + step) ^ i;
-            nearest[i] = order < smallest ? step : nearest[i];
-            smallest = order < smallest ? order : smallest;
+            int slot = first_bit(equal);
+            uint other = i - RADIUS + slot + (slot >= RADIUS);
+            first_of_equal = (other ^ i) < first_of_equal ? other ^ i : first_of_equal;
         }
+        nearest[i] = (int)(first_of_equal ^ i) - (int)i;
     }
-}
-
-// Neighbours by index, whatever their boxes: the rounds that this serves halve the clusters.
-kernel void pair_clusters(uint count, uint block, global char *nearest) {
-    uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
-    for (uint i = first; i < end; ++i) nearest[i] = (i ^ 1) < count ? (int)(i ^ 1) - (int)i : 0;
 }
 
 // The step to the cluster that i is joined with, 0 if it stays alone.

@@ -1,11 +1,16 @@
-// Exclusive prefix sums of several arrays of `count` numbers, one after another in `values`, in place: a work-group each.
+// Exclusive prefix sums of several arrays of `count` numbers, one after another in `values`, in place.
+//
+// Each array is cut into `parts`, one a work-group. Where there are several, the sums of the parts are scanned in turn,
+// and what stood before each part is added to it.
 #define SCAN_ITEMS 256
 
-kernel void scan(global uint *values, uint count, global uint *totals) {
+kernel void scan(global uint *values, uint count, uint parts, global uint *totals) {
     local uint sums[SCAN_ITEMS];
-    uint me = get_local_id(0), items = get_local_size(0), share = (count + items - 1) / items;
-    uint first = me * share < count ? me * share : count, end = first + share < count ? first + share : count;
-    global uint *mine = values + get_group_id(0) * count;
+    uint group = get_group_id(0), part = (count + parts - 1) / parts, start = group % parts * part;
+    uint here = start < count ? (count - start < part ? count - start : part) : 0;
+    uint me = get_local_id(0), items = get_local_size(0), share = (here + items - 1) / items;
+    uint first = me * share < here ? me * share : here, end = first + share < here ? first + share : here;
+    global uint *mine = values + group / parts * count + start;
     uint sum = 0;
     for (uint i = first; i < end; ++i) sum += mine[i];
     sums[me] = sum;
@@ -17,5 +22,12 @@ kernel void scan(global uint *values, uint count, global uint *totals) {
         mine[i] = before;
         before += value;
     }
-    if (me == items - 1) totals[get_group_id(0)] = before;
+    if (me == items - 1) totals[group] = before;
+}
+
+// count: of all arrays together, `each` of one.
+kernel void add_before(uint count, uint block, global uint *values, uint each, uint parts, global const uint *before) {
+    uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
+    uint part = (each + parts - 1) / parts;
+    for (uint i = first; i < end; ++i) values[i] += before[i / each * parts + i % each / part];
 }

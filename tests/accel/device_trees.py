@@ -24,6 +24,11 @@ from .cases import SCENES
 from .test_cwbvh import boxes_below, children_of, leaves_of
 
 
+def like_gpu(device: Device) -> Device:
+    """The same device, worked with as with a GPU: many work-items, in groups."""
+    return replace(device, info=replace(device.info, type="gpu"))
+
+
 @lru_cache(maxsize=None)
 def built(device: Device, layout: str, case: str) -> Layout:
     """The tree over a scene, with its buffers on the host."""

@@ -16,7 +16,7 @@ from clrt.device.arrays import on_host
 from clrt.device.open import Device
 
 from .cases import SCENES
-from .device_trees import built, wide_tree
+from .device_trees import built, like_gpu, wide_tree
 
 
 def records(device: Device, case: str, name: str, dtype: np.dtype[np.void]) -> NDArray[np.void]:
@@ -98,3 +98,13 @@ def test_the_same_tree_again_and_everywhere(device: Device, layout: str, case: s
     for buffers in (built(device, layout, case).buffers, again):
         first_result(layout, case).append({name: on_host(device, a).tobytes() for name, a in buffers.items()})
         assert first_result(layout, case)[-1] == first_result(layout, case)[0]
+
+
+@pytest.mark.parametrize("case", ["two", "blocks", "mixed", "equal_centroids"])
+@pytest.mark.parametrize("layout", SHAPES)
+def test_the_same_tree_by_many_work_items(device: Device, layout: str, case: str) -> None:
+    found = build_tree(like_gpu(device), layout, "ploc", *SCENES[case])
+    expected = built(device, layout, case)
+    for name, array in found.buffers.items():
+        assert on_host(device, array).tobytes() == expected.buffers[name].tobytes()
+    assert found.sah_cost == pytest.approx(expected.sah_cost, rel=1e-5)

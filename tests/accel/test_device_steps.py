@@ -19,7 +19,7 @@ from clrt.device.blocks import Blocks
 from clrt.device.open import Device
 
 from .cases import SCENES
-from .device_trees import Binary, binary, binary_tree, wide_tree
+from .device_trees import Binary, binary, binary_tree, like_gpu, wide_tree
 
 
 @pytest.mark.parametrize("case", SCENES)
@@ -92,12 +92,13 @@ def test_codes_are_sorted_and_equal_ones_stay_in_order(device: Device, bits: int
 
 
 @pytest.mark.parametrize("count, arrays", [(1, 1), (300, 3), (70_001, 2)])
-def test_sums_of_what_stands_before(device: Device, count: int, arrays: int) -> None:
-    work = Blocks(device, program_source(SHAPES["bvh8"], True, False, False))
+@pytest.mark.parametrize("groups", [False, True])
+def test_sums_of_what_stands_before(device: Device, groups: bool, count: int, arrays: int) -> None:
+    work = Blocks(like_gpu(device) if groups else device, program_source(SHAPES["bvh8"], True, False, False))
     values = np.random.default_rng(0).integers(1000, size=(arrays, count), dtype=np.uint32)
     array = work.upload(values)
-    sums = work.scan(array, count, arrays)
-    np.testing.assert_array_equal(sums, values.sum(axis=1))
+    work.scan(array, count, arrays)
+    assert work.sums(arrays) == values.sum(axis=1).tolist()
     np.testing.assert_array_equal(work.download(array, np.uint32, values.size).reshape(values.shape),
                                   np.cumsum(values, axis=1) - values)
 
