@@ -16,13 +16,14 @@ from ..device.open import Device
 from ..device.preamble import defines, typedefs
 from ..device.program import compose
 from ..device.records import record
+from ..errors import SceneError
 from .cwbvh import CWBVH_NODE, MAX_LEAF, SLOTS
 from .layouts import BVH2_NODE, BVH8_NODE, LANES, LEAF_SIZES, LEAF_SPHERE, LEAF_TRIANGLE, TRIANGLE_PACK
 from .morton import Primitives, sort_primitives
 from .ploc import BINARY_NODE, BinaryTree, cluster
 from .reinsertion import MOVE, reinsert
 from .tree import FloatArray, half_area
-from .wide import EMPTY
+from .wide import EMPTY, MAX_PRIMITIVES
 
 
 @dataclass(frozen=True)
@@ -76,8 +77,10 @@ def build_tree(device: Device, shape: Shape, triangles: FloatArray, spheres: Flo
                reinsertions: int = 0) -> DeviceTree:
     """The tree over at least two primitives: triangles (m, 3, 3), spheres (s, 4), coordinates finite, below 1e18.
 
-    reinsertions: passes that make it better.
+    reinsertions: passes that make it better. Raises SceneError for more than MAX_PRIMITIVES in all.
     """
+    if (count := len(triangles) + len(spheres)) > MAX_PRIMITIVES:
+        raise SceneError(f"{count} primitives, but a device builds trees over {MAX_PRIMITIVES}: take the builder sah")
     work = Blocks(device, program_source(shape, len(triangles) > 0, len(spheres) > 0, reinsertions > 0))
     primitives = sort_primitives(work, triangles, spheres)
     tree = cluster(work, primitives)
@@ -139,12 +142,13 @@ def _plan(work: Blocks, shape: Shape, primitives: Primitives, tree: BinaryTree) 
     top = work.download(tree.nodes, BINARY_NODE, 1, root)
     size, area = top["hi"] - top["lo"], half_area(top["lo"], top["hi"])
     for per, none, whole in (("per_side", "no_side", size), ("per_area", "no_area", area)):
-        world[per], world[none] = np.divide(1, whole, out=np.zeros_like(whole), where=whole > 0), whole == 0
-    plans, least = work.empty(np.uint32, tree.count), work.empty(np.float32, 2 * tree.count)
+        some = whole > np.finfo(np.float32).tiny
+        world[per], world[none] = np.divide(1, whole, out=np.zeros_like(whole), where=some), ~some
+    plans, leaves = work.empty(np.uint32, tree.count), work.empty(np.float32, 2 * tree.count)
     costs = work.empty(np.float32, tree.count * (shape.children - 1))
     for first, count in zip(itertools.accumulate(tree.rounds, initial=0), tree.rounds):
-        work.run("plan_nodes", count, *primitives.arguments, tree.nodes, first, root, world[0], plans, costs, least)
-    work.free(costs, least)
+        work.run("plan_nodes", count, *primitives.arguments, tree.nodes, first, root, world[0], plans, costs, leaves)
+    work.free(costs, leaves)
     return _Plan(primitives, tree, plans, float(area[0]))
 
 

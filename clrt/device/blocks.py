@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -89,10 +90,9 @@ class Blocks:
 
     def run(self, name: str, count: int, *arguments: Any) -> None:
         """Launches kernel `name` over `count` items. Python's ints are passed as uint, floats as float."""
-        kernel, local = self._kernel(name), self.device.local_size
-        kernel.set_args(np.uint32(count), np.uint32(self.block(count)), *map(_scalar, arguments))
-        groups = -(-self.number(count) // local)
-        cl.enqueue_nd_range_kernel(self.device.queue, kernel, (groups * local,), (local,))
+        values = np.uint32(count), np.uint32(self.block(count)), *map(_scalar, arguments)
+        groups = -(-self.number(count) // self.device.local_size)
+        self._launch(name, groups, self.device.local_size, values)
 
     def scan(self, values: cl.Buffer, count: int, arrays: int = 1) -> None:
         """Turns each of `arrays` arrays of `count` numbers, one after another in `values`, into what stood before it.
@@ -113,9 +113,16 @@ class Blocks:
         return [int(total) for total in self.download(self._totals, np.uint32, arrays)]
 
     def _scan(self, values: cl.Buffer, count: int, arrays: int, parts: int, totals: cl.Buffer) -> None:
-        kernel, local = self._kernel("scan"), 1 if self.device.local_size == 1 else SCAN_ITEMS
-        kernel.set_args(values, np.uint32(count), np.uint32(parts), totals)
-        cl.enqueue_nd_range_kernel(self.device.queue, kernel, (arrays * parts * local,), (local,))
+        local = 1 if self.device.local_size == 1 else SCAN_ITEMS
+        self._launch("scan", arrays * parts, local, (values, np.uint32(count), np.uint32(parts), totals))
+
+    def _launch(self, name: str, groups: int, local: int, values: Sequence[Any]) -> None:
+        if name not in self._kernels:
+            self._kernels[name] = make_kernel(self.device, self.program, name)
+            # Without types pyopencl finds out what each value is at every launch, by exceptions.
+            self._kernels[name].set_arg_types([None if isinstance(v, cl.Buffer) else v.dtype for v in values])
+        self._kernels[name].set_args(*values)
+        cl.enqueue_nd_range_kernel(self.device.queue, self._kernels[name], (groups * local,), (local,))
 
     @property
     def totals(self) -> cl.Buffer:
@@ -126,11 +133,6 @@ class Blocks:
         self._bytes += array.size
         self.peak_bytes = max(self.peak_bytes, self._bytes)
         return array
-
-    def _kernel(self, name: str) -> cl.Kernel:
-        if name not in self._kernels:
-            self._kernels[name] = make_kernel(self.device, self.program, name)
-        return self._kernels[name]
 
 
 def _scalar(argument: Any) -> Any:

@@ -11,6 +11,7 @@
 #include "build/binary.cl"
 
 #define WORTHWHILE 0.2f
+#define PLANS_AHEAD 8   // nodes whose children's plans are on their way
 
 // A node's plan: for b = 2 … CHILDREN three bits say how many of b roots that stand for its subtree are the left
 // child's, 0 where it stays whole; then whether it is a leaf, which kinds it holds, whether it stays whole for any b, and
@@ -44,18 +45,18 @@ static inline float chance(Box box, const World *world) {
 }
 
 // A binary tree whose nodes are being planned, children first. costs[b − 1] of a node: with at most b roots, b < CHILDREN,
-// unless it stays whole. least: of a node that fits into a leaf, with whatever stands for it.
+// unless it stays whole. leaves, of a node that fits into a leaf: as one, and at least, with whatever stands for it.
 typedef struct {
     Primitives primitives;
     global const BinaryNode *nodes;
     global uint *plans;
     global float *costs;
-    global float2 *least;
+    global float2 *leaves;
     World world;
 } Planned;
 
 static inline float2 leaf_costs(const Planned *tree, int node) {
-    return node >= 0 ? tree->least[node] : (float2)(chance(primitive_box(&tree->primitives, ~node), &tree->world));
+    return node >= 0 ? tree->leaves[node] : (float2)(chance(primitive_box(&tree->primitives, ~node), &tree->world));
 }
 
 // cost[b] with at most b = 1 … CHILDREN − 1 roots.
@@ -93,7 +94,7 @@ static inline uint plan_node(const Planned *tree, int node, int root) {
     if (may_be_leaf) leaf = fma(met, tests_of((plan & HAS_SPHERES) != 0, count), 0.0f);
     if (PACK > 1 && may_be_leaf) {
         float opened = leaf_costs(tree, left).y + leaf_costs(tree, right).y;
-        tree->least[node] = (float2)(leaf, opened < leaf ? opened : leaf);
+        tree->leaves[node] = (float2)(leaf, opened < leaf ? opened : leaf);
         if (opened >= (1.0f - WORTHWHILE) * leaf) return plan | IS_LEAF | WHOLE;
     }
     float best[CHILDREN + 1];
@@ -109,27 +110,25 @@ static inline uint plan_node(const Planned *tree, int node, int root) {
         tree->costs[(CHILDREN - 1) * node + b - 1] = opened ? best[b] : best[1];
         if (opened) plan |= shares[b] << 3 * (b - 2);
     }
-    if (PACK > 1 && may_be_leaf) tree->least[node].y = best[CHILDREN - 1] < best[1] ? best[CHILDREN - 1] : best[1];
+    if (PACK > 1 && may_be_leaf) tree->leaves[node].y = best[CHILDREN - 1] < best[1] ? best[CHILDREN - 1] : best[1];
     return plan | shares[CHILDREN] << 3 * (CHILDREN - 2);
 }
-
-#define AHEAD_PLANS 8   // nodes whose children are on their way
 
 static inline void prefetch_planned(const Planned *tree, int node) {
     if (node < 0) return;
     PREFETCH(tree->plans + node, 4)
-    PREFETCH(tree->least + node, 8)
+    PREFETCH(tree->leaves + node, 8)
 }
 
 // Plans of `count` nodes from `node` on, whose children have theirs.
 kernel void plan_nodes(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *nodes, uint node,
-                       uint root, const World world, global uint *plans, global float *costs, global float2 *least) {
-    Planned tree = {PRIMITIVE_ARGUMENTS, nodes, plans, costs, least, world};
+                       uint root, const World world, global uint *plans, global float *costs, global float2 *leaves) {
+    Planned tree = {PRIMITIVE_ARGUMENTS, nodes, plans, costs, leaves, world};
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
     for (uint i = node + first; i < node + end; ++i) {
-        if (i + AHEAD_PLANS < node + end) {
-            prefetch_planned(&tree, nodes[i + AHEAD_PLANS].left);
-            prefetch_planned(&tree, nodes[i + AHEAD_PLANS].right);
+        if (i + PLANS_AHEAD < node + end) {
+            prefetch_planned(&tree, nodes[i + PLANS_AHEAD].left);
+            prefetch_planned(&tree, nodes[i + PLANS_AHEAD].right);
         }
         plans[i] = plan_node(&tree, i, root);
     }

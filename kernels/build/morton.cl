@@ -3,7 +3,7 @@
 #include "build/sort.cl"
 #include "mask.cl"
 
-#define AHEAD 16   // shapes that are on their way
+#define SHAPES_AHEAD 16   // shapes that are on their way
 
 #define SCENE_PARAMETERS global const float *triangles, global const float *spheres, uint triangle_count
 
@@ -55,7 +55,7 @@ kernel void morton_codes(uint count, uint block, SCENE_PARAMETERS, float low_x, 
 kernel void gather_shapes(uint count, uint block, SCENE_PARAMETERS, global const uint *ids, global float *shapes) {
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
     for (uint i = first; i < end; ++i) {
-        if (i + AHEAD < end) { PREFETCH(scene_shape(triangles, spheres, triangle_count, ids[i + AHEAD]), 64) }
+        if (i + SHAPES_AHEAD < end) { PREFETCH(scene_shape(triangles, spheres, triangle_count, ids[i + SHAPES_AHEAD]), 64) }
         uint floats = SPHERES && ids[i] >= triangle_count ? 4 : SHAPE;
         global const float *shape = scene_shape(triangles, spheres, triangle_count, ids[i]);
         for (uint k = 0; k < floats; ++k) shapes[SHAPE * i + k] = shape[k];

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from clrt.accel.build import build_tree
 from clrt.accel.device_builder import SHAPES
 from clrt.accel.layouts import LEAF_SPHERE, TRIANGLE_PACK, sphere_boxes
-from clrt.accel.wide import EMPTY, leaf_fields
+from clrt.accel.wide import EMPTY, MAX_PRIMITIVES, leaf_fields
 from clrt.device.arrays import on_host
 from clrt.device.open import Device
+from clrt.errors import SceneError
 
-from .cases import SCENES
+from .cases import NO_SPHERES, SCENES
 from .device_trees import built, like_gpu, wide_tree
 
 
@@ -108,3 +109,9 @@ def test_the_same_tree_by_many_work_items(device: Device, layout: str, case: str
     for name, array in found.buffers.items():
         assert on_host(device, array).tobytes() == expected.buffers[name].tobytes()
     assert found.sah_cost == pytest.approx(expected.sah_cost, rel=1e-5)
+
+
+def test_more_than_a_reference_can_say_is_refused(device: Device) -> None:
+    many = np.broadcast_to(np.zeros((1, 3, 3), np.float32), (MAX_PRIMITIVES + 1, 3, 3))
+    with pytest.raises(SceneError, match="take the builder sah"):
+        build_tree(device, "bvh2", "ploc", many, NO_SPHERES)
