@@ -7,13 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .accel.kernels import HitTests
 from .accel.layouts import Layout
 from .accel.two_level import TwoLevels
 from .device.open import open_device
 from .errors import SceneError
 from .tree_query import TreeQuery
 from .scene.mesh_arrays import mesh_arrays
-from .scene.scaling import unit_for
+from .scene.numbers import real_array, whole_array
+from .scene.scaling import Frame, frame_around, unit_for
 
 Doubles = NDArray[np.float64]
 #: A transform is singular if it makes a unit of volume smaller than this, measured in its own longest column.
@@ -23,28 +25,30 @@ SINGULAR = 1e-12
 class InstancedRayQuery(TreeQuery):
     """Instances to shoot rays at, as in `TreeQuery`, with the hit's `instance` (int32, −1) beside the others.
 
-    meshes: pairs of vertices (n, 3) float32 and faces (m, 3) int32. mesh: (k,) which of them each instance is.
+    meshes: a list of pairs, vertices (n, 3) float32 and faces (m, 3) int32. mesh: (k,) which of them each instance is.
     transforms: (k, 3, 4), rows of an affine map from the mesh's frame to the world; mirrored and non-uniform ones too.
-    device, layout, builder, triangle: as in `RayQuery`; the layout list has no instances.
+    device, layout, builder, triangle, box: as in `RayQuery`; the layout list has no instances.
     `primitive` counts in the instance's mesh. Of hits at the same t the lowest instance comes first.
-    Raises SceneError for other shapes, indices out of range and transforms that are not finite or singular.
+    Raises SceneError for other shapes, indices out of range and transforms that are not finite or singular, and
+    UsageError for other choices.
     """
 
     def __init__(self, meshes: Sequence[tuple[ArrayLike, ArrayLike]], mesh: ArrayLike, transforms: ArrayLike, *,
                  device: str | int | None = None, layout: str | None = None, builder: str | None = None,
-                 triangle: str = "watertight", traversal: str | None = None) -> None:
-        triangles = [points[faces] for points, faces in (mesh_arrays(*each) for each in meshes)]
+                 triangle: str = "watertight", box: str = "robust", traversal: str | None = None) -> None:
+        """Builds the trees: see the class."""
+        triangles = _meshes(meshes)
         self._mesh = _indices(mesh, len(triangles))
         self._extents = np.array([np.abs(mesh_corners).reshape(-1, 3).max(axis=0, initial=0)
                                   for mesh_corners in triangles], np.float64).reshape(-1, 3)
         self._units = np.array([unit_for(largest) for largest in self._extents.max(axis=1).tolist()])
         to_world = _matrices(transforms, len(self._mesh))
-        opened = open_device(device)
+        tests, opened = HitTests(triangle, box), open_device(device)
         self._levels = TwoLevels(opened, layout or opened.layout, builder,
                                  [(mesh_corners * unit).astype(np.float32)
-                                  for mesh_corners, unit in zip(triangles, self._units)], self._mesh)
-        tree, unit = self._placed(to_world)
-        super().__init__(opened, tree, sum(map(len, triangles)), unit, triangle, traversal)
+                                  for mesh_corners, unit in zip(triangles, self._units)], self._mesh, triangle)
+        tree, frame = self._placed(to_world)
+        super().__init__(opened, tree, (sum(map(len, triangles)), 0), frame, tests, traversal)
 
     def move(self, transforms: ArrayLike) -> None:
         """Puts the same instances elsewhere: transforms (k, 3, 4) as before, SceneError likewise.
@@ -53,36 +57,57 @@ class InstancedRayQuery(TreeQuery):
         """
         self._use(*self._placed(_matrices(transforms, len(self._mesh))))
 
-    def _placed(self, to_world: Doubles) -> tuple[Layout, float]:
-        """The tree, and the unit of the world's lengths. Those of each mesh have one of their own."""
-        reach = np.einsum("kij,kj->ki", np.abs(to_world[..., :3]), self._extents[self._mesh]) + np.abs(to_world[..., 3])
-        unit = unit_for(float(reach.max(initial=0)))
-        scaled = unit * to_world
-        scaled[..., :3] /= self._units[self._mesh][:, None, None]
-        return self._levels.place(scaled), unit
+    def _placed(self, to_world: Doubles) -> tuple[Layout, Frame]:
+        """The tree, and the frame of the world. The lengths of each mesh have a unit of their own."""
+        reach = np.einsum("kij,kj->ki", np.abs(to_world[..., :3]), self._extents[self._mesh])
+        low, high = to_world[..., 3] - reach, to_world[..., 3] + reach
+        frame = frame_around(low.min(axis=0, initial=np.inf), high.max(axis=0, initial=-np.inf))
+        placed = to_world.copy()
+        placed[..., 3] -= frame.center
+        placed *= frame.unit
+        placed[..., :3] /= self._units[self._mesh][:, None, None]
+        return self._levels.place(placed), frame
+
+
+def _meshes(meshes: Sequence[tuple[ArrayLike, ArrayLike]]) -> list[NDArray[np.floating]]:
+    """The corners (m, 3, 3) of each."""
+    if not isinstance(meshes, list | tuple):
+        raise SceneError(f"meshes is a {type(meshes).__name__}; write a list of pairs, [(vertices, faces), …]")
+    triangles = []
+    for i, pair in enumerate(meshes):
+        if not (isinstance(pair, list | tuple) and len(pair) == 2):
+            raise SceneError(f"meshes[{i}] is not a pair (vertices, faces); write a list of pairs, [(vertices, faces)]")
+        try:
+            points, faces = mesh_arrays(*pair)
+        except SceneError as error:
+            raise SceneError([f"meshes[{i}]: {problem}" for problem in error.problems]) from None
+        triangles.append(points[faces])
+    return triangles
 
 
 def _indices(mesh: ArrayLike, meshes: int) -> NDArray[np.int32]:
-    index = np.asarray(mesh)
-    if index.ndim != 1 or (index.size and index.dtype.kind not in "iu"):
-        raise SceneError(f"mesh {index.shape} {index.dtype} must have the shape (k,), of whole numbers")
+    index = whole_array("mesh", mesh, SceneError)
+    if index.ndim != 1:
+        raise SceneError(f"mesh {index.shape} must have the shape (k,): for each instance which mesh it is")
     outside = (index < 0) | (index >= meshes)
     if outside.any():
         first = int(np.argmax(outside))
-        raise SceneError(f"mesh[{first}] = {index[first]}: there are {meshes} meshes")
+        raise SceneError(f"mesh[{first}] = {index[first]}: the length of meshes is {meshes}, and they count from 0")
     return index.astype(np.int32)
 
 
 def _matrices(transforms: ArrayLike, instances: int) -> Doubles:
-    to_world = np.asarray(transforms, np.float64)
+    to_world = real_array("transforms", transforms, SceneError).astype(np.float64)
     if to_world.shape != (instances, 3, 4):
-        raise SceneError(f"transforms {to_world.shape} must have the shape ({instances}, 3, 4), one an instance")
+        rows = "; drop the last row: transforms[:, :3]" * (to_world.shape == (instances, 4, 4))
+        raise SceneError(f"transforms {to_world.shape} must have the shape ({instances}, 3, 4), one an instance{rows}")
     with np.errstate(all="ignore"):
         length = np.linalg.norm(to_world[..., :3], axis=1).max(axis=1, initial=0)
         volume = np.abs(np.linalg.det(to_world[..., :3] / np.maximum(length, 1e-300)[:, None, None]))
-    bad = ~np.isfinite(to_world).all(axis=(1, 2)) | ~(volume > SINGULAR)
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise SceneError(f"transforms[{first}] = {to_world[first].tolist()} is not finite or flattens the mesh; "
-                         "repair it")
+    finite = np.isfinite(to_world).all(axis=(1, 2))
+    faults = {"is not finite": ~finite, "flattens the mesh": finite & ~(volume > SINGULAR)}
+    firsts = {fault: (int(np.argmax(wrong)), int(wrong.sum())) for fault, wrong in faults.items() if wrong.any()}
+    if firsts:
+        raise SceneError([f"transforms[{first}] = {to_world[first].tolist()} {fault}; repair it"
+                          + f" and {count - 1} more like it" * (count > 1) for fault, (first, count) in firsts.items()])
     return to_world

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import ArrayLike, NDArray
 
-from .accel.kernels import tree_buffers, tree_defines, tree_files
+from .accel.kernels import HitTests, tree_buffers, tree_defines, tree_files
 from .accel.layouts import LANES, Layout
 from .accel.wide import EMPTY
 from .device.arrays import resident
@@ -21,6 +22,8 @@ from .device.preamble import defines, scene_struct, typedefs
 from .device.program import build, compose, make_kernel
 from .device.records import record
 from .errors import UsageError
+from .scene.ray_arrays import Rays, ray_arrays
+from .scene.scaling import Frame
 
 HIT = record(t="f4", primitive="i4", u="f4", v="f4")
 INSTANCE_HIT = record(t="f4", primitive="i4", u="f4", v="f4", instance="i4", pad="3i4")
@@ -31,56 +34,68 @@ CHUNK = 1 << 20
 TRAVERSALS = ("single", "packet", "pool")
 #: Rays that a work-item has in its pool (kernels/traverse/pool.cl), and how many it answers in all.
 POOL, SHARE = 16, 512
+#: Bytes; what a ray needs next is fetched by so many at a time.
+CACHE_LINE = 64
 #: Rays are coherent if the mean cosine between one and the next is above this: a camera's are, reflected ones are not.
 COHERENT, PAIRS = 0.9, 1024
-Rays = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
+QUERIES = ("closest_hit", "any_hit", "next_hit")
 
 
 class TreeQuery:
     """A tree on a device to shoot rays at. The answers do not depend on the device, the tree or the order of the rays.
 
-    traversal: one of TRAVERSALS; None takes what was fastest for such rays: the pool, but packets where rays are
-    coherent and the processor's cache holds the tree. Single rays with other layouts and on GPUs, and on a CPU
-    whose driver does not tell its cache.
+    traversal, of the layout bvh8: "single", "packet" (eight coherent rays together; single ones where that is not to be
+    had: on GPUs, and among spheres and instances) or "pool" (many rays in turns). None takes what was fastest for such
+    rays: the pool, but packets where rays are coherent and the processor's cache holds the tree; single rays with other
+    layouts and on GPUs, and on a CPU whose driver does not tell its cache.
     kernel_seconds: the time of all kernels so far, without uploads and downloads.
 
     Of a ray, origins and directions are (n, 3), or (3,) for all; t_max is (n,) or one number, and t counts lengths of
     the direction. Of hits at the same t the lowest primitive comes first. A ray whose direction is zero, or that holds
-    a NaN or infinity, meets nothing; t_max may be infinite. UsageError where the arrays do not fit.
+    a NaN or infinity, meets nothing; t_max may be infinite. UsageError where the arrays do not fit. Threads may share
+    a query, but not while its tree changes; a process forked from one that has used OpenCL gets a UsageError.
     """
 
-    def __init__(self, device: Device, tree: Layout, triangles: int, unit: float, triangle: str,
+    def __init__(self, device: Device, tree: Layout, counts: tuple[int, int], frame: Frame, tests: HitTests,
                  traversal: str | None) -> None:
-        """Of a tree over so many triangles, whose lengths are multiplied by `unit`."""
+        """Of a tree over so many triangles and spheres, whose points are those of the rays in `frame`."""
         self.device = device
         self.kernel_seconds = 0.0
         self._hit = INSTANCE_HIT if "instances" in tree.buffers else HIT
         self._counts = np.zeros(1, COUNTS)
-        self._counts["triangles"] = triangles
-        self._triangle = triangle
-        self._traversal = traversal if tree.name == "bvh8" and triangles else "single"
-        if traversal not in (None, *TRAVERSALS):
-            raise UsageError(f"there is no traversal {traversal!r}: take one of {', '.join(TRAVERSALS)}")
+        self._counts["triangles"], self._counts["spheres"] = counts
+        self._tests = tests
+        _check("traversal", traversal, (None, *TRAVERSALS))
+        if traversal in ("packet", "pool") and tree.name != "bvh8":
+            raise UsageError(f"the traversal {traversal} is for the layout bvh8, not {tree.name}; leave it out")
+        self._traversal = traversal if tree.name == "bvh8" and any(counts) else "single"
+        self._lock = threading.Lock()
         self._kernels: dict[tuple[str, str, int], cl.Kernel] = {}
-        self._use(tree, unit)
+        self._use(tree, frame)
 
-    def _use(self, tree: Layout, unit: float) -> None:
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{self._counts[name][0]} {name}" for name in ("triangles", "spheres"))
+        return f"<{type(self).__name__}: {counts}; {self.tree.name} on {self.device.info.name}>"
+
+    def _use(self, tree: Layout, frame: Frame) -> None:
         """Takes the rays to this tree from now on, which is uploaded."""
         buffers = {name: resident(self.device, array) for name, array in tree.buffers.items()}
-        self.tree, self.unit = replace(tree, buffers=buffers), unit
+        self.tree, self.frame = replace(tree, buffers=buffers), frame
         self._scene = [array.buffer for array in buffers.values()]
 
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[Any]:
-        """(n,) records of t float32 (inf: a miss), primitive int32 (−1), u, v float32: the first at 0 < t < t_max.
+        """(n,) records of t float32, primitive int32, u, v float32: the first at 0 < t < t_max; of a miss t inf and
+        primitive −1.
 
-        The hit point is origin + t·direction = (1 − u − v)·p0 + u·p1 + v·p2.
+        The hit point is origin + t·direction = (1 − u − v)·p0 + u·p1 + v·p2. Ask primitive >= 0 for a hit: its t, too,
+        is inf where it is beyond float32, as in lengths of 1e-40.
         """
-        rays = _rays(origins, directions, t_max)
-        return self._ask("closest_hit", rays, np.empty(len(rays[2]), self._hit))
+        rays = ray_arrays(origins, directions, t_max)
+        return _shown(self._ask("closest_hit", rays, np.empty(len(rays[2]), self._hit)))
 
     def any_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[np.bool_]:
         """(n,) bool: whether anything lies at 0 < t < t_max."""
-        rays = _rays(origins, directions, t_max)
+        rays = ray_arrays(origins, directions, t_max)
         return self._ask("any_hit", rays, np.empty(len(rays[2]), np.bool_))
 
     def all_hits(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf, *,
@@ -90,9 +105,9 @@ class TreeQuery:
         Sorted by ray, then t, then primitive. Each hit is found from the one before by comparing (t, primitive), not
         by moving the origin, so surfaces that touch or coincide all count, once each.
         """
-        if max_hits < 1:
-            raise UsageError(f"max_hits is {max_hits}; it must be at least 1")
-        o, d, t = _rays(origins, directions, t_max)
+        if not isinstance(max_hits, int | np.integer) or max_hits < 1:
+            raise UsageError(f"max_hits is {max_hits!r}; it must be a whole number, at least 1")
+        o, d, t = ray_arrays(origins, directions, t_max)
         index = np.arange(len(t))
         last = np.zeros(len(t), self._hit)
         last["primitive"] = -1
@@ -107,12 +122,16 @@ class TreeQuery:
             indices.append(index)
             hits.append(last)
         order = np.argsort(np.concatenate(indices), kind="stable")
-        return np.concatenate(indices)[order], np.concatenate(hits)[order]
+        return np.concatenate(indices)[order], _shown(np.concatenate(hits)[order])
 
     def _ask(self, name: str, rays: Rays, answers: NDArray[Any]) -> NDArray[Any]:
         """`answers`, with what kernel query_`name` writes over it for the rays."""
         for part in _chunks(len(answers)):
-            inputs = [np.ascontiguousarray(array[part], np.float32) for array in rays]
+            origins, directions, t_max = (array[part] for array in rays)
+            if any(self.frame.center):
+                origins = origins - np.array(self.frame.center)
+            with np.errstate(over="ignore"):
+                inputs = [np.ascontiguousarray(array, np.float32) for array in (origins, directions, t_max)]
             self._ask_chunk(name, inputs, answers[part])
         return answers
 
@@ -124,16 +143,19 @@ class TreeQuery:
         output = cl.Buffer(context, flags.READ_WRITE | source, hostbuf=answers)
         traversal = self._way(name, inputs[1])
         kernel, local = self._kernel(name, traversal), self.device.local_size
-        kernel.set_args(*self._scene, self._counts[0], *buffers, output, np.float32(self.unit), np.uint32(n))
         groups = -(-n // ((SHARE if traversal == "pool" else self.device.lanes) * local))
         start = time.perf_counter()
-        wait_for(cl.enqueue_nd_range_kernel(queue, kernel, (groups * local,), (local,)))
+        with self._lock:  # another thread's arguments must not come between
+            kernel.set_args(*self._scene, self._counts[0], *buffers, output, np.float32(self.frame.unit), np.uint32(n))
+            launched = cl.enqueue_nd_range_kernel(queue, kernel, (groups * local,), (local,))
+        wait_for(launched)
         self.kernel_seconds += time.perf_counter() - start
         wait_for(cl.enqueue_copy(queue, answers, output, is_blocking=False))
 
     def _way(self, name: str, directions: NDArray[np.float32]) -> str:
         """The traversal for these rays."""
-        packets = self.device.lanes == LANES and self._triangle == "watertight" and self._hit is HIT
+        packets = (self.device.lanes == LANES and self._tests.triangle == "watertight" and self._hit is HIT
+                   and not self._counts["spheres"])
         if name == "next_hit" or (self._traversal == "packet" and not packets):
             return "single"
         if self._traversal is not None:
@@ -152,19 +174,34 @@ class TreeQuery:
         return self._kernels[key]
 
     def source(self, name: str, traversal: str) -> str:
-        """The program that answers `name`: closest_hit, any_hit or next_hit."""
-        triangles, instances = bool(self._counts["triangles"][0]), self._hit is INSTANCE_HIT
+        """The program that answers `name`, one of QUERIES, by a traversal of TRAVERSALS."""
+        _check("query", name, QUERIES)
+        _check("traversal", traversal, TRAVERSALS)
+        triangles, spheres = bool(self._counts["triangles"]), bool(self._counts["spheres"])
+        instances = self._hit is INSTANCE_HIT
+        has = {"TRIANGLES": triangles, "SPHERES": spheres, "PRIMITIVES": triangles or spheres, "INSTANCES": instances,
+               "NEXT_HIT": name == "next_hit"}
+        fetched = max((array.dtype.itemsize for array in self.tree.buffers.values()), default=0)
         values = {"LANES": self.device.lanes, **tree_defines(self.tree)}
-        values |= {"TRIANGLES": 1, "PRIMITIVES": 1} if triangles else {}
-        values |= {"INSTANCES": 1} if instances else {}
-        values |= {"NEXT_HIT": 1} if name == "next_hit" else {}
+        values |= {feature: 1 for feature, present in has.items() if present}
         values |= {"packet": {"PACKET_RAYS": 1, "EMPTY": EMPTY}, "single": {},
-                   "pool": {"POOL": POOL, "SHARE": SHARE, "STOP_AT_FIRST": int(name == "any_hit")}}[traversal]
+                   "pool": {"POOL": POOL, "SHARE": SHARE, "STOP_AT_FIRST": int(name == "any_hit"),
+                            "FETCH_LINES": -(-fetched // CACHE_LINE)}}[traversal]
         preamble = "\n".join([defines(values), f"#define QUERY_NAME query_{name}",
                               typedefs({"Counts": COUNTS, "RayHit": self._hit}), scene_struct(tree_buffers(self.tree))])
-        files = tree_files(self.tree.name, self._triangle, triangles, spheres=False, instances=instances)
+        files = tree_files(self.tree.name, self._tests, triangles, spheres, instances)
         return compose(preamble, "query_pool.cl" if traversal == "pool" else "query.cl",
                        files | {"PACKETS": ["traverse/packet.cl"] if traversal == "packet" else []})
+
+
+def _check(kind: str, name: str | None, known: Sequence[str | None]) -> None:
+    if name not in known:
+        raise UsageError(f"there is no {kind} {name!r}: take one of {', '.join(filter(None, known))}")
+
+
+def _shown(hits: NDArray[Any]) -> NDArray[Any]:
+    """Records without the padding that the device wants."""
+    return hits[[name for name in hits.dtype.names or () if name != "pad"]]
 
 
 def _coherent(directions: NDArray[np.float32]) -> bool:
@@ -179,17 +216,3 @@ def _coherent(directions: NDArray[np.float32]) -> bool:
 def _chunks(n: int) -> Iterator[slice]:
     for first in range(0, n, CHUNK):
         yield slice(first, min(n, first + CHUNK))
-
-
-def _rays(origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike) -> Rays:
-    """The three arrays, broadcast to the same number of rays; UsageError where they do not fit."""
-    o, d, t = np.asarray(origins), np.asarray(directions), np.asarray(t_max)
-    try:
-        shape = np.broadcast_shapes(o.shape[:-1], d.shape[:-1], t.shape)
-    except ValueError:
-        shape = None
-    if o.shape[-1:] != (3,) or d.shape[-1:] != (3,) or shape is None or len(shape) > 1:
-        raise UsageError(f"origins {o.shape}, directions {d.shape} and t_max {t.shape} must have shapes (n, 3), (n, 3) "
-                         "and (n,), or stand for all rays with (3,) or one number")
-    n = shape or (1,)
-    return np.broadcast_to(o, (*n, 3)), np.broadcast_to(d, (*n, 3)), np.broadcast_to(t, n)

@@ -1,8 +1,8 @@
 // What a ray hit: position with its error bound, normals, material and emitter. World frame.
 //
-// The position is rebuilt from the primitive, not from origin + t·direction: its error is a few roundings of the
-// primitive's own coordinates, however far the ray came. New rays start at the edge of that error, on the side they
-// leave to, so no scene-size epsilon exists (pbrt, 4th ed., 6.8).
+// The position is rebuilt from the primitive, not (but for some spheres) from origin + t·direction: its error is a few
+// roundings of the primitive's own coordinates, however far the ray came (pbrt, 4th ed., 6.8). Where new rays start is
+// said in offset/.
 #include "traverse/trace.cl"
 
 typedef struct {
@@ -50,10 +50,16 @@ static inline void sphere_surface(const Scene *scene, real3 origin, real3 direct
                                   Surface *surface) {
     real3 center = GATHER3(scene->spheres, sphere, .center);
     real radius = GATHER(real, scene->spheres, sphere, .radius);
-    real3 n = normalize3(sub(mad3(direction, hits->t, origin), center));
+    real3 met = mad3(direction, hits->t, origin);
+    real3 n = normalize3(sub(met, center));
     surface->p = mad3(n, radius, center);
-    real3 size = add(absolute3(center), splat(radius));
-    surface->p_error = scale(size, (real)(GAMMA(9)));
+    surface->p_error = scale(add(absolute3(center), splat(radius)), (real)(GAMMA(9)));
+    // Near a sphere that is huge or far off, such as a ground, the ray itself says better where it was met: t is right to
+    // 3 units in the last place.
+    real3 met_error = scale(mad3(absolute3(direction), hits->t, absolute3(origin)), (real)(GAMMA(6)));
+    ireal nearby = largest(met_error) < largest(surface->p_error);
+    surface->p = choose(nearby, met, surface->p);
+    surface->p_error = choose(nearby, met_error, surface->p_error);
     surface->ng = surface->ns = n;
     surface->material = GATHER(ireal, scene->spheres, sphere, .material);
     surface->light = GATHER(ireal, scene->spheres, sphere, .light);
@@ -85,8 +91,4 @@ static inline Surface surface_at(const Scene *scene, real3 origin, real3 directi
     return surface;
 }
 
-// p moved out of its error box along the normal, to the side that `direction` leaves to.
-static inline real3 offset_origin(real3 p, real3 p_error, real3 ng, real3 direction) {
-    real distance = dot3(absolute3(ng), p_error);
-    return mad3(ng, dot3(direction, ng) < 0.0f ? -distance : distance, p);
-}
+#include OFFSET

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass
 from typing import Any
 
+from ..errors import UsageError
 from .build import DEVICE_BUILDERS
 from .builders import BUILDERS
 from .layouts import Layout
@@ -16,10 +18,29 @@ UPPER_LEVELS = {"bvh8": "traverse/instance.cl", "bvh2": "traverse/slab_instance.
                 "cwbvh": "traverse/slab_instance.cl"}
 #: Builders by name.
 BUILDER_NAMES = [*DEVICE_BUILDERS, *BUILDERS]
-TRIANGLE_TESTS = {"watertight": "geometry/triangle_watertight.cl",
-                  "moller_trumbore": "geometry/triangle_moller_trumbore.cl"}
+TRIANGLE_TESTS = {name: f"geometry/triangle_{name}.cl"
+                  for name in ("watertight", "moller_trumbore", "precomputed", "baldwin_weber")}
+BOX_TESTS = {"robust": "geometry/box_robust.cl", "plain": "geometry/box_plain.cl"}
+SPHERE_TESTS = {"robust": "geometry/sphere.cl", "textbook": "geometry/sphere_textbook.cl"}
 RECORDS = {"nodes": "Node", "packs": "Triangles", "leaf_triangles": "Triangles", "leaf_spheres": "LeafSphere",
            "instances": "Instance", "visits": "Visits"}
+
+
+@dataclass(frozen=True)
+class HitTests:
+    """How rays meet things: names in TRIANGLE_TESTS, BOX_TESTS and SPHERE_TESTS; UsageError for others.
+
+    Those that are not watertight or robust are there to compare: they lose hits, or digits, and say where.
+    """
+
+    triangle: str = "watertight"
+    box: str = "robust"
+    sphere: str = "robust"
+
+    def __post_init__(self) -> None:
+        for (name, value), known in zip(asdict(self).items(), (TRIANGLE_TESTS, BOX_TESTS, SPHERE_TESTS)):
+            if value not in known:
+                raise UsageError(f"{name} {value!r} is unknown; choose from {', '.join(known)}")
 
 
 def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
@@ -36,10 +57,11 @@ def tree_defines(tree: Layout) -> dict[str, int]:
     return defines | ({"COUNT_VISITS": 1} if "visits" in tree.buffers else {})
 
 
-def tree_files(layout: str, triangle: str, triangles: bool, spheres: bool,
+def tree_files(layout: str, tests: HitTests, triangles: bool, spheres: bool,
                instances: bool = False) -> dict[str, list[str]]:
     """What the includes of kernels/traverse stand for, in a scene that has triangles or spheres or neither."""
     return {"TREE": [TREES[layout][0]] if triangles or spheres else [],
-            "TRIANGLE_TEST": [TRIANGLE_TESTS[triangle]] if triangles else [],
+            "BOX_TEST": [BOX_TESTS[tests.box]],
+            "TRIANGLE_TEST": [TRIANGLE_TESTS[tests.triangle]] if triangles else [],
             "UPPER_LEVEL": [UPPER_LEVELS[layout]] if instances else [],
-            "SPHERE_TEST": ["geometry/sphere.cl"] if spheres else []}
+            "SPHERE_TEST": [SPHERE_TESTS[tests.sphere]] if spheres else []}

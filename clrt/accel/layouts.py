@@ -42,6 +42,9 @@ BVH2_NODE = np.dtype([("aabb_min", "f4", 3), ("left_first", "i4"), ("aabb_max", 
 BVH8_NODE = np.dtype([("lo", "f4", (3, LANES)), ("hi", "f4", (3, LANES)), ("child", "i4", LANES), ("pad", "i4", LANES)])
 LEAF_TRIANGLE = np.dtype([("p0", "f4", 3), ("primitive", "i4"), ("p1", "f4", 3), ("pad1", "i4"),
                           ("p2", "f4", 3), ("pad2", "i4")])
+#: A triangle's box is larger than it by this part of its longest side: its test moves corners by a few roundings of how
+#: far they are from the ray's origin, and a sliver's are far from where it is hit. Also in kernels/build/primitives.cl.
+TRIANGLE_PAD = 2.0**-21
 #: Unused lanes have NaN vertices and primitive −1.
 TRIANGLE_PACK = np.dtype([("p0", "f4", (3, LANES)), ("p1", "f4", (3, LANES)), ("p2", "f4", (3, LANES)),
                           ("primitive", "i4", LANES)])
@@ -143,10 +146,17 @@ LAYOUTS: dict[str, Callable[[str, FloatArray, FloatArray], Layout]] = {"list": _
 
 def _tree(builder: str, triangles: FloatArray, spheres: FloatArray, leaf_size: int, lanes: int) -> Tree:
     """One tree over both kinds; triangles are intersected `lanes` at a time, spheres one by one."""
-    p0, p1, p2 = triangles.transpose(1, 0, 2)
     build = BUILDERS[builder]
-    return join(build(np.minimum(np.minimum(p0, p1), p2), np.maximum(np.maximum(p0, p1), p2), leaf_size, lanes),
+    return join(build(*triangle_boxes(triangles), leaf_size, lanes),
                 build(*sphere_boxes(spheres), min(LEAF_SIZES[builder], leaf_size), 1))
+
+
+def triangle_boxes(triangles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """aabb_min, aabb_max (m, 3) float32 around triangles (m, 3, 3) as their test sees them: see TRIANGLE_PAD."""
+    p0, p1, p2 = triangles.transpose(1, 0, 2)
+    low, high = np.minimum(np.minimum(p0, p1), p2), np.maximum(np.maximum(p0, p1), p2)
+    pad = TRIANGLE_PAD * (high - low).max(axis=1, keepdims=True, initial=0).astype(np.float64)
+    return (low - pad).astype(np.float32), (high + pad).astype(np.float32)
 
 
 def sphere_boxes(spheres: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -34,9 +34,11 @@ RECIPES = {"bvh8": Recipe("build/refit_bvh8.cl", BVH8_NODE, TRIANGLE_PACK, "pack
 
 
 def can_refit(tree: Layout) -> bool:
-    """Whether there is a way: a layout of RECIPES, its nodes level by level, and triangles in it, no spheres."""
-    return (tree.name in RECIPES and bool(tree.level_sizes) and RECIPES[tree.name].leaves in tree.buffers
-            and "leaf_spheres" not in tree.buffers)
+    """Whether there is a way: a layout of RECIPES, its nodes level by level, and corners in its leaves, no spheres."""
+    if tree.name not in RECIPES or not tree.level_sizes or "leaf_spheres" in tree.buffers:
+        return False
+    recipe = RECIPES[tree.name]
+    return recipe.leaves in tree.buffers and bool(tree.buffers[recipe.leaves].dtype == recipe.leaf)
 
 
 class Refitter:

@@ -34,18 +34,19 @@ class TwoLevels:
     """Trees of meshes on a device, and above them the tree over instances, which can be made anew.
 
     meshes: triangles (m, 3, 3) each, all of sizes near 1. mesh: (k,) int32 indices of `meshes`, one an instance.
+    triangle: the test that the leaves are for.
     The upper level comes first in the array of nodes, in room for the largest one of so many instances.
     Raises UsageError for a layout that has no upper level.
     """
 
     def __init__(self, device: Device, layout: str, builder: str | None, meshes: Sequence[FloatArray],
-                 mesh: IntArray) -> None:
+                 mesh: IntArray, triangle: str = "watertight") -> None:
         if layout not in FORMS:
             raise UsageError(f"the layout {layout} has no instances: take one of {', '.join(FORMS)}")
         start = time.perf_counter()
         self._device, self._form, self._mesh = device, FORMS[layout], mesh
         self._boxes = np.array([_box(triangles) for triangles in meshes]).reshape(-1, 2, 3)
-        trees = [build_tree(device, layout, builder, triangles) for triangles in meshes]
+        trees = [build_tree(device, layout, builder, triangles, triangle=triangle) for triangles in meshes]
         self._stack = max((tree.stack for tree in trees), default=0)
         self._depth = max((tree.depth for tree in trees), default=0)
         self._nodes = sum(tree.nodes for tree in trees)
@@ -75,8 +76,8 @@ class TwoLevels:
         first_node = form.room(len(self._mesh)) + _starts([len(tree.buffers["nodes"]) for tree in trees])
         first_leaf = _starts([len(tree.buffers.get(form.leaves, ())) for tree in trees])
         buffers = {"nodes": empty_array(device, form.node, first_node[-1])}
-        if first_leaf[-1]:
-            buffers[form.leaves] = empty_array(device, form.leaf, first_leaf[-1])
+        if leaves := [tree.buffers[form.leaves] for tree in trees if form.leaves in tree.buffers]:
+            buffers[form.leaves] = empty_array(device, leaves[0].dtype, first_leaf[-1])
         for tree, node, leaf in zip(trees, first_node, first_leaf):
             nodes = on_host(device, tree.buffers["nodes"]).copy()
             form.shift(nodes, node, leaf)

@@ -10,8 +10,7 @@ import numpy as np
 
 from .builders import BUILDERS
 from .cwbvh import CWBVH_NODE, compress
-from .layouts import (BVH2_NODE, BVH8_NODE, LANES, LEAF_TRIANGLE, TRIANGLE_PACK, Layout, Records, bvh2_nodes,
-                      wide_nodes)
+from .layouts import BVH2_NODE, BVH8_NODE, LANES, Layout, Records, bvh2_nodes, wide_nodes
 from .tree import FloatArray, IntArray, Tree
 from .wide import EMPTY, collapse
 
@@ -19,13 +18,12 @@ from .wide import EMPTY, collapse
 class Form(NamedTuple):
     """What two levels ask of a layout.
 
-    node, leaf: its records. leaves: the buffer of leaves. room: the most nodes of a tree over so many instances.
+    node: its record. leaves: the buffer of leaves. room: the most nodes of a tree over so many instances.
     pack: the tree whose leaves hold an instance each, and which instance a leaf's number stands for, (k,).
     shift: adds to all references to nodes and to leaf records, in place.
     """
 
     node: np.dtype[np.void]
-    leaf: np.dtype[np.void]
     leaves: str
     room: Callable[[int], int]
     pack: Callable[[Tree], tuple[Layout, IntArray]]
@@ -85,6 +83,6 @@ def _binary_room(instances: int) -> int:
 
 
 #: By layout.
-FORMS = {"bvh2": Form(BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", _binary_room, _bvh2, _shift_bvh2),
-         "bvh8": Form(BVH8_NODE, TRIANGLE_PACK, "packs", _wide_room, _bvh8, _shift_bvh8),
-         "cwbvh": Form(CWBVH_NODE, LEAF_TRIANGLE, "leaf_triangles", _wide_room, _cwbvh, _shift_cwbvh)}
+FORMS = {"bvh2": Form(BVH2_NODE, "leaf_triangles", _binary_room, _bvh2, _shift_bvh2),
+         "bvh8": Form(BVH8_NODE, "packs", _wide_room, _bvh8, _shift_bvh8),
+         "cwbvh": Form(CWBVH_NODE, "leaf_triangles", _wide_room, _cwbvh, _shift_cwbvh)}

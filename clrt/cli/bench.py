@@ -6,14 +6,15 @@ import click
 
 from .bench_build import build_command
 from .bench_hits import hits_command
+from .bench_numerics import numerics_command
 from .bench_peers import peers_command
 from .bench_rays import rays_command
 
 
 @click.group()
 def command() -> None:
-    """Measure this machine: rays, build, hits, peers."""
+    """Measure this machine: rays, build, hits, peers, numerics."""
 
 
-for each in (rays_command, build_command, hits_command, peers_command):
+for each in (rays_command, build_command, hits_command, peers_command, numerics_command):
     command.add_command(each)

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from .options import box_option, triangle_option
+
 
 @click.command("rays")
 @click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE", help="A model file; default: a bumpy ball.")
@@ -16,8 +18,8 @@ import click
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
 @click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "list"]),
               help="Tree layout; default: all of them or, with --rays, the device's.")
-@click.option("--triangle", type=click.Choice(["watertight", "moller_trumbore"]), default="watertight",
-              show_default=True, help="Triangle test.")
+@triangle_option
+@box_option
 @click.option("--builder", type=click.Choice(["ploc", "reinsertion", "sah", "midpoint"]), help="Tree builder.")
 @click.option("--quick", is_flag=True, help="Fewer rays, and a smaller ball.")
 @click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
@@ -25,9 +27,7 @@ def rays_command(mesh: Path | None, rays: Path | None, quick: bool, json_file: P
     """Rays a second through a mesh, in kernels alone and in whole calls from Python.
 
     With --rays, those of the file: for their closest hits and for any hit. Without, from a camera, on from their hits
-    and to two lights, by every tree layout in turns: Mrays/s of kernels; how many times as fast the first line is, by
-    the clock and by processor time; Mrays/s of whole calls; nodes and leaf tests (of a triangle or a pack of eight) a
-    ray; how many answers are not the same bits.
+    and to two lights, by every tree layout in turns.
     """
     from ..output.files import check_target
     from ..output.report import write_report
@@ -64,10 +64,13 @@ def _lines(result: Mapping[str, Any]) -> list[str]:
         lines.append(f"  {f'{kind}: {hits:.0%} hit':24}" + "".join(f"{title:>12}" for title, _, _ in COLUMNS))
         lines += [f"  {name:24}" + "".join(f"{row[key]:{form}}" for _, key, form in COLUMNS)
                   for name, row in rows.items()]
-    return lines
+    return lines + LEGEND
 
 
-#: `slower`: how many times as fast the first line is, by the clock and by processor time.
-COLUMNS = [("rays", "rays", "12"), ("Mrays/s", "mrays", "12.3g"), ("slower", "ratio", "12.2f"),
-           ("in CPU time", "cpu_ratio", "12.2f"), ("calls", "mrays_call", "12.3g"), ("nodes", "nodes", "12.2f"),
+COLUMNS = [("rays", "rays", "12"), ("Mrays/s", "mrays", "12.3g"), ("in calls", "mrays_call", "12.3g"),
+           ("time", "ratio", "12.2f"), ("CPU time", "cpu_ratio", "12.2f"), ("nodes", "nodes", "12.2f"),
            ("leaf tests", "tests", "12.2f"), ("differ", "differ", "12")]
+LEGEND = ["  Mrays/s: kernels alone, and in whole calls from Python",
+          "  time, CPU time (of the processor): of a ray, over the first line's; above 1 is slower",
+          "  nodes, leaf tests: what a ray visits; a leaf test is of one triangle, in bvh8 of eight",
+          "  differ: answers that are not the first line's, bit by bit"]

@@ -16,14 +16,16 @@ from .options import tracing_options
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @tracing_options
-def command(scene: Path, as_json: bool, lanes: str | None, triangle: str, builder: str | None,
-            layout: str | None) -> None:
+def command(scene: Path, as_json: bool, lanes: int | None, triangle: str, box: str, sphere: str, offset: str,
+            builder: str | None, layout: str | None) -> None:
     """Show what SCENE contains and what is compiled for it; renders nothing and needs no device."""
+    from ..accel.kernels import HitTests
     from ..rendering.compile import Choices, compile_scene
     from ..scene.file import load
 
     content = load(scene)
-    compiled = compile_scene(content, Choices(int(lanes or 8), layout or "bvh8", builder, triangle))
+    choices = Choices(lanes or 8, layout or "bvh8", builder, HitTests(triangle, box, sphere), offset)
+    compiled = compile_scene(content, choices)
     tree = compiled.tree
     materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}
     report: dict[str, Any] = {

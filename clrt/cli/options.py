@@ -23,12 +23,24 @@ class Size(click.ParamType[tuple[int, int]]):
         return int(match[1]), int(match[2])
 
 
+triangle_option = click.option(
+    "--triangle", type=click.Choice(["watertight", "moller_trumbore", "precomputed", "baldwin_weber"]),
+    default="watertight", show_default=True, help="Triangle test.")
+box_option = click.option("--box", type=click.Choice(["robust", "plain"]), default="robust", show_default=True,
+                          help="Box test.")
+
+
 def tracing_options(command: F) -> F:
     """How rays are traced: defaults suit the device; the other choices are there to compare."""
     for option in [
-        click.option("--lanes", type=click.Choice(["1", "8", "16"]), help="Paths a work-item."),
-        click.option("--triangle", type=click.Choice(["watertight", "moller_trumbore"]), default="watertight",
-                     show_default=True, help="Triangle test."),
+        click.option("--lanes", type=click.Choice(["1", "8", "16"]), help="Paths a work-item.",
+                     callback=lambda context, parameter, value: int(value) if value else None),
+        triangle_option,
+        box_option,
+        click.option("--sphere", type=click.Choice(["robust", "textbook"]), default="robust", show_default=True,
+                     help="Sphere test."),
+        click.option("--offset", type=click.Choice(["bound", "ulp", "fixed"]), default="bound", show_default=True,
+                     help="Where rays leave a surface: beyond its rounding, some ulps away, or 0.001."),
         click.option("--builder", type=click.Choice(["ploc", "reinsertion", "sah", "midpoint"]),
                      help="Tree builder; default: sah for small scenes, ploc on the device for large ones."),
         click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "list"]),

@@ -41,8 +41,7 @@ from .progress import Goal, make_progress
 def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None, spp: int | None,
             seconds: float | None, error: float | None, depth: int | None, seed: int | None, devices: tuple[str, ...],
             integrator: str | None, reference: Path | None, report: Path | None, view: str, exposure: float,
-            progress_kind: str | None, print_kernel: bool, quiet: bool, lanes: str | None, triangle: str,
-            builder: str | None, layout: str | None) -> None:
+            progress_kind: str | None, print_kernel: bool, quiet: bool, **tracing: Any) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
     from ..rendering.renderer import Renderer, check_stops
     from ..scene.file import load
@@ -57,8 +56,7 @@ def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's end keeps the picture, too
     options: dict[str, Any] = {
         "size": size, "max_depth": depth, "seed": seed, "device": devices[0] if devices else None,
-        "integrator": integrator, "triangle": triangle, "builder": builder, "layout": layout,
-        "lanes": int(lanes) if lanes else None}
+        "integrator": integrator, **tracing}
     with make_progress(progress_kind, quiet) as progress:
         progress.phase("load")
         content = load(scene)

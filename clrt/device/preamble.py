@@ -33,9 +33,9 @@ def type_list(macro: str, types: Iterable[tuple[str, int]]) -> str:
     return f"#define {macro}(X) {' '.join(f'X({name}, {number})' for name, number in types)}"
 
 
-def defines(values: Mapping[str, int]) -> str:
-    """`#define NAME number` for each."""
-    return "\n".join(f"#define {name} {value}" for name, value in values.items())
+def defines(values: Mapping[str, int | float]) -> str:
+    """`#define NAME number` for each; a Python float, which must be one of float32, is a float."""
+    return "\n".join(f"#define {name} {value}{'f' * isinstance(value, float)}" for name, value in values.items())
 
 
 def typedefs(records: Mapping[str, np.dtype[Any]]) -> str:

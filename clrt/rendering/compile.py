@@ -10,35 +10,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accel.build import build_tree
-from ..accel.kernels import tree_buffers, tree_defines, tree_files
+from ..accel.kernels import HitTests, tree_buffers, tree_defines, tree_files
 from ..accel.layouts import Layout
 from ..device.open import Device
 from ..device.preamble import Buffers, defines, scene_struct, type_list, typedefs
 from ..device.program import compose, files_of
 from ..scene.materials import MATERIALS, Material
 from ..scene.model import Camera, Scene
-from ..scene.scaling import scaled, unit_of
+from ..scene.scaling import Frame, frame_of, in_frame
 from ..scene.validate import validate
 from .emitters import SURFACES, TYPES, Emitters, pack_emitters
 from .environment import Sky, pack_sky
 from .records import COUNTS, LAUNCH, NORMALS, PIXEL, SPHERE, TRIANGLE, material_record
 
 
+#: Of a scene's unit, what float32 holds.
+LARGEST_UNIT = 2.0**127
+#: Where rays leave a surface.
+OFFSETS = {"bound": "offset/bound.cl", "ulp": "offset/ulp.cl", "fixed": "offset/fixed.cl"}
+
+
 @dataclass(frozen=True)
 class Choices:
-    """What a device or a user chooses about the program. `lanes`: paths a work-item (1, 8 or 16)."""
+    """What a device or a user chooses about the program. lanes: paths a work-item (1, 8 or 16); offset: see OFFSETS."""
 
     lanes: int = 8
     layout: str = "bvh8"
     builder: str | None = None
-    triangle: str = "watertight"
+    tests: HitTests = HitTests()
+    offset: str = "bound"
 
 
 @dataclass(frozen=True)
 class CompiledScene:
     """What a device needs to render a scene. The buffers' order is the order of the kernel's arguments.
 
-    All lengths, the camera's too, are those of the scene times `unit` (see scene.scaling).
+    All points, the camera's too, are those of the scene in `frame` (see scene.scaling).
     """
 
     buffers: Buffers
@@ -48,7 +55,7 @@ class CompiledScene:
     tree: Layout
     choices: Choices
     camera: Camera
-    unit: float
+    frame: Frame
 
     @property
     def files(self) -> list[str]:
@@ -68,11 +75,11 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
     device: where large trees are built, if given.
     """
     validate(scene)
-    unit = unit_of(scene)
-    scene = scaled(scene, unit)
+    frame = frame_of(scene)
+    scene = in_frame(scene, frame)
     triangles, normals = _geometry(scene)
     spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
-    tree = build_tree(device, choices.layout, choices.builder, triangles, spheres)
+    tree = build_tree(device, choices.layout, choices.builder, triangles, spheres, choices.tests.triangle)
     sky = pack_sky(scene.environment)
     emitters = pack_emitters(scene, triangles, sky, _radius(triangles, spheres))
     users = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
@@ -94,9 +101,9 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
 
     used = [m for m in MATERIALS if m.kernel in material_buffers]
     features = _features(scene, used, users, emitters, sky, choices)
-    text = compose(_preamble(buffers, features, used, emitters, choices, tree), entry,
+    text = compose(_preamble(buffers, features, used, emitters, choices, tree, frame.unit), entry,
                    _files(used, emitters, sky, choices, bool(len(triangles)), bool(len(spheres))))
-    return CompiledScene(buffers, counts, sorted(features), text, tree, choices, scene.camera, unit)
+    return CompiledScene(buffers, counts, sorted(features), text, tree, choices, scene.camera, frame)
 
 
 def _geometry(scene: Scene) -> tuple[NDArray[np.float32], dict[int, NDArray[np.float32]]]:
@@ -127,7 +134,7 @@ def _materials(users: list[Material]) -> tuple[NDArray[np.int32], dict[str, tupl
     buffers: dict[str, tuple[str, NDArray[Any]]] = {}
     for kind in MATERIALS:
         if kind in distinct:
-            records = np.zeros(len(distinct[kind]), material_record(kind))
+            records = np.zeros(len(distinct[kind]), material_record(distinct[kind]))
             for material, index in distinct[kind].items():
                 for name, value in material.parameters().items():
                     records[name][index] = value
@@ -175,10 +182,12 @@ def _features(scene: Scene, used: Iterable[type[Material]], users: Iterable[Mate
 
 
 def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], emitters: Emitters, choices: Choices,
-              tree: Layout) -> str:
+              tree: Layout, unit: float) -> str:
+    # Only offsets that are lengths of the scene's know its unit: others share programs whatever it is.
+    lengths = {} if choices.offset == "bound" else {"SCENE_UNIT": min(unit, LARGEST_UNIT)}
     surfaces = [t for t in emitters.types if t in SURFACES]
     return "\n".join([
-        defines({"LANES": choices.lanes, **tree_defines(tree)}),
+        defines({"LANES": choices.lanes, **tree_defines(tree), **lengths}),
         defines({feature: 1 for feature in sorted(features)}),
         typedefs({"Counts": COUNTS, "Pixel": PIXEL, "Launch": LAUNCH}),
         scene_struct(buffers),
@@ -190,6 +199,6 @@ def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], 
 def _files(used: list[type[Material]], emitters: Emitters, sky: Sky, choices: Choices, triangles: bool,
            spheres: bool) -> dict[str, list[str]]:
     lights = [f"light/{t}.cl" for t in emitters.types if t != "sky"]
-    return {**tree_files(choices.layout, choices.triangle, triangles, spheres),
+    return {**tree_files(choices.layout, choices.tests, triangles, spheres), "OFFSET": [OFFSETS[choices.offset]],
             "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in used],
             "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else [])}

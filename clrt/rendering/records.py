@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -32,12 +33,17 @@ LAUNCH = record(position="3f4", width="u4", right="3f4", height="u4", up="3f4", 
                 seed="u4", first_pixel="u4", pixel_count="u4", first_sample="u4", sample_count="u4")
 
 
-def material_record(material: type[Material]) -> np.dtype[Any]:
-    """The record of a material type: its kernel parameters, triples first, each followed by a scalar or padding."""
-    parameters = material().parameters()
-    triples = [name for name, value in parameters.items() if isinstance(value, tuple)]
-    scalars = [name for name, value in parameters.items() if not isinstance(value, tuple)]
-    fields: dict[str, str] = {}
+def material_record(materials: Iterable[Material]) -> np.dtype[Any]:
+    """The record of materials of one type: all parameters that one of them has.
+
+    Rows of a multiple of four first, then triples, each followed by a scalar or padding, then the other scalars.
+    """
+    sizes: dict[str, int] = {}
+    for material in materials:
+        sizes |= {name: len(value) if isinstance(value, tuple) else 1 for name, value in material.parameters().items()}
+    triples = [name for name, size in sizes.items() if size == 3]
+    scalars = [name for name, size in sizes.items() if size == 1]
+    fields = {name: f"{size}f4" for name, size in sizes.items() if size > 3}
     for i, triple in enumerate(triples):
         fields[triple] = "3f4"
         fields[scalars.pop(0) if scalars else f"pad{i}"] = "f4"

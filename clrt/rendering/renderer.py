@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accel.kernels import BUILDER_NAMES, TREES, TRIANGLE_TESTS
+from ..accel.kernels import BUILDER_NAMES, TREES, HitTests
 from ..device.open import open_device
 from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
-from .compile import Choices, compile_scene
+from .compile import OFFSETS, Choices, compile_scene
 from .film import RELATIVE_FLOOR, Film
 from .session import Session
 
@@ -46,20 +46,23 @@ class State:
 class Renderer:
     """A scene on a device, ready to render. Everything not given is taken from `scene.render`.
 
-    device: see `clrt devices`; size: (width, height); triangle, builder, layout, lanes: see `compile.Choices`.
+    device: see `clrt devices`; size: (width, height); triangle, box, sphere: see `HitTests`; offset, builder, layout,
+    lanes: see `compile.Choices`.
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
     Raises SceneError, DeviceError, KernelError, UsageError.
     """
 
     def __init__(self, scene: Scene, *, device: str | int | None = None, size: tuple[int, int] | None = None,
                  max_depth: int | None = None, seed: int | None = None, integrator: str | None = None,
-                 triangle: str = "watertight", builder: str | None = None, layout: str | None = None,
-                 lanes: int | None = None, on_phase: Callable[[str], None] = lambda phase: None) -> None:
+                 triangle: str = "watertight", box: str = "robust", sphere: str = "robust", offset: str = "bound",
+                 builder: str | None = None, layout: str | None = None, lanes: int | None = None,
+                 on_phase: Callable[[str], None] = lambda phase: None) -> None:
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
         self.device = open_device(device)
-        choices = Choices(lanes or self.device.lanes, layout or self.device.layout, builder, triangle)
+        choices = Choices(lanes or self.device.lanes, layout or self.device.layout, builder,
+                          HitTests(triangle, box, sphere), offset)
         _check(choices)
         on_phase("build")
         self.compiled = compile_scene(self.scene, choices, device=self.device)
@@ -142,8 +145,8 @@ class Renderer:
 
 
 def _check(choices: Choices) -> None:
-    known: dict[str, Sequence[object]] = {"layout": list(TREES), "triangle": list(TRIANGLE_TESTS),
-                                          "builder": [None, *BUILDER_NAMES], "lanes": (1, 8, 16)}
+    known: dict[str, Sequence[object]] = {"layout": list(TREES), "builder": [None, *BUILDER_NAMES], "lanes": (1, 8, 16),
+                                          "offset": list(OFFSETS)}
     for name, values in known.items():
         if (value := getattr(choices, name)) not in values:
             named = ", ".join(str(known_value) for known_value in values if known_value is not None)

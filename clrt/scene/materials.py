@@ -8,15 +8,18 @@ the packing and the tests of every BSDF find it in that list. Field types carry 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from math import log1p
 from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Ge, Le
+
+from .microfacets import fitted_loss, multiple_scattering
 
 Unit = Annotated[float, Ge(0), Le(1)]
 Albedo = tuple[Unit, Unit, Unit]
 NonNegative = Annotated[float, Ge(0)]
 Radiance = tuple[NonNegative, NonNegative, NonNegative]
-Parameter = float | tuple[float, float, float]
+Parameter = float | tuple[float, ...]
 
 #: Specular reflectance at normal incidence, linear: (F0, metallic). Suchiński 2022, table 6.1.
 F0_PRESETS: dict[str, tuple[tuple[float, float, float], float]] = {
@@ -62,7 +65,10 @@ class Material:
         tuples_for_lists(self)
 
     def parameters(self) -> dict[str, Parameter]:
-        """The values its kernel reads, in the order of the kernel's record."""
+        """The values its kernel reads: numbers, triples, rows of a multiple of four.
+
+        What only some materials of a type have is 0 for the others.
+        """
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "emission"}
 
     def features(self) -> frozenset[str]:
@@ -84,7 +90,8 @@ class MetallicRoughness(Material):
 
     alpha = roughness². `preset` takes F0 (and for metals the color) from the table. `smith` chooses the
     shadowing–masking term: height-correlated (glTF), separable G1·G1, or Schlick-GGX with k = (r+1)²/8 ("schlick")
-    or k = r²/2 ("schlick_ibl").
+    or k = r²/2 ("schlick_ibl"). `multiple_scattering` gives back what one bounce between microfacets leaves out
+    (scene.microfacets): white metal then reflects all light, and coloured metal grows deeper in color.
     """
 
     kernel: ClassVar[str] = "metallic_roughness"
@@ -93,6 +100,7 @@ class MetallicRoughness(Material):
     roughness: Unit = 0.5
     preset: Preset | None = None
     smith: Smith = "height_correlated"
+    multiple_scattering: bool = False
 
     def parameters(self) -> dict[str, Parameter]:
         color, specular, metallic = self.color, (0.04, 0.04, 0.04), self.metallic
@@ -101,12 +109,19 @@ class MetallicRoughness(Material):
             color = specular if metallic else color
         f0 = tuple(s + metallic * (c - s) for s, c in zip(specular, color))
         albedo = tuple((1 - metallic) * c for c in color)
+        alpha = max(self.roughness**2, ALPHA_MIN)
         forms = ("height_correlated", "separable", "schlick", "schlick_ibl")
-        return {"albedo": (albedo[0], albedo[1], albedo[2]), "alpha": max(self.roughness**2, ALPHA_MIN),
-                "f0": (f0[0], f0[1], f0[2]), "smith": float(forms.index(self.smith))}
+        single: dict[str, Parameter] = {
+            "albedo": albedo, "alpha": alpha, "f0": f0, "smith": float(forms.index(self.smith))}
+        if not self.multiple_scattering:
+            return single
+        loss = fitted_loss(alpha, self.smith)
+        return {**single, "multiple": multiple_scattering(f0, loss.mean), "mean_loss": loss.mean, "width": loss.width,
+                "spread": log1p(alpha**-2), "loss": loss.coefficients}
 
     def features(self) -> frozenset[str]:
-        return frozenset({f"SMITH_{self.smith.upper()}"})
+        multiple = {"MULTIPLE_SCATTERING"} if self.multiple_scattering else set()
+        return frozenset({f"SMITH_{self.smith.upper()}"} | multiple)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,28 +1,57 @@
-"""Scenes of any size: the same scene in units in which float32 neither overflows nor loses digits.
+"""Scenes of any size and anywhere: the same scene in coordinates in which float32 neither overflows nor loses digits.
 
 A triangle test multiplies three lengths, so edges of 1e-20 or 1e15 leave float32's range though the scene itself does
-not. Multiplying all lengths by a power of two changes no digit and no picture.
+not; multiplying all lengths by a power of two changes no digit and no picture. And a scene far from the origin has few
+digits left for its own size, where rays leave its surfaces; moving it back costs none, since numbers that are near each
+other are subtracted exactly (Sterbenz 1974).
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 from math import frexp
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .lights import Light, PointLight
-from .model import Mesh, Scene, Sphere, Vector
+from .model import Scene, Sphere, Vector
 
-#: Scenes whose largest coordinate (the camera's aside) lies between 2^-20 and 2^20 are left as they are.
+#: Scenes whose largest coordinate (the camera's aside) lies between 2^-20 and 2^20 are left as large as they are.
 COMFORTABLE = 20
+#: Along an axis a scene is left where it is unless its middle is this many times half its largest extent from 0.
+FAR = 4.0
 
 
-def unit_of(scene: Scene) -> float:
-    """The power of two by which lengths should be multiplied: 1 unless the scene is very small or very large."""
-    lengths = [float(np.abs(mesh.vertices).max()) for mesh in scene.meshes if mesh.vertices.size]
-    lengths += [max(map(abs, sphere.center)) + sphere.radius for sphere in scene.spheres]
-    return unit_for(max(lengths, default=0.0))
+class Frame(NamedTuple):
+    """What the device sees of a point p: (p − center)·unit. unit: a power of two."""
+
+    center: Vector = (0.0, 0.0, 0.0)
+    unit: float = 1.0
+
+    def points(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
+        """(…, 3) points in this frame."""
+        if self == Frame():
+            return points.astype(np.float32, copy=False)
+        with np.errstate(over="ignore"):
+            return np.asarray((points - np.array(self.center)) * self.unit, np.float32)
+
+    def point(self, point: Vector) -> Vector:
+        """One point in this frame."""
+        x, y, z = ((p - c) * self.unit for p, c in zip(point, self.center))
+        return x, y, z
+
+
+def frame_around(low: NDArray[np.floating], high: NDArray[np.floating]) -> Frame:
+    """The frame for what lies in a box; low, high: (3,), or inf and −inf for nothing."""
+    low, high = low.astype(np.float64), high.astype(np.float64)
+    if not np.all(low <= high):
+        return Frame()
+    middle, half = (low + high) / 2, float((high - low).max()) / 2
+    center = np.where(np.abs(middle) > FAR * half, middle, 0).astype(np.float32).astype(np.float64)
+    x, y, z = center.tolist()
+    return Frame((x, y, z), unit_for(float(np.maximum(np.abs(low - center), np.abs(high - center)).max())))
 
 
 def unit_for(largest: float) -> float:
@@ -31,31 +60,32 @@ def unit_for(largest: float) -> float:
     return 1.0 if largest == 0 or abs(exponent) <= COMFORTABLE else 2.0**-exponent
 
 
-def scaled(scene: Scene, unit: float) -> Scene:
-    """The scene with all lengths multiplied by `unit`, and point lights such that the picture stays the same."""
-    if unit == 1:
+def frame_of(scene: Scene) -> Frame:
+    """The frame for the scene's surfaces."""
+    balls = [(np.array(sphere.center), sphere.radius) for sphere in scene.spheres]
+    points = [mesh.vertices for mesh in scene.meshes if mesh.vertices.size]
+    low = [each.min(axis=0) for each in points] + [center - radius for center, radius in balls]
+    high = [each.max(axis=0) for each in points] + [center + radius for center, radius in balls]
+    return frame_around(np.min(low, axis=0), np.max(high, axis=0)) if low else Frame()
+
+
+def in_frame(scene: Scene, frame: Frame) -> Scene:
+    """The scene in a frame, with point lights such that the picture stays the same."""
+    if frame == Frame():
         return scene
-    camera = replace(scene.camera, position=_times(scene.camera.position, unit),
-                     look_at=_times(scene.camera.look_at, unit))
-    return replace(scene, meshes=[_mesh(mesh, unit) for mesh in scene.meshes], camera=camera,
-                   spheres=[_sphere(sphere, unit) for sphere in scene.spheres],
-                   lights=[_light(light, unit) for light in scene.lights])
+    position, look_at = frame.point(scene.camera.position), frame.point(scene.camera.look_at)
+    return replace(scene, meshes=[replace(mesh, vertices=frame.points(mesh.vertices)) for mesh in scene.meshes],
+                   camera=replace(scene.camera, position=position, look_at=look_at),
+                   spheres=[_sphere(sphere, frame) for sphere in scene.spheres],
+                   lights=[_light(light, frame) for light in scene.lights])
 
 
-def _mesh(mesh: Mesh, unit: float) -> Mesh:
-    return replace(mesh, vertices=(mesh.vertices * np.float64(unit)).astype(np.float32))
+def _sphere(sphere: Sphere, frame: Frame) -> Sphere:
+    return replace(sphere, center=frame.point(sphere.center), radius=sphere.radius * frame.unit)
 
 
-def _sphere(sphere: Sphere, unit: float) -> Sphere:
-    return replace(sphere, center=_times(sphere.center, unit), radius=sphere.radius * unit)
-
-
-def _light(light: Light, unit: float) -> Light:
+def _light(light: Light, frame: Frame) -> Light:
     if not isinstance(light, PointLight):
         return light
-    return replace(light, position=_times(light.position, unit), intensity=_times(light.intensity, unit * unit))
-
-
-def _times(vector: Vector, factor: float) -> Vector:
-    x, y, z = vector
-    return x * factor, y * factor, z * factor
+    red, green, blue = (value * frame.unit**2 for value in light.intensity)
+    return replace(light, position=frame.point(light.position), intensity=(red, green, blue))

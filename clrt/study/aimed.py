@@ -25,6 +25,17 @@ def rays_of_kinds(vertices: Floats, faces: Faces, count: int, seed: int = 0) -> 
             "axes": _along_axes(rng, vertices, corners[:, 0])}
 
 
+def inside_rays(vertices: Floats, faces: Faces, count: int, rng: np.random.Generator) -> Rays:
+    """`count` rays from the middle of a mesh: a third each to vertices, to points of edges and of faces."""
+    corners = vertices[faces[rng.integers(0, len(faces), count)]].astype(np.float64)
+    weights = rng.dirichlet([1, 1, 1], count)
+    weights[: count // 3] = [1, 0, 0]
+    edges = weights[count // 3: 2 * (count // 3)]
+    edges[:, 2] = 0
+    edges /= edges.sum(axis=1, keepdims=True)
+    return _from_inside(rng, vertices, np.einsum("ni,nij->nj", weights, corners))
+
+
 def _from_inside(rng: np.random.Generator, vertices: Floats, targets: Doubles) -> Rays:
     low, high = vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)
     spread = rng.normal(size=targets.shape)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import time
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
+from ..errors import SceneError, UsageError
 from ..query import RayQuery
 from ..scene.meshes import read_mesh
+from ..scene.ray_arrays import ray_arrays
 
 Floats = NDArray[np.float32]
 Rays = tuple[Floats, Floats, Floats]
@@ -58,14 +61,25 @@ def measure_rays(vertices: Floats, faces: NDArray[np.int32], rays: Rays, *, repe
 
 
 def load_rays(path: Path) -> Rays:
-    """origins (k, 3), directions (k, 3) and t_max (k,), float32, of an .npz file; SceneError for what is none."""
+    """origins (k, 3), directions (k, 3) and t_max (k,), float32, of an .npz file with arrays as `RayQuery` takes them.
+
+    SceneError for what is none and for an empty one.
+    """
+    remedy = "store origins, directions and t_max with numpy.savez"
     try:
-        with np.load(path) as stored:
-            names = ("origins", "directions", "t_max")
-            origins, directions, t_max = (stored[name].astype(np.float32) for name in names)
-    except (OSError, ValueError, KeyError) as error:
-        raise SceneError(f"{path}: cannot be read as rays: {error}; store origins, directions and t_max "
-                         "with numpy.savez") from error
+        with np.load(path) as stored, np.errstate(over="ignore"):
+            rays = ray_arrays(*(stored[name] for name in ("origins", "directions", "t_max")))
+            origins, directions, t_max = (np.ascontiguousarray(array, np.float32) for array in rays)
+    except OSError as error:
+        raise SceneError(f"{path}: cannot be read ({error.strerror or error})") from error
+    except UsageError as error:
+        raise SceneError(f"{path}: {error}") from error
+    except KeyError as error:
+        raise SceneError(f"{path}: {error.args[0]}; {remedy}") from error
+    except (BadZipFile, EOFError, TypeError, ValueError, zlib.error) as error:
+        raise SceneError(f"{path}: is no .npz file of arrays; {remedy}") from error
+    if not len(t_max):
+        raise SceneError(f"{path}: holds no rays; {remedy}")
     return origins, directions, t_max
 
 

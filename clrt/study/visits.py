@@ -19,8 +19,8 @@ class _Counting(TreeQuery):
 
     def __init__(self, query: TreeQuery) -> None:
         tree = replace(query.tree, buffers={**query.tree.buffers, "visits": np.zeros(1, VISITS)})
-        super().__init__(query.device, tree, int(query._counts["triangles"][0]), query.unit, query._triangle,
-                         query._traversal)
+        counts = int(query._counts["triangles"][0]), int(query._counts["spheres"][0])
+        super().__init__(query.device, tree, counts, query.frame, query._tests, query._traversal)
 
 
 def visits_a_ray(query: TreeQuery, rays: Rays, *, any_hit: bool) -> dict[str, float]:

@@ -8,28 +8,72 @@
 //
 // D is GGX (Walter et al. 2007, eq. 33). The microfacet lobe draws normals visible from wo (Dupuy and Benyoub 2023,
 // "Sampling Visible GGX Normals with Spherical Caps"); it and the cosine lobe are chosen by the Fresnel term at wo.
+//
+// MULTIPLE_SCATTERING adds what further bounces between microfacets reflect, as clrt/scene/microfacets.py says:
+//   multiple·loss(cos wi)·loss(cos wo)/pi
+// The loss is near 0.1 at cos ≈ alpha and falls with 1/cos² behind; a lobe of its own is drawn with about that density.
 #include "sampling.cl"
 #include "bsdf/interface.cl"
+
+#define LOSS_COEFFICIENTS ((int)(sizeof(((MetallicRoughness *)0)->loss) / sizeof(float)))
 
 typedef struct {
     real3 albedo, f0;
     real alpha;
     ireal smith;
+#if MULTIPLE_SCATTERING
+    real3 multiple;
+    real mean_loss, width, spread;
+    real loss[LOSS_COEFFICIENTS];
+#endif
 } MetallicRoughnessLobes;
 
 static inline MetallicRoughnessLobes metallic_roughness_lobes(const Scene *scene, ireal index) {
-    return (MetallicRoughnessLobes){GATHER3(scene->metallic_roughness, index, .albedo),
-                                    GATHER3(scene->metallic_roughness, index, .f0),
-                                    GATHER(real, scene->metallic_roughness, index, .alpha),
-                                    TO_INT(GATHER(real, scene->metallic_roughness, index, .smith))};
+    MetallicRoughnessLobes m;
+    m.albedo = GATHER3(scene->metallic_roughness, index, .albedo);
+    m.f0 = GATHER3(scene->metallic_roughness, index, .f0);
+    m.alpha = GATHER(real, scene->metallic_roughness, index, .alpha);
+    m.smith = TO_INT(GATHER(real, scene->metallic_roughness, index, .smith));
+#if MULTIPLE_SCATTERING
+    m.multiple = GATHER3(scene->metallic_roughness, index, .multiple);
+    m.mean_loss = GATHER(real, scene->metallic_roughness, index, .mean_loss);
+    m.width = GATHER(real, scene->metallic_roughness, index, .width);
+    m.spread = GATHER(real, scene->metallic_roughness, index, .spread);
+    for (int k = 0; k < LOSS_COEFFICIENTS; ++k) m.loss[k] = GATHER(real, scene->metallic_roughness, index, .loss[k]);
+#endif
+    return m;
 }
+
+#if MULTIPLE_SCATTERING
+// What a single bounce with F = 1 loses of light from an angle: a polynomial in a stretched cosine.
+static inline real microfacet_loss(const MetallicRoughnessLobes *m, real cos_theta) {
+    real q = cos_theta / (cos_theta + m->width);
+    real x = 2.0f * sqrt(q * (1.0f + m->width)) - 1.0f;
+    real sum = ZERO;
+    for (int k = LOSS_COEFFICIENTS - 1; k >= 0; --k) sum = sum * x + m->loss[k];
+    return maximum((1.0f - q) * sum, ZERO);
+}
+
+// Around +z with a density of cos² + alpha² in cos²: pdf = cos/(pi·spread·(cos² + alpha²)), spread = log(1 + 1/alpha²).
+static inline real3 sample_multiple(const MetallicRoughnessLobes *m, real2 u) {
+    real s, c, z2 = minimum(m->alpha * m->alpha * (exp(u.x * m->spread) - 1.0f), ONE), r = sqrt(1.0f - z2);
+    sincos_turns(u.y, &s, &c);
+    return vector(r * c, r * s, sqrt(z2));
+}
+static inline real multiple_pdf(const MetallicRoughnessLobes *m, real cos_theta) {
+    return cos_theta / (PI * m->spread * (cos_theta * cos_theta + m->alpha * m->alpha));
+}
+#endif
 
 static inline real3 fresnel_schlick(real3 f0, real cos_theta) {
     real c = maximum(1.0f - cos_theta, ZERO), c2 = c * c;
     return mad3(sub(splat(ONE), f0), c2 * c2 * c, f0);
 }
 
-static inline real3 transmitted(real3 f0, real cos_theta) { return sub(splat(ONE), fresnel_schlick(f0, cos_theta)); }
+// 1 − F, with 1 − (1 − c)^5 multiplied out so that it keeps its digits at grazing angles.
+static inline real3 transmitted(real3 f0, real c) {
+    return scale(sub(splat(ONE), f0), c * (5.0f - c * (10.0f - c * (10.0f - c * (5.0f - c)))));
+}
 
 // Walter's D(h), with the denominator summed so that a tiny alpha keeps its digits at the lobe's centre.
 static inline real ggx_d(real3 h, real alpha) {
@@ -63,28 +107,44 @@ static inline real shadowing(const MetallicRoughnessLobes *m, real3 wo, real3 wi
     return g;
 }
 
-// Probability of the microfacet lobe: its share of the reflected light, judged by the Fresnel term at wo.
-static inline real specular_probability(const MetallicRoughnessLobes *m, real3 wo) {
+// The lobes' probabilities: their shares of the reflected light, judged by the Fresnel term at wo.
+typedef struct { real specular, multiple, diffuse; } LobeShares;
+
+static inline LobeShares lobe_shares(const MetallicRoughnessLobes *m, real3 wo) {
     real3 f = fresnel_schlick(m->f0, wo.z);
-    real specular = luminance(f);
-    real diffuse = luminance(mul(sub(splat(ONE), f), m->albedo));
-    return specular + diffuse > 0.0f ? specular / (specular + diffuse) : ONE;
+    LobeShares share = {luminance(f), ZERO, luminance(mul(sub(splat(ONE), f), m->albedo))};
+#if MULTIPLE_SCATTERING
+    share.multiple = luminance(m->multiple) * m->mean_loss * microfacet_loss(m, wo.z);
+#endif
+    real sum = share.specular + share.multiple + share.diffuse;
+    ireal some = sum > 0.0f;
+    return (LobeShares){some ? share.specular / sum : ONE, some ? share.multiple / sum : ZERO,
+                        some ? share.diffuse / sum : ZERO};
 }
 
 static inline real3 metallic_roughness_value(const MetallicRoughnessLobes *m, real3 wo, real3 wi) {
-    real3 h = normalize3(add(wo, wi));
-    real3 f = fresnel_schlick(m->f0, dot3(wi, h));
+    real3 sum = add(wo, wi);
+    real length = length3(sum);
+    real3 h = scale(sum, 1.0f / length);
+    real3 f = fresnel_schlick(m->f0, 0.5f * length);     // wi·h = wo·h, which as products differ near wi = −wo
     real specular = ggx_d(h, m->alpha) * shadowing(m, wo, wi) / (4.0f * wo.z);
     real3 crossing = mul(transmitted(m->f0, wi.z), transmitted(m->f0, wo.z));
-    real3 diffuse = scale(mul(crossing, m->albedo), wi.z * (1.0f / PI));
+    real3 body = mul(crossing, m->albedo);
+#if MULTIPLE_SCATTERING
+    body = mad3(m->multiple, microfacet_loss(m, wo.z) * microfacet_loss(m, wi.z), body);
+#endif
+    real3 diffuse = scale(body, wi.z * (1.0f / PI));
     return choose((wo.z > 0.0f) & (wi.z > 0.0f), mad3(f, specular, diffuse), splat(ZERO));
 }
 
 static inline real metallic_roughness_density(const MetallicRoughnessLobes *m, real3 wo, real3 wi) {
     real3 h = normalize3(add(wo, wi));
     real visible = ggx_d(h, m->alpha) / (4.0f * wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
-    real p = specular_probability(m, wo);
-    real pdf = p * visible + (1.0f - p) * cosine_pdf(wi.z);
+    LobeShares share = lobe_shares(m, wo);
+    real pdf = share.specular * visible + share.diffuse * cosine_pdf(wi.z);
+#if MULTIPLE_SCATTERING
+    pdf += share.multiple > 0.0f ? share.multiple * multiple_pdf(m, wi.z) : ZERO;   // spread is 0 where there is none
+#endif
     return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
 }
 
@@ -114,7 +174,11 @@ static inline BsdfSample metallic_roughness_sample(const Scene *scene, ireal ind
     real3 h = sample_visible_normal(wo, m.alpha, u);
     real3 reflected = sub(scale(h, 2.0f * dot3(wo, h)), wo);
     BsdfSample sample;
-    sample.wi = choose(lobe < specular_probability(&m, wo), reflected, sample_cosine(u));
+    LobeShares share = lobe_shares(&m, wo);
+    sample.wi = choose(lobe < share.specular, reflected, sample_cosine(u));
+#if MULTIPLE_SCATTERING
+    sample.wi = choose(lobe >= 1.0f - share.multiple, sample_multiple(&m, u), sample.wi);
+#endif
     sample.pdf = metallic_roughness_density(&m, wo, sample.wi);
     real inverse = sample.pdf > 0.0f ? 1.0f / sample.pdf : ZERO;
     sample.weight = scale(metallic_roughness_value(&m, wo, sample.wi), inverse);

@@ -27,6 +27,16 @@ static inline Box box_union(Box a, Box b) {
     return (Box){a.lo < b.lo ? a.lo : b.lo, a.hi > b.hi ? a.hi : b.hi};
 }
 
+#define TRIANGLE_PAD 4.7683716e-7f   // 2^-21; why: see clrt/accel/layouts.py
+
+static inline Box triangle_box(float3 a, float3 b, float3 c) {
+    Box box = box_union(box_union((Box){a, a}, (Box){b, b}), (Box){c, c});
+    float3 size = box.hi - box.lo;
+    float side = size.x > size.y ? size.x : size.y;
+    float3 longest = side > size.z ? side : size.z;
+    return (Box){fma(longest, (float3)(-TRIANGLE_PAD), box.lo), fma(longest, (float3)(TRIANGLE_PAD), box.hi)};
+}
+
 static inline Box shape_box(global const float *shape, bool sphere) {
 #if SPHERES
     if (sphere) {
@@ -34,8 +44,7 @@ static inline Box shape_box(global const float *shape, bool sphere) {
         return (Box){nextafter(centre - shape[3], (float3)(-INFINITY)), nextafter(centre + shape[3], (float3)(INFINITY))};
     }
 #endif
-    float3 a = vload3(0, shape), b = vload3(1, shape), c = vload3(2, shape);
-    return box_union(box_union((Box){a, a}, (Box){b, b}), (Box){c, c});
+    return triangle_box(vload3(0, shape), vload3(1, shape), vload3(2, shape));
 }
 
 static inline Box primitive_box(const Primitives *primitives, int primitive) {

@@ -15,5 +15,5 @@ static inline Corners face_corners(global const float *vertices, global const in
 }
 
 static inline Box corners_box(Corners c) {
-    return box_union(box_union((Box){c.p0, c.p0}, (Box){c.p1, c.p1}), (Box){c.p2, c.p2});
+    return triangle_box(c.p0, c.p1, c.p2);
 }

@@ -1,13 +1,11 @@
-// Ray against boxes by slabs (Nadolny 2.1–2.6), made safe against rounding and zeros.
+// Ray against boxes by slabs (Nadolny 2.1–2.6), one multiplication a plane.
 //
-// A plane's t is (plane − origin)·(1/direction): three roundings, so a relative error below 3 units. Near planes are
-// pulled in and far planes pushed out by twice that (Ize 2013, "Robust BVH Ray Traversal", JCGT 2(2)), which costs
-// nothing as it is folded into 1/direction. A zero component gives ±inf, and on a slab plane 0·inf = NaN, which every
-// comparison here drops: such a ray counts as inside the slab. Flat boxes are kept since near == far counts as a hit.
+// A plane's t is (plane − origin)·(1/direction). Near planes are pulled in and far planes pushed out by SLAB_PAD of that,
+// which costs nothing as it is folded into 1/direction. A zero component gives ±inf, and on a slab plane 0·inf = NaN, which
+// every comparison here drops: such a ray counts as inside the slab. Flat boxes are kept since near == far counts as a hit.
 #include "geometry/wide.cl"
 #include "vector.cl"
-
-#define SLAB_PAD (6.0f * 5.9604645e-8f)
+#include BOX_TEST
 
 typedef struct {
     float origin[3], near[3], far[3];   // near, far: padded 1/direction

@@ -1,19 +1,12 @@
 // A ray against eight boxes at once, by slabs with one multiplication-addition a plane.
 //
-// A plane's t is plane·inverse + shift, inverse = 1/direction and shift = −origin·inverse. With u = 2^-24 the division
-// costs 1 u of t, the sum 1 u of t, and the product in `shift` 1 u of |shift|. Near planes are pulled in and far planes
-// pushed out by 4 u of t, folded into inverse and shift, and by 4 u of |shift| (Ize 2013, "Robust BVH Ray Traversal",
-// JCGT 2(2), for the sum of a difference): so no box is missed that the exact ray enters at t >= 0.
-//
-// A direction's component below 1/STEEPEST, or zero, counts as that small: t is then off, but for all planes of the axis
-// alike, so only on which side of them the origin lies has a meaning. SIDE pads it by 1e-8 lengths, so that an origin on
-// a plane is on its inner side. Where numbers overflow a NaN comes out, which the comparisons drop: inside again.
-// Flat boxes are kept since near == far counts as a hit. Directions are of a length near 1.
+// A plane's t is plane·inverse + shift, inverse = 1/direction and shift = −origin·inverse. Near planes are pulled in and
+// far planes pushed out by BOX_PAD of t, folded into inverse and shift, and by BOX_PAD of |shift|. A direction's component
+// below 1/STEEPEST, or zero, counts as that small, and SIDE pads its planes. Where numbers overflow a NaN comes out, which
+// the comparisons drop: such a ray counts as inside the slab. Flat boxes are kept since near == far counts as a hit.
+// Directions are of a length near 1.
 #include "vector.cl"
-
-#define BOX_PAD (4.0f * UNIT_ROUNDOFF)
-#define STEEPEST 1e36f
-#define SIDE 1e28f
+#include BOX_TEST
 
 typedef struct {
     float near[3], far[3], near_shift[3], far_shift[3];

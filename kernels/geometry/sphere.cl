@@ -1,27 +1,34 @@
-// Ray against a sphere: nearest root beyond 0, right from outside and inside (Nadolny 1.8).
+// Ray against a sphere: nearest root beyond t_min, right from outside and inside (Nadolny 1.8).
 //
-// The discriminant is taken from the closest approach to the centre, and the smaller root from the product of the
-// roots, so that neither a small far sphere nor a grazing ray loses its digits (Haines et al. 2019, "Precision
-// Improvements for Ray/Sphere Intersection", Ray Tracing Gems, ch. 7).
+// With f from the centre to the origin: a·t² + 2b·t + c = 0, a = d·d, b = f·d, c = f·f − r², and a quarter of the
+// discriminant is a·r² − |f×d|² (Haines et al. 2019, "Precision Improvements for Ray/Sphere Intersection", Ray Tracing
+// Gems, ch. 7, from the closest approach). What cancels there is computed in twice as many digits: c near the surface of
+// a large sphere, and the cross product far from a small one. The sign of c says on which side the origin is, so a ray
+// that leaves never meets its own sphere; the smaller root comes from the product of the roots.
 #include "geometry/wide.cl"
+#include "geometry/twice.cl"
 
-static inline bool intersect_sphere(const Ray *ray, global const LeafSphere *sphere, float t_max, float *t) {
-    const float *d = ray->direction;
-    float fx = ray->origin[0] - sphere->center[0];
-    float fy = ray->origin[1] - sphere->center[1];
-    float fz = ray->origin[2] - sphere->center[2];
-    float r = sphere->radius;
-    float a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    float b = -(fx * d[0] + fy * d[1] + fz * d[2]);
-    float s = b / a;
-    float lx = fx + s * d[0], ly = fy + s * d[1], lz = fz + s * d[2];
-    float discriminant = r * r - (lx * lx + ly * ly + lz * lz);
+TWICE_OF(float, Twice, twice)
+
+static inline Twice twice_dot(Twice a[3], Twice b[3]) {
+    return twice_sum(twice_sum(twice_product(a[0], b[0]), twice_product(a[1], b[1])), twice_product(a[2], b[2]));
+}
+
+static inline bool intersect_sphere(const Ray *ray, global const LeafSphere *sphere, float t_min, float t_max,
+                                    float *t) {
+    Twice f[3], d[3], r = {sphere->radius, 0.0f};
+    for (int k = 0; k < 3; ++k) {
+        f[k] = twice_difference(ray->origin[k], sphere->center[k]);
+        d[k] = (Twice){ray->direction[k], 0.0f};
+    }
+    Twice n[3] = {twice_minor(f[1], f[2], d[1], d[2]), twice_minor(f[2], f[0], d[2], d[0]), twice_minor(f[0], f[1], d[0], d[1])};
+    Twice a = twice_dot(d, d), r2 = twice_product(r, r);
+    float discriminant = twice_value(twice_sum(twice_product(a, r2), twice_negative(twice_dot(n, n))));
     if (!(discriminant >= 0.0f)) return false;
-    float f = sqrt(fx * fx + fy * fy + fz * fz);
-    float c = (f - r) * (f + r);
-    float q = b + copysign(sqrt(a * discriminant), b);
-    float t0 = c / q, t1 = q / a;
+    float b = twice_value(twice_dot(f, d)), c = twice_value(twice_sum(twice_dot(f, f), twice_negative(r2)));
+    float q = -b - copysign(sqrt(discriminant), b);
+    float t0 = c / q, t1 = q / twice_value(a);
     float near = t0 < t1 ? t0 : t1, far = t0 < t1 ? t1 : t0;
-    *t = near > 0.0f ? near : far;
-    return *t > 0.0f && *t <= t_max;
+    *t = near > t_min ? near : far;
+    return *t > t_min && *t <= t_max;
 }

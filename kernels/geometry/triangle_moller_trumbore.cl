@@ -1,13 +1,6 @@
 // Ray against triangles with the least memory and arithmetic (Möller and Trumbore 1997; Suchiński 3.6, Nadolny 1.15):
 // q = d×e2, r = s×e1, (t, u, v) = (r·e2, q·s, r·d)/(q·e1). It leaves cracks along edges: see the watertight test.
-#include "geometry/wide.cl"
-#include "vector.cl"
-
-typedef Ray TriangleRay;
-
-typedef int TriangleRays;
-static inline TriangleRays triangle_rays(real3 origin, real3 direction) { return 0; }
-static inline TriangleRay triangle_ray(const TriangleRays *rays, const Ray *ray, int lane) { return *ray; }
+#include "geometry/plain_ray.cl"
 
 static inline WideHit intersect_triangles(const TriangleRay *ray, global const Triangles *leaf, float t_max) {
     const float *d = ray->direction;
@@ -17,13 +10,7 @@ static inline WideHit intersect_triangles(const TriangleRay *ray, global const T
     wide sx = ray->origin[0] - p0x, sy = ray->origin[1] - p0y, sz = ray->origin[2] - p0z;
     wide qx = d[1] * e2z - d[2] * e2y, qy = d[2] * e2x - d[0] * e2z, qz = d[0] * e2y - d[1] * e2x;
     wide rx = sy * e1z - sz * e1y, ry = sz * e1x - sx * e1z, rz = sx * e1y - sy * e1x;
-    wide det = qx * e1x + qy * e1y + qz * e1z;
-    wide inverse = 1.0f / det;
-    WideHit result;
-    result.t = (rx * e2x + ry * e2y + rz * e2z) * inverse;
-    result.u = (qx * sx + qy * sy + qz * sz) * inverse;
-    result.v = (rx * d[0] + ry * d[1] + rz * d[2]) * inverse;
-    result.hit = (det != 0.0f) & (result.u >= 0.0f) & (result.v >= 0.0f) & (result.u + result.v <= 1.0f)
-               & (result.t > 0.0f) & (result.t <= t_max);
-    return result;
+    wide inverse = 1.0f / (qx * e1x + qy * e1y + qz * e1z);
+    return inside_triangle((rx * e2x + ry * e2y + rz * e2z) * inverse, (qx * sx + qy * sy + qz * sz) * inverse,
+                           (rx * d[0] + ry * d[1] + rz * d[2]) * inverse, t_max);
 }

@@ -2,14 +2,19 @@
 //
 // The ray is sheared onto the z axis; a vertex's sheared coordinates depend on the vertex and the ray alone, so both
 // triangles at an edge see the same ones. The side of an edge is found by comparing its two products instead of
-// subtracting them: both triangles form the same two products, and no compiler can contract a comparison. Equal
-// products mean that the ray meets the edge, and count as inside on both sides, so no double precision is needed.
+// subtracting them: both triangles form the same two products, and no compiler can contract a comparison. Rounding keeps
+// order, so only equal products leave the side open; then their rounding errors are compared, which are exact (fma). So
+// every side is right for the corners as they were sheared, and the ray meets the edge itself on both sides or neither.
 //
 // t is a mean of the corners' t with weights of one sign, so it is right to rounding, and above 0, where all corners lie
-// ahead, however small or thin the triangle. Where some do not, a hit closer than the rounding error of t is dropped
-// (pbrt, 4th ed., 6.8.8): rays that leave a surface never meet it.
+// ahead, however small or thin the triangle. Where some do not, and t may be no more than rounding, it is taken from the
+// volume between origin and triangle in twice as many digits, whose sign is right: rays that start beside a surface and
+// leave it never meet it, and none slips through a sliver.
 #include "geometry/wide.cl"
+#include "geometry/twice.cl"
 #include "vector.cl"
+
+TWICE_OF(wide, TwiceWide, wide)
 
 typedef struct {
     int kx, ky, kz;       // kz: the direction's largest component
@@ -44,9 +49,32 @@ static inline TriangleRay triangle_ray(const TriangleRays *rays, const Ray *ray,
 
 typedef struct { wide sx, sy, sz, ox, oy, oz; } ShearedRay;
 
+// Six times the volume between the ray's origin and a triangle: the determinant of the corners seen from there.
+static inline wide volume(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray) {
+#define FROM_ORIGIN(p) {wide_difference(p[0], ray->ox), wide_difference(p[1], ray->oy), wide_difference(p[2], ray->oz)}
+    TwiceWide a[3] = FROM_ORIGIN(p0), b[3] = FROM_ORIGIN(p1), c[3] = FROM_ORIGIN(p2);
+    TwiceWide x = wide_product(a[0], wide_minor(b[1], b[2], c[1], c[2]));
+    TwiceWide y = wide_product(a[1], wide_minor(b[2], b[0], c[2], c[0]));
+    TwiceWide z = wide_product(a[2], wide_minor(b[0], b[1], c[0], c[1]));
+    return wide_value(wide_sum(wide_sum(x, y), z));
+}
+
+// What the shear says. open: where t may be no more than rounding, and settle decides; det: its triangle's area, twice.
+typedef struct { WideHit hit; wide_mask open; wide inverse_det; } ShearedHit;
+
+// The rounding error of t is at most T_ERROR·reach·(reach + slope·depth)·depth·|sz/det|. By pbrt (4th ed., 6.8.8) a sheared
+// corner is off by 5 u of reach + slope·depth, hence each of u, v, w by 24 u of reach·(reach + slope·depth), which
+// depth·|sz/det| carries to t, thrice; with the sum's own roundings that makes 108 u.
+#define T_ERROR (108.0f * UNIT_ROUNDOFF)
+// A t behind the origin is believed unless the triangle, seen along the ray, is so thin that t may be off by this part of
+// the triangle's depth.
+#define THIN 0.01f
+
+static inline wide wide_far(wide x, wide y) { return WIDE_ABS(x) > WIDE_ABS(y) ? WIDE_ABS(x) : WIDE_ABS(y); }
+
 // Corners with permuted components, one triangle in each lane against one ray, or one for all lanes against a ray in each.
-static inline WideHit intersect_sheared(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray,
-                                        wide t_max) {
+static inline ShearedHit intersect_sheared(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray,
+                                           wide t_max) {
     wide az = p0[2] - ray->oz, bz = p1[2] - ray->oz, cz = p2[2] - ray->oz;
     wide ax = fma(-ray->sx, az, p0[0] - ray->ox), ay = fma(-ray->sy, az, p0[1] - ray->oy);
     wide bx = fma(-ray->sx, bz, p1[0] - ray->ox), by = fma(-ray->sy, bz, p1[1] - ray->oy);
@@ -57,38 +85,63 @@ static inline WideHit intersect_sheared(const wide p0[3], const wide p1[3], cons
     wide w1 = bx * ay, w2 = by * ax;
     wide_mask front = (u1 >= u2) & (v1 >= v2) & (w1 >= w2);
     wide_mask back = (u1 <= u2) & (v1 <= v2) & (w1 <= w2);
-    WideHit result;
-    result.hit = front | back;
-    if (!WIDE_ANY(result.hit)) return result;
+    ShearedHit result;
+    result.hit.hit = front | back;
+    result.open = (wide_mask)(0);
+    if (!WIDE_ANY(result.hit.hit)) return result;
 
     wide u = u1 - u2, v = v1 - v2, w = w1 - w2;
-    wide det = u + v + w;
-    wide inverse = 1.0f / det;
+    if (WIDE_ANY(result.hit.hit & (u * v * w == 0.0f))) {
+        u = u == 0.0f ? fma(cx, by, -u1) - fma(cy, bx, -u2) : u;
+        v = v == 0.0f ? fma(ax, cy, -v1) - fma(ay, cx, -v2) : v;
+        w = w == 0.0f ? fma(bx, ay, -w1) - fma(by, ax, -w2) : w;
+        front = (u >= 0.0f) & (v >= 0.0f) & (w >= 0.0f);
+        back = (u <= 0.0f) & (v <= 0.0f) & (w <= 0.0f);
+        result.hit.hit = front | back;
+    }
+    result.inverse_det = 1.0f / (u + v + w);   // of a triangle without an area infinite, so that t is a NaN
     wide ta = az * ray->sz, tb = bz * ray->sz, tc = cz * ray->sz;
-    result.t = (u * ta + v * tb + w * tc) * inverse;
-    result.hit = result.hit & (result.t > 0.0f) & (result.t <= t_max) & (det != 0.0f);
-    if (!WIDE_ANY(result.hit)) return result;
-    result.u = v * inverse;
-    result.v = w * inverse;
-
-    wide_mask beside = result.hit & ((ta <= 0.0f) | (tb <= 0.0f) | (tc <= 0.0f));
+    result.hit.t = (u * ta + v * tb + w * tc) * result.inverse_det;
+    result.hit.u = v * result.inverse_det;
+    result.hit.v = w * result.inverse_det;
+    wide_mask inside = result.hit.hit;
+    wide_mask thin = WIDE_ABS(u + v + w) < THIN * wide_max3(WIDE_ABS(u1), WIDE_ABS(v1), WIDE_ABS(w1));
+    result.hit.hit = inside & (result.hit.t > 0.0f) & (result.hit.t <= t_max);
+    wide_mask possible = result.hit.hit | (inside & thin);
+    if (!WIDE_ANY(possible)) return result;
+    wide_mask beside = possible & (wide_min3(ta, tb, tc) <= 0.0f) & (wide_max3(ta, tb, tc) >= 0.0f);
     if (!WIDE_ANY(beside)) return result;
-    wide max_x = wide_max3(WIDE_ABS(ax), WIDE_ABS(bx), WIDE_ABS(cx));
-    wide max_y = wide_max3(WIDE_ABS(ay), WIDE_ABS(by), WIDE_ABS(cy));
-    wide max_z = wide_max3(WIDE_ABS(az), WIDE_ABS(bz), WIDE_ABS(cz));
-    wide max_e = wide_max3(WIDE_ABS(u), WIDE_ABS(v), WIDE_ABS(w));
-    wide delta_x = GAMMA(5) * (max_x + max_z), delta_y = GAMMA(5) * (max_y + max_z);
-    wide delta_e = 2.0f * (GAMMA(2) * max_x * max_y + delta_y * max_x + delta_x * max_y);
-    max_z *= WIDE_ABS(ray->sz);
-    wide t_min = 3.0f * (GAMMA(3) * max_e * max_z + delta_e * max_z + GAMMA(3) * max_z * max_e) * WIDE_ABS(inverse);
-    result.hit = result.hit & ((result.t > t_min) | (beside == 0));
+    wide reach = wide_max3(wide_far(ax, ay), wide_far(bx, by), wide_far(cx, cy));
+    wide depth = wide_max3(WIDE_ABS(az), WIDE_ABS(bz), WIDE_ABS(cz));
+    wide error = T_ERROR * reach * (reach + wide_far(ray->sx, ray->sy) * depth) * WIDE_ABS(result.inverse_det);
+    result.open = beside & (WIDE_ABS(result.hit.t) <= error * depth * WIDE_ABS(ray->sz))
+                & ((result.hit.t > 0.0f) | (error > THIN));
     return result;
 }
 
+// The hits, with t in twice as many digits where it was left open.
+static inline WideHit settle(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray, wide t_max,
+                             ShearedHit sheared) {
+    WideHit result = sheared.hit;
+    wide t = -ray->sz * sheared.inverse_det * volume(p0, p1, p2, ray);
+    result.t = sheared.open ? t : result.t;
+    result.hit = sheared.open ? (t > 0.0f) & (t <= t_max) : result.hit;
+    return result;
+}
+
+#define PACK_CORNER(p) {LOAD_WIDE(leaf->p[ray->kx]), LOAD_WIDE(leaf->p[ray->ky]), LOAD_WIDE(leaf->p[ray->kz])}
+#define PACK_CORNERS wide p0[3] = PACK_CORNER(p0), p1[3] = PACK_CORNER(p1), p2[3] = PACK_CORNER(p2); \
+    ShearedRay sheared_ray = {ray->sx, ray->sy, ray->sz, ray->ox, ray->oy, ray->oz};
+
+// Seldom called, so it loads the corners again: to hand them over, all tests would have to put them into memory.
+__attribute__((noinline)) static WideHit settle_triangles(const TriangleRay *ray, global const Triangles *leaf,
+                                                          float t_max, ShearedHit sheared) {
+    PACK_CORNERS
+    return settle(p0, p1, p2, &sheared_ray, t_max, sheared);
+}
+
 static inline WideHit intersect_triangles(const TriangleRay *ray, global const Triangles *leaf, float t_max) {
-    ShearedRay sheared = {ray->sx, ray->sy, ray->sz, ray->ox, ray->oy, ray->oz};
-    wide p0[3] = {LOAD_WIDE(leaf->p0[ray->kx]), LOAD_WIDE(leaf->p0[ray->ky]), LOAD_WIDE(leaf->p0[ray->kz])};
-    wide p1[3] = {LOAD_WIDE(leaf->p1[ray->kx]), LOAD_WIDE(leaf->p1[ray->ky]), LOAD_WIDE(leaf->p1[ray->kz])};
-    wide p2[3] = {LOAD_WIDE(leaf->p2[ray->kx]), LOAD_WIDE(leaf->p2[ray->ky]), LOAD_WIDE(leaf->p2[ray->kz])};
-    return intersect_sheared(p0, p1, p2, &sheared, t_max);
+    PACK_CORNERS
+    ShearedHit sheared = intersect_sheared(p0, p1, p2, &sheared_ray, t_max);
+    return WIDE_ANY(sheared.open) ? settle_triangles(ray, leaf, t_max, sheared) : sheared.hit;
 }

@@ -42,3 +42,8 @@ static inline wide wide_max3(wide a, wide b, wide c) {
     wide ab = a > b ? a : b;
     return ab > c ? ab : c;
 }
+
+static inline wide wide_min3(wide a, wide b, wide c) {
+    wide ab = a < b ? a : b;
+    return ab < c ? ab : c;
+}

@@ -9,14 +9,12 @@
 // below an instance's tree on the stack, says LEAVE.
 //
 // Watertight as geometry/box.cl is. A plane at p + q·step is seen from the ray at q·step + (p − origin): q·step is exact,
-// and the sum's rounding is within what box.cl keeps in hand. The roundings of p − origin, and of plane − p when the tree
-// was built, are below 3 units of p − origin, and 4 are padded. The product with 1/direction stays apart, which costs one
-// a plane, so that zeros and infinities mean here what they mean there.
+// and the sum's rounding is within what SLAB_PAD keeps in hand. The roundings of p − origin, and of plane − p when the
+// tree was built, are below 3 units of p − origin, and ORIGIN_PAD is 4. The product with 1/direction stays apart, which
+// costs one a plane, so that zeros and infinities mean here what they mean there.
 #include "geometry/box.cl"
 #include "traverse/leaf.cl"
 #include UPPER_LEVEL
-
-#define ORIGIN_PAD (4.0f * 5.9604645e-8f)
 
 typedef struct { float step[3], near[3], far[3]; } Grid;   // a node's: the step, and p − origin for near and far planes
 typedef struct { uint first, bits; } Group;

@@ -86,8 +86,12 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
 #if SPHERES
 static inline void hit_spheres(const LeafRay *ray, global const LeafSphere *spheres, int count, Hit *hit) {
     for (int i = 0; i < count; ++i) {
-        float t;
-        if (intersect_sphere(&ray->ray, spheres + i, hit->t, &t))
+        float t = 0.0f;
+#if NEXT_HIT
+        while (intersect_sphere(&ray->ray, spheres + i, t, hit->t, &t))   // where the ray enters, and where it leaves
+#else
+        if (intersect_sphere(&ray->ray, spheres + i, t, hit->t, &t))
+#endif
             keep_closest(ray, hit, t, 0.0f, 0.0f, spheres[i].primitive);
     }
 }

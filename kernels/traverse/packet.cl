@@ -53,11 +53,21 @@ static inline ireal enter_child(const Packet *packet, global const float *bounds
     return (t_near <= t_far) & packet->active;
 }
 
+#define CORNER(p) {pack->p[packet->axis[0]][i], pack->p[packet->axis[1]][i], pack->p[packet->axis[2]][i]}
+#define CORNERS wide p0[3] = CORNER(p0), p1[3] = CORNER(p1), p2[3] = CORNER(p2);
+
+__attribute__((noinline)) static WideHit settle_rays(const Packet *packet, global const Triangles *pack, int i, real t_max,
+                                                     ShearedHit found) {
+    CORNERS
+    return settle(p0, p1, p2, &packet->triangles, t_max, found);
+}
+
 static inline void hit_pack(const Packet *packet, global const Triangles *pack, Hits *hits) {
     for (int i = 0; i < WIDTH && pack->primitive[i] >= 0; ++i) {
-#define CORNER(p) {pack->p[packet->axis[0]][i], pack->p[packet->axis[1]][i], pack->p[packet->axis[2]][i]}
-        wide p0[3] = CORNER(p0), p1[3] = CORNER(p1), p2[3] = CORNER(p2);
-        WideHit found = intersect_sheared(p0, p1, p2, &packet->triangles, hits->t);
+        CORNERS
+        ShearedHit sheared = intersect_sheared(p0, p1, p2, &packet->triangles, hits->t);
+        WideHit found = sheared.hit;
+        if (ANY(sheared.open)) found = settle_rays(packet, pack, i, hits->t, sheared);
         if (!ANY(found.hit)) continue;
         ireal primitive = pack->primitive[i];
         ireal closer = found.hit & packet->active

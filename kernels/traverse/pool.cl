@@ -24,7 +24,10 @@ static inline void fetch(const Scene *scene, int reference) {
 #if TRIANGLES
     node = reference < 0 ? (global const void *)(scene->packs + (~reference >> 4)) : node;
 #endif
-    PREFETCH(node, 5 * 64)
+#if SPHERES
+    node = reference < 0 && (~reference & 8) ? (global const void *)(scene->leaf_spheres + (~reference >> 4)) : node;
+#endif
+    PREFETCH(node, FETCH_LINES * 64)
 }
 
 typedef struct {

@@ -15,6 +15,13 @@ def soup(count: int, size: float = 0.1, seed: int = 0) -> FloatArray:
     return corners
 
 
+def edges(triangles: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Low and high corners (m, 3) of the triangles' boxes in a tree: 2^-21 of their longest side larger."""
+    low, high = triangles.min(axis=1).astype(np.float64), triangles.max(axis=1).astype(np.float64)
+    pad = (high - low).max(axis=1, keepdims=True, initial=0).astype(np.float32).astype(np.float64) / 2**21
+    return (low - pad).astype(np.float32), (high + pad).astype(np.float32)
+
+
 def spheres(count: int, seed: int = 0) -> FloatArray:
     """Random spheres, (s, 4) centre and radius, in the unit cube."""
     rng = np.random.default_rng(seed)

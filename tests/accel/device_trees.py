@@ -20,7 +20,7 @@ from clrt.device.arrays import on_host
 from clrt.device.blocks import Blocks
 from clrt.device.open import Device
 
-from .cases import SCENES
+from .cases import SCENES, edges
 from .test_cwbvh import boxes_below, children_of, leaves_of
 
 
@@ -121,6 +121,7 @@ def binary(device: Device, layout: str, case: str, passes: int = 0) -> Binary:
     tree = reinsert(work, primitives, tree, passes) if passes else tree
     ids = work.download(primitives.ids, np.uint32, primitives.count)
     ball_low, ball_high = sphere_boxes(balls)
-    low, high = np.concatenate([triangles.min(axis=1), ball_low]), np.concatenate([triangles.max(axis=1), ball_high])
+    triangle_low, triangle_high = edges(triangles)
+    low, high = np.concatenate([triangle_low, ball_low]), np.concatenate([triangle_high, ball_high])
     return Binary(work.download(tree.nodes, BINARY_NODE, tree.count), tree.rounds, ids >= len(triangles), low[ids],
                   high[ids])

@@ -19,7 +19,7 @@ from clrt.accel.layouts import Layout, pack, sphere_boxes
 from clrt.accel.tree import FloatArray
 from clrt.scene.scaling import unit_for
 
-from .cases import NASTY, soup, spheres
+from .cases import NASTY, edges, soup, spheres
 from .test_layouts import SCENES
 
 Doubles = NDArray[np.float64]
@@ -45,8 +45,8 @@ def boxes_below(layout: Layout) -> tuple[FloatArray, FloatArray]:
     """(k, 8, 3) the boxes of what is below each slot, from the primitives up; inverted where nothing is."""
     low, high = [np.zeros((0, 3), np.float32)], [np.zeros((0, 3), np.float32)]
     if "leaf_triangles" in layout.buffers:
-        corners = np.stack([layout.buffers["leaf_triangles"][name] for name in ("p0", "p1", "p2")])
-        low, high = [corners.min(axis=0)], [corners.max(axis=0)]
+        corners = np.stack([layout.buffers["leaf_triangles"][name] for name in ("p0", "p1", "p2")], axis=1)
+        low, high = ([each] for each in edges(corners))
     if "leaf_spheres" in layout.buffers:
         balls = layout.buffers["leaf_spheres"]
         inside = sphere_boxes(np.column_stack([balls["center"], balls["radius"]]))

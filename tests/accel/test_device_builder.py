@@ -16,7 +16,7 @@ from clrt.device.arrays import on_host
 from clrt.device.open import Device
 from clrt.errors import SceneError
 
-from .cases import NO_SPHERES, SCENES
+from .cases import NO_SPHERES, SCENES, edges
 from .device_trees import built, like_gpu, wide_tree
 
 
@@ -65,14 +65,15 @@ def test_boxes_are_tight(device: Device, case: str) -> None:
     wide, packs = wide_tree(device, "bvh8", case), records(device, case, "packs", TRIANGLE_PACK)
     first, sphere, _ = leaf_fields(wide.child)
     triangles, balls = (wide.child < 0) & ~sphere, (wide.child < 0) & sphere
-    corners = np.concatenate([packs[name] for name in ("p0", "p1", "p2")], axis=2)
+    corners = np.stack([packs[name] for name in ("p0", "p1", "p2")]).transpose(1, 3, 0, 2)
+    low, high = (each.reshape(-1, 8, 3) for each in edges(corners.reshape(-1, 3, 3)))
     bounds = sphere_boxes(SCENES[case][1][wide.sphere_order])
-    for boxes, union, ends, edges in ((wide.aabb_min, np.minimum, np.fmin.reduce(corners, axis=2), bounds[0]),
-                                      (wide.aabb_max, np.maximum, np.fmax.reduce(corners, axis=2), bounds[1])):
+    for boxes, union, ends, sides in ((wide.aabb_min, np.minimum, np.fmin.reduce(low, axis=1), bounds[0]),
+                                      (wide.aabb_max, np.maximum, np.fmax.reduce(high, axis=1), bounds[1])):
         np.testing.assert_array_equal(boxes[triangles], ends[first[triangles] // 8])
         if balls.any():
             order = np.argsort(first[balls])
-            np.testing.assert_array_equal(boxes[balls][order], union.reduceat(edges, first[balls][order]))
+            np.testing.assert_array_equal(boxes[balls][order], union.reduceat(sides, first[balls][order]))
         np.testing.assert_array_equal(boxes[wide.interior], union.reduce(boxes[1:], axis=1))
     unused = wide.child == EMPTY
     assert (wide.aabb_min[unused] == np.inf).all() and (wide.aabb_max[unused] == -np.inf).all()

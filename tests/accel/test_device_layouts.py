@@ -13,7 +13,7 @@ from clrt.accel.tree import half_area
 from clrt.accel.wide import EMPTY
 from clrt.device.open import Device
 
-from .cases import SCENES, soup
+from .cases import SCENES, edges, soup
 from .device_trees import binary_tree, built, wide_tree
 from .test_builders import check
 from .test_cwbvh import check_said_once
@@ -40,9 +40,8 @@ def test_nodes_of_two_children(device: Device, case: str) -> None:
     tree, unused = binary_tree(device, case), layout.buffers["nodes"][1]
     assert (unused["aabb_min"] == np.inf).all() and (unused["aabb_max"] == -np.inf).all()
     check_leaf_records(layout, case)
-    edges = sphere_boxes(balls)
-    check(tree, np.concatenate([triangles.min(axis=1), edges[0]]), np.concatenate([triangles.max(axis=1), edges[1]]),
-          leaf_size=4, free_depth=64)
+    low, high = (np.concatenate(each) for each in zip(edges(triangles), sphere_boxes(balls)))
+    check(tree, low, high, leaf_size=4, free_depth=64)
     assert layout.level_sizes == tuple(len(level) for level in tree.levels())
     assert (layout.stack, layout.depth, layout.nodes) == (tree.stack_bound, tree.depth, len(tree.count))
     assert layout.sah_cost == pytest.approx(tree.sah_cost(), rel=1e-5)

@@ -18,7 +18,7 @@ from clrt.accel.wide import leaf_fields
 from clrt.device.blocks import Blocks
 from clrt.device.open import Device
 
-from .cases import SCENES
+from .cases import SCENES, edges
 from .device_trees import Binary, binary, binary_tree, like_gpu, wide_tree
 
 
@@ -106,8 +106,8 @@ def test_sums_of_what_stands_before(device: Device, groups: bool, count: int, ar
 @pytest.mark.parametrize("case", ["mixed", "flat_grid", "points"])
 def test_primitives_follow_the_morton_curve(device: Device, case: str) -> None:
     triangles, balls = SCENES[case]
-    ball_low, ball_high = sphere_boxes(balls)
-    twice = np.concatenate([triangles.min(axis=1) + triangles.max(axis=1), ball_low + ball_high])
+    low, high = (np.concatenate(each) for each in zip(edges(triangles), sphere_boxes(balls)))
+    twice = low + high
     extent = np.ptp(twice, axis=0).max()
     cell = (twice - twice.min(axis=0)) * np.float32((2**21 - 1) / extent if extent else 0)
     place = np.arange(21, dtype=np.uint64)[:, None]

@@ -17,7 +17,7 @@ from clrt.accel.tree import FloatArray, half_area
 from clrt.device.blocks import Blocks
 from clrt.device.open import Device
 
-from .cases import NO_SPHERES, SCENES, soup
+from .cases import NO_SPHERES, SCENES, edges, soup
 from .device_trees import Binary, binary, like_gpu
 
 Children = list[list[int]]
@@ -94,7 +94,7 @@ def test_the_best_move_is_always_made(device: Device, seed: int, monkeypatch: py
     corners = triangles[work.download(primitives.ids, np.uint32, count)]
     after = reinsert(work, primitives, BinaryTree(work.upload(nodes), [1] * (count - 1)), 1)
     tree = Binary(work.download(after.nodes, BINARY_NODE, after.count), after.rounds, np.zeros(count, bool),
-                  corners.min(axis=1), corners.max(axis=1))
+                  *edges(corners))
     tree.check()
     below = replace(tree, nodes=nodes).below.tolist()
     best = min(total_area(moved, tree.low, tree.high) for moved in moves(below, count))

@@ -8,17 +8,19 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clrt.accel import cwbvh, layouts
+from clrt.accel import cwbvh, layouts, triangle_forms
 from clrt.device.open import Device
 from clrt.device.program import build
 from clrt.device.records import c_typedef, record
 from clrt.rendering import records
 from clrt.scene.materials import MATERIALS
 
+from clrt.study.bsdfs import variants
+
 RECORDS: dict[str, np.dtype[Any]] = {
-    f"{module.__name__.rsplit('.', 1)[1]}_{name}": value for module in (records, layouts, cwbvh)
+    f"{module.__name__.rsplit('.', 1)[1]}_{name}": value for module in (records, layouts, cwbvh, triangle_forms)
     for name, value in vars(module).items() if isinstance(value, np.dtype) and value.names
-} | {f"material_{kind.__name__}": records.material_record(kind) for kind in MATERIALS}
+} | {f"material_{kind.__name__}": records.material_record(variants(kind)) for kind in MATERIALS}
 
 
 def offsets(dtype: np.dtype[Any]) -> list[int]:

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from clrt.device.open import Device
 from clrt.rendering.film import RELATIVE_FLOOR, Film
-from clrt.rendering.records import PIXEL
 from clrt.scene.materials import Diffuse
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
+from clrt.study.accumulation import accumulate, stream_errors
+from clrt.study.probe import Probe
 
-from ..probe import Probe
 from .pictures import box, film, quad
 
-Doubles = NDArray[np.float64]
+#: Text of film.cl and what makes sums stall: no second float, and one that forgets what it lacked before.
+STALLING = {"plain": ("    *sum = s + e;\n    *error = e - (*sum - s);", "    *sum = s;\n    *error = 0.0f;"),
+            "forgetful": ("real e = *error + (", "real e = (")}
 
 
 @pytest.fixture(scope="module")
@@ -23,41 +25,58 @@ def probe(device: Device) -> Probe:
     return Probe(device, Scene())
 
 
-def accumulated(probe: Probe, radiance: Doubles, samples: int) -> Film:
-    """A row of pixels, each with `samples` times its radiance (n, 3), as the kernels leave it."""
-    out = probe("accumulate", 14, radiance, samples=samples)
-    pixels = np.zeros((1, len(out)), PIXEL)
-    for name, first in (("sum", 0), ("sum_error", 3), ("square", 6), ("square_error", 9)):
-        pixels[name] = out[None, :, first:first + 3]
-    pixels["count"], pixels["dropped"] = out[None, :, 12], out[None, :, 13]
-    return Film(pixels)
+@pytest.mark.parametrize("before", [0, 1 << 27])
+def test_means_hold_past_2_to_24_samples(probe: Probe, before: int) -> None:
+    """Constants from 3e-38 to 1e30, two values in turn, and rare peaks: all to 1e-7, where 1e-6 is asked for."""
+    for name, error, miscounted in stream_errors(probe, (1 << 24) + 8, before):
+        assert error < 1e-7 and miscounted == 0, name
 
 
-def test_mean_holds_past_2_to_24_samples(probe: Probe) -> None:
-    """2^25 + 8 samples of each radiance: a plain sum of floats stands still at 2^24 times the first."""
-    samples = (1 << 25) + 8
-    radiance = np.array([[1.0, 0.1, 1 + 2.0**-23], [1e6, 1e-6, 1e30], [1 / 3, 255.0, 3e-38]], np.float32).astype(float)
-    picture = accumulated(probe, radiance, samples)
-    assert np.all(picture.pixels["count"] == samples)
-    np.testing.assert_allclose(picture.mean[0], radiance, rtol=1e-6)
+@pytest.mark.parametrize("what", STALLING)
+def test_sums_that_stall_are_noticed(device: Device, what: str) -> None:
+    stalling = Probe(device, Scene(), changes=dict([STALLING[what]]))
+    assert max(error for _, error, _ in stream_errors(stalling, 1 << 22, 1 << 24)) > 1e-6
+
+
+def constant(probe: Probe, radiance: ArrayLike, samples: int) -> Film:
+    """A row of pixels, each with `samples` times its radiance (n, 3)."""
+    return accumulate(probe, np.asarray(radiance, np.float64), np.asarray(radiance, np.float64), 1, samples).film
+
+
+def test_dark_pixels_beside_bright_ones(probe: Probe) -> None:
+    """Each to itself: 1e-6 beside 1e6 and 1e30, in lanes of one work-item."""
+    radiance = np.array([[1e-6] * 3, [1e6] * 3, [1e-6] * 3, [1e30] * 3, [1e-6] * 3], np.float32).astype(float)
+    picture = constant(probe, radiance, (1 << 20) + 1)
+    np.testing.assert_allclose(picture.mean[0], radiance, rtol=1e-7)
 
 
 def test_samples_that_are_no_numbers_are_dropped(probe: Probe) -> None:
-    bad = np.array([[np.nan, 1, 1], [1, np.inf, 1], [1, 1, -np.inf], [1, 2, 3]])
-    picture = accumulated(probe, bad, 5)
-    assert picture.pixels["dropped"].tolist() == [[5, 5, 5, 0]]
-    assert picture.pixels["count"].tolist() == [[0, 0, 0, 5]]
-    assert picture.mean[0].tolist() == [[0, 0, 0], [0, 0, 0], [0, 0, 0], [1, 2, 3]]
-    assert picture.nonfinite_samples == 15 and picture.samples == 20
+    """Every third of four pixels' samples; the fifth has none but such, and the sixth none at all."""
+    bad = [[np.nan, 1, 1], [1, np.inf, 1], [1, 1, -np.inf], [3e38, 1, 1], [np.nan] * 3, [1, 2, 3]]
+    good = [[1, 2, 3]] * 4 + [[np.nan] * 3, [1, 2, 3]]
+    picture = accumulate(probe, np.array(good, np.float64), np.array(bad), 3, 15).film
+    assert picture.pixels["dropped"].tolist() == [[5, 5, 5, 5, 15, 0]]
+    assert picture.pixels["count"].tolist() == [[10, 10, 10, 10, 0, 15]]
+    assert picture.mean[0].tolist() == [[1, 2, 3]] * 4 + [[0, 0, 0], [1, 2, 3]]
+    assert picture.nonfinite_samples == 35 and picture.samples == 90
     assert picture.noise is None
 
 
 def test_sums_that_would_overflow(probe: Probe) -> None:
     """Finite samples whose sum is not: either the mean is right, or they are dropped and counted."""
-    radiance = np.full((1, 3), 3e38, np.float32).astype(float)
-    picture = accumulated(probe, radiance, 16)
-    assert picture.samples == 16
-    assert picture.nonfinite_samples == 16 or np.allclose(picture.mean[0], radiance, rtol=1e-6)
+    for value in (1e30, 1e31, 3e38):
+        radiance = np.full((1, 3), value, np.float32).astype(float)
+        picture = constant(probe, radiance, 1 << 22)
+        assert picture.samples == 1 << 22
+        assert picture.nonfinite_samples == 1 << 22 or np.allclose(picture.mean[0], radiance, rtol=1e-6)
+
+
+@pytest.mark.parametrize("radiance", [4e15, 1e17, 1e30])
+def test_noise_of_radiance_whose_squares_are_no_floats(probe: Probe, radiance: float) -> None:
+    """What is not known is taken as the most that it can be; it is a number after any number of samples."""
+    for samples in (2, 100, 1 << 20):
+        assert constant(probe, [[radiance] * 3], samples).noise == pytest.approx(1)
+    assert constant(probe, [[1e15] * 3], 1 << 20).noise == pytest.approx(0, abs=1e-5)
 
 
 def test_overflowing_light_is_dropped_and_counted(device: Device) -> None:

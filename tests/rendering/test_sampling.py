@@ -1,70 +1,89 @@
-"""Warps against their densities, and the sine and cosine they use against float64."""
+"""Warps and lights against their densities, and the sine and cosine they use against float64."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from clrt.device.open import Device
-from clrt.scene.model import Scene
+from clrt.study.light_sampling import lamps, light_tests, picks, skies
+from clrt.study.probe import Probe
+from clrt.study.samplers import AREA, DENSITY
+from clrt.study.significance import rejected
+from clrt.study.warps import HEIGHTS, visible_normals, warp_density_errors, warp_p_values, warp_probe
 
-from ..probe import Probe
-from ..stats import chi2_test
-
-Doubles = NDArray[np.float64]
-COUNT, SIGNIFICANCE = 1 << 18, 1e-4
+SAMPLES = 1 << 16
+#: Text of the kernels and what makes it wrong by little.
+WRONG_WARPS = {
+    "cone": ("h = u.x * height;", "h = u.x * height * (0.9f + 0.1f * u.x);"),
+    "cosine": ("real s, c, r = sqrt(u.x);", "real s, c, r = sqrt(u.x * (0.9f + 0.1f * u.x));"),
+    "triangle": ("real root = sqrt(u.x);", "real root = sqrt(u.x * (0.9f + 0.1f * u.x));"),
+    "turns": ("real x = (u * 4.0f - TO_REAL(q)) * (0.5f * PI);", "real x = (u * 4.0f - TO_REAL(q)) * (0.48f * PI);"),
+    "visible normals": ("vector(wo.x * alpha, wo.y * alpha, wo.z)", "vector(wo.x * alpha, wo.y * alpha, 1.1f * wo.z)"),
+}
+WRONG_LIGHTS = {
+    "sphere": ("return sin2 < 1.0f ? sin2 /", "return sin2 < 1.0f ? 0.9f * sin2 /"),
+    "alias": ("unit_interval(bits.y) < GATHER", "0.9f * unit_interval(bits.y) < GATHER"),
+    "sky": ("(TO_REAL(column) + u.x)", "(TO_REAL(column) + 0.9f * u.x)"),
+}
 
 
 @pytest.fixture(scope="module")
 def probe(device: Device) -> Probe:
-    return Probe(device, Scene())
+    return warp_probe(device)
 
 
-def warped(probe: Probe, height: float = 0.5, seed: int = 0) -> Doubles:
-    """(COUNT, 12): what probe_warps gives for random numbers, in a cone of 1 − cos = `height`."""
-    u = np.random.default_rng(seed).integers(1 << 24, size=(COUNT, 2)) / (1 << 24)
-    return probe("warps", 12, u, np.full(COUNT, height))
+def test_warps_follow_their_densities(probe: Probe) -> None:
+    """Cosine, triangle, cones to 1e-5 degrees, and normals visible from grazing angles on the smoothest surface."""
+    p_values = warp_p_values(probe, SAMPLES, 1)
+    assert len(p_values) == 44 and not rejected(p_values)
 
 
-def uniformity(x: Doubles, y: Doubles) -> float:
-    """p-value of points being uniform over the unit square."""
-    cells = 16 * np.minimum(np.floor(16 * np.clip(x, 0, 1)), 15) + np.minimum(np.floor(16 * np.clip(y, 0, 1)), 15)
-    return chi2_test(np.bincount(cells.astype(int), minlength=256), np.full(256, len(x) / 256))
+def test_lights_follow_their_densities(device: Device) -> None:
+    """Spheres and triangles of all sizes, skies, and what is picked from light tables. A lamp's density is its closed
+    form, a sky's integrates to 1."""
+    tests = light_tests(device, SAMPLES, 1)
+    assert len(tests) == 20 and not rejected({test.name: test.density for test in tests})
+    assert max(test.error for test in tests) < DENSITY
 
 
-def turn(wi: Doubles) -> Doubles:
-    """Azimuth as a fraction of a turn."""
-    return np.asarray(np.arctan2(wi[:, 1], wi[:, 0]) / (2 * np.pi) % 1)
+@pytest.mark.parametrize("what", WRONG_WARPS)
+def test_a_wrong_warp_is_rejected(device: Device, what: str) -> None:
+    """By the test of its name; turns that do not close belong to all."""
+    wrong = rejected(warp_p_values(warp_probe(device, dict([WRONG_WARPS[what]])), SAMPLES, 1), 1e-9)
+    assert wrong and all(what == "turns" or name.startswith(what) for name in wrong)
 
 
-def test_cosine_hemisphere(probe: Probe) -> None:
-    """pdf cos θ/pi makes sin²θ and the azimuth uniform."""
-    out = warped(probe)
-    wi, pdf = out[:, :3], out[:, 3]
-    assert uniformity(wi[:, 0]**2 + wi[:, 1]**2, turn(wi)) > SIGNIFICANCE
-    np.testing.assert_allclose(pdf, np.maximum(wi[:, 2], 0) / np.pi, rtol=2e-7)
-    np.testing.assert_allclose(np.linalg.norm(wi, axis=1), 1, atol=3e-7)
+@pytest.mark.parametrize("what", WRONG_LIGHTS)
+def test_a_wrong_light_is_rejected(device: Device, what: str) -> None:
+    measure = {"sphere": lamps, "alias": picks, "sky": skies}[what]
+    tests = measure(device, SAMPLES, 1, dict([WRONG_LIGHTS[what]]))
+    assert rejected({test.name: test.density for test in tests}, 1e-9)
 
 
-@pytest.mark.parametrize("height", [2.0, 1.0, 0.3, 1e-3, 1e-7, 1e-14])
-def test_cone(probe: Probe, height: float) -> None:
-    """Uniform in 1 − cos θ, which is taken from the sine: cos θ itself is 1 in float32 for the small cones."""
-    out = warped(probe, height)
-    wi, pdf = out[:, 4:7], out[:, 7]
-    one_minus_cos = np.where(wi[:, 2] > 0, (wi[:, 0]**2 + wi[:, 1]**2) / (1 + np.abs(wi[:, 2])), 1 - wi[:, 2])
-    assert uniformity(one_minus_cos / height, turn(wi)) > SIGNIFICANCE
-    assert one_minus_cos.max() <= height * (1 + 1e-6)
-    np.testing.assert_allclose(pdf, 1 / (2 * np.pi * height), rtol=1e-6)
-    np.testing.assert_allclose(np.linalg.norm(wi, axis=1), 1, atol=3e-7)
+def test_densities_are_one_over_the_area_of_the_map(probe: Probe) -> None:
+    assert max(warp_density_errors(probe).values()) < AREA
 
 
-def test_triangle(probe: Probe) -> None:
-    """Uniform over b1 + b2 ≤ 1: folded over that edge, half of the points fill the unit square."""
-    b1, b2 = warped(probe)[:, 8:10].T
-    assert b1.min() >= 0 and b2.min() >= 0 and (b1 + b2).max() <= 1 + 2e-7
-    folded = np.arange(COUNT) % 2 == 1
-    assert uniformity(np.where(folded, 1 - b1, b1), np.where(folded, 1 - b2, b2)) > SIGNIFICANCE
+def test_warps_report_their_closed_forms(probe: Probe) -> None:
+    """Directions of length 1 with cos θ/pi, or 1/(2·pi·height) inside the cone; triangles inside their edges."""
+    u = np.random.default_rng(0).integers(1 << 24, size=(SAMPLES, 2)) / (1 << 24)
+    for height in HEIGHTS:
+        out = probe("warps", 12, u, np.full(SAMPLES, height))
+        np.testing.assert_allclose(np.linalg.norm(out[:, [0, 1, 2, 4, 5, 6]].reshape(-1, 2, 3), axis=2), 1, atol=3e-7)
+        np.testing.assert_allclose(out[:, 3], np.maximum(out[:, 2], 0) / np.pi, rtol=2e-7)
+        np.testing.assert_allclose(out[:, 7], 1 / (2 * np.pi * height), rtol=1e-6)
+        sin2 = out[:, 4]**2 + out[:, 5]**2
+        assert np.max(np.where(out[:, 6] > 0, sin2 / (1 + np.abs(out[:, 6])), 1 - out[:, 6])) <= height * (1 + 1e-6)
+        assert out[:, 8:10].min() >= 0 and out[:, 8:10].sum(axis=1).max() <= 1 + 2e-7
+
+
+@pytest.mark.parametrize("alpha", [1e-4, 0.3, 1.0])
+@pytest.mark.parametrize("cosine", [1.0, 0.3, 1e-4])
+def test_normals_are_all_visible(alpha: float, cosine: float) -> None:
+    """The probabilities of the cells, exact but for one integral, sum to 1."""
+    cells = visible_normals(alpha, np.array([np.sqrt(1 - cosine**2), 0.0, cosine]))
+    assert cells.sum() == pytest.approx(1, abs=1e-12) and cells.min() >= 0
 
 
 def test_sine_and_cosine_of_turns(probe: Probe) -> None:

@@ -189,7 +189,7 @@ def test_scaled_mesh_has_the_same_hits(device: Device, layout: str, scale: float
     unscaled = Probe(device, Scene(meshes=[mesh(corners)]), layout=layout)("closest_hit", 4, origin, direction)
     scene = Scene(meshes=[mesh(corners * np.float32(scale))])
     probe = Probe(device, scene, layout=layout)
-    scale *= probe.compiled.unit
+    scale *= probe.compiled.frame.unit
     scaled = probe("closest_hit", 4, scale * origin, direction)
     assert np.count_nonzero(scaled[:, 3] != unscaled[:, 3]) == 0
     np.testing.assert_allclose(scaled[:, 0], scale * unscaled[:, 0], rtol=1e-6)

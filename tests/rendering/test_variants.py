@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS
 from clrt.device.open import Device
 from clrt.rendering import session as session_module
+from clrt.rendering.compile import OFFSETS, compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight
 from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 
+from ..probe import choices
 from . import rays
 from .pictures import film, quad, session
 
@@ -117,6 +120,27 @@ def test_a_scene_compiles_to_what_it_needs(device: Device, layout: str) -> None:
         assert "bsdf/mirror.cl" not in program.files and "bsdf/metallic_roughness.cl" not in program.files
     trees = ("geometry/", "traverse/bvh", "traverse/cwbvh", "traverse/list")
     assert not [file for file in compiled["empty"].files if file.startswith(trees)]
+
+
+@pytest.mark.parametrize("kind, known", {
+    "triangle": TRIANGLE_TESTS, "box": BOX_TESTS, "sphere": SPHERE_TESTS, "offset": OFFSETS}.items())
+def test_of_each_test_one_is_compiled(device: Device, kind: str, known: dict[str, str]) -> None:
+    """The file that was chosen, and no other; the first of each kind where nothing is chosen."""
+    default = compile_scene(everything(), choices(device))
+    assert set(known.values()) & set(default.files) == {next(iter(known.values()))}
+    assert "SCENE_UNIT" not in default.source
+    for name, file in known.items():
+        chosen = compile_scene(everything(), choices(device, **{kind: name}))
+        assert set(known.values()) & set(chosen.files) == {file}
+        assert set(default.files) ^ set(chosen.files) <= {*known.values(), "geometry/plain_ray.cl"}
+
+
+def test_other_tests_make_much_the_same_picture(device: Device, reference: Doubles) -> None:
+    """Rays leave and meet a little elsewhere, so few samples are the same bits; but it is the same scene."""
+    picture = film(device, everything(), triangle="baldwin_weber", box="plain", sphere="textbook", offset="ulp").mean
+    same = np.all(np.abs(picture - reference) <= 0.02 * (reference + 0.1), axis=2)
+    assert np.mean(same) > 0.9
+    assert abs(picture.mean() / reference.mean() - 1) < 0.01
 
 
 def test_settings_do_not_change_the_program(device: Device) -> None:

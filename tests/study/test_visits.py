@@ -56,7 +56,7 @@ def boxes(query: clrt.RayQuery) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any
 def test_rays_that_hit_nothing_visit_what_they_enter(device: Device, layout: str, traversal: str,
                                                      any_hit: bool) -> None:
     query = clrt.RayQuery(*BALL, device=device.info.index, layout=layout, builder="sah", traversal=traversal)
-    assert query.unit == 1
+    assert query.frame.unit == 1
     low, high, nodes, tests = boxes(query)
     rays = past_the_ball(4000)
     small, large = (entered(low, high, rays, margin) for margin in (-MARGIN, MARGIN))

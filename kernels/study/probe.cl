@@ -1,7 +1,11 @@
-// Test-only entry points: each hands arrays to one function of the kernels, LANES elements a work-item.
+// Entry points that hand arrays to one function of the kernels each, LANES elements a work-item (clrt/study/probe.py).
 //
-// The text is appended to a scene's program, so what is probed is what renders that scene. Arrays are rows of n
+// A scene's program with this file in place of path.cl: what is probed is what renders that scene. Arrays are rows of n
 // floats: row r of element i is array[r·n + i]. Whole numbers up to 2^24 and masks (0, 1) are written as floats.
+#include "bsdf.cl"
+#include "camera.cl"
+#include "film.cl"
+#include "light.cl"
 
 #define ELEMENTS \
     Scene scene = SCENE_ARGUMENTS; \
@@ -53,12 +57,13 @@ kernel void probe_random(SCENE_PARAMETERS, uint n, global const float *in, globa
     put(out, n, 1, u.y);
 }
 
-// in: the radiance (3) of every sample of `samples` -> out: sum, sum_error, square, square_error (3 each), count, dropped
-kernel void probe_accumulate(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint samples) {
+// in: two radiances (3 each), and sums, sum_errors, squares, square_errors (3 each) of what came before -> out: these with
+// `samples` samples added, every `period`-th of the second radiance; how many were counted, and how many dropped
+kernel void probe_accumulate(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint samples, uint period) {
     ELEMENTS
-    Accumulator a = {splat(ZERO), splat(ZERO), splat(ZERO), splat(ZERO), (ureal)(0), (ureal)(0), (ureal)(0)};
-    real3 L = ROW3(in, 0);
-    for (uint i = 0; i < samples; ++i) accumulate(&a, L, active);
+    Accumulator a = {ROW3(in, 6), ROW3(in, 9), ROW3(in, 12), ROW3(in, 15), (ureal)(0), (ureal)(0), (ureal)(0)};
+    real3 often = ROW3(in, 0), seldom = ROW3(in, 3);
+    for (uint i = 1; i <= samples; ++i) accumulate(&a, i % period ? often : seldom, active);
     put3(out, n, 0, a.sum);
     put3(out, n, 3, a.sum_error);
     put3(out, n, 6, a.square);
@@ -85,6 +90,15 @@ kernel void probe_bsdf_value(SCENE_PARAMETERS, uint n, global const float *in, g
     put3(out, n, 0, bsdf_eval(&scene, material, ROW3(in, 1), ROW3(in, 4)));
     put(out, n, 3, bsdf_pdf(&scene, material, ROW3(in, 1), ROW3(in, 4)));
 }
+
+#if MATERIAL_METALLIC_ROUGHNESS
+// in: wo (3), alpha, u (2) -> out: the normal that is drawn of those visible from wo
+kernel void probe_visible_normal(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    real2 u = {ROW(in, 4), ROW(in, 5)};
+    put3(out, n, 0, sample_visible_normal(ROW3(in, 0), ROW(in, 3), u));
+}
+#endif
 
 // in: origin (3), direction (3) -> out: t, u, v, primitive
 kernel void probe_closest_hit(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {

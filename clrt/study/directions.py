@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 Doubles = NDArray[np.float64]
 
-#: Rows of cells in log r, columns in azimuth. 90°, where the horizon runs at grazing wo, is the middle of a column.
-ROWS, COLUMNS = 48, 12
-LOWEST, HIGHEST = np.log(1e-6), np.log(1e4)
-#: Points inside a cell at which a density is summed.
+#: Rows of cells in log r, columns in azimuth; what is flatter than the lowest row counts to it.
+ROWS, COLUMNS = 52, 12
+LOWEST, HIGHEST = np.log(1e-7), np.log(1e4)
+#: Gauss–Legendre points inside a cell at which a density is summed, in log r and in azimuth.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
-STEPS = 24
+TURNS, TURN_WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 def count(wo: Doubles, wi: Doubles) -> NDArray[np.int64]:
@@ -27,7 +27,7 @@ def count(wo: Doubles, wi: Doubles) -> NDArray[np.int64]:
     # Where x is nearly ±1 its last bit is as much as a narrow lobe at grazing wo is wide; y and z say it better.
     exact_x = np.where(np.abs(x) > 0.9, np.copysign(np.sqrt(np.maximum(1 - y * y - z * z, 0)), x), x)
     h = wo + np.column_stack([exact_x, y, z])
-    turn = (np.arctan2(h[:, 1], h[:, 0]) - np.arctan2(wo[1], wo[0])) / (2 * np.pi) + 0.5 / COLUMNS
+    turn = (np.arctan2(h[:, 1], h[:, 0]) - np.arctan2(wo[1], wo[0])) / (2 * np.pi)
     slope = np.maximum(np.hypot(h[:, 0], h[:, 1]) / h[:, 2], 1e-30)
     row = np.clip((np.log(slope) - LOWEST) / (HIGHEST - LOWEST) * ROWS, 0, ROWS - 1).astype(np.intp)
     column = np.minimum(turn % 1 * COLUMNS, COLUMNS - 1).astype(np.intp)
@@ -36,7 +36,9 @@ def count(wo: Doubles, wi: Doubles) -> NDArray[np.int64]:
 
 def integrate(density: Callable[[Doubles], Doubles], wo: Doubles) -> Doubles:
     """(ROWS·COLUMNS,) integrals over solid angle of density(wi (n, 3)) -> (n,) above the horizon."""
-    phi = 2 * np.pi * ((np.arange(COLUMNS * STEPS) + 0.5) / STEPS - 0.5) / COLUMNS
+    # At grazing wo the horizon bends within that angle of an azimuth of 90°, which is an edge of a column.
+    inside, weight = (2 + TURNS * (3 - TURNS**2)) / 4, 0.75 * (1 - TURNS**2) * TURN_WEIGHTS
+    phi = np.add.outer(np.arange(COLUMNS), inside).ravel() * 2 * np.pi / COLUMNS
     edges = np.minimum(np.linspace(LOWEST, HIGHEST, ROWS + 1)[:, None], _log_horizon(wo, phi))
     low, width = edges[:-1, None], (edges[1:] - edges[:-1])[:, None]
     r = np.exp(low + width * (NODES[:, None] + 1) / 2).ravel()
@@ -46,9 +48,9 @@ def integrate(density: Callable[[Doubles], Doubles], wo: Doubles) -> Doubles:
     # dωi = 4 (wo·h) dωh, and dωh = cos³θ times the area r dr dphi = r² d(log r) dphi of slopes.
     jacobian = 4 * cosine * h[:, 2]**3 * r * r
     values = density(2 * cosine[:, None] * h - wo) * jacobian
-    parts = values.reshape(ROWS, len(NODES), COLUMNS * STEPS) * width * WEIGHTS[:, None] / 2
-    sums = parts.reshape(ROWS, len(NODES), COLUMNS, STEPS).sum(axis=(1, 3))
-    return np.asarray(sums.ravel() * 2 * np.pi / (COLUMNS * STEPS))
+    parts = values.reshape(ROWS, len(NODES), COLUMNS * len(TURNS)) * width * WEIGHTS[:, None] / 2
+    sums = parts.sum(axis=1).reshape(ROWS, COLUMNS, len(TURNS)) @ weight
+    return np.asarray(sums.ravel() * 2 * np.pi / COLUMNS)
 
 
 def _log_horizon(wo: Doubles, azimuth: Doubles) -> Doubles:

@@ -1,0 +1,73 @@
+"""`clrt bench numerics`: what each way to intersect gets wrong beside its speed, and all hard cases by the defaults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+@click.command("numerics")
+@click.option("--device", metavar="SEL", help="See `clrt devices`; default: all but simulators.")
+@click.option("--quick", is_flag=True, help="Seconds instead of many minutes.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against speed there.")
+def numerics_command(device: str | None, quick: bool, json_file: Path | None, plot: Path | None) -> None:
+    """Numerical stability: errors beside speeds.
+
+    First the intersection tests of each family, the default on top: Mrays/s of bounce rays (of offsets: Msamples/s of
+    a picture), how many times as fast as the default, by the clock and by processor time, and errors: of a million
+    rays or pixels, or of t in units in the last place (ulp). Then the hard cases by the defaults: how many answers are
+    wrong, where 0 is asked of all but M1.
+    """
+    from ..device.discover import devices
+    from ..output.files import check_target
+    from ..output.report import write_report
+    from ..study.families import measure_families
+    from ..study.numerics import chosen_devices, measure_device, measure_together
+    from ..study.plots import check_plots, plot_families
+
+    for target in filter(None, (json_file, plot)):
+        check_target(target)
+    if plot is not None:
+        check_plots()
+    chosen, known = chosen_devices(device), devices()
+    results: list[dict[str, Any]] = []
+    for index in chosen:
+        info = known[index]
+        click.echo(f"device {index}: {info['name']} ({info['platform']}, {info['driver']})")
+        families = {}
+        for name, tests in measure_families(index, quick=quick):
+            families[name] = tests
+            click.echo("\n".join(_family(name, tests)))
+        rows = [_echo(row) for row in measure_device(index, quick=quick)]
+        results.append({"device": info, "families": families, "rows": rows})
+    together = [_echo(row) for row in measure_together(chosen, quick=quick)]
+    wrong = sum(row["wrong"] for result in results for row in result["rows"])
+    click.echo(f"wrong in all: {wrong + sum(row['wrong'] for row in together if row['case'] != 'M1')}")
+    if plot is not None:
+        click.echo(str(plot_families(plot, results)))
+    if json_file is not None:
+        write_report(json_file, {"quick": quick, "devices": results, "together": together})
+        click.echo(str(json_file))
+
+
+def _family(name: str, tests: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    from ..study.families import FIGURES
+
+    figures = FIGURES[name]
+    lines = [f"  {name:18}{'M/s':>9}{'times as fast':>18}" + "".join(f"{title:>17}" for title in figures.values())]
+    for test, row in tests.items():
+        lines.append(f"  {test:18}{row['mrays']:9.3g}{1 / row['ratio']:9.2f} ({1 / row['cpu_ratio']:5.2f})  "
+                     + "".join(f"{row[key]:17.6g}" for key in figures))
+    return lines
+
+
+def _echo(row: Any) -> dict[str, Any]:
+    """Prints a row as it comes."""
+    figure = "" if row.figure is None else f"{row.figure:12.4g} {row.unit}"
+    click.echo(f"  {row.case:4} {row.what:72}{row.wrong:>8} of {row.count:<10}{figure}")
+    return asdict(row)

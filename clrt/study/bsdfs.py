@@ -1,0 +1,125 @@
+"""Every material with every kind of parameters, taken from the registry, and its kernel called on arrays."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Literal, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.open import Device
+from ..scene.materials import ALPHA_MIN, MATERIALS, Material
+from ..scene.model import Scene, Sphere
+from .probe import Doubles, Probe
+
+#: What is tried of fields that want more than the ends and the middle of their range.
+NUMBERS: dict[str, tuple[Any, ...]] = {"roughness": (0.0, 0.05, 0.1, 0.3, 0.6, 1.0)}
+COLOR = (1.0, 0.5, 0.2)
+#: cos θ of wo, down to grazing; these sines are float32 numbers or round to 1.
+COSINES = (1.0, 0.6, 0.1, 2.0**-7, 2.0**-10, 2.0**-13)
+#: Of wo that does not graze.
+AZIMUTH, STEEP = 1.0, 0.05
+#: A lobe of GGX is 2·alpha·cos θ wide across the plane of incidence. One of less than 16 roundings of a unit vector's
+#: components is no function of float32 directions any more.
+NARROWEST = 16 * 2.0**-24
+
+
+def variants(kind: type[Material]) -> list[Material]:
+    """All combinations of the numbers and flags above, and each word that a field may be, one at a time."""
+    return plain_variants(kind) + worded_variants(kind)
+
+
+def plain_variants(kind: type[Material]) -> list[Material]:
+    """All combinations of numbers and flags."""
+    numbers, flags, _ = _values(kind)
+    return [kind(**values) for values in _product(numbers | flags)]
+
+
+def worded_variants(kind: type[Material]) -> list[Material]:
+    """Each word that a field may be, one at a time, with all flags, and numbers from the middle of their ranges."""
+    numbers, flags, words = _values(kind)
+    middle = {name: values[len(values) // 2] for name, values in numbers.items()}
+    return [kind(**middle, **raised, **{name: word}) for name, found in words.items() for word in found
+            for raised in _product(flags)]
+
+
+def views(material: Material) -> list[float]:
+    """Of COSINES those from which the material's lobes are wide enough for float32."""
+    alpha = max(getattr(material, "roughness", 1.0)**2, ALPHA_MIN)
+    return [cosine for cosine in COSINES if 2 * alpha * cosine >= NARROWEST]
+
+
+def view(cosine: float) -> Doubles:
+    """A unit wo at an angle to the normal, with components that float32 holds.
+
+    A grazing one is along x: there the lobe is narrow in y, which float32 resolves best around 0.
+    """
+    sine, azimuth = np.sqrt(1 - cosine**2), AZIMUTH if cosine > STEEP else 0.0
+    return np.array([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], np.float32).astype(np.float64)
+
+
+def uniform(count: int, seed: int) -> Doubles:
+    """(count, 3) numbers in [0, 1) that float32 holds exactly."""
+    return np.random.default_rng(seed).integers(1 << 24, size=(count, 3)) / (1 << 24)
+
+
+@dataclass
+class Bsdfs:
+    """Materials on a device; `code[i]` names the i-th to the kernels."""
+
+    materials: list[Material]
+    probe: Probe
+    code: NDArray[np.int32]
+
+    def sample(self, which: int, wo: Doubles, numbers: Doubles) -> tuple[Doubles, Doubles, Doubles, Doubles]:
+        """wi (n, 3), weight (n, 3), pdf (n,), specular (n,) for one wo (3,) and numbers (n, 3) in [0, 1)."""
+        n = len(numbers)
+        out = self.probe("bsdf_sample", 8, np.full(n, self.code[which]), np.broadcast_to(wo, (n, 3)), numbers)
+        return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7]
+
+    def value(self, which: NDArray[np.intp] | int, wo: Doubles, wi: Doubles) -> tuple[Doubles, Doubles]:
+        """f·|cos| (n, 3) and pdf (n,) for wi (n, 3); which (n,) or one, wo (n, 3) or (3,)."""
+        codes = np.broadcast_to(self.code[which], len(wi))
+        out = self.probe("bsdf_value", 4, codes, np.broadcast_to(wo, wi.shape), wi)
+        return out[:, :3], out[:, 3]
+
+
+def bsdfs(device: Device, materials: list[Material] | None = None, changes: Mapping[str, str] | None = None) -> Bsdfs:
+    """These materials, or all variants of all; changes: see Probe."""
+    wanted = materials or [material for kind in MATERIALS for material in variants(kind)]
+    probe = Probe(device, Scene(spheres=[Sphere(material=material) for material in wanted]), changes=changes)
+    return Bsdfs(wanted, probe, probe.compiled.buffers["spheres"][1]["material"])
+
+
+def _values(kind: type[Material]) -> tuple[dict[str, tuple[Any, ...]], ...]:
+    """What is tried of the fields that are numbers, of those that are flags, and of those that are words."""
+    hints = get_type_hints(kind)
+    names = [field.name for field in fields(kind) if field.name != "emission"]
+    words = {name: tuple(found) for name in names if (found := _words(hints[name]))}
+    flags = {name: (False, True) for name in names if hints[name] is bool}
+    numbers = {name: NUMBERS.get(name) or _numbers(kind, name) for name in names if name not in words | flags}
+    return numbers, flags, words
+
+
+def _product(values: Mapping[str, tuple[Any, ...]]) -> list[dict[str, Any]]:
+    return [dict(zip(values, chosen)) for chosen in itertools.product(*values.values())]
+
+
+def _numbers(kind: type[Material], name: str) -> tuple[Any, ...]:
+    """A color, or the ends and the middle of the range in the field's type; its default where it has no two ends."""
+    hint, default = get_type_hints(kind, include_extras=True)[name], getattr(kind(), name)
+    if isinstance(default, tuple):
+        return (COLOR,)
+    limits = [getattr(limit, end) for limit in get_args(hint)[1:] for end in ("ge", "gt", "le", "lt")
+              if hasattr(limit, end)]
+    return (min(limits), sum(limits) / 2, max(limits)) if len(limits) == 2 else (default,)
+
+
+def _words(hint: Any) -> list[str]:
+    """The strings that a Literal, alone or in a union, allows."""
+    if get_origin(hint) is Literal:
+        return list(get_args(hint))
+    return [word for part in get_args(hint) for word in _words(part)]

@@ -1,0 +1,104 @@
+"""G9: far from the origin nothing shadows itself, and no light comes into a closed box."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ...scene.lights import DirectionalLight
+from ...scene.materials import Diffuse
+from ...scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from ..row import Row
+from ..workloads import Doubles
+from .subject import Subject
+from .watertight import AWAY, words
+
+#: What the scene is multiplied by, and sizes by which it is then moved. At 1e7 float32 knows few places but those of a
+#: level plane.
+PLACES = ((1.0, 0.0), (1.0, 1e3), (1.0, 1e6), (1.0, 1e7), (1e-5, 0.0), (1e5, 0.0))
+SIDE, QUICK_SIDE, SEEDS = 1024, 128, 10
+LEVEL, TILTED = np.eye(3), np.linalg.qr([[0.6, 0.5, -0.3], [0.2, 0.7, 0.4], [-0.5, 0.3, 0.8]])[0]
+
+
+def measure_departures(subject: Subject, *, quick: bool) -> Iterator[Row]:
+    """Lit points that are found dark, of about 1e7 a scene and place, and dark ones that are found lit."""
+    for factor, sizes in PLACES:
+        place, where = 2 * factor * sizes * AWAY, words(sizes, factor)
+        scenes = lit_scenes(place, factor, level_only=sizes > 1e6) | held_scenes(place, factor, level_only=sizes > 1e6)
+        for name, scene in scenes.items():
+            yield Row("G9", f"{name}, {where}: dark", *_pixels(subject, scene, quick, lit=False))
+        yield Row("G9", f"closed box, {where}: lit", *_pixels(subject, dark_box(place, factor), quick, lit=True))
+
+
+def _pixels(subject: Subject, scene: Scene, quick: bool, *, lit: bool) -> tuple[int, int]:
+    """How many pixels of one sample were made, and how many of them are lit or dark."""
+    side, found, seeds = (QUICK_SIDE, 0, 1) if quick else (SIDE, 0, SEEDS)
+    for seed in range(seeds):
+        settings = replace(scene.render, size=(side, side), seed=seed)
+        shining = subject.picture(replace(scene, render=settings)).any(axis=2)
+        found += int(np.count_nonzero(shining == lit))
+    return side * side * seeds, found
+
+
+def lit_scenes(place: Doubles, factor: float, *, level_only: bool) -> dict[str, Scene]:
+    """Scenes of about size 2·factor around a place that fill the picture, with nothing in the light's way."""
+    level = _scene(place, factor, LEVEL, PLANE, [0.3, 1, 0.2], [0.2, 2, 0.3])
+    scenes = {"level plane": level, "grazed plane": replace(level, lights=[_light(LEVEL, [1, 0.01, 0.2])])}
+    if level_only:
+        return scenes
+    sphere = replace(_scene(place, factor, LEVEL, PLANE, [0.2, 3, 0.3], [0.2, 3, 0.3]), meshes=[],
+                     spheres=[Sphere(center=_tuple(place.astype(np.float32)), radius=factor)])
+    return scenes | {"tilted plane": _scene(place, factor, TILTED, PLANE, [0.3, 1, 0.2], [0.2, 2, 0.3]),
+                     "corner of two walls": _scene(place, factor, TILTED, WALLS, [0.5, 1, 0], [1, 1.2, 0.1]),
+                     "sphere": replace(sphere, camera=replace(sphere.camera, fov_degrees=25))}
+
+
+def held_scenes(place: Doubles, factor: float, *, level_only: bool) -> dict[str, Scene]:
+    """What the device cannot move back: scenes beside a ball on the other side of the origin; and a huge ground."""
+    if not place.any():
+        ground = Sphere(center=(0, -1e6 * factor, 0), radius=1e6 * factor)
+        level = lit_scenes(place, factor, level_only=True)["level plane"]
+        return {"ground of a million sizes": replace(level, meshes=[], spheres=[ground])}
+    ball = Sphere(center=_tuple(-place), radius=0.5 * factor)
+    return {f"{name} and a far ball": replace(scene, spheres=[*scene.spheres, ball])
+            for name, scene in lit_scenes(place, factor, level_only=level_only).items() if "corner" not in name}
+
+
+def dark_box(place: Doubles, factor: float) -> Scene:
+    """Seen from inside, a sky around it."""
+    corners = np.stack(np.unravel_index(np.arange(8), (2, 2, 2)), axis=1) * 2.0 - 1
+    sides = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    faces = np.concatenate([sides[:, [0, 1, 2]], sides[:, [0, 2, 3]]]).astype(np.int32)
+    box = Mesh((place + 2 * factor * corners).astype(np.float32), faces)
+    camera = replace(_camera(place, factor, LEVEL, [0.5, 0.4, 0.3]), fov_degrees=120)
+    return Scene(meshes=[box], camera=camera, environment=Environment(color=(1, 1, 1)),
+                 render=RenderSettings(max_depth=8))
+
+
+#: A triangle around the origin of the plane y = 0, and two that are walls at x = 0 and y = 0.
+PLANE = np.array([[[-20, 0, -12], [0, 0, 24], [20, 0, -12]]])
+WALLS = np.array([[[0, 0, -20], [0, 0, 20], [40, 0, 0]], [[0, 0, -20], [0, 40, 0], [0, 0, 20]]])
+
+
+def _scene(place: Doubles, factor: float, frame: Doubles, triangles: Doubles, light: list[float],
+           camera: list[float]) -> Scene:
+    points = (place + factor * triangles.reshape(-1, 3) @ frame).astype(np.float32)
+    faces = np.arange(len(points), dtype=np.int32).reshape(-1, 3)
+    return Scene(meshes=[Mesh(points, faces, Diffuse(color=(0.5, 0.5, 0.5)))], lights=[_light(frame, light)],
+                 camera=_camera(place, factor, frame, camera), render=RenderSettings(integrator="direct"))
+
+
+def _light(frame: Doubles, towards: list[float]) -> DirectionalLight:
+    return DirectionalLight(direction=_tuple(-np.asarray(towards) @ frame), irradiance=(3, 3, 3))
+
+
+def _camera(place: Doubles, factor: float, frame: Doubles, position: list[float]) -> Camera:
+    return Camera(position=_tuple(place + factor * np.asarray(position) @ frame), look_at=_tuple(place),
+                  up=_tuple(np.array([0, 0, 1]) @ frame))
+
+
+def _tuple(vector: Doubles) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z

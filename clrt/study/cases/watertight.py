@@ -1,0 +1,54 @@
+"""G1: from inside a closed mesh no ray gets out, wherever the mesh stands and however large it is.
+
+Rays are aimed from inside at vertices, at points of edges and of faces, as float32 has them. Far from the origin
+vertices fall together, but those that neighbours share stay shared, so the mesh stays closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..aimed import inside_rays
+from ..row import Row
+from ..shapes import icosphere
+from ..workloads import Mesh, bumpy_ball
+from .subject import Subject
+
+#: (sizes by which the mesh is moved, what it is multiplied by).
+PLACES = ((0, 1), (1e3, 1), (1e4, 1), (1e5, 1), (1e6, 1), (0, 1e-6), (0, 1e6))
+AWAY = np.array([1.0, -0.7, 0.4])
+RAYS = 1 << 20
+
+
+def measure_watertight(subject: Subject, *, quick: bool, rays: float = 1e8) -> Iterator[Row]:
+    """Rays that get out, of each mesh in each place; of `rays` in all, or 2e6."""
+    meshes = {"icosphere": icosphere(4 if quick else 8), "bumpy ball": bumpy_ball(4 if quick else 7)}
+    rays = 2e6 if quick else rays
+    for name, mesh in meshes.items():
+        for sizes, factor in PLACES:
+            count = round(rays / (len(meshes) * len(PLACES)))
+            yield Row("G1", f"{name}, {len(mesh[1])} triangles, {words(sizes, factor)}", count,
+                      misses(subject, placed(mesh, sizes, factor), count))
+
+
+def placed(mesh: Mesh, sizes: float, factor: float) -> Mesh:
+    """The mesh moved by so many of its sizes along AWAY, then multiplied; in float32 again."""
+    points = mesh[0].astype(np.float64)
+    points = factor * (points + sizes * np.ptp(points, axis=0).max() * AWAY)
+    return points.astype(np.float32), mesh[1]
+
+
+def misses(subject: Subject, mesh: Mesh, count: int) -> int:
+    """How many of `count` rays from inside the closed mesh meet nothing."""
+    query, rng, missed = subject.query(mesh), np.random.default_rng(0), 0
+    for first in range(0, count, RAYS):
+        rays = inside_rays(*mesh, min(RAYS, count - first), rng)
+        missed += int(np.count_nonzero(query.closest_hit(*rays)["primitive"] < 0))
+    return missed
+
+
+def words(sizes: float, factor: float) -> str:
+    """What was done to a scene that was multiplied by a factor and moved by so many sizes."""
+    return f"moved by {sizes:g} sizes" if sizes else f"times {factor:g}" if factor != 1 else "in its place"

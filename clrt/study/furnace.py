@@ -1,0 +1,70 @@
+"""White furnaces: what a surface sends back where the same light comes from everywhere, from every angle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple, get_args
+
+import numpy as np
+
+from ..device.open import Device
+from ..scene.materials import ALPHA_MIN, Diffuse, MetallicRoughness, Mirror, Smith
+from ..scene.microfacets import albedo
+from .bsdfs import Bsdfs, bsdfs
+from .probe import Doubles
+
+ROUGHNESSES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
+COSINES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 1e-2, 1e-3, 1e-4)
+SMITHS: tuple[Smith, ...] = get_args(Smith)
+COLOR = (0.8, 0.5, 0.2)
+
+
+class Reflected(NamedTuple):
+    """What a white metal sends back, and what it should: 1 with multiple scattering, else the albedo of one bounce."""
+
+    metal: MetallicRoughness
+    cosine: float
+    found: float
+    exact: float
+
+
+def measure_metals(device: Device, samples: int, smiths: Iterable[Smith] = SMITHS) -> Iterator[Reflected]:
+    """White metals without and with multiple scattering, of every roughness from every angle."""
+    metals = [MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=roughness, smith=smith,
+                                multiple_scattering=multiple)
+              for smith in smiths for multiple in (False, True) for roughness in ROUGHNESSES]
+    subject, numbers = bsdfs(device, [*metals]), evenly(samples)
+    for which, metal in enumerate(metals):
+        single = albedo(np.array(COSINES), max(metal.roughness**2, ALPHA_MIN), metal.smith)
+        for cosine, once in zip(COSINES, single):
+            found = float(_weights(subject, which, cosine, numbers)[:, 0].mean())
+            yield Reflected(metal, cosine, found, 1.0 if metal.multiple_scattering else float(once))
+
+
+def inexact(device: Device, samples: int) -> tuple[int, int]:
+    """How many samples of diffuse and mirror weigh other than their color, and how many there were."""
+    subject, numbers = bsdfs(device, [Diffuse(color=COLOR), Mirror(color=COLOR)]), evenly(samples)
+    weights = [_weights(subject, which, cosine, numbers) for which in (0, 1) for cosine in COSINES]
+    wrong = sum(int(np.any(weight != np.array(COLOR, np.float32), axis=1).sum()) for weight in weights)
+    return wrong, len(weights) * samples
+
+
+def evenly(count: int) -> Doubles:
+    """(count, 3) numbers that fill the unit cube evenly, as float32 holds them: Hammersley's points."""
+    points = np.column_stack([(np.arange(count) + 0.5) / count, _reversed_digits(count, 2), _reversed_digits(count, 3)])
+    return np.asarray(np.floor(points * (1 << 24)) / (1 << 24))
+
+
+def _reversed_digits(count: int, base: int) -> Doubles:
+    """(count,) 0, 1, 2 … with their digits mirrored at the point."""
+    number, place, mirrored = np.arange(count), 1.0, np.zeros(count)
+    while number.any():
+        place /= base
+        mirrored += place * (number % base)
+        number //= base
+    return mirrored
+
+
+def _weights(subject: Bsdfs, which: int, cosine: float, numbers: Doubles) -> Doubles:
+    wo = np.array([np.sqrt(1 - cosine**2), 0.0, cosine])
+    return subject.sample(which, wo, numbers)[1]

@@ -1,0 +1,97 @@
+"""Densities by the rule for changing variables: 1 over what the map from random numbers to directions does to areas.
+
+The maps are differentiated on the device's own samples, by central differences of order six.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from .bsdfs import Bsdfs, view
+from .probe import Doubles
+
+STEP = 2.0**-6
+#: f' ≈ Σ WEIGHTS[k]·(f(x + (k + 1)·step) − f(x − (k + 1)·step))/step. With twice the step the error is 64 times larger;
+#: an eighth of the difference between the two is thus more than the error of the finer one.
+WEIGHTS = np.array([45, -9, 1]) / 60
+#: Rounding of unit vectors, a few units in the last place, as it comes out of the differences.
+NOISE = 3 * 2.0**-24 * 2 * np.abs(WEIGHTS).sum() / STEP
+#: Samples whose area is not known better than this tell nothing.
+LEAST_KNOWN = 0.05
+#: Random numbers that choose the lobe: as many are tried.
+LOBES = 1 << 10
+
+
+class Areas(NamedTuple):
+    """scale: of the area around each point; error: relative, at most. (n,) each."""
+
+    scale: Doubles
+    error: Doubles
+
+
+def areas(mapping: Callable[[Doubles], Doubles], u: Doubles) -> Areas:
+    """What a map of u (n, 2) -> unit vectors (n, 3) does to areas at u, which is farther than 6·STEP from 0 and 1."""
+    fine, coarse = _slopes(mapping, u, STEP), _slopes(mapping, u, 2 * STEP)
+    scale, rough = (np.linalg.norm(np.cross(slopes[:, 0], slopes[:, 1]), axis=1) for slopes in (fine, coarse))
+    longest = np.linalg.norm(fine, axis=2).max(axis=1)
+    return Areas(scale, (NOISE * longest + np.abs(scale - rough) / 8) / np.maximum(scale, 1e-30))
+
+
+def _slopes(mapping: Callable[[Doubles], Doubles], u: Doubles, step: float) -> Doubles:
+    """(n, 2, 3): the derivatives of the map by both numbers."""
+    moves = np.array([(axis, sign * (k + 1) * step) for axis in (0, 1) for k in range(3) for sign in (1, -1)])
+    moved = u[:, None, :] + np.where(np.arange(2) == moves[:, :1], moves[:, 1:], 0)
+    w = mapping(moved.reshape(-1, 2)).reshape(len(u), 2, 3, 2, 3)
+    return np.asarray(np.einsum("k,nakx->nax", WEIGHTS / step, w[:, :, :, 0] - w[:, :, :, 1]))
+
+
+def grid(side: int = 12) -> Doubles:
+    """(side², 2) points well inside the unit square that float32 holds."""
+    inside = (0.2 + 0.6 * (np.arange(side) + 0.5) / side).astype(np.float32).astype(np.float64)
+    return np.stack(np.meshgrid(inside, inside), axis=-1).reshape(-1, 2)
+
+
+def missed(mapping: Callable[[Doubles], Doubles], u: Doubles, density: Doubles) -> float:
+    """By what part the density of a map of u (n, 2) misses 1/area at most, beyond the error of that, if it is known."""
+    area = areas(mapping, u)
+    known = area.error < LEAST_KNOWN
+    return float(np.max((np.abs(1 - density * area.scale) - area.error)[known], initial=0.0))
+
+
+class Checked(NamedTuple):
+    """known: of how many samples the area is known; lobes: how many maps there are; error: by what part the density
+    reported for a sample misses 1/area at most, beyond the error of that.
+
+    Where there are several maps, one's 1/area times its probability is but a part of the density: then `error` is what
+    the density lacks of that part.
+    """
+
+    known: int
+    lobes: int
+    error: float
+
+
+def check_density(bsdfs: Bsdfs, which: int, cosine: float) -> Checked:
+    """Compares the densities of one material's samples, seen from `cosine`, with the areas of its maps."""
+    wo, u = view(cosine), grid()
+
+    def draw(at: Doubles, lobe: Doubles | float) -> tuple[Doubles, Doubles]:
+        wi, _, pdf, _ = bsdfs.sample(which, wo, np.column_stack([at, np.broadcast_to(lobe, len(at))]))
+        return wi, pdf
+
+    lobes = (np.arange(LOBES) + 0.5) / LOBES
+    _, first, counts = np.unique(draw(np.tile(u[:1], (LOBES, 1)), lobes)[0], axis=0, return_index=True,
+                                 return_counts=True)
+    known, error = 0, 0.0
+    for lobe, count in zip(lobes[first], counts):
+        (wi, pdf), area = draw(u, lobe), areas(lambda at: draw(at, lobe)[0], u)
+        told = (pdf > 0) & (wi[:, 2] > 0) & (area.error < LEAST_KNOWN)
+        part = count / LOBES if len(counts) == 1 else (count - 1) / LOBES
+        lacks = 1 - pdf[told] * area.scale[told] / part if part else np.zeros(told.sum())
+        off = np.abs(lacks) if len(counts) == 1 else lacks
+        known += int(told.sum())
+        error = max(error, float(np.max(off - area.error[told], initial=0.0)))
+    return Checked(known, len(counts), error)

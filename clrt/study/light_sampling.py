@@ -1,0 +1,137 @@
+"""Samples of lights against their densities: lamps of all sizes, skies, and the tables that lights are picked from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.open import Device
+from ..scene.materials import Diffuse
+from ..scene.model import Environment, Mesh, Scene, Sphere
+from .probe import Doubles, Probe
+from .significance import chi2_test
+from .warps import triangle_test, uniform_test
+
+LAMP = Diffuse(emission=(1.0, 1.0, 1.0))
+#: Centers and radii, seen from the origin: large, one that almost touches it, small, tiny and far.
+SPHERES = (((0.0, 0.0, 3.0), 2.0), ((0.0, 0.0, 1.0001), 1.0), ((3.0, -4.0, 12.0), 2.0), ((3.0, -4.0, 12.0), 0.05),
+           ((0.0, 0.0, 1e4), 1.0), ((0.0, 0.0, 10.0), 1e-6), ((0.0, 0.0, 1e5 + 1.0), 1e5))
+#: Corners of triangles that face the origin: large and near, grazing, a sliver, small and far.
+TRIANGLES = (((-2.0, -1.0, 1.0), (0.5, 2.0, 1.5), (3.0, -1.0, 2.0)),
+             ((-1.0, 0.01, 1.0), (1.0, 0.01, 1.0), (0.0, 0.012, 3.0)),
+             ((-1.0, 0.0, 2.0), (0.0, 1e-4, 2.0), (1.0, 0.0, 2.0)),
+             ((-1e-3, -1e-3, 1e2), (0.0, 1e-3, 1e2), (1e-3, -1e-3, 1e2)))
+#: Cells of a texel along each side.
+PARTS = 2
+
+
+class LightTest(NamedTuple):
+    """density: chi-square of samples by their density, p; error: by what part that density misses its closed form at
+    most, or its integral 1.
+    """
+
+    name: str
+    density: float
+    error: float
+
+
+def light_tests(device: Device, samples: int, seed: int) -> list[LightTest]:
+    """Each light's samples, and the picks from light tables."""
+    return [test for measure in (lamps, picks, skies) for test in measure(device, samples, seed)]
+
+
+def lamps(device: Device, samples: int, seed: int, changes: Mapping[str, str] | None = None) -> Iterator[LightTest]:
+    """SPHERES and TRIANGLES; changes: see Probe."""
+    for k, (center, radius) in enumerate(SPHERES):
+        probe = Probe(device, Scene(spheres=[Sphere(center=center, radius=radius, material=LAMP)]), changes=changes)
+        wi, pdf = _sampled(probe, samples, seed + k)
+        yield LightTest(f"sphere at {center}, radius {radius:g}", *_cone(wi, pdf, np.array(center), radius))
+    for k, corners in enumerate(TRIANGLES, start=len(SPHERES)):
+        mesh = Mesh(np.array(corners, np.float32), np.array([[0, 1, 2]], np.int32), LAMP)
+        wi, pdf = _sampled(Probe(device, Scene(meshes=[mesh]), changes=changes), samples, seed + k)
+        yield LightTest(f"triangle {corners}", *_area(wi, pdf, mesh.vertices.astype(np.float64)))
+
+
+def _sampled(probe: Probe, samples: int, seed: int) -> tuple[Doubles, Doubles]:
+    """wi (n, 3) and pdf (n,) of light samples from the origin."""
+    origin = probe.compiled.frame.points(np.zeros(3))
+    out = probe("light_sample", 12, np.broadcast_to(origin, (samples, 3)), seed=seed)
+    return out[:, :3], out[:, 6]
+
+
+def _cone(wi: Doubles, pdf: Doubles, center: Doubles, radius: float) -> tuple[float, float]:
+    """Uniform in 1 − cos of the angle from the sphere's middle, and around it."""
+    center = center.astype(np.float32).astype(np.float64)
+    sin2_max = (np.float64(np.float32(radius)) / np.linalg.norm(center))**2
+    height = sin2_max / (1 + np.sqrt(1 - sin2_max))
+    n = center / np.linalg.norm(center)
+    s = np.cross(n, [0.0, 1.0, 0.0]) / np.linalg.norm(np.cross(n, [0.0, 1.0, 0.0]))
+    x, y, z = wi @ s, wi @ np.cross(n, s), wi @ n
+    turn = np.arctan2(y, x) / (2 * np.pi) % 1
+    return uniform_test((x * x + y * y) / (1 + z) / height, turn), _off(pdf, 1 / (2 * np.pi * height))
+
+
+def _area(wi: Doubles, pdf: Doubles, corners: Doubles) -> tuple[float, float]:
+    """Uniform over the triangle, where wi meets its plane; pdf = d²/(cos θ·area)."""
+    p0, e1, e2 = corners[0], corners[1] - corners[0], corners[2] - corners[0]
+    n = np.cross(e1, e2)
+    t = p0 @ n / (wi @ n)
+    b = np.linalg.lstsq(np.column_stack([e1, e2]), (t[:, None] * wi - p0).T, rcond=None)[0]
+    area = np.linalg.norm(n) / 2
+    return triangle_test(*b), _off(pdf, t * t / (np.abs(wi @ n) / (2 * area) * area))
+
+
+def _off(found: Doubles, exact: Doubles | float) -> float:
+    return float(np.max(np.abs(found / exact - 1)))
+
+
+def skies(device: Device, samples: int, seed: int, changes: Mapping[str, str] | None = None) -> Iterator[LightTest]:
+    """Over parts of texels, in each of which pdf·sin θ is the same everywhere."""
+    for k, (name, (image, degrees)) in enumerate(_pictures().items()):
+        probe = Probe(device, Scene(environment=Environment(image=image, rotation_degrees=degrees)), changes=changes)
+        rows, columns = PARTS * image.shape[0], PARTS * image.shape[1]
+        v, u = np.meshgrid((np.arange(rows) + 0.5) / rows, (np.arange(columns) + 0.5) / columns, indexing="ij")
+        mass = probe("sky", 4, _direction(u.ravel(), v.ravel(), degrees))[:, 3] * np.sin(np.pi * v.ravel())
+        mass *= 2 * np.pi**2 / v.size
+        x, y = _place(_sampled(probe, samples, seed + k)[0], degrees)
+        row, column = (np.minimum((a * n).astype(int), n - 1) for a, n in ((y, rows), (x, columns)))
+        counts = np.bincount(row * columns + column, minlength=v.size)
+        yield LightTest(f"sky: {name}", chi2_test(counts, mass / mass.sum() * samples), float(abs(mass.sum() - 1)))
+
+
+def _pictures() -> dict[str, tuple[NDArray[np.float32], float]]:
+    """Pictures (height, width, 3), and by how many degrees they are turned."""
+    uneven = np.random.default_rng(1).uniform(0.1, 2.0, (16, 32, 3)).astype(np.float32)
+    sun = uneven.copy()
+    sun[4, 20] = 1e5
+    return {"uneven": (uneven, 0.0), "turned": (uneven, 77.0), "sun": (sun, -130.0), "one row": (uneven[:1], 10.0)}
+
+
+def _direction(u: Doubles, v: Doubles, degrees: float) -> Doubles:
+    """(n, 3): u = atan2(x, −z)/2·pi, v = acos(y)/pi, then turned about +Y, counter-clockwise seen from above."""
+    sine, phi = np.sin(np.pi * v), 2 * np.pi * u - np.radians(degrees)
+    return np.column_stack([sine * np.sin(phi), np.cos(np.pi * v), -sine * np.cos(phi)])
+
+
+def _place(wi: Doubles, degrees: float) -> tuple[Doubles, Doubles]:
+    """u and v of directions (n, 3)."""
+    x, y, z = wi.T
+    return (np.arctan2(x, -z) + np.radians(degrees)) / (2 * np.pi) % 1, np.arctan2(np.hypot(x, z), y) / np.pi
+
+
+def picks(device: Device, samples: int, seed: int, changes: Mapping[str, str] | None = None) -> Iterator[LightTest]:
+    """The triangles of a lamp are picked by their areas."""
+    rng = np.random.default_rng(7)
+    tables = {"two": np.array([1.0, 3.0]), "equal": np.ones(1000), "random": rng.random(10_000),
+              "sun": np.where(np.arange(20_000) == 777, 1e5, 1.0), "zeros": rng.random(3000) * (rng.random(3000) < 0.5)}
+    for k, (name, areas) in enumerate(tables.items()):
+        vertices = np.zeros((3 * len(areas), 3), np.float32)
+        vertices[1::3, 0], vertices[2::3, 1] = areas, 1
+        lamp = Mesh(vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3), LAMP)
+        probe = Probe(device, Scene(meshes=[lamp]), changes=changes)
+        picked = probe("alias", 1, np.zeros(samples), seed=seed + k)[:, 0].astype(int)
+        counts = np.bincount(picked, minlength=len(areas))
+        yield LightTest(f"picks: {name}", chi2_test(counts, areas / areas.sum() * samples), 0.0)

@@ -1,0 +1,162 @@
+"""Hard cases of light and samples: furnaces, samplers against their densities, sums, random numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ..device.open import Device
+from ..rendering.film import Film
+from ..rendering.renderer import Renderer
+from ..scene.materials import Diffuse, Material
+from ..scene.model import Camera, RenderSettings, Scene, Sphere
+from .accumulation import accumulate, stream_errors
+from .bsdfs import Bsdfs, bsdfs
+from .furnace import SMITHS, Reflected, inexact, measure_metals
+from .jacobians import check_density
+from .light_sampling import light_tests
+from .probe import Probe
+from .random_numbers import draw_on, independence, repetitions, uniformity
+from .row import Row
+from .scattering import QUADRATURE, ROUNDING, Scattered, cases, reciprocity, scatter
+from .significance import family_row
+from .warps import warp_density_errors, warp_p_values, warp_probe
+
+#: What furnaces may be off: the albedo of one bounce, and 1 with multiple scattering.
+SINGLE, MULTIPLE = 1e-3, 2e-3
+#: What a density may miss 1/area and a closed form by, and a mean of the film the true one.
+AREA, DENSITY, MEAN = 2e-3, 1e-5, 1e-6
+LAMP_SAMPLES = 64
+
+
+class Effort(NamedTuple):
+    """Samples of each case of a kind, and of what there is the part that is taken: of materials one case in `step`, of
+    forms of shadowing the first `smiths`, of repeated numbers those of side² pixels and samples.
+    """
+
+    scattered: int
+    step: int
+    furnace: int
+    smiths: int
+    warped: int
+    added: int
+    drawn: int
+    side: int
+
+
+FULL = Effort(scattered=1 << 18, step=1, furnace=1 << 16, smiths=4, warped=1 << 20, added=(1 << 25) + 8, drawn=1 << 18,
+              side=1024)
+QUICK = Effort(scattered=1 << 14, step=7, furnace=1 << 14, smiths=1, warped=1 << 16, added=(1 << 22) + 8, drawn=1 << 14,
+               side=128)
+
+
+def measure_samplers(device: Device, *, quick: bool) -> Iterator[Row]:
+    """Rows of cases L1, L2, L6, L7 and L8 on one device."""
+    effort = QUICK if quick else FULL
+    yield from _furnaces(device, effort)
+    yield from _materials(device, effort)
+    yield from _warps_and_lights(device, effort)
+    probe = Probe(device, Scene())
+    yield from _sums(probe, effort)
+    yield from _dropped(device, probe)
+    yield from _random_numbers(probe, effort)
+
+
+def _furnaces(device: Device, effort: Effort) -> Iterator[Row]:
+    wrong, count = inexact(device, effort.furnace)
+    yield Row("L1", "diffuse and mirror weigh their color exactly", count, wrong)
+    metals = list(measure_metals(device, effort.furnace, SMITHS[:effort.smiths]))
+    for what, limit, some in (
+            ("white metal reflects the albedo of one bounce", SINGLE, [m for m in metals if not _multiple(m)]),
+            ("white metal with multiple scattering reflects all", MULTIPLE, [m for m in metals if _multiple(m)])):
+        errors = np.array([abs(m.found - m.exact) for m in some])
+        yield Row("L1", what, len(errors), int(np.sum(~(errors <= limit))), float(errors.max()), "largest error")
+
+
+def _multiple(reflected: Reflected) -> bool:
+    return reflected.metal.multiple_scattering
+
+
+def _materials(device: Device, effort: Effort) -> Iterator[Row]:
+    chosen = cases()[::effort.step]
+    materials = list(dict.fromkeys(material for material, _ in chosen))
+    subject = bsdfs(device, materials)
+    found = [scatter(subject, materials.index(material), cosine, effort.scattered, seed)
+             for seed, (material, cosine) in enumerate(chosen)]
+    yield from scattering_rows(found, effort.scattered)
+    pairs = np.concatenate([reciprocity(subject, which, 1 << 12, which) for which in range(len(materials))])
+    yield Row("L2", "f(wo, wi) = f(wi, wo)", len(pairs), int(np.sum(~(pairs <= 5 * ROUNDING))), float(pairs.max()),
+              "largest relative difference")
+    yield _areas(subject, chosen, found)
+
+
+def scattering_rows(found: list[Scattered], samples: int) -> Iterator[Row]:
+    """What `scatter` found of all cases, each with `samples` samples."""
+    count = len(found) * samples
+    yield family_row("L2", "directions of materials follow their densities",
+                     {s.name: s.density for s in found if not s.specular})
+    yield family_row("L2", "materials reflect no more than they get", {s.name: s.energy for s in found})
+    integral = max(s.integral for s in found) - 1
+    yield Row("L2", "densities integrate to at most 1", len(found),
+              sum(not s.integral <= 1 + QUADRATURE for s in found), integral, "largest excess")
+    weight = float(max(s.weight for s in found))
+    yield Row("L2", "weights are value over density", len(found), sum(not s.weight <= ROUNDING for s in found), weight,
+              "largest relative error")
+    yield Row("L2", "directions have length 1, and fail exactly below the horizon", count, sum(s.wrong for s in found))
+
+
+def _areas(subject: Bsdfs, chosen: list[tuple[Material, float]], found: list[Scattered]) -> Row:
+    checked = [check_density(subject, subject.materials.index(material), cosine)
+               for (material, cosine), scattered in zip(chosen, found) if not scattered.specular]
+    errors = [c.error for c in checked]
+    return Row("L2", "densities are 1 over the area that the map makes", sum(c.known for c in checked),
+               sum(not error <= AREA for error in errors), max(errors), "largest relative error")
+
+
+def _warps_and_lights(device: Device, effort: Effort) -> Iterator[Row]:
+    warps = warp_probe(device)
+    yield family_row("L2", "warps follow their densities", warp_p_values(warps, effort.warped, 1))
+    missed = warp_density_errors(warps)
+    yield Row("L2", "densities of warps are 1 over the area that the map makes", len(missed),
+              sum(not error <= AREA for error in missed.values()), max(missed.values()), "largest relative error")
+    lights = light_tests(device, effort.warped, 1)
+    yield family_row("L2", "lights and skies follow their densities", {test.name: test.density for test in lights})
+    yield Row("L2", "densities of lights are their closed forms", len(lights),
+              sum(not test.error <= DENSITY for test in lights), max(test.error for test in lights),
+              "largest relative error")
+
+
+def _sums(probe: Probe, effort: Effort) -> Iterator[Row]:
+    for before in (0, 1 << 27):
+        streams = list(stream_errors(probe, effort.added, before))
+        yield Row("L6", f"means of {effort.added} samples after {before}", len(streams),
+                  sum(not (error <= MEAN and miscounted == 0) for _, error, miscounted in streams),
+                  max(error for _, error, _ in streams), "largest relative error")
+
+
+def _dropped(device: Device, probe: Probe) -> Iterator[Row]:
+    bad, one = np.array([[np.nan, 1, 1], [1, np.inf, 1], [1, 1, -np.inf], [3e38, 1, 1]]), np.ones((4, 3))
+    film = accumulate(probe, one, bad, 3, 3000).film
+    yield Row("L7", "samples that are no numbers are dropped and counted", 4 * 1000,
+              abs(film.nonfinite_samples - 4 * 1000) + int(np.sum(film.mean != 1)))
+    hits, lost = _lamp(device, 1.0), _lamp(device, 3e38)
+    count = round(float(hits.mean[..., 0].sum() * LAMP_SAMPLES))
+    yield Row("L7", "samples of a lamp that is too bright for floats are dropped and counted", count,
+              abs(lost.nonfinite_samples - count) + int(np.sum(lost.mean != 0)))
+
+
+def _lamp(device: Device, radiance: float) -> Film:
+    """The film of a lamp before the black, which covers a part of the picture."""
+    scene = Scene(spheres=[Sphere(material=Diffuse(emission=(radiance, radiance, radiance)))],
+                  camera=Camera(position=(0.0, 0.0, 5.0)), render=RenderSettings(size=(32, 32), max_depth=1))
+    *_, last = Renderer(scene, device=device.info.index).passes(spp=LAMP_SAMPLES)
+    return last.film
+
+
+def _random_numbers(probe: Probe, effort: Effort) -> Iterator[Row]:
+    draw = draw_on(probe)
+    yield family_row("L8", "random numbers, and each of their bits, are uniform", uniformity(draw, effort.drawn))
+    yield family_row("L8", "random numbers are independent of their neighbours", independence(draw, effort.drawn))
+    yield Row("L8", "pairs of random numbers repeat", 4 * effort.side**2, repetitions(draw, effort.side))

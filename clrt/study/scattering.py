@@ -1,0 +1,102 @@
+"""Whether the materials' samples, densities and values fit each other, for every material from every angle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..scene.materials import MATERIALS, Material
+from . import directions
+from .bsdfs import Bsdfs, plain_variants, uniform, view, views, worded_variants
+from .probe import Doubles
+from .significance import chi2_test, mean_test
+
+#: Two computations of one float32 formula whose products a compiler may fuse or not: some dozen roundings apart.
+ROUNDING = 2e-6
+#: The quadrature of densities, at directions that are rounded to float32; seen at the narrowest lobes.
+QUADRATURE = 5e-4
+#: What white metal with multiple scattering reflects too much at most (see scene.microfacets).
+FITTED = 5e-4
+#: Views of what differs in words only.
+FEW = (0.6, 0.1)
+
+
+class Scattered(NamedTuple):
+    """What samples of one material seen from one angle showed. p-values of single directions are 1.
+
+    density: chi-square of the samples over cells of the hemisphere, and one for the failed ones, p; integral: of the
+    density; failed: part of the samples below the horizon; energy: that no channel of the furnace exceeds 1, one-sided
+    p; weight: largest relative error of the weights as value over density; wrong: samples that are no unit vectors, are
+    below the horizon without having failed or the other way around, or are specular and have a density elsewhere.
+    """
+
+    name: str
+    density: float
+    integral: float
+    failed: float
+    energy: float
+    weight: float
+    wrong: int
+    specular: bool = False
+
+
+def cases(kinds: Iterable[type[Material]] = MATERIALS) -> list[tuple[Material, float]]:
+    """Materials with the cosines from which they are seen."""
+    found: list[tuple[Material, float]] = []
+    for kind in kinds:
+        found += [(material, cosine) for material in plain_variants(kind) for cosine in views(material)]
+        found += [(material, cosine) for material in worded_variants(kind) for cosine in FEW]
+    return list(dict.fromkeys(found))
+
+
+def scatter(bsdfs: Bsdfs, which: int, cosine: float, samples: int, seed: int) -> Scattered:
+    """Draws `samples` directions of a material seen from `cosine`."""
+    wo = view(cosine)
+    wi, weight, pdf, specular = bsdfs.sample(which, wo, uniform(samples, seed))
+    name = f"cos {cosine:.3g}: {bsdfs.materials[which]}"
+    kept = pdf > 0
+    value, density = bsdfs.value(which, wo, wi[kept])
+    wrong = np.abs(np.linalg.norm(wi, axis=1) - 1) > ROUNDING
+    wrong |= np.where(kept, wi[:, 2] < 0, (wi[:, 2] > 0) | weight.any(axis=1))
+    if specular.any():
+        wrong |= (specular == 0) | np.any(wi != wi[0], axis=1)
+        wrong[kept] |= value.any(axis=1) | (density != 0)
+        return Scattered(name, 1.0, 1.0, 0.0, _energy(weight), 0.0, int(wrong.sum()), True)
+    above = wi[kept, 2] > 0
+    off = np.abs(weight[kept][above] * density[above, None] - value[above])
+    error = np.max(off / np.maximum(value[above], 1e-30), initial=0.0, where=value[above] > 1e-30)
+    error = max(error, float(np.max(np.abs(pdf[kept][above] / density[above] - 1), initial=0.0)))
+    expected = directions.integrate(lambda w: bsdfs.value(which, wo, w)[1], wo)
+    return Scattered(name, density_test(wo, wi[kept], expected, samples), float(expected.sum()),
+                     1 - kept.mean(), _energy(weight), error, int(wrong.sum()))
+
+
+def density_test(wo: Doubles, wi: Doubles, expected: Doubles, samples: int) -> float:
+    """p-value of wi (n, 3), those of `samples` directions that did not fail, by a density's integrals over cells."""
+    rest = max(1 - float(expected.sum()), 0.0)
+    return chi2_test([*directions.count(wo, wi), samples - len(wi)], samples * np.array([*expected, rest]) + 1e-9)
+
+
+def _energy(weight: Doubles) -> float:
+    """One-sided p-value of every channel's mean weight being at most 1, or what multiple scattering is fitted to."""
+    mean, variance = weight.mean(axis=0), weight.var(axis=0)
+    p = mean_test(mean, np.maximum(variance, 1e-12), len(weight), 1 + FITTED)
+    return float(np.where(mean > 1 + FITTED, p / 2, 1).min())
+
+
+def reciprocity(bsdfs: Bsdfs, which: int, count: int, seed: int) -> Doubles:
+    """(count,) |f(wo, wi) − f(wi, wo)| over their sum, at pairs all over the hemisphere, half of them grazing."""
+    wo, wi = above(count, seed), above(count, seed + 1)
+    there, back = bsdfs.value(which, wo, wi)[0] / wi[:, 2:], bsdfs.value(which, wi, wo)[0] / wo[:, 2:]
+    return np.asarray(np.max(np.abs(there - back) / np.maximum(there + back, 1e-3), axis=1))
+
+
+def above(count: int, seed: int) -> Doubles:
+    """(count, 3) unit vectors of the upper hemisphere as float32 holds them: half uniform, half with z down to 1e-4."""
+    rng = np.random.default_rng(seed)
+    z = np.where(np.arange(count) % 2, rng.uniform(1e-3, 1, count), 10**rng.uniform(-4, -1, count))
+    azimuth, sine = rng.uniform(0, 2 * np.pi, count), np.sqrt(1 - z * z)
+    unit = np.column_stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z])
+    return unit.astype(np.float32).astype(np.float64)

@@ -1,0 +1,105 @@
+"""Statistical tests with p-values, for checking what is random without guessed tolerances.
+
+A p-value is uniform in [0, 1] where the hypothesis holds; a test that rejects below `sidak(alpha, tests)` errs in a
+fraction alpha of all runs of `tests` tests.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .row import Row
+
+Numbers = float | NDArray[Any]
+
+#: What a family of tests may reject by chance.
+FAMILY = 1e-3
+
+
+def sidak(alpha: float, tests: int) -> float:
+    """The significance for each of `tests` independent tests so that all together err with probability alpha."""
+    return float(-np.expm1(np.log1p(-alpha) / tests))
+
+
+def rejected(p_values: Mapping[str, float], alpha: float = FAMILY) -> dict[str, float]:
+    """Those of a family of tests that are rejected, so that a right family is with probability alpha."""
+    limit = sidak(alpha, max(1, len(p_values)))
+    return {name: p for name, p in p_values.items() if not p >= limit}
+
+
+def family_row(case: str, what: str, p_values: Mapping[str, float]) -> Row:
+    """How many of a family of tests are rejected; the figure is the least p-value, corrected for their number."""
+    least = min(p_values.values())
+    corrected = -math.expm1(len(p_values) * math.log1p(-least)) if least < 1 else 1.0
+    return Row(case, what, len(p_values), len(rejected(p_values)), corrected, "least p, corrected")
+
+
+def chi2_test(observed: ArrayLike, expected: ArrayLike, min_expected: float = 5.0) -> float:
+    """Pearson's chi-square: the p-value of the observed counts of cells, given their expected counts (any shape).
+
+    Both must have the same total: where samples can fail, give the failures a cell. The cells that expect least are
+    pooled until every one expects at least `min_expected`. A count where none can be gives 0.
+    """
+    counts, means = np.ravel(observed).astype(np.float64), np.ravel(expected).astype(np.float64)
+    if np.any(counts[means == 0] > 0):
+        return 0.0
+    counts, means = _pooled(counts, means, min_expected)
+    if means.size < 2:
+        raise ValueError(f"too few samples: only {means.size} cells expect {min_expected} or more")
+    return _upper_gamma((means.size - 1) / 2, float(np.sum((counts - means)**2 / means)) / 2)
+
+
+def mean_test(mean: Numbers, variance: Numbers, count: Numbers, expected: Numbers) -> NDArray[np.float64]:
+    """Two-sided z-test: the p-value of each sample mean, given the samples' variance and number, and the true mean.
+
+    Arguments broadcast. `count` must be large enough for the mean to be normal. Where the variance is 0 the p-value is
+    1 for the exact mean and 0 for any other.
+    """
+    error = np.sqrt(np.divide(variance, count, dtype=np.float64))
+    difference = np.abs(np.subtract(mean, expected, dtype=np.float64))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        z = np.where(difference == 0, 0.0, difference / error)
+    return np.asarray(np.vectorize(math.erfc, otypes=[np.float64])(z / np.sqrt(2)))
+
+
+def _pooled(counts: NDArray[np.float64], means: NDArray[np.float64],
+            least: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    order = np.argsort(means, kind="stable")
+    counts, means = counts[order], means[order]
+    # The pool takes every small cell, then the next larger ones until it is large enough itself.
+    size = max(int(np.searchsorted(means, least)), 1)
+    while size < means.size and means[:size].sum() < least:
+        size += 1
+    return (np.concatenate(([counts[:size].sum()], counts[size:])),
+            np.concatenate(([means[:size].sum()], means[size:])))
+
+
+def _upper_gamma(a: float, x: float) -> float:
+    """Q(a, x) = Γ(a, x)/Γ(a): a series below x = a + 1, a continued fraction above (Press et al. 2007, 6.2)."""
+    if x <= 0:
+        return 1.0
+    front = math.exp(a * math.log(x) - x - math.lgamma(a))
+    if x < a + 1:
+        term = total = 1 / a
+        n = a
+        while term > total * 1e-16:
+            n += 1
+            term *= x / n
+            total += term
+        return 1 - front * total
+    b = x + 1 - a
+    c, d = math.inf, 1 / b
+    fraction, i, change = d, 0, 0.0
+    while abs(change - 1) > 1e-15:
+        i += 1
+        step, b = i * (a - i), b + 2
+        d = 1 / (step * d + b)
+        c = b + step / c
+        change = c * d
+        fraction *= change
+    return front * fraction

@@ -1,0 +1,8 @@
+// Boxes without padding, the slab test of textbooks: rounding makes rays miss boxes at their edges, and what is in them.
+// Beside a zero component of the direction, t by inverse and shift is a NaN: all such planes count as entered.
+
+#define SLAB_PAD 0.0f
+#define ORIGIN_PAD 0.0f
+#define BOX_PAD 0.0f
+#define STEEPEST INFINITY
+#define SIDE 0.0f

@@ -1,0 +1,40 @@
+"""Options that name choices offer those that there are; they are written out so that --help loads nothing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from clrt.accel.kernels import BOX_TESTS, BUILDER_NAMES, SPHERE_TESTS, TREES, TRIANGLE_TESTS
+from clrt.cli import bench_rays, info, render
+from clrt.rendering.compile import OFFSETS
+
+KNOWN: dict[str, Iterable[str]] = {"triangle": TRIANGLE_TESTS, "box": BOX_TESTS, "sphere": SPHERE_TESTS,
+                                   "offset": OFFSETS, "layout": TREES, "builder": BUILDER_NAMES}
+
+
+@pytest.mark.parametrize("command, names", [
+    (render.command, KNOWN), (info.command, KNOWN),
+    (bench_rays.rays_command, ["triangle", "box", "layout", "builder"])], ids=["render", "info", "bench rays"])
+def test_options_offer_what_there_is(command: click.Command, names: Iterable[str]) -> None:
+    options = {option.name: option.type for option in command.params}
+    for name in names:
+        offered = options[name]
+        assert isinstance(offered, click.Choice) and set(offered.choices) == set(KNOWN[name])
+
+
+def test_what_is_chosen_is_compiled(tmp_path: Path) -> None:
+    """`clrt info` lists its files, and `clrt render --print-kernel` prints them."""
+    scene = tmp_path / "ball.toml"
+    scene.write_text("[[sphere]]\n[[mesh]]\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\nfaces = [[0, 1, 2]]\n")
+    chosen = ["--triangle", "precomputed", "--box", "plain", "--sphere", "textbook", "--offset", "ulp", "--lanes", "1"]
+    listed = CliRunner().invoke(info.command, [str(scene), "--json", *chosen], catch_exceptions=False)
+    printed = CliRunner().invoke(render.command, [str(scene), "--print-kernel", "-q", *chosen], catch_exceptions=False)
+    for file in ("geometry/triangle_precomputed.cl", "geometry/box_plain.cl", "geometry/sphere_textbook.cl",
+                 "offset/ulp.cl"):
+        assert file in json.loads(listed.stdout)["files"] and f'"{file}"' in printed.stdout

@@ -1,0 +1,24 @@
+"""The hard cases of light and samples that users can run."""
+
+from __future__ import annotations
+
+import pytest
+
+from clrt.device.open import Device
+from clrt.study.row import Row
+from clrt.study.samplers import measure_samplers
+
+
+@pytest.fixture(scope="module")
+def rows(device: Device) -> list[Row]:
+    return list(measure_samplers(device, quick=True))
+
+
+def test_nothing_is_wrong(rows: list[Row]) -> None:
+    assert {row.case for row in rows} == {"L1", "L2", "L6", "L7", "L8"}
+    assert not [row for row in rows if row.wrong]
+
+
+def test_every_row_counts_something(rows: list[Row]) -> None:
+    assert len({(row.case, row.what) for row in rows}) == len(rows) > 15
+    assert all(row.count > 0 and (row.figure is None) == (row.unit == "") for row in rows)
