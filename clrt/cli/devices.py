@@ -1,27 +1,73 @@
-"""`clrt devices`: the OpenCL devices of this machine, best first."""
+"""`clrt devices`: the OpenCL devices of this machine, best first, and whether they compute right."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import click
+
+from ..errors import DeviceError
+
+if TYPE_CHECKING:
+    from ..device.discover import DeviceInfo
+    from ..device.verdicts import Verdict
 
 
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON list.")
-def command(as_json: bool) -> None:
-    """List the OpenCL devices, best first; * marks the one used when none is named."""
-    from ..device.discover import devices
+@click.option("--check", is_flag=True, help="Check each against known answers, and keep what is found.")
+@click.option("--device", "selectors", multiple=True, metavar="SEL", help="Only this one; may be repeated.")
+@click.option("--limit", type=click.FloatRange(1.0), default=300.0, show_default=True, metavar="SECONDS",
+              help="What a check may take.")
+def command(as_json: bool, check: bool, selectors: tuple[str, ...], limit: float) -> None:
+    """List the OpenCL devices, best first; * marks the one used when none is named.
 
-    found = devices()
+    Checks take some seconds a device, of simulators minutes: these are checked only if they are named. A device that
+    fails its check is used only if it is named, until its driver or clrt changes or it passes.
+    """
+    from ..device.discover import as_dict, find_devices, select
+
+    wanted = [select(selector)[0].id for selector in selectors]
+    verdicts = {} if not check else {info.id: _checked(info, limit) for info, _ in find_devices()
+                                     if (info.id in wanted if wanted else info.usable and info.type != "simulator")}
+    found = [replace(info, check=verdicts.get(info.id, info.check)) for info, _ in find_devices()
+             if not wanted or info.id in wanted]
     if as_json:
-        click.echo(json.dumps(found, indent=1))
-        return
-    if not found:
+        click.echo(json.dumps([as_dict(info) for info in found], indent=1))
+    elif found:
+        click.echo("\n".join(line for info in found for line in _lines(info)))
+    else:
         click.echo('no OpenCL device; `pip install "pyopencl[pocl]"` brings one that runs on the CPU')
-    for device in found:
-        mark = "*" if device["chosen"] else " "
-        click.echo(f"{mark} {device['index']}  {device['id']}  {device['type']:11}  {device['name']}")
-        click.echo(f"     {device['platform']}, {device['platform_version']}, driver {device['driver']}; "
-                   f"{device['compute_units']} compute units, {device['global_bytes'] / 2**30:.1f} GiB")
-        click.echo(f"     {'usable' if device['usable'] else 'not usable'}: {device['why']}")
+    if failed := [info for info in found if info.id in verdicts and info.failed]:
+        names = ", ".join(info.name for info in failed)
+        raise DeviceError(f"{names} failed the check: update the driver and run `clrt devices --check` again; until "
+                          "that passes, such a device is used only if it is named")
+
+
+def _checked(info: DeviceInfo, limit: float) -> Verdict:
+    """Checks a device, telling what is going on, and keeps the verdict."""
+    from ..check.run import check_device
+    from ..device.verdicts import keep_verdict
+
+    verdict = check_device(info, limit, lambda part: click.echo(f"{info.name}: {part}", err=True))
+    if not keep_verdict(info, verdict):
+        click.echo(f"{info.name}: what was found cannot be kept: the cache folder cannot be written", err=True)
+    return verdict
+
+
+def _lines(info: DeviceInfo) -> Iterator[str]:
+    yield f"{'*' if info.chosen else ' '} {info.index}  {info.id}  {info.type:11}  {info.name}"
+    yield (f"     {info.platform}, {info.platform_version}, driver {info.driver}; "
+           f"{info.compute_units} compute units, {info.global_bytes / 2**30:.1f} GiB")
+    yield f"     {'usable' if info.usable else 'not usable'}: {info.why}"
+    if info.check is None:
+        named = f" --device {info.index}" if info.type == "simulator" else ""
+        yield f"     not checked: `clrt devices --check{named}`"
+        return
+    yield f"     checked {info.check.when} in {info.check.seconds} s: {'passed' if info.check.passed else 'FAILED'}"
+    yield from (f"       {failure}" for failure in info.check.failures)
+    if info.check.figures:
+        yield f"       {'; '.join(f'{name}: {figure}' for name, figure in info.check.figures.items())}"

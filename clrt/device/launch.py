@@ -13,6 +13,8 @@ from collections import deque
 import pyopencl as cl
 
 from ..errors import DeviceError
+from .fork import check_process
+from .open import Device
 
 TARGET_SECONDS = 0.08
 IN_FLIGHT = 2
@@ -49,11 +51,18 @@ class Launches:
         self.size = max(1, int(min(wanted, 2 * max(work, self.size))))
 
 
+def run_kernel(device: Device, kernel: cl.Kernel, groups: int) -> None:
+    """Runs a kernel, whose arguments are set, on `groups` groups of the device's size, and waits for it."""
+    local = device.local_size
+    wait_for(cl.enqueue_nd_range_kernel(device.queue, kernel, (groups * local,), (local,)))
+
+
 def wait_for(event: cl.Event) -> None:
     """Returns when the event is complete, letting signals through; DeviceError where it failed.
 
     Asking for an event's status starts nothing: a driver may hold commands back until their queue is flushed.
     """
+    check_process()
     event.command_queue.flush()
     start, pause = time.perf_counter(), 1e-5
     while (status := event.command_execution_status) > cl.command_execution_status.COMPLETE:

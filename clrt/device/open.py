@@ -22,19 +22,24 @@ class Device:
     queue: CommandQueue
 
     @property
+    def vectors(self) -> bool:
+        """Whether the program writes its vectors: on a CPU, unless its driver joins work-items as a GPU does."""
+        return self.info.type == "cpu" and self.cl.native_vector_width_float > 1
+
+    @property
     def lanes(self) -> int:
         """Paths a work-item follows: one on a GPU, whose hardware joins work-items; a vector of them on a CPU."""
-        return 8 if self.info.type == "cpu" else 1
+        return 8 if self.vectors else 1
 
     @property
     def local_size(self) -> int:
         """Work-items of a group. On a CPU one: its compiler then has no loop over work-items to write around."""
-        return 1 if self.info.type == "cpu" else 64
+        return 1 if self.vectors else 64
 
     @property
     def layout(self) -> str:
         """The tree layout that suits the device: eight boxes at a time where there are vectors, else compressed."""
-        return "bvh8" if self.info.type == "cpu" else "cwbvh"
+        return "bvh8" if self.vectors else "cwbvh"
 
 
 def open_device(selector: str | int | None = None) -> Device:

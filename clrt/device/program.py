@@ -14,15 +14,14 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from importlib.resources.abc import Traversable
-from pathlib import Path
 
 import pyopencl as cl
 
 from ..errors import KernelError
 from .cache import read_binary, write_binary
 from .open import Device
+from .sources import kernel_folder
 
 OPTIONS = ["-cl-std=CL1.2"]
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|(\w+))\s*$')
@@ -70,14 +69,6 @@ def files_of(source: str) -> list[str]:
     return re.findall(r'^#line 1 "(.+)"$', source, re.MULTILINE)
 
 
-def kernel_folder() -> Traversable:
-    """Where the kernel files are: the installed package clrt.kernels, or the folder beside clrt in a source tree."""
-    try:
-        return files("clrt.kernels")
-    except ModuleNotFoundError:
-        return Path(__file__).parents[2] / "kernels"
-
-
 def build(device: Device, source: str) -> BuiltProgram:
     """Builds `source` for the device, or takes it from this process or the cache; KernelError with the log if refused.
 
@@ -115,20 +106,22 @@ def _binary(program: cl.Program) -> bytes:
 
 def _from_binary(device: Device, binary: bytes) -> cl.Program | None:
     try:
-        program = cl.Program(device.context, [device.cl], [binary])
-        program.build()
-        return program
+        return _quietly_built(cl.Program(device.context, [device.cl], [binary]), [])
     except (cl.Error, ValueError):
         return None  # a driver may refuse an old or damaged binary: compile again
 
 
 def _compile(device: Device, source: str) -> cl.Program:
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", cl.CompilerWarning)
-            program = cl.Program(device.context, source)
-            program.build(options=OPTIONS, cache_dir=False)  # type: ignore[arg-type]  # False: pyopencl's own cache off
-            return program
+        return _quietly_built(cl.Program(device.context, source), OPTIONS)
     except cl.Error as error:
         log = str(error).strip()
         raise KernelError(f"{device.info.name} ({device.info.platform}) cannot build the kernel:\n{log}") from error
+
+
+def _quietly_built(program: cl.Program, options: list[str]) -> cl.Program:
+    """The program, built. pyopencl warns of whatever a compiler says, and Intel's always says something."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", cl.CompilerWarning)
+        program.build(options=options, cache_dir=False)  # type: ignore[arg-type]  # False: pyopencl's own cache off
+    return program

@@ -22,8 +22,8 @@ from clrt.errors import KernelError
 from clrt.rendering.compile import OFFSETS, Choices, compile_scene
 from clrt.scene.materials import MATERIALS
 from clrt.scene.model import Environment
-
 from clrt.study.bsdfs import variants
+
 from ..rendering.test_variants import everything
 
 KERNELS = Path(str(files("clrt.kernels")))
@@ -81,7 +81,7 @@ def test_a_kernel_file_opens_with_what_it_is(name: str) -> None:
 
 
 def test_every_kernel_file_is_used(device: Device) -> None:
-    """By some scene, with some choice, by ray queries, by the builder, to refit a tree, or to check a device."""
+    """By some scene, with some choice, by ray queries, by the builder, to refit a tree, to check a device, or to study it."""
     corners = np.zeros((3, 3), np.float32)
     used: set[str] = set()
     for layout, traversal in (("bvh8", "pool"), ("bvh8", "packet"), ("bvh2", "single")):
@@ -102,6 +102,7 @@ def test_every_kernel_file_is_used(device: Device) -> None:
                 scene = everything()
                 scene.environment = environment
                 used |= set(compile_scene(scene, choices).files)
+    used |= set(compile_scene(everything(), Choices(), "study/probe.cl").files)
     assert sorted(used) == FILES
 
 

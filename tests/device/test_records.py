@@ -14,7 +14,6 @@ from clrt.device.program import build
 from clrt.device.records import c_typedef, record
 from clrt.rendering import records
 from clrt.scene.materials import MATERIALS
-
 from clrt.study.bsdfs import variants
 
 RECORDS: dict[str, np.dtype[Any]] = {

@@ -1,0 +1,32 @@
+"""The parts of a check, in order: what an earlier one finds wrong explains what a later one does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..device.open import Device
+from .arithmetic import check_arithmetic
+from .comparisons import check_comparisons
+from .findings import Findings
+from .integers import check_integers
+from .masks import check_masks
+from .memory import check_memory
+from .pictures import check_furnace, check_lamp, check_room
+from .rays import check_binary_tree, check_rays, check_tree_builder
+from .samples import check_random_numbers, check_sums
+
+PARTS: dict[str, Callable[[Device, Findings], None]] = {
+    "arithmetic": check_arithmetic,
+    "comparisons": check_comparisons,
+    "integers": check_integers,
+    "masks": check_masks,
+    "memory": check_memory,
+    "random numbers": check_random_numbers,
+    "sums": check_sums,
+    "rays": check_rays,
+    "binary tree": check_binary_tree,
+    "tree builder": check_tree_builder,
+    "furnace": check_furnace,
+    "lamp": check_lamp,
+    "room": check_room,
+}

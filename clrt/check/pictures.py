@@ -1,0 +1,101 @@
+"""Small pictures whose pixels are known. They take several launches, most of them of several samples a pixel."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..device.open import Device
+from ..rendering.film import Film
+from ..rendering.renderer import Renderer
+from ..scene.lights import PointLight
+from ..scene.materials import Diffuse, Material, Mirror
+from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
+from .findings import Findings
+
+SIZE = 16
+#: Edges of paths in the room, enough for some to be ended by chance.
+DEPTH = 6
+#: A mean further than this many of its standard errors from the truth is wrong: by chance one in a million is.
+SIGMAS = 5.0
+
+
+def check_furnace(device: Device, findings: Findings) -> None:
+    """Under a white sky a plane, which sees nothing of itself, has its own colour, and the sky is white: exactly.
+
+    Left diffuse and right a mirror, above white and below coloured, in the middle half of the picture.
+    """
+    truth, meshes, quarter = np.ones((SIZE, SIZE, 3), np.float32), list[Mesh](), SIZE // 4
+    for row, colors in enumerate([((1.0, 1.0, 1.0), (1.0, 1.0, 1.0)), ((0.5, 0.25, 0.75), (0.75, 0.5, 0.25))]):
+        for column, (kind, color) in enumerate(zip((Diffuse, Mirror), colors)):
+            corner = (0.5 * column - 0.5, -0.5 * row, 0.0)
+            meshes.append(_quad(corner, (0.5, 0.0, 0.0), (0.0, 0.5, 0.0), kind(color=color)))
+            truth[quarter * (row + 1):quarter * (row + 2), quarter * (column + 1):quarter * (column + 2)] = color
+    film = _film(device, findings, Scene(
+        meshes=meshes, environment=Environment(color=(1.0, 1.0, 1.0)),
+        camera=Camera(position=(0.0, 0.0, 1.0), look_at=(0.0, 0.0, 0.0), fov_degrees=90)), spp=16)
+    findings.same(film.mean.astype(np.float32).ravel(), truth.ravel(), "colour under a white sky")
+
+
+def check_lamp(device: Device, findings: Findings) -> None:
+    """A floor, a wall and a lamp: black behind the wall, else color/π · I · cos θ/d² of some point of the pixel."""
+    color, intensity, (x, height, z) = (0.8, 0.5, 0.2), (60.0, 40.0, 20.0), (0.75, 3.0, 0.5)
+    material = Diffuse(color=color)
+    floor = _quad((-9.0, 0.0, 9.0), (18.0, 0.0, 0.0), (0.0, 0.0, -18.0), material)
+    wall = _quad((0.0, 0.0, 9.0), (0.0, 3.5, 0.0), (0.0, 0.0, -18.0), material)
+    film = _film(device, findings, Scene(
+        meshes=[floor, wall], lights=[PointLight(position=(x, height, z), intensity=intensity)],
+        camera=Camera(position=(0.0, 4.0, 0.0), look_at=(0.0, 0.0, 0.0), up=(0.0, 0.0, -1.0),
+                      fov_degrees=float(np.degrees(2 * np.arctan(1 / 16))))), spp=16, max_depth=2)
+    edges = np.linspace(-0.25, 0.25, SIZE + 1)    # of the pixels, on the floor, along x and z
+    nearest, farthest = [], []
+    for lamp in (z, x):
+        low, high = edges[:-1] - lamp, edges[1:] - lamp
+        nearest.append(np.maximum(np.maximum(low, -high), 0))
+        farthest.append(np.maximum(np.abs(low), np.abs(high)))
+    light = np.multiply(color, intensity) / np.pi * (edges[:-1, None] >= 0)
+    least, most = ((height / (height**2 + np.add.outer(b**2, a**2)) ** 1.5)[..., None] * light
+                   for b, a in (farthest, nearest))
+    inside = (least * (1 - 1e-5) <= film.mean) & (film.mean <= most * (1 + 1e-5))
+    findings.expect(inside.ravel(), "light of a lamp on a floor", ("gave", film.mean.ravel()),
+                    ("not between", least.ravel()), ("and", most.ravel()))
+
+
+def check_room(device: Device, findings: Findings) -> None:
+    """In a closed room where all shines with e and reflects the share a, d edges bring e·(1 + a + … + a^(d − 1)).
+
+    Walls, a diffuse and a mirror ball: light sampled from triangles and spheres, found by reflection, weighed, and
+    paths that end by chance must all add up to that.
+    """
+    share, shine = np.array([0.8, 0.5, 0.2]), np.array([1.0, 2.0, 0.5])
+    diffuse, mirror = (kind(color=(0.8, 0.5, 0.2), emission=(1.0, 2.0, 0.5)) for kind in (Diffuse, Mirror))
+    walls = []
+    for axis in range(3):
+        n, a, b = np.roll(np.eye(3), -axis, axis=0)
+        walls += [_quad(-n - a - b, 2 * a, 2 * b, diffuse), _quad(n - a - b, 2 * b, 2 * a, diffuse)]
+    film = _film(device, findings, Scene(
+        meshes=walls, spheres=[Sphere(center=(-0.4, -0.3, -0.4), radius=0.4, material=mirror),
+                               Sphere(center=(0.5, -0.6, -0.2), radius=0.3, material=diffuse)],
+        camera=Camera(position=(0.1, 0.2, 0.9), look_at=(0.0, -0.1, -1.0), fov_degrees=70)),
+        spp=256, max_depth=DEPTH)
+    truth = shine * (1 - share**DEPTH) / (1 - share)
+    count, mean = film.samples, film.mean.mean(axis=(0, 1))
+    squares = (film.pixels["square"].astype(np.float64) + film.pixels["square_error"]).sum(axis=(0, 1)) / count
+    errors = np.abs(mean - truth) / np.sqrt((squares - mean**2) / count)
+    findings.at_most(SIGMAS, errors, "light in a room", "standard errors", truth)
+
+
+def _quad(corner: ArrayLike, side: ArrayLike, other: ArrayLike, material: Material) -> Mesh:
+    """A parallelogram, seen from its front where `side` turns to `other` counter-clockwise."""
+    a, b, c = (np.asarray(vector, np.float32) for vector in (corner, side, other))
+    return Mesh(np.stack([a, a + b, a + b + c, a + c]), np.array([[0, 1, 2], [0, 2, 3]], np.int32), material)
+
+
+def _film(device: Device, findings: Findings, scene: Scene, spp: int, max_depth: int = 8) -> Film:
+    """The scene's film after `spp` samples a pixel, of which a simulator makes 2; a failure where some are lost."""
+    spp = 2 if device.info.type == "simulator" else spp
+    renderer = Renderer(scene, device=device.info.id, size=(SIZE, SIZE), max_depth=max_depth)
+    *_, state = renderer.passes(spp=spp)
+    count, dropped = (state.film.pixels[name].ravel() for name in ("count", "dropped"))
+    findings.expect(count == spp, "samples of a pixel", ("kept", count), ("dropped", dropped))
+    return state.film

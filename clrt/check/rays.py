@@ -1,0 +1,84 @@
+"""Rays through trees: what they hit first, and whether they hit anything before some distance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.open import Device
+from ..query import RayQuery
+from .findings import Findings
+from .star import Doubles, Rays, Star, make_star, rays_from_elsewhere, rays_from_inside
+
+ELSEWHERE = 300
+#: A hit's point follows from some 30 operations on coordinates, each of which may round.
+ROUNDINGS = 30.0
+
+
+def check_rays(device: Device, findings: Findings) -> None:
+    """Through the tree that the device uses, in the surface's order and in none: the ways differ (tree_query.py)."""
+    star = make_star()
+    query, inside = _query(device, star), _rays(device, star)
+    for rays in (inside, _shuffled(inside), rays_from_elsewhere(star, ELSEWHERE)):
+        _check_hits(query, star, rays, findings)
+
+
+def check_binary_tree(device: Device, findings: Findings) -> None:
+    """Through the plain binary tree."""
+    star = make_star()
+    _check_hits(_query(device, star, layout="bvh2"), star, _shuffled(_rays(device, star)), findings)
+
+
+def check_tree_builder(device: Device, findings: Findings) -> None:
+    """Through a tree that the device built: the hits are those of a tree of numpy's, to the bit."""
+    star = make_star()
+    rays = _shuffled(_rays(device, star))
+    built = _check_hits(_query(device, star, builder="ploc"), star, rays, findings)
+    other = _query(device, star, builder="sah").closest_hit(rays.origins, rays.directions)
+    findings.expect(built == other, "hits in the device's tree", ("gave", built), ("and in numpy's", other))
+
+
+def _rays(device: Device, star: Star) -> Rays:
+    """From inside; for a simulator, which takes milliseconds for each, a few."""
+    return rays_from_inside(star).take(slice(None, None, 61 if device.info.type == "simulator" else 1))
+
+
+def _shuffled(rays: Rays) -> Rays:
+    return rays.take(np.random.default_rng(10).permutation(len(rays.t)))
+
+
+def _query(device: Device, star: Star, **options: Any) -> RayQuery:
+    return RayQuery(star.vertices, star.faces, device=device.info.id, **options)
+
+
+def _check_hits(query: RayQuery, star: Star, rays: Rays, findings: Findings) -> NDArray[Any]:
+    """Whether, what and where each ray hits, and what it meets if it ends before or behind that; returns the hits."""
+    hits = query.closest_hit(rays.origins, rays.directions)
+    meets = np.isfinite(rays.t)
+    shown = ("from", rays.origins), ("along", rays.directions), ("gave", hits)
+    findings.expect((hits["primitive"] >= 0) == meets, "whether a ray hits", *shown)
+    met = star.faces[np.maximum(hits["primitive"], 0)]
+    right = np.all(np.any(met[:, :, None] == rays.corners[:, None, :], axis=1), axis=1)
+    findings.expect(right | ~meets, "which triangle a ray hits", *shown)
+    tree = f"hit in {query.tree.name} by {query.tree.builder}"
+    findings.at_most(ROUNDINGS, _errors(star, rays, hits), tree, "roundings", rays.origins, rays.directions, hits)
+    for part, where in ((0.875, "before"), (1.125, "behind")):
+        blocked = query.any_hit(rays.origins, rays.directions, part * rays.t)
+        first = query.closest_hit(rays.origins, rays.directions, part * rays.t)["primitive"]
+        findings.expect(blocked == (meets & (part > 1)), f"any hit of a ray that ends {where} it", *shown)
+        findings.expect((first >= 0) == (meets & (part > 1)), f"first hit of a ray that ends {where} it", *shown)
+    return hits
+
+
+def _errors(star: Star, rays: Rays, hits: NDArray[Any]) -> Doubles:
+    """(n,): how far the point at t and that at (u, v) are from where the ray hits, in roundings of the coordinates."""
+    both = np.isfinite(rays.t) & (hits["primitive"] >= 0)
+    t, t_exact = np.where(both, hits["t"], 0.0)[:, None], np.where(both, rays.t, 0.0)[:, None]
+    u, v = hits["u"].astype(np.float64), hits["v"].astype(np.float64)
+    corners = star.vertices[star.faces[np.maximum(hits["primitive"], 0)]]
+    inside = np.einsum("nk,nkx->nx", np.stack([1 - u - v, u, v], axis=1), corners)
+    along = rays.origins + t_exact * rays.directions
+    errors = np.maximum(np.abs((t - t_exact) * rays.directions), np.abs(inside - along) * both[:, None]).max(axis=1)
+    return np.asarray(errors / (np.abs(star.vertices).max() * 2.0**-24), np.float64)

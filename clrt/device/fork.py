@@ -1,0 +1,18 @@
+"""OpenCL and fork: a child has none of the threads that serve its parent's devices, and would wait for them forever."""
+
+from __future__ import annotations
+
+import os
+
+from ..errors import UsageError
+
+_process = 0
+
+
+def check_process() -> None:
+    """UsageError in a process that was forked from one in which this was called before."""
+    global _process
+    _process = _process or os.getpid()
+    if _process != os.getpid():
+        raise UsageError("this process was forked from one that had used OpenCL, which does not work: start it with "
+                         "multiprocessing's spawn method, or use clrt in children alone")

@@ -1,0 +1,31 @@
+// Random numbers and sums of samples, for the host to compare with exact answers.
+#include "check/rows.cl"
+#include "film.cl"
+#include "rng.cl"
+
+// in: pixel, sample. out: two dimensions' bits, then the numbers made of them
+kernel void numbers(uint count, uint block, global const ureal *in, uint seed, uint dimension, global ureal *bits,
+                    global real *units) {
+    FOR_BLOCK(i) {
+        Sampler sampler = {in[i], in[count + i], seed, dimension};
+        ureal2 drawn = next_bits(&sampler);
+        bits[i] = drawn.x;
+        bits[count + i] = drawn.y;
+        units[i] = unit_interval(drawn.x);
+        units[count + i] = unit_interval(drawn.y);
+    }
+}
+
+// in: `samples` rows of radiance. out: sum, its error, sum of squares, its error; then how many were kept and dropped
+kernel void sums(uint count, uint block, global const real *in, uint samples, global real *out, global ureal *counts) {
+    FOR_BLOCK(i) {
+        Accumulator a = {splat(ZERO), splat(ZERO), splat(ZERO), splat(ZERO), (ureal)(0), (ureal)(0), (ureal)(0)};
+        for (uint s = 0; s < samples; ++s) accumulate(&a, splat(in[s * count + i]), ALL_LANES);
+        out[i] = a.sum.x;
+        out[count + i] = a.sum_error.x;
+        out[2 * count + i] = a.square.x;
+        out[3 * count + i] = a.square_error.x;
+        counts[i] = a.count;
+        counts[count + i] = a.dropped;
+    }
+}

@@ -1,0 +1,76 @@
+"""A device that computes right passes every part; and what the parts take for exact is."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from clrt.check import star
+from clrt.check.exact import nearest_float32, ulps
+from clrt.check.findings import Findings
+from clrt.check.floats import operands
+from clrt.check.parts import PARTS
+from clrt.device.open import Device
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_device_passes(device: Device, part: str) -> None:
+    findings = Findings()
+    PARTS[part](device, findings)
+    assert not findings.failures
+
+
+def test_the_nearest_float() -> None:
+    """numpy rounds doubles right; what is no double, beside the middle between floats, only this does."""
+    doubles = np.random.default_rng(0).normal(size=1000) * 2.0 ** np.random.default_rng(1).integers(-60, 60, 1000)
+    assert [nearest_float32(Fraction(double)) for double in doubles] == list(doubles.astype(np.float32))
+    half, ulp, hair = Fraction(1, 1 << 24), Fraction(1, 1 << 23), Fraction(1, 1 << 80)
+    for exact, nearest in [(1 + half, 1), (1 + half + hair, 1 + ulp), (1 + half - hair, 1), (-1 - half, -1),
+                           (1 + ulp + half, 1 + 2 * ulp), (-1 - half - hair, -1 - ulp)]:
+        assert Fraction(float(nearest_float32(exact))) == nearest
+
+
+def test_units_in_the_last_place() -> None:
+    got = np.array([1 + 2.0**-23, 1.0, 2.0**-23, -8.0], np.float32)
+    assert ulps(got, [1.0, 1.0, 2.0**-23 * (1 + 2.0**-25), -8.0 - 2.0**-21]).tolist() == [1.0, 0.0, 0.25, 0.5]
+
+
+def test_operands_round_to_all_sides() -> None:
+    """Of sums and of products a tenth goes up, a tenth down, some are halfway, and none leaves the normal range."""
+    a, b, c = (values.astype(np.float64) for values in operands())
+    for exact in (a + b, a * b):
+        rounded = exact.astype(np.float32)
+        error = (rounded - exact) / np.spacing(np.abs(rounded))
+        assert np.mean(error > 0) > 0.1 and np.mean(error < 0) > 0.1 and np.mean(np.abs(error) == 0.5) > 0.05
+        assert np.all((np.abs(exact) > 2.0**-126) & (np.abs(exact) < 2.0**127))
+    separate = (a * b).astype(np.float32) + c
+    assert np.mean(np.abs(separate) < np.abs(a * b) * 2.0**-20) > 0.2     # what fma gives there is all rounding
+
+
+def test_the_star_is_closed_and_seen_from_inside() -> None:
+    """Every edge is one of two triangles, in opposite directions; all face outwards."""
+    surface = star.make_star()
+    edges = {tuple(edge) for a, b in ((0, 1), (1, 2), (2, 0)) for edge in surface.faces[:, [a, b]].tolist()}
+    assert len(edges) == 3 * len(surface.faces) and edges == {(b, a) for a, b in edges}
+    p0, p1, p2 = surface.vertices[surface.faces].transpose(1, 0, 2)
+    assert np.all(np.sum(np.cross(p1 - p0, p2 - p0) * p0, axis=1) > 0)
+
+
+def test_rays_of_both_kinds_agree() -> None:
+    """Rays into triangles from the origin, whose hits follow from their making, against all triangles one by one."""
+    surface = star.make_star()
+    inside = star.rays_from_inside(surface).take(slice(6, 700, 7))
+    t, least, _ = star.meet_planes(surface, np.zeros_like(inside.corners), inside.directions.astype(np.int64))
+    hit = (t > 0) & (least > 0)
+    assert np.all(hit.sum(axis=1) == 1)
+    assert np.array_equal(surface.faces[hit.argmax(axis=1)], inside.corners)
+    np.testing.assert_allclose(t[hit], inside.t, rtol=1e-15)
+    signs = np.signbit(star.rays_from_inside(surface).directions[star.rays_from_inside(surface).directions == 0])
+    assert signs.any() and not signs.all()
+
+
+def test_rays_from_elsewhere_hit_and_miss() -> None:
+    rays = star.rays_from_elsewhere(star.make_star(), 300)
+    assert len(rays.t) > 200 and 0.2 < np.mean(np.isfinite(rays.t)) < 0.9

@@ -1,0 +1,54 @@
+"""Whatever is broken, the part of the check whose matter it is says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from clrt.check.findings import Findings
+from clrt.check.parts import PARTS
+from clrt.device import program
+from clrt.device.open import Device, open_device
+
+from .sabotage import sabotaged
+
+#: The part that must notice, what is replaced in the kernels, by what, and a line before that.
+SABOTAGES = {
+    "roots left out": ("arithmetic", r"\bsqrt\(", "("),
+    "an fma that rounds twice": ("arithmetic", r"\bfma\(", "TWICE(",
+                                 "#define TWICE(a, b, c) (fma(a, b, (c) * 0.0f) + (c))"),
+    "a minimum that keeps NaN": ("comparisons", r"return a < b \? a : b;", "return b < a ? b : a;"),
+    "one bit too many": ("integers", r"\bpopcount\(", "1 + popcount("),
+    "conversion that truncates": ("integers", r"PASTE\(convert_float, LANES\)",
+                                  "PASTE(PASTE(convert_float, LANES), _rtz)"),
+    "the lane before": ("masks", r"31 - \(int\)clz", "30 - (int)clz"),
+    "an atomic that is none": ("memory", r"\batomic_max\(", "SET(", "#define SET(place, value) (*(place) = (value))"),
+    "another hash": ("random numbers", r"1664525u", "1664527u"),
+    "sums without their errors": ("sums", r"real s = \*sum \+ x;[^}]*", "*sum += x;"),
+    "boxes inside out": ("rays", r"t_near <= t_far", "t_near > t_far"),
+    "cracks between triangles": ("rays", r"u1 >= u2\)(.*\n.*)u1 <= u2\)", r"u1 > u2)\1u1 < u2)"),
+    "the far child forgotten": ("binary tree", r"distance\[top\+\+\] = far;", ""),
+    "boxes too small": ("tree builder", r"box_union\(Box a, Box b\) \{", r"\g<0>\n    b = a;"),
+    "paint that swallows light": ("furnace", r"sample.weight = (GATHER3\(scene->diffuse.*\));",
+                                  r"sample.weight = scale(\1, (real)(0.999999f));"),
+    "light that does not fade": ("lamp", r"inverse \* inverse", "inverse"),
+    "weights that sum to two": ("room", r"return 1.0f / \(1.0f \+ ratio \* ratio\);", "return ONE;"),
+    "a density off by a tenth": ("room", r"return t \* t / \(absolute", "return 1.1f * t * t / (absolute"),
+}
+
+
+@pytest.fixture(scope="module")
+def best() -> Device:
+    """The device that is used when none is named."""
+    return open_device()
+
+
+@pytest.mark.parametrize("name", SABOTAGES)
+def test_what_is_broken_is_found(best: Device, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    part, *edit = SABOTAGES[name]
+    folder = sabotaged(tmp_path / "kernels", *edit)
+    monkeypatch.setattr(program, "kernel_folder", lambda: folder)
+    findings = Findings()
+    PARTS[part](best, findings)
+    assert findings.failures, f"{name} is not found by {part}"

@@ -1,0 +1,143 @@
+"""Every kernel at work on something small, in all its forms: little enough for a simulator.
+
+    CLRT_DEVICE=oclgrind python -m tests.small_work cpu answers.npz
+
+works with the device as with a CPU, or as with a GPU, and stores what came out, and which kernel files were compiled.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import NDArray
+
+import clrt
+from clrt.accel.build import build_tree
+from clrt.accel.device_builder import SHAPES
+from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, UPPER_LEVELS, HitTests
+from clrt.device import blocks, program
+from clrt.device.open import Device, open_device
+from clrt.rendering.compile import OFFSETS, compile_scene
+from clrt.rendering.session import Session
+from clrt.scene.model import Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.tree_query import TRAVERSALS
+
+from .accel.cases import soup, spheres
+from .probe import choices
+from .rendering.rays import icosphere
+from .rendering.test_variants import everything
+
+#: How a device is worked with, whatever its type; groups of a GPU, and parts of a scan, small enough to have several.
+DEVICES: dict[str, dict[str, Any]] = {"cpu": {"lanes": 8, "local_size": 1, "layout": "bvh8"},
+                                      "gpu": {"lanes": 1, "local_size": 4, "layout": "cwbvh"}}
+SCANS = {"SCAN_ITEMS": 4, "SCAN_PART": 256}
+SETTINGS = RenderSettings(size=(6, 4), spp=2, max_depth=5, seed=11)
+TRIANGLES = soup(60, 0.5)
+FACES = np.arange(3 * len(TRIANGLES), dtype=np.int32).reshape(-1, 3)
+RNG = np.random.default_rng(7)
+ORIGINS = RNG.uniform(-1, 2, (33, 3)).astype(np.float32)
+DIRECTIONS = (RNG.random((33, 3)) - ORIGINS).astype(np.float32)
+TO_WORLD = np.concatenate([np.linalg.qr(RNG.normal(size=(5, 3, 3)))[0], RNG.normal(size=(5, 3, 1))], axis=2)
+Answers = dict[str, NDArray[Any]]
+
+
+def scene() -> Scene:
+    """All kinds of primitives, materials and lights, and few triangles."""
+    full, (vertices, faces) = everything(), icosphere(0)
+    smooth = [Mesh((mesh.vertices.mean(axis=0) + vertices).astype(np.float32), faces, mesh.material, normals=vertices)
+              for mesh in full.meshes if mesh.normals is not None]
+    return replace(full, meshes=[*(mesh for mesh in full.meshes if mesh.normals is None), *smooth], render=SETTINGS)
+
+
+def picture(device: Device, what: Scene, **chosen: Any) -> Answers:
+    """Its mean, (h, w, 3). chosen: see Choices."""
+    compiled = compile_scene(what, choices(device, **chosen), device=device)
+    session = Session(device, compiled, what.render.size, what.render.max_depth, what.render.seed)
+    for _ in session.render(what.render.spp):
+        pass
+    return {"mean": session.film().mean}
+
+
+def hits(query: clrt.RayQuery | clrt.InstancedRayQuery) -> Answers:
+    """What the rays meet first and next, and whether they meet anything close."""
+    closest, (ray, several) = query.closest_hit(ORIGINS, DIRECTIONS), query.all_hits(ORIGINS, DIRECTIONS, max_hits=2)
+    return {"t": closest["t"], "primitive": closest["primitive"], "blocked": query.any_hit(ORIGINS, DIRECTIONS, 0.7),
+            "ray": ray, "several": several["primitive"]}
+
+
+def mesh_hits(device: Device, layout: str, traversal: str) -> Answers:
+    """In a tree that was built over other triangles, and refitted."""
+    query = clrt.RayQuery(TRIANGLES[::-1].reshape(-1, 3), FACES, device=device.info.index, layout=layout,
+                          builder="ploc" if layout in SHAPES else "sah", traversal=traversal)
+    query.refit(TRIANGLES.reshape(-1, 3))
+    return hits(query)
+
+
+def instance_hits(device: Device, layout: str, traversal: str) -> Answers:
+    """Of five instances of two meshes."""
+    meshes = [(TRIANGLES[part].reshape(-1, 3), FACES[:len(TRIANGLES[part])]) for part in (slice(0, 40), slice(40, 60))]
+    return hits(clrt.InstancedRayQuery(meshes, [0, 1, 1, 0, 1], TO_WORLD, device=device.info.index, layout=layout,
+                                       traversal=traversal))
+
+
+def variants() -> Iterator[dict[str, Any]]:
+    """Choices that are there to compare, each at least once."""
+    for i, triangle in enumerate(TRIANGLE_TESTS):
+        box, sphere, offset = (list(known)[i % len(known)] for known in (BOX_TESTS, SPHERE_TESTS, OFFSETS))
+        yield {"tests": HitTests(triangle, box, sphere), "offset": offset}
+
+
+def work(device: Device) -> Iterator[tuple[str, Answers]]:
+    """Answers by subject and way. All ways should answer alike."""
+    for layout in TREES:
+        builder = "reinsertion" if layout in SHAPES else "sah"
+        yield f"scene {layout}", picture(device, scene(), layout=layout, builder=builder)
+    for chosen in variants():
+        yield chosen["tests"].triangle, picture(device, scene(), **chosen)
+    yield "ball", picture(device, Scene(spheres=[Sphere()], environment=Environment(color=(1, 1, 1)), render=SETTINGS))
+    for layout in SHAPES:
+        build_tree(device, layout, "ploc", soup(0), spheres(60))
+    for layout, traversal in [*((layout, "single") for layout in TREES), *(("bvh8", way) for way in TRAVERSALS[1:])]:
+        yield f"mesh {layout} {traversal}", mesh_hits(device, layout, traversal)
+        if layout in UPPER_LEVELS and traversal != "packet":
+            yield f"instances {layout} {traversal}", instance_hits(device, layout, traversal)
+
+
+def compiled_files() -> list[str]:
+    """The kernel files of all programs that this process has built."""
+    return sorted({file for built in program._built.values() for file in program.files_of(built.source)})
+
+
+class KeptBuffer(cl.Buffer):
+    """Is never released.
+
+    Oclgrind 21.10 remembers of a released buffer, under its number, which bytes were written; those that the next one
+    of that number has more count as never written.
+    """
+
+    kept: list[cl.Buffer] = []
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.kept.append(self)
+
+    def release(self) -> None:
+        """Not now."""
+
+
+def main(form: str, path: str) -> None:
+    """Works with the device as with a `form` of DEVICES; writes the answers to `path`, an .npz file."""
+    for owner, values in ((Device, DEVICES[form]), (blocks, SCANS), (cl, {"Buffer": KeptBuffer})):
+        for name, value in values.items():
+            setattr(owner, name, value)
+    answers = {f"{way}/{name}": array for way, found in work(open_device()) for name, array in found.items()}
+    np.savez(path, compiled_files=compiled_files(), **answers)  # type: ignore[arg-type]
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
