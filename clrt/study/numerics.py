@@ -19,6 +19,7 @@ from .cases.spheres import measure_spheres
 from .cases.subject import Subject
 from .cases.watertight import measure_watertight
 from .hits import measure_hits
+from .pictures import measure_pictures
 from .row import Row
 from .samplers import measure_samplers
 
@@ -38,6 +39,7 @@ def measure_device(device: int, *, quick: bool) -> Iterator[Row]:
     """All rows of one device, by its default tests. What it fails to run is a row with a wrong answer."""
     for measure in GEOMETRY:
         yield from _or_error(measure.__name__, lambda: measure(Subject(device), quick=quick))
+    yield from _or_error("measure_pictures", lambda: measure_pictures(Subject(device), quick=quick))
     yield from _or_error("measure_samplers", lambda: measure_samplers(open_device(device), quick=quick))
 
 

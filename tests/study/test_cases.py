@@ -17,10 +17,11 @@ from clrt.study.cases.subject import Subject, ulps
 from clrt.study.cases.watertight import measure_watertight, misses, placed
 from clrt.study.families import FAMILIES, FIGURES, measure_families
 from clrt.study.numerics import GEOMETRY
+from clrt.study.pictures import measure_pictures
 from clrt.study.shapes import icosphere
 
 
-@pytest.mark.parametrize("measure", GEOMETRY, ids=lambda measure: str(measure.__name__))
+@pytest.mark.parametrize("measure", [*GEOMETRY, measure_pictures], ids=lambda measure: str(measure.__name__))
 def test_nothing_is_wrong(device: Device, measure: object) -> None:
     assert callable(measure)
     rows = list(measure(Subject(device.info.index), quick=True))
@@ -56,6 +57,13 @@ def test_textbook_spheres_are_found_out(device: Device) -> None:
 def test_fixed_offsets_are_found_out(device: Device) -> None:
     subject = Subject(device.info.index, offset="fixed")
     assert sum(row.wrong for row in measure_departures(subject, quick=True)) > 100
+
+
+def test_pictures_off_by_a_hundredth_are_found_out(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The floors stay as white as they are."""
+    monkeypatch.setattr("clrt.study.pictures.ALBEDO", 0.505)
+    rows = [row for row in measure_pictures(Subject(device.info.index), quick=True) if row.unit == "standard errors"]
+    assert [row.what for row in rows if row.wrong] == ["a point light", "a lamp like a ball", "a tiny lamp"]
 
 
 def test_exact_hits_of_a_sphere() -> None:

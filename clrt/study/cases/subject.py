@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...query import RayQuery
+from ...rendering.film import Film
 from ...rendering.renderer import Renderer
 from ...scene.model import Scene
 from ..rays import Floats
@@ -38,10 +39,14 @@ class Subject:
 
     def picture(self, scene: Scene, spp: int = 1) -> Floats:
         """(height, width, 3): the scene after `spp` samples a pixel."""
+        return self.film(replace(scene, render=replace(scene.render, spp=spp))).mean.astype(np.float32)
+
+    def film(self, scene: Scene) -> Film:
+        """The scene by its own settings."""
         renderer = Renderer(scene, device=self.device, layout=self.layout, triangle=self.triangle, box=self.box,
                             sphere=self.sphere, offset=self.offset)
-        *_, last = renderer.passes(spp=spp)
-        return last.pixels
+        *_, last = renderer.passes(spp=scene.render.spp)
+        return last.film
 
 
 def unit_vectors(rng: np.random.Generator, count: int) -> Doubles:
