@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .scene.materials import (Diffuse as Diffuse, MetallicRoughness as MetallicRoughness, Mirror as Mirror)
     from .scene.model import (Camera as Camera, Environment as Environment, Mesh as Mesh,
                               RenderSettings as RenderSettings, Scene as Scene, Sphere as Sphere)
+    __version__: str
 
 _HOME = {
     "api": ("load", "render"),
@@ -47,6 +48,8 @@ __all__ = sorted([*_MODULE_OF, *_MODULES])
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return import_module("importlib.metadata").version("clrt")
     if name in _MODULES:
         return import_module(f".{name}", __name__)
     if name not in _MODULE_OF:

@@ -19,8 +19,8 @@ from .tree_query import TreeQuery
 class RayQuery(TreeQuery):
     """Triangles, and maybe spheres, to shoot rays at; how rays are given and answered is in `TreeQuery`, its base.
 
-    vertices: (n, 3) float32; faces: (m, 3) int32; spheres: (s, 4) float32, centre and radius, which are the primitives
-    m … m + s − 1, with u = v = 0. Answers depend on none of the first four choices:
+    vertices: (n, 3) float32, or float64 if far from the origin; faces: (m, 3) int32; spheres: (s, 4) float32, centre
+    and radius, the primitives m … m + s − 1, with u = v = 0. Answers depend on none of the first four choices:
     device: a number, an id, a part of a name, "cpu" or "gpu", see `clrt.devices()`; None takes the best.
     layout: "bvh8", "bvh2", "cwbvh" or "list" (no tree); None takes bvh8 on CPUs and cwbvh on GPUs.
     builder: "sah" or "midpoint" in numpy, "ploc" or "reinsertion" on the device; None takes sah for small meshes and

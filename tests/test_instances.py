@@ -168,7 +168,9 @@ def test_nothing_to_hit(device: Device, layout: str) -> None:
 
 
 @pytest.mark.parametrize("mesh, matrix, message", [
-    ([3], np.eye(3, 4), r"mesh\[0\] = 3: there are 3 meshes"),
+    ([3], np.eye(3, 4), r"mesh\[0\] = 3: the length of meshes is 3"),
+    ([0], np.eye(4), r"transforms \(1, 4, 4\) must .*transforms\[:, :3\]"),
+    ([0], 1j * np.eye(3, 4), "transforms has dtype complex128"),
     ([0], np.diag([1.0, 1.0, 0.0]) @ np.eye(3, 4), r"transforms\[0\].*flattens the mesh"),
     ([0], np.full((3, 4), np.nan), r"transforms\[0\].*not finite"),
     ([0.5], np.eye(3, 4), "whole numbers"),
@@ -176,6 +178,31 @@ def test_nothing_to_hit(device: Device, layout: str) -> None:
 def test_mistakes_are_named(device: Device, mesh: list[Any], matrix: Doubles, message: str) -> None:
     with pytest.raises(clrt.SceneError, match=message):
         clrt.InstancedRayQuery(MESHES, mesh, matrix[None], device=device.info.index)
+
+
+def test_every_fault_of_transforms_is_named(device: Device) -> None:
+    faulty = np.tile(np.eye(3, 4), (6, 1, 1))
+    faulty[[1, 3]], faulty[[2, 4, 5], 0, 0] = [[[np.nan]], [[np.inf]]], 0
+    with pytest.raises(clrt.SceneError) as caught:
+        clrt.InstancedRayQuery(MESHES, [0] * 6, faulty, device=device.info.index)
+    first, second = caught.value.problems
+    assert first.startswith("transforms[1]") and "not finite" in first and "1 more" in first
+    assert second.startswith("transforms[2]") and "flattens" in second and "2 more" in second
+
+
+@pytest.mark.parametrize("meshes, message", [
+    (MESHES[0], r"meshes\[0\] is not a pair \(vertices, faces\); write"), (None, "meshes is a NoneType"),
+    ([MESHES[0], (np.zeros((3, 3)), [[0, 1, 3]])], r"^meshes\[1\]: faces\[0\]"),
+])
+def test_what_are_no_meshes_is_refused(device: Device, meshes: Any, message: str) -> None:
+    with pytest.raises(clrt.SceneError, match=message):
+        clrt.InstancedRayQuery(meshes, [0], np.eye(3, 4)[None], device=device.info.index)
+
+
+def test_hits_hold_what_is_documented(device: Device) -> None:
+    query = clrt.InstancedRayQuery(MESHES, [0], np.eye(3, 4)[None], device=device.info.index)
+    for hits in (query.closest_hit([0, 0, 2], [0, 0, -1]), query.all_hits([0, 0, 2], [0, 0, -1])[1]):
+        assert hits.dtype.names == ("t", "primitive", "u", "v", "instance")
 
 
 def test_a_layout_without_an_upper_level_is_refused(device: Device) -> None:

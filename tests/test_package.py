@@ -5,7 +5,10 @@ from __future__ import annotations
 import subprocess
 import sys
 import zipfile
+from configparser import ConfigParser
 from pathlib import Path
+
+import clrt
 
 ROOT = Path(__file__).parent.parent
 
@@ -24,6 +27,12 @@ def test_wheel_holds_every_module_and_kernel(tmp_path: Path) -> None:
     kernels = {f"clrt/{file.relative_to(ROOT)}" for pattern in ("*.cl", "__init__.py")
                for file in (ROOT / "kernels").rglob(pattern)}
     assert packed == modules | kernels
+
+
+def test_version_is_the_package_s() -> None:
+    setup = ConfigParser()
+    setup.read(ROOT / "setup.cfg")
+    assert clrt.__version__ == setup["metadata"]["version"]
 
 
 def test_import_loads_nothing_heavy() -> None:

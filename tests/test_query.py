@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -134,7 +138,14 @@ def test_a_mesh_without_faces_is_empty(device: Device) -> None:
     (np.zeros((3, 3)), [[0, 1, 3]], "faces[0]"),
     (np.zeros((3, 3)), [[0, -1, 2]], "faces[0]"),
     (np.zeros((3, 3)), [[0.0, 1.0, 2.0]], "float64"),
+    (np.zeros((4, 3)), [[1, 2, 3], [2, 3, 4]], "faces[1] = [2, 3, 4]: there are 4 vertices, and they count from 0"),
     ([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]], "vertices[2]"),
+    ([[0, 0, 0], [1e300, 0, 0], [0, 1, 0]], [[0, 1, 2]], "vertices[1] = [1e+300, 0.0, 0.0]"),
+    (np.zeros((3, 3), complex), [[0, 1, 2]], "vertices has dtype complex128"),
+    (np.zeros((3, 3)), [[0j, 1, 2]], "faces has dtype complex128"),
+    ([[0, 0, 0], [1, 0]], [[0, 1, 2]], "vertices is no array"),
+    (np.zeros((3, 3)), [[0, 1, 2], [0]], "faces is no array"),
+    (np.zeros((3, 3)), "faces", "faces has dtype"),
 ])
 def test_what_is_no_mesh_is_refused(vertices: Any, faces: Any, words: str) -> None:
     with pytest.raises(clrt.SceneError) as caught:
@@ -142,9 +153,88 @@ def test_what_is_no_mesh_is_refused(vertices: Any, faces: Any, words: str) -> No
     assert words in str(caught.value)
 
 
-def test_rays_that_do_not_fit_are_refused(soup: clrt.RayQuery) -> None:
-    misfits: list[tuple[Any, Any, Any]] = [(np.zeros((2, 3)), np.ones((3, 3)), 1.0), (np.zeros(2), np.ones(3), 1.0),
-                                           (np.zeros((2, 3)), np.ones((2, 3)), np.ones(3))]
-    for origins, directions, t_max in misfits:
-        with pytest.raises(clrt.UsageError):
-            soup.closest_hit(origins, directions, t_max)
+@pytest.mark.parametrize(("origins", "directions", "t_max", "words"), [
+    (np.zeros((2, 3)), np.ones((3, 3)), 1, r"directions \(3, 3\): there are 2 origins"),
+    (np.zeros((2, 3)), np.ones((2, 3)), np.ones(3), r"t_max \(3,\): there are 2 origins"),
+    (np.zeros(3), np.ones((2, 3)), np.ones(3), r"t_max \(3,\): there are 2 directions"),
+    (np.zeros(2), np.ones(3), 1, r"origins \(2,\) must"),
+    (np.zeros((3, 9)), np.ones((3, 9)), 1, r"origins \(3, 9\) must"),
+    (np.zeros(3), np.ones((2, 2, 3)), 1, r"directions \(2, 2, 3\) must"),
+    (np.zeros(3), np.ones(3), np.ones((2, 2)), r"t_max \(2, 2\) must"),
+    (np.zeros(3), np.ones(3), None, "t_max has dtype object"),
+    (np.zeros(3), np.ones(3), "far", "t_max has dtype"),
+    (np.zeros(3, complex), np.ones(3), 1, "origins has dtype complex128"),
+    ([[0, 0, 0], [0]], np.ones(3), 1, "origins is no array"),
+])
+def test_rays_that_do_not_fit_are_refused(device: Device, origins: Any, directions: Any, t_max: Any,
+                                          words: str) -> None:
+    query = clrt.RayQuery(VERTICES, FACES, device=device.info.index)
+    for ask in (query.closest_hit, query.any_hit, query.all_hits):
+        with pytest.raises(clrt.UsageError, match=words):
+            ask(origins, directions, t_max)
+
+
+@pytest.mark.parametrize("max_hits", [0, 2.5, None, "all"])
+def test_numbers_of_hits_are_whole(device: Device, max_hits: Any) -> None:
+    with pytest.raises(clrt.UsageError, match=f"max_hits is {max_hits!r}"):
+        clrt.RayQuery(VERTICES, FACES, device=device.info.index).all_hits(ORIGINS, DIRECTIONS, max_hits=max_hits)
+
+
+@pytest.mark.parametrize(("choice", "words"), [
+    ({"layout": "bvh9"}, "bvh2, bvh8, cwbvh"), ({"builder": "lbvh"}, "ploc, reinsertion, sah, midpoint"),
+    ({"traversal": "pol"}, "single, packet, pool"), ({"traversal": "pool", "layout": "bvh2"}, "bvh8, not bvh2"),
+    ({"triangle": "watertite"}, "watertight, "), ({"box": "loose"}, "robust, plain"), ({"sphere": "flat"}, "textbook"),
+])
+def test_choices_that_are_none_are_refused(device: Device, choice: dict[str, Any], words: str) -> None:
+    with pytest.raises(clrt.UsageError, match=words):
+        clrt.RayQuery(VERTICES, FACES, device=device.info.index, **choice)
+
+
+def test_programs_that_are_none_are_refused(soup: clrt.RayQuery) -> None:
+    for name, traversal in (("closesthit", "single"), ("closest_hit", "pol")):
+        with pytest.raises(clrt.UsageError, match="take one of"):
+            soup.source(name, traversal)
+
+
+def test_numbers_beyond_float32_are_infinite(soup: clrt.RayQuery) -> None:
+    """Without a word: a limit that cuts nothing, an origin from which nothing is met."""
+    np.testing.assert_array_equal(soup.any_hit(ORIGINS, DIRECTIONS, 1e300), soup.any_hit(ORIGINS, DIRECTIONS))
+    assert not soup.any_hit([1e300, 0, 0], DIRECTIONS).any()
+
+
+def test_threads_share_a_query(device: Device) -> None:
+    """Each gets the answers to its own rays, however often they take turns."""
+    query = clrt.RayQuery(VERTICES, FACES, device=device.info.index)
+    parts = [slice(size) for size in (300, 700, 1500, 3000)] * 100
+    expected = query.closest_hit(ORIGINS, DIRECTIONS)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as threads:
+            answers = list(threads.map(lambda part: query.closest_hit(ORIGINS[part], DIRECTIONS[part]), parts))
+    finally:
+        sys.setswitchinterval(interval)
+    for part, answer in zip(parts, answers):
+        np.testing.assert_array_equal(answer, expected[part])
+
+
+def test_a_forked_process_is_refused(device: Device) -> None:
+    """It would wait forever, for the query of its parent and for one of its own."""
+    query = clrt.RayQuery(VERTICES, FACES, device=device.info.index)
+    query.any_hit(ORIGINS, DIRECTIONS)
+    for ask in (lambda: query.any_hit(ORIGINS, DIRECTIONS), lambda: clrt.RayQuery(VERTICES, FACES)):
+        child = os.fork()
+        if not child:
+            signal.alarm(20)
+            try:
+                ask()
+            except clrt.UsageError as error:
+                os._exit(0 if "spawn" in str(error) else 1)
+            finally:
+                os._exit(2)
+        assert os.waitpid(child, 0)[1] == 0
+
+
+def test_a_query_says_what_it_is(device: Device) -> None:
+    query = clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout="bvh2")
+    assert repr(query) == f"<RayQuery: 400 triangles, 0 spheres; bvh2 on {device.info.name}>"

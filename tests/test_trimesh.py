@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import numpy as np
+import pytest
 import trimesh
 from numpy.typing import NDArray
 
@@ -18,32 +20,67 @@ def rays(n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return RNG.uniform(-1.5, 1.5, (n, 3)), RNG.normal(size=(n, 3))
 
 
-def test_documented_example(device: Device) -> None:
-    """From trimesh's examples: two rays through a sphere, each of which enters and leaves it."""
-    mesh = trimesh.primitives.Sphere().to_mesh()
+def reference(mesh: Any) -> Any:
+    """trimesh's engine in float64."""
+    return trimesh.ray.ray_triangle.RayMeshIntersector(mesh)
+
+
+@pytest.mark.parametrize("mesh", [trimesh.primitives.Sphere().to_mesh(), trimesh.creation.icosphere(),
+                                  trimesh.creation.box(), trimesh.creation.cylinder(1, 2)],
+                         ids=["sphere", "icosphere", "box", "cylinder"])
+def test_a_corner_is_one_location(device: Device, mesh: Any) -> None:
+    """trimesh's documented example: two rays, one of which enters and leaves where up to 32 triangles meet."""
     mesh.ray = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index)
-    origins, directions = np.array([[0, 0, -5], [2, 2, -10]]), np.array([[0, 0, 1], [0, 0, 1]])
-    locations, index_ray, index_tri = mesh.ray.intersects_location(ray_origins=origins, ray_directions=directions)
-    assert set(index_ray) == {0} and len(index_tri) >= 2
-    np.testing.assert_allclose(np.unique(np.round(locations, 5), axis=0), [[0, 0, -1], [0, 0, 1]], atol=1e-4)
+    two = np.array([[0, 0, -5], [2, 2, -10]]), np.array([[0, 0, 1], [0, 0, 1]])
+    locations, index_ray, index_tri = mesh.ray.intersects_location(*two)
+    expected, _, _ = reference(mesh).intersects_location(*two)
+    np.testing.assert_allclose(locations, expected[np.argsort(expected[:, 2])], atol=1e-15, rtol=0)
+    assert index_ray.tolist() == [0, 0] and len(mesh.ray.intersects_id(*two)[0]) >= 2
+    assert len(mesh.ray.intersects_id(*two, return_locations=True)[0]) == 2
 
 
 def test_same_answers_as_trimesh(device: Device) -> None:
     """On a torus inside a box; away from edges, which its engine takes or leaves as rounding falls."""
     mesh = trimesh.util.concatenate([trimesh.creation.torus(0.7, 0.25), trimesh.creation.box((2.5, 2.5, 2.5))])
     own = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index)
-    theirs: Any = trimesh.ray.ray_triangle.RayMeshIntersector(mesh)
+    theirs = reference(mesh)
     origins, directions = rays(400)
     ours, expected = own.intersects_location(origins, directions), theirs.intersects_location(origins, directions)
     assert [a.dtype for a in ours] == [a.dtype for a in expected] and ours[0].shape == expected[0].shape
-    order, reference = (np.lexsort((triangle, ray)) for _, ray, triangle in (ours, expected))
+    order, expected_order = (np.lexsort((triangle, ray)) for _, ray, triangle in (ours, expected))
     for a, b, exact in zip(ours, expected, (False, True, True)):
-        np.testing.assert_allclose(a[order], b[reference], atol=0 if exact else 1e-5, rtol=0)
+        np.testing.assert_allclose(a[order], b[expected_order], atol=0 if exact else 1e-14, rtol=0)
     for method in ("intersects_first", "intersects_any"):
         ours, expected = (getattr(engine, method)(origins, directions) for engine in (own, theirs))
         np.testing.assert_array_equal(ours, expected)
     triangle, ray = own.intersects_id(origins, directions, multiple_hits=False)
     np.testing.assert_array_equal(triangle, own.intersects_first(origins, directions)[ray])
+
+
+def test_locations_lie_on_ray_and_plane(device: Device) -> None:
+    """In float64, though the hits are found in float32."""
+    mesh = trimesh.creation.icosphere(subdivisions=4)
+    origins, directions = rays(5000)
+    locations, index_ray, index_tri = clrt.trimesh.RayMeshIntersector(
+        mesh, device=device.info.index).intersects_location(origins, directions)
+    unit = directions[index_ray] / np.linalg.norm(directions[index_ray], axis=1, keepdims=True)
+    assert len(locations) > 1000
+    assert np.abs(np.cross(locations - origins[index_ray], unit)).max() < 2e-15
+    plane = (locations - mesh.triangles[index_tri][:, 0]) * mesh.face_normals[index_tri]
+    assert np.abs(plane.sum(axis=1)).max() < 4e-15
+
+
+def test_rays_along_a_plane_are_located_on_the_triangle(device: Device) -> None:
+    """In float64 such rays pass the plane anywhere or nowhere; most of those that float32 lets hit do so inside."""
+    mesh = trimesh.creation.icosphere()
+    corners = mesh.triangles[RNG.integers(0, len(mesh.faces), 5000)]
+    one, other = (np.einsum("nk,nkj->nj", weights, corners) for weights in RNG.dirichlet([1, 1, 1], (2, 5000)))
+    locations, _, index_tri = clrt.trimesh.RayMeshIntersector(
+        mesh, device=device.info.index).intersects_location(one - 9 * (other - one), other - one)
+    assert len(locations) > 1000
+    hit = mesh.triangles[index_tri]
+    beyond = np.maximum(hit.min(axis=1) - locations, locations - hit.max(axis=1)).max(axis=1)
+    assert (beyond > 1e-5).mean() < 1e-3 and beyond.max() < 0.2
 
 
 def test_contains_points(device: Device) -> None:
@@ -53,6 +90,55 @@ def test_contains_points(device: Device) -> None:
     contains = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index).contains_points(points)
     np.testing.assert_array_equal(contains[radius > 1], False)
     np.testing.assert_array_equal(contains[radius < 0.99], True)
+
+
+def test_a_hundred_shells_hide_none(device: Device) -> None:
+    """The middle of 121 spheres is inside of an odd number, and a ray through them meets each twice."""
+    shells = [trimesh.creation.icosphere(subdivisions=1, radius=radius) for radius in np.linspace(0.1, 1, 121)]
+    ray = clrt.trimesh.RayMeshIntersector(trimesh.util.concatenate(shells), device=device.info.index)
+    between = 0.5 * (shells[7].vertices[:1] + shells[8].vertices[:1])
+    np.testing.assert_array_equal(ray.contains_points([[0, 0, 0.01], *between, [0, 0, 1.01]]), [True, True, False])
+    through = [[0.01, 0.02, -5]], [[0, 0, 1]]
+    assert len(ray.intersects_location(*through)[0]) == len(ray.intersects_id(*through)[0]) == 242
+    assert len(ray.intersects_location(*through, max_hits=3)[0]) == 3
+    assert len(ray.intersects_location(*through, multiple_hits=False)[0]) == 1
+
+
+def test_a_changed_mesh_is_asked_anew(device: Device) -> None:
+    mesh = trimesh.creation.box()
+    mesh.ray = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index)
+    places = [[0, 0, 0], [100, 0, 0]]
+    assert mesh.contains(places).tolist() == [True, False]
+    mesh.apply_translation([100, 0, 0])
+    assert mesh.contains(places).tolist() == [False, True]
+    mesh.update_faces(mesh.face_normals[:, 2] < 0.5)
+    down = [100.1, 0.2, 9], [0, 0, -1]
+    np.testing.assert_allclose(mesh.ray.intersects_location(*down)[0], [[100.1, 0.2, -0.5]], atol=1e-13)
+    mesh.vertices[:, 2] += 1
+    np.testing.assert_allclose(mesh.ray.intersects_location(*down)[0], [[100.1, 0.2, 0.5]], atol=1e-13)
+
+
+def test_a_pickled_mesh_answers(device: Device) -> None:
+    mesh = trimesh.creation.box()
+    mesh.ray = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index)
+    copy = pickle.loads(pickle.dumps(mesh))
+    copy.apply_translation([9, 0, 0])
+    assert copy.contains([[9, 0, 0]]).all() and mesh.contains([[0, 0, 0]]).all()
+
+
+@pytest.mark.parametrize("shape", [(3, 300), (300, 2), (300,), (2, 2, 3)])
+@pytest.mark.parametrize("method", ["intersects_id", "intersects_location", "intersects_first", "intersects_any",
+                                    "contains_points"])
+def test_arrays_of_other_shapes_are_refused(device: Device, method: str, shape: tuple[int, ...]) -> None:
+    ray = clrt.trimesh.RayMeshIntersector(trimesh.creation.box(), device=device.info.index)
+    with pytest.raises(clrt.UsageError, match="must have"):
+        getattr(ray, method)(*[np.ones(shape)] * (1 if method == "contains_points" else 2))
+
+
+@pytest.mark.parametrize("other", [None, trimesh.Scene(trimesh.creation.box()), trimesh.PointCloud([[0, 0, 0]])])
+def test_what_is_no_mesh_is_refused(other: Any) -> None:
+    with pytest.raises(clrt.UsageError, match=rf"{type(other).__name__}.*to_mesh"):
+        clrt.trimesh.RayMeshIntersector(other)
 
 
 def test_coincident_surfaces_all_count(device: Device) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from .tables import race_table
+from .tables import race_legend, race_table
 
 
 @click.command("build")
@@ -47,27 +47,29 @@ def _builder_lines(result: Mapping[str, Any]) -> list[str]:
     for name, row in result["builders"].items():
         lines.append(f"  {name:12}" + "".join(
             f"{row[key]:{form}}" if row.get(key) is not None else " " * 12 for _, key, form in BUILDER_COLUMNS))
-    return lines
+    return lines + ["  first call: seconds with all that it prepares; peak: bytes while the device builds",
+                    "  ratio: of the SAH cost to that of the builder sah"]
 
 
 BUILDER_COLUMNS = [("seconds", "seconds", "12.4f"), ("first call", "first_seconds", "12.4f"),
                    ("Mtri/s", "mtriangles", "12.3f"), ("B/triangle", "bytes_per_triangle", "12.1f"),
                    ("peak B/tri", "peak_bytes_per_triangle", "12.1f"), ("SAH cost", "sah_cost", "12.2f"),
-                   ("to sah's", "cost_ratio", "12.3f"), ("depth", "depth", "12"), ("stack", "stack", "12")]
+                   ("ratio", "cost_ratio", "12.3f"), ("depth", "depth", "12"), ("stack", "stack", "12")]
 
 
 def _ray_lines(result: Mapping[str, Any]) -> list[str]:
-    lines = race_table("triangles", result["kinds"], result["device_type"] == "cpu", agrees=False)
-    lines.append("  seconds of a ray = a + b·log2(triangles)")
+    on_cpu = result["device_type"] == "cpu"
+    lines = race_table("triangles", result["kinds"], on_cpu, agrees=False)
+    lines += [race_legend(on_cpu), "  seconds of a ray = a + b·log2(triangles)"]
     return lines + [f"  {kind:12} a = {1e9 * fit['a']:8.1f} ns, b = {1e9 * fit['b']:6.2f} ns, R² = {fit['r2']:.3f}"
                     for kind, fit in result["fits"].items()]
 
 
 def _fresh_lines(result: Mapping[str, Any]) -> list[str]:
-    lines = [f"  {'a new process':24}{'tree, s':>10}{'from arrays':>13}{'first call':>12}{'peak, MB':>10}"]
+    lines = [f"  {'a new process, seconds':24}{'tree':>10}{'query':>10}{'first call':>12}{'peak, MB':>10}"]
     names = {"compiled": "kernels compiled", "cached": "kernels cached", "largest": "the largest mesh"}
     for name, row in result.items():
         peak = f"{row['peak_bytes'] / 1e6:10.0f}" if row["peak_bytes"] else f"{'?':>10}"
-        lines.append(f"  {names[name]:24}{row['tree_seconds']:10.3f}{row['build_seconds']:13.3f}"
+        lines.append(f"  {names[name]:24}{row['tree_seconds']:10.3f}{row['build_seconds']:10.3f}"
                      f"{row['answer_seconds']:12.3f}{peak}")
-    return lines
+    return lines + ["  query: from arrays to the tree on the device; first call: then to the first answers"]

@@ -19,16 +19,18 @@ def hits_command(device: str | None, quick: bool, json_file: Path | None) -> Non
     A million rays a mesh: random ones, and ones aimed at vertices, at edges and along the axes. Then how many of the
     answers are wrong by float64.
     """
-    from ..device.discover import devices
+    from ..device.discover import choose, devices
     from ..output.files import check_target
     from ..output.report import write_report
     from ..study.hits import measure_hits
 
     if json_file is not None:
         check_target(json_file)
-    found, results = devices(), []
+    only = None if device is None else choose(device)[0].index
+    found, results = [each for each in devices() if only in (None, each["index"])], []
     for each in found:
         click.echo(f"device {each['index']}: {each['name']} ({each['platform']}, {each['driver']})")
+    click.echo("Below each kind of rays: how many answers are not the first line's, bit by bit")
     for result in measure_hits(quick=quick, device=device):
         click.echo("\n" + "\n".join(_lines(result)))
         results.append(result)
@@ -48,8 +50,8 @@ def _lines(result: Mapping[str, Any]) -> list[str]:
             f"{count:10}" for count in way["differ"].values())))
     if "exact" in result:
         exact = result["exact"]
-        lines.append(f"  by float64: {exact['wrong']} of {exact['rays']} wrong, {exact['decided']} of them with one "
-                     "possible triangle")
+        lines.append(f"  checked in float64: {exact['wrong']} of {exact['rays']} answers impossible (only one triangle "
+                     f"was possible for {exact['decided']})")
         if result["escaped"] is not None:
             lines.append(f"  rays from the inside that hit nothing: {result['escaped']}")
         lines.append(f"  hits on triangles without an area: {result['flat']}")

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from .tables import race_table
+from .tables import race_legend, race_table
 
 
 @click.command("peers")
@@ -19,9 +19,8 @@ from .tables import race_table
 def peers_command(mesh: Path | None, device: str | None, quick: bool, json_file: Path | None) -> None:
     """The same rays through clrt and other libraries, in turns.
 
-    Mrays/s, then how many times as fast clrt is, by the clock and (in brackets) by processor time. Embree, inside pip's
-    embreex, is called from C on all processors: singly or in packets of 8, in fast and in robust mode, without and
-    with its flag for coherent rays. Python libraries are measured by whole calls.
+    Embree, inside pip's embreex, is called from C on all processors: singly or in packets of 8, in fast and in robust
+    mode, without and with its flag for coherent rays. Python libraries are measured by whole calls.
     """
     from ..output.files import check_target
     from ..output.report import write_report
@@ -50,4 +49,5 @@ def _lines(result: Mapping[str, Any]) -> list[str]:
     lines += race_table("kernels alone", result["kernels"], on_cpu)
     if "calls" in result:
         lines += race_table("whole calls from Python", result["calls"], on_cpu)
+    lines += [race_legend(on_cpu), "  agrees: the part of the answers that are the first line's"]
     return lines + [f"  {name:24}{why}" for name, why in result["missing"].items()]

@@ -7,19 +7,31 @@ from typing import Any
 
 
 def race_table(title: str, kinds: Mapping[str, Any], on_cpu: bool, *, agrees: bool = True) -> list[str]:
-    """A line for each contestant, a column for each kind of rays, and the part of the rays for which answers agree.
+    """A line for each contestant.
 
-    A column has Mrays/s, how many times as fast the first contestant is, and (on a CPU) that by processor time.
+    A column for each kind of rays has rays/s, the time of a ray over the first contestant's, and (on a CPU) that of
+    processor time; the last one has the part of the rays for which answers agree.
     """
-    lines = [f"  {title:24}" + "".join(f"{kind:>23}" for kind in kinds) + "    agrees" * agrees]
+    columns = f"{'rays/s':>9}{'time':>6}" + (f" ({'CPU':>5})" if on_cpu else " " * 8)
+    lines = [f"  {title:24}" + "".join(f"{kind:>23}" for kind in kinds),
+             f"  {'':24}" + columns * len(kinds) + "    agrees" * agrees]
     for name in next(iter(kinds.values())):
         line = f"  {name:24}"
         for kind in kinds.values():
             row = kind[name]
-            line += f"{row['mrays']:9.3g}{_times(row['ratio']):>6}"
+            line += f"{_rate(1e6 * row['mrays']):>9}{_times(row['ratio']):>6}"
             line += f" ({_times(row['cpu_ratio']):>5})" if on_cpu else " " * 8
         lines.append(line + f"{min(kind[name]['agrees'] for kind in kinds.values()):10.5f}" * agrees)
     return lines
+
+
+def race_legend(on_cpu: bool) -> str:
+    """What the columns of `race_table` are, in the user's words."""
+    return f"  time{' (CPU: processor time)' if on_cpu else ''}: of a ray, over the first line's; above 1 is slower"
+
+
+def _rate(rays: float) -> str:
+    return f"{1e-6 * rays:.3g}M" if rays >= 1e6 else f"{1e-3 * rays:.3g}k" if rays >= 1e3 else f"{rays:.3g}"
 
 
 def _times(ratio: float) -> str:

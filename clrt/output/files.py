@@ -15,7 +15,7 @@ from ..errors import OutputError
 def check_target(path: Path) -> None:
     """Raise OutputError unless a file can be written at `path`; for use before the work that fills it."""
     if path.is_dir():
-        raise OutputError(f"{path}: is a folder; name a file in it, such as {path / 'picture.png'}")
+        raise OutputError(f"{path}: is a folder; name a file in it")
     if not path.parent.is_dir():
         raise OutputError(f"{path}: the folder {path.parent} does not exist; create it first")
     try:

@@ -25,7 +25,7 @@ def _array(name: str, values: ArrayLike, kinds: str, wanted: str, error: type[Cl
     try:
         array = np.asarray(values)
     except (ValueError, TypeError) as misfit:
-        raise error(f"{name}: is no array; give rows of the same length, of {wanted}") from misfit
+        raise error(f"{name} is no array; give rows of the same length, of {wanted}") from misfit
     if array.size and array.dtype.kind not in kinds:
         raise error(f"{name} has dtype {array.dtype}; give {wanted}")
     return array

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+
+from clrt.errors import SceneError
+from clrt.study.rays import load_rays
 
 CORNER = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
@@ -46,6 +50,7 @@ def test_rays_of_four_kinds(tmp_path: Path) -> None:
         assert not any(row["differ"] for row in rows.values()) and f"{kind}: " in printed
     assert all({"build_seconds", "tree_seconds", "bytes_per_triangle", "sah_cost", "builder"} <= set(tree)
                for tree in figures["trees"].values())
+    assert "time, CPU time (of the processor): of a ray, over the first line's" in printed
 
 
 def test_trees_by_size(tmp_path: Path) -> None:
@@ -70,13 +75,43 @@ def test_hits_that_must_be_the_same(tmp_path: Path) -> None:
     for mesh in figures["meshes"]:
         assert {way["layout"] for way in mesh["ways"]} >= {"bvh8", "bvh2", "cwbvh", "list"}
         assert all(list(way["differ"]) == mesh["kinds"] for way in mesh["ways"]) and mesh["rays"] == 4 * 4096
-        assert f"by float64: {mesh['exact']['wrong']} of {mesh['exact']['rays']} wrong" in printed
+        assert f"float64: {mesh['exact']['wrong']} of {mesh['exact']['rays']} answers impossible" in printed
     assert [mesh["escaped"] for mesh in figures["meshes"]] == [0, 0, None]
     assert {"index", "platform", "driver"} <= set(figures["devices"][0])
 
 
+def stored(path: Path, **arrays: Any) -> Path:
+    """A file of four rays, with these arrays in place of what `RayQuery` takes."""
+    np.savez(path, **{"origins": np.zeros((4, 3)), "directions": np.ones((4, 3)), "t_max": np.ones(4)} | arrays)
+    return path
+
+
+def test_rays_are_stored_as_queries_take_them(tmp_path: Path) -> None:
+    file = stored(tmp_path / "rays.npz", directions=[0, 0, 1], t_max=1e300)
+    for array, expected in zip(load_rays(file), (np.zeros((4, 3)), [[0, 0, 1]] * 4, [np.inf] * 4), strict=True):
+        assert array.dtype == np.float32
+        np.testing.assert_array_equal(array, expected)
+
+
+def test_files_without_rays_are_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / "one.npy", np.zeros((4, 3)))
+    (tmp_path / "text.npz").write_text("0 0 0 1 1 1\n")
+    (tmp_path / "cut.npz").write_bytes(stored(tmp_path / "whole.npz").read_bytes()[:300])
+    np.savez(tmp_path / "unlimited.npz", origins=np.zeros((4, 3)), directions=np.ones((4, 3)))
+    for file, words in {
+            tmp_path / "one.npy": "no .npz", tmp_path / "text.npz": "no .npz", tmp_path / "cut.npz": "no .npz",
+            tmp_path / "none.npz": "No such file", tmp_path: "directory", tmp_path / "unlimited.npz": "t_max is not",
+            stored(tmp_path / "a.npz", origins=np.zeros((0, 3)), directions=np.ones(3), t_max=1): "no rays",
+            stored(tmp_path / "b.npz", directions=np.ones((3, 4))): r"directions \(3, 4\) must",
+            stored(tmp_path / "c.npz", t_max=np.ones(5)): r"t_max \(5,\): there are 4 origins",
+            stored(tmp_path / "d.npz", origins=np.array([None])): "no .npz"}.items():
+        with pytest.raises(SceneError, match=f"^{re.escape(str(file))}: .*{words}"):
+            load_rays(file)
+
+
 @pytest.mark.parametrize(("arguments", "code", "words"), [
     (("rays", "--rays", "r.npz"), 2, ["--rays", "--mesh"]),
+    (("rays", "--json", "."), 6, [".: is a folder; name a file in it\n"]),
     (("build", "--mesh", "missing.ply"), 3, ["missing.ply"]),
     (("hits", "--device", "nonesuch"), 4, ["nonesuch"]),
     (("build", "--json", "no/such/b.json"), 6, ["no/such"]),
@@ -85,4 +120,4 @@ def test_mistakes_end_in_one_message(tmp_path: Path, arguments: tuple[str, ...],
     command = [sys.executable, "-m", "clrt", "bench", *arguments]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == code and "Traceback" not in done.stderr
-    assert all(word in done.stderr for word in words), done.stderr
+    assert not done.stdout and all(word in done.stderr for word in words), done.stderr
