@@ -54,5 +54,5 @@ def _lines(result: Mapping[str, Any]) -> list[str]:
                      f"was possible for {exact['decided']})")
         if result["escaped"] is not None:
             lines.append(f"  rays from the inside that hit nothing: {result['escaped']}")
-        lines.append(f"  hits on triangles without an area: {result['flat']}")
+        lines.append(f"  hits on triangles whose corners lie in one line, the seams between others: {result['flat']}")
     return lines
