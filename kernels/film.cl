@@ -21,19 +21,20 @@ static inline void two_sum(real *sum, real *error, real x) {
     *error = e - (*sum - s);
 }
 
-static inline void accumulate(Accumulator *a, real3 L, ireal counted) {
-    ireal finite = (absolute(L.x) <= BRIGHTEST) & (absolute(L.y) <= BRIGHTEST) & (absolute(L.z) <= BRIGHTEST);
+static inline void accumulate(Accumulator *a, real3 sample, ireal counted) {
+    real3 size = absolute3(sample);
+    ireal finite = (size.x <= BRIGHTEST) & (size.y <= BRIGHTEST) & (size.z <= BRIGHTEST);
     ireal kept = counted & finite;
-    L = choose(kept, L, splat(ZERO));
+    real3 L = choose(kept, sample, splat(ZERO));
     a->count += kept ? (ureal)(1) : (ureal)(0);
     a->dropped += (counted & !finite) ? (ureal)(1) : (ureal)(0);
     two_sum(&a->sum.x, &a->sum_error.x, L.x);
     two_sum(&a->sum.y, &a->sum_error.y, L.y);
     two_sum(&a->sum.z, &a->sum_error.z, L.z);
-    // Squares above 1e34 would overflow their sum: such a pixel's variance is reported as at least that.
-    two_sum(&a->square.x, &a->square_error.x, minimum(L.x * L.x, (real)(1e34f)));
-    two_sum(&a->square.y, &a->square_error.y, minimum(L.y * L.y, (real)(1e34f)));
-    two_sum(&a->square.z, &a->square_error.z, minimum(L.z * L.z, (real)(1e34f)));
+    // Squares are cut off, so that their sum does not overflow either; then they average to less than the mean's square.
+    two_sum(&a->square.x, &a->square_error.x, minimum(L.x * L.x, (real)(BRIGHTEST)));
+    two_sum(&a->square.y, &a->square_error.y, minimum(L.y * L.y, (real)(BRIGHTEST)));
+    two_sum(&a->square.z, &a->square_error.z, minimum(L.z * L.z, (real)(BRIGHTEST)));
 }
 
 static inline Accumulator load_pixels(global const Pixel *film, ireal pixel) {

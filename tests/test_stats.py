@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare, kstest, norm
 
-from tests.stats import chi2_test, mean_test, sidak
+from clrt.study.significance import chi2_test, family_row, mean_test, rejected, sidak
 
 CELLS = np.array([0.3, 0.2, 0.2, 0.1, 0.1, 0.06, 0.04])
 
@@ -50,6 +50,17 @@ def test_chi2_rejects_another_distribution() -> None:
     assert chi2_test(np.random.default_rng(2).multinomial(50000, other), 50000 * CELLS) < 1e-10
 
 
+@pytest.mark.parametrize("cells", [2, 3, 20, 1000, 20000])
+def test_chi2_p_values_over_their_whole_range(cells: int) -> None:
+    """From nearly 1 to 1e-280, with few degrees of freedom and many."""
+    expected = np.full(cells, 1000.0)
+    for spread in (0.2, 0.7, 0.95, 1.0, 1.05, 1.3, 3.0):
+        observed = expected + np.where(np.arange(cells) % 2, 1, -1) * np.sqrt(1000 * spread * (cells - 1) / cells)
+        by_scipy = chisquare(observed, expected, sum_check=False).pvalue
+        if by_scipy > 1e-280:
+            assert chi2_test(observed, expected) == pytest.approx(by_scipy, rel=1e-9)
+
+
 def test_mean_p_values_are_uniform_under_the_hypothesis() -> None:
     samples = np.random.default_rng(3).exponential(2.0, (1500, 4000))
     p = mean_test(samples.mean(1), samples.var(1, ddof=1), 4000, 2.0)
@@ -71,3 +82,17 @@ def test_mean_without_variance_must_be_exact() -> None:
 @pytest.mark.parametrize("tests", [1, 7, 10**6])
 def test_sidak_keeps_the_error_of_all_tests_together(tests: int) -> None:
     assert 1 - (1 - sidak(0.01, tests)) ** tests == pytest.approx(0.01, rel=1e-6)
+
+
+def test_a_family_rejects_those_below_its_own_significance() -> None:
+    p_values = {"right": 0.4, "by chance": 2e-4, "wrong": 1e-5, "no number": float("nan")}
+    assert set(rejected(p_values)) == {"by chance", "wrong", "no number"}
+    assert set(rejected(p_values, 1e-4)) == {"wrong", "no number"}
+    assert not rejected({})
+
+
+def test_a_row_tells_the_least_p_value_corrected() -> None:
+    row = family_row("L2", "a family", {"a": 0.5, "b": 1e-3, "c": 0.2})
+    assert (row.count, row.wrong) == (3, 0) and row.figure == pytest.approx(1 - 0.999**3)
+    assert family_row("L2", "a family", {"a": 1e-5, "b": 1.0}).wrong == 1
+    assert family_row("L2", "a family", {"a": 1.0}).figure == 1 and family_row("L2", "", {"a": 0.0}).figure == 0

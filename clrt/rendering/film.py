@@ -27,14 +27,16 @@ class Film:
     def noise(self) -> float | None:
         """Estimate of √relMSE: sqrt(mean(Var[mean] / (mean² + 0.01))) over pixels and channels.
 
-        Var[mean] is the sample variance over n; samples are independent. None before every pixel has two samples.
+        Var[mean] is the sample variance over n; samples are independent. Where squares were too large to be summed
+        (kernels/film.cl) it is taken as mean², the most it can be. None before every pixel has two samples.
         """
         count = self.pixels["count"].astype(np.float64)[..., None]
         if not count.size or count.min() < 2:
             return None
         mean = self.mean
         squares = (self.pixels["square"].astype(np.float64) + self.pixels["square_error"]) / count
-        variance = np.maximum(squares - mean**2, 0) / (count - 1)
+        summed = squares >= (1 - 1e-6) * mean**2    # false for NaN, too
+        variance = np.where(summed, np.maximum(squares - mean**2, 0) / (count - 1), mean**2)
         return float(np.sqrt(np.mean(variance / (mean**2 + RELATIVE_FLOOR))))
 
     @property

@@ -11,8 +11,8 @@ from ..rendering.film import Film
 from ..rendering.records import PIXEL
 from .probe import Doubles, Probe
 
-#: Samples of a launch.
-LAUNCH = 1 << 20
+#: Samples of a launch; llvmpipe ends loops after 65535 rounds.
+LAUNCH = 1 << 15
 LARGEST_SUM = 1e38
 #: Rows of the kernel's state, in its order.
 STATE = ("sum", "sum_error", "square", "square_error")

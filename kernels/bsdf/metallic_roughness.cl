@@ -4,7 +4,7 @@
 //
 // The sources, and glTF, weigh Lambert by 1 − F(wi·h). That makes light: a white plastic of roughness 0.1 reflects
 // 1.7 times what it gets at grazing angles. Light that reaches the body crosses the surface twice, which the two
-// factors stand for; they are reciprocal and never sum to more than 1 with the specular part.
+// factors stand for; they are reciprocal and never sum to more than 1 with the specular part, further bounces included.
 //
 // D is GGX (Walter et al. 2007, eq. 33). The microfacet lobe draws normals visible from wo (Dupuy and Benyoub 2023,
 // "Sampling Visible GGX Normals with Spherical Caps"); it and the cosine lobe are chosen by the Fresnel term at wo.

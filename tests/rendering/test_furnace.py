@@ -58,7 +58,7 @@ def test_multiple_scattering_reflects_all(metals: list[Reflected]) -> None:
         assert len(errors) == 90 and max(errors) < most, smith
 
 
-@pytest.mark.parametrize("smith, most", zip(SMITHS, (1e-4, 1e-4, 1e-4, 5e-4)))
+@pytest.mark.parametrize("smith, most", list(zip(SMITHS, (1e-4, 1e-4, 1e-4, 5e-4), strict=True)))
 def test_loss_is_fitted(smith: Smith, most: float) -> None:
     """1 − albedo at every angle for every alpha, and its cosine-weighted mean."""
     cosines = np.geomspace(1e-5, 1, 400)

@@ -28,7 +28,7 @@ UP = np.array([0.0, 1.0, 0.0])
 def irradiances(probe: Probe, points: Doubles, normal: Doubles = UP) -> tuple[Doubles, Doubles]:
     """Mean and variance, (m, 3) each, of COUNT samples' radiance·cos/pdf at points (m, 3)."""
     parts = []
-    for seed, point in enumerate(points):
+    for seed, point in enumerate(probe.compiled.frame.points(points)):
         out = probe("light_sample", 12, np.tile(point, (COUNT, 1)), seed=seed)
         parts.append(out[:, 3:6] * (np.maximum(out[:, :3] @ normal, 0) / out[:, 6])[:, None])
     return np.mean(parts, axis=1), np.var(parts, axis=1)

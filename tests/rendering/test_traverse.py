@@ -59,7 +59,7 @@ def test_closed_mesh_has_no_cracks(device: Device, layout: str, offset: float) -
     origin = (offset + rng.uniform(-0.5, 0.5, target.shape)).astype(np.float32)
     assert len(target) > 1_000_000
     probe = Probe(device, Scene(meshes=[Mesh(vertices, faces)]), layout=layout)
-    found = probe("closest_hit", 4, origin, target - origin)
+    found = probe("closest_hit", 4, probe.compiled.frame.points(origin), target - origin)
     assert np.count_nonzero(found[:, 3] < 0) == 0
     assert np.abs(found[:, 0] - 1).max() < 0.01 + offset * 1e-6   # a facet is a ten-thousandth flatter than the sphere
 

@@ -27,7 +27,8 @@ Doubles = NDArray[np.float64]
 def everything() -> Scene:
     """All kinds of primitives, materials and lights, with a picture wide enough for uneven lanes."""
     vertices, faces = rays.icosphere(2)
-    gold, plastic = MetallicRoughness(preset="gold", roughness=0.4), MetallicRoughness(roughness=0.2, smith="schlick")
+    gold = MetallicRoughness(preset="gold", roughness=0.4, multiple_scattering=True)
+    plastic = MetallicRoughness(roughness=0.2, smith="schlick")
     ball = Mesh(vertices + np.array([1.2, 0.8, 0], np.float32), faces, gold, normals=vertices)
     lamp = quad([(-1, 4, -1), (1, 4, -1), (1, 4, 1), (-1, 4, 1)], Diffuse(emission=(6.0, 5.0, 4.0)))
     floor = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse(color=(0.7, 0.6, 0.5)))
