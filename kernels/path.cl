@@ -60,10 +60,10 @@ static inline real3 sampled_light(const Scene *scene, const Surface *surface, Fr
 }
 #endif
 
-static inline real3 radiance(const Scene *scene, real3 origin, real3 direction, ireal active, int max_depth,
+static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ireal active, int max_depth,
                              Sampler *sampler, ureal *rays) {
-    real3 L = splat(ZERO), beta = splat(ONE);
-    Step step = {origin, direction, ONE, ALL_LANES};
+    real3 L = splat(ZERO), beta = splat(ONE), origin = eye;
+    Step step = {eye, direction, ONE, ALL_LANES};
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
         Hits hits = closest_hit(scene, origin, step.wi, (real)(INFINITY), active);

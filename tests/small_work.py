@@ -1,27 +1,19 @@
-"""Every kernel at work on something small, in all its forms: little enough for a simulator.
-
-    CLRT_DEVICE=oclgrind python -m tests.small_work cpu answers.npz
-
-works with the device as with a CPU, or as with a GPU, and stores what came out, and which kernel files were compiled.
-"""
+"""Every kernel at work on something small, in all its forms: little enough for a simulator."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pyopencl as cl
 from numpy.typing import NDArray
 
 import clrt
 from clrt.accel.build import build_tree
 from clrt.accel.device_builder import SHAPES
 from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, UPPER_LEVELS, HitTests
-from clrt.device import blocks, program
-from clrt.device.open import Device, open_device
+from clrt.device.open import Device
 from clrt.rendering.compile import OFFSETS, compile_scene
 from clrt.rendering.session import Session
 from clrt.scene.model import Environment, Mesh, RenderSettings, Scene, Sphere
@@ -32,10 +24,6 @@ from .probe import choices
 from .rendering.rays import icosphere
 from .rendering.test_variants import everything
 
-#: How a device is worked with, whatever its type; groups of a GPU, and parts of a scan, small enough to have several.
-DEVICES: dict[str, dict[str, Any]] = {"cpu": {"lanes": 8, "local_size": 1, "layout": "bvh8"},
-                                      "gpu": {"lanes": 1, "local_size": 4, "layout": "cwbvh"}}
-SCANS = {"SCAN_ITEMS": 4, "SCAN_PART": 256}
 SETTINGS = RenderSettings(size=(6, 4), spp=2, max_depth=5, seed=11)
 TRIANGLES = soup(60, 0.5)
 FACES = np.arange(3 * len(TRIANGLES), dtype=np.int32).reshape(-1, 3)
@@ -73,7 +61,7 @@ def hits(query: clrt.RayQuery | clrt.InstancedRayQuery) -> Answers:
 def mesh_hits(device: Device, layout: str, traversal: str) -> Answers:
     """In a tree that was built over other triangles, and refitted."""
     query = clrt.RayQuery(TRIANGLES[::-1].reshape(-1, 3), FACES, device=device.info.index, layout=layout,
-                          builder="ploc" if layout in SHAPES else "sah", traversal=traversal)
+                          builder="sah", traversal=traversal)
     query.refit(TRIANGLES.reshape(-1, 3))
     return hits(query)
 
@@ -95,49 +83,15 @@ def variants() -> Iterator[dict[str, Any]]:
 def work(device: Device) -> Iterator[tuple[str, Answers]]:
     """Answers by subject and way. All ways should answer alike."""
     for layout in TREES:
-        builder = "reinsertion" if layout in SHAPES else "sah"
+        builder = "ploc" if layout in SHAPES else "sah"
         yield f"scene {layout}", picture(device, scene(), layout=layout, builder=builder)
     for chosen in variants():
         yield chosen["tests"].triangle, picture(device, scene(), **chosen)
     yield "ball", picture(device, Scene(spheres=[Sphere()], environment=Environment(color=(1, 1, 1)), render=SETTINGS))
     for layout in SHAPES:
-        build_tree(device, layout, "ploc", soup(0), spheres(60))
+        build_tree(device, layout, "ploc", soup(0), spheres(30))
+    build_tree(device, device.layout, "reinsertion", soup(120, 0.3))
     for layout, traversal in [*((layout, "single") for layout in TREES), *(("bvh8", way) for way in TRAVERSALS[1:])]:
         yield f"mesh {layout} {traversal}", mesh_hits(device, layout, traversal)
         if layout in UPPER_LEVELS and traversal != "packet":
             yield f"instances {layout} {traversal}", instance_hits(device, layout, traversal)
-
-
-def compiled_files() -> list[str]:
-    """The kernel files of all programs that this process has built."""
-    return sorted({file for built in program._built.values() for file in program.files_of(built.source)})
-
-
-class KeptBuffer(cl.Buffer):
-    """Is never released.
-
-    Oclgrind 21.10 remembers of a released buffer, under its number, which bytes were written; those that the next one
-    of that number has more count as never written.
-    """
-
-    kept: list[cl.Buffer] = []
-
-    def __init__(self, *arguments: Any, **options: Any) -> None:
-        super().__init__(*arguments, **options)
-        self.kept.append(self)
-
-    def release(self) -> None:
-        """Not now."""
-
-
-def main(form: str, path: str) -> None:
-    """Works with the device as with a `form` of DEVICES; writes the answers to `path`, an .npz file."""
-    for owner, values in ((Device, DEVICES[form]), (blocks, SCANS), (cl, {"Buffer": KeptBuffer})):
-        for name, value in values.items():
-            setattr(owner, name, value)
-    answers = {f"{way}/{name}": array for way, found in work(open_device()) for name, array in found.items()}
-    np.savez(path, compiled_files=compiled_files(), **answers)  # type: ignore[arg-type]
-
-
-if __name__ == "__main__":
-    main(*sys.argv[1:])

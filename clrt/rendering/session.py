@@ -42,8 +42,7 @@ class Session:
         self._check_memory()
         try:
             self._scene = [on_device(device, array) for _, array in compiled.buffers.values()]
-            self._film = cl.Buffer(device.context, cl.mem_flags.READ_WRITE, width * height * PIXEL.itemsize)
-            wait_for(cl.enqueue_fill_buffer(device.queue, self._film, np.zeros(1, np.uint8), 0, self._film.size))
+            self._film = on_device(device, np.zeros(width * height, PIXEL))
         except cl.Error as error:
             raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes do not fit: {error}") from error
         self._kernel = make_kernel(device, self.program, "path")

@@ -43,7 +43,7 @@ FIGURES = {
 LEAST_GRAZING_DEGREES = 85.0
 BALLS = 2000
 #: Of each test from inside closed meshes.
-RAYS = 1e7
+RAYS = 4e6
 
 
 def measure_families(device: int, *, quick: bool) -> Iterator[tuple[str, dict[str, dict[str, Any]]]]:

@@ -20,7 +20,7 @@ typedef struct {
 #define PRIMITIVE_ARGUMENTS {shapes, ids, triangle_count}
 
 static inline bool is_sphere(const Primitives *primitives, int primitive) {
-    return SPHERES && (!TRIANGLES || primitives->ids[primitive] >= primitives->triangle_count);
+    return (!TRIANGLES || primitives->ids[primitive] >= primitives->triangle_count) && SPHERES;
 }
 
 static inline Box box_union(Box a, Box b) {

@@ -101,12 +101,8 @@ static inline bool compete(int step, const Move *move, uint name, global uint *g
     if (step == GIVE_UP) return *gain != as_uint(INFINITY);
     if (step == CLAIM) atomic_max(gain, mine);
     if (step == OWN && *gain == mine) atomic_max(owner, name);
-    bool owned = *owner == name;
-    if (step == SETTLE && owned) {
-        *gain = move->gain < 0.0f ? as_uint(INFINITY) : 0;
-        *owner = 0;
-    }
-    return owned;
+    if (step == SETTLE && atomic_cmpxchg(owner, name, 0) == name) *gain = move->gain < 0.0f ? as_uint(INFINITY) : 0;
+    return step == WIN && *owner == name;
 }
 
 kernel void match_moves(uint count, uint block, BINARY_PARAMETERS, uint step, global Move *moves, global uint *gains,
