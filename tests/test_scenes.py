@@ -19,8 +19,8 @@ from clrt.scene.materials import F0_PRESETS, MATERIALS, Material, MetallicRoughn
 from clrt.scene.mesh_table import MeshTable
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 from clrt.scene.pictures import read_picture
+from clrt.study.significance import mean_test, sidak
 from .rendering.ggx import albedo
-from .stats import mean_test, sidak
 
 if TYPE_CHECKING:
     from clrt.device.open import Device

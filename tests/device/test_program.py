@@ -81,7 +81,7 @@ def test_a_kernel_file_opens_with_what_it_is(name: str) -> None:
 
 
 def test_every_kernel_file_is_used(device: Device) -> None:
-    """By some scene, with some choice, by ray queries, by the builder, to refit a tree, to check a device, or to study it."""
+    """By some scene, with some choice, by ray queries, the builder, to refit, to check a device, or to study it."""
     corners = np.zeros((3, 3), np.float32)
     used: set[str] = set()
     for layout, traversal in (("bvh8", "pool"), ("bvh8", "packet"), ("bvh2", "single")):

@@ -13,9 +13,9 @@ from clrt.rendering.film import Film
 from clrt.rendering.session import Session
 from clrt.scene.model import Camera, Mesh, Scene
 from clrt.scene.materials import Material
+from clrt.study.significance import mean_test
+from clrt.study.probe import choices
 
-from ..probe import choices
-from ..stats import mean_test
 
 Doubles = NDArray[np.float64]
 

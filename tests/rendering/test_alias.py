@@ -12,9 +12,9 @@ from clrt.device.open import Device
 from clrt.rendering.alias import alias_table
 from clrt.scene.materials import Diffuse
 from clrt.scene.model import Mesh, Scene
+from clrt.study.significance import chi2_test
+from clrt.study.probe import Probe
 
-from ..probe import Probe
-from ..stats import chi2_test
 
 Doubles = NDArray[np.float64]
 RNG = np.random.default_rng(7)

@@ -13,9 +13,9 @@ from clrt.device.open import Device
 from clrt.scene.lights import DirectionalLight, PointLight
 from clrt.scene.materials import Diffuse
 from clrt.scene.model import Mesh, Scene, Sphere
+from clrt.study.significance import mean_test, sidak
+from clrt.study.probe import Probe
 
-from ..probe import Probe
-from ..stats import mean_test, sidak
 
 Doubles = NDArray[np.float64]
 COUNT, FAMILY = 1 << 18, 1e-3

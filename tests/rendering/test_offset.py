@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from clrt.device.open import Device
 from clrt.scene.model import Mesh, Scene, Sphere
+from clrt.study.probe import Probe
 
-from ..probe import Probe
 
 Doubles = NDArray[np.float64]
 COUNT = 1_000_000

@@ -8,8 +8,8 @@ import pytest
 from clrt.device.open import Device
 from clrt.scene.model import Scene
 from clrt.study.probe import Probe
-from clrt.study.random_numbers import Draw, draw_on, independence, repetitions, uniformity
 from clrt.study.significance import rejected
+from clrt.study.random_numbers import Draw, draw_on, independence, repetitions, uniformity
 
 COUNT = 1 << 15
 #: Text of rng.cl and what weakens it: fewer rounds, indices that can be exchanged, that end early, or are forgotten.

@@ -12,8 +12,8 @@ from clrt.device.open import Device
 from clrt.scene.lights import DirectionalLight, PointLight
 from clrt.scene.materials import Diffuse, Material, MetallicRoughness, Mirror, Smith
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
+from clrt.study.significance import mean_test, sidak
 
-from ..stats import mean_test, sidak
 from .ggx import albedo
 from .pictures import box, film, pixel_means, pixel_p_values, pixel_points, quad
 

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from clrt.device.open import Device
 from clrt.scene.model import Environment, Scene
+from clrt.study.significance import chi2_test, mean_test, sidak
+from clrt.study.probe import Probe
 
-from ..probe import Probe
-from ..stats import chi2_test, mean_test, sidak
 from . import skies
 
 Doubles = NDArray[np.float64]

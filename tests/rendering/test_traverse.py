@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from clrt.device.open import Device
 from clrt.scene.model import Mesh, Scene, Sphere
+from clrt.study.probe import Probe
 
 from ..accel.cases import soup, spheres
-from ..probe import Probe
 from . import rays
 
 Doubles = NDArray[np.float64]
@@ -214,7 +214,7 @@ import numpy as np
 from clrt.device.open import open_device
 from clrt.scene.model import Mesh, Scene, Sphere
 from tests.accel.cases import soup
-from tests.probe import Probe
+from clrt.study.probe import Probe
 rays = np.tile([0.5, 0.5, 3.0, 0.1, 0.1, -1.0], (12, 1))
 for i, bad in enumerate((np.nan, np.inf, -np.inf, 0.0)):
     rays[3 * i, :3] = rays[3 * i + 1, 3:] = rays[3 * i + 2] = bad

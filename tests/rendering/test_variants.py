@@ -16,8 +16,8 @@ from clrt.rendering.compile import OFFSETS, compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight
 from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.study.probe import choices
 
-from ..probe import choices
 from . import rays
 from .pictures import film, quad, session
 

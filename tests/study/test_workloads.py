@@ -15,7 +15,7 @@ from clrt.study.workloads import (GAP, Faces, Mesh, bounce_rays, bumpy_ball, cam
                                   light_rays, rotated_copies, subdivide, surface_points, workloads)
 
 from ..rendering.rays import icosphere
-from ..stats import chi2_test, sidak
+from clrt.study.significance import chi2_test, sidak
 
 Doubles = NDArray[np.float64]
 RNG = np.random.default_rng(11)
