@@ -13,6 +13,10 @@ typedef struct {
 } Surface;
 
 #if TRIANGLES
+// By how much points are drawn from a triangle's edges towards its middle, along its plane: more than they are then moved
+// off it, so that rays from a corner of two walls do not start behind the other wall.
+#define INWARD (32.0f * UNIT_ROUNDOFF)
+
 // The edges are brought to length one or so first: the square of their product must not leave the range of floats.
 static inline real3 triangle_normal(real3 e1, real3 e2) {
     real3 n = cross3(scale(e1, 1.0f / largest(absolute3(e1))), scale(e2, 1.0f / largest(absolute3(e2))));
@@ -24,8 +28,10 @@ static inline void triangle_surface(const Scene *scene, const Hits *hits, ireal 
     real3 p1 = GATHER3(scene->triangles, primitive, .p1);
     real3 p2 = GATHER3(scene->triangles, primitive, .p2);
     real b1 = hits->u, b2 = hits->v, b0 = 1.0f - b1 - b2;
-    surface->p = mad3(p0, b0, mad3(p1, b1, scale(p2, b2)));
-    real3 size = mad3(absolute3(p0), absolute(b0), mad3(absolute3(p1), b1, scale(absolute3(p2), b2)));
+    real inner1 = b1 * (1.0f - 3.0f * INWARD) + INWARD, inner2 = b2 * (1.0f - 3.0f * INWARD) + INWARD;
+    real inner0 = 1.0f - inner1 - inner2;
+    surface->p = mad3(p0, inner0, mad3(p1, inner1, scale(p2, inner2)));
+    real3 size = mad3(absolute3(p0), inner0, mad3(absolute3(p1), inner1, scale(absolute3(p2), inner2)));
     surface->p_error = scale(size, (real)(GAMMA(9)));
     surface->ng = triangle_normal(sub(p1, p0), sub(p2, p0));
     surface->ns = surface->ng;

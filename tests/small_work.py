@@ -17,10 +17,10 @@ from clrt.device.open import Device
 from clrt.rendering.compile import OFFSETS, compile_scene
 from clrt.rendering.session import Session
 from clrt.scene.model import Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.study.probe import choices
 from clrt.tree_query import TRAVERSALS
 
 from .accel.cases import soup, spheres
-from .probe import choices
 from .rendering.rays import icosphere
 from .rendering.test_variants import everything
 

@@ -132,14 +132,16 @@ def test_moved_vertices_get_new_records(device: Device, triangle: str) -> None:
 def test_plain_boxes_lose_what_robust_ones_find(device: Device, layout: str, traversal: str | None) -> None:
     """From inside a closed mesh to its vertices, where boxes end; to the middles of faces both answer alike.
 
-    It stands ten radii from the coordinates' origin, so that what the tree's boxes are larger is rounded away.
+    It stands ten radii from the coordinates' origin, so that what the tree's boxes are larger is rounded away, and a
+    ball opposite keeps it there.
     """
     ball, faces = icosphere(4)
     vertices = np.asarray(ball + 10, np.float32)
     targets = np.repeat(vertices, 20, axis=0)
     origins = np.random.default_rng(0).uniform(9.5, 10.5, targets.shape).astype(np.float32)
-    robust = clrt.RayQuery(vertices, faces, device=device.info.index, layout="bvh8")
-    plain = clrt.RayQuery(vertices, faces, device=device.info.index, layout=layout, traversal=traversal, box="plain")
+    given: dict[str, Any] = {"spheres": [[-10, -10, -10, 0.1]], "device": device.info.index}
+    robust = clrt.RayQuery(vertices, faces, layout="bvh8", **given)
+    plain = clrt.RayQuery(vertices, faces, layout=layout, traversal=traversal, box="plain", **given)
     assert np.all(robust.closest_hit(origins, targets - origins)["primitive"] >= 0)
     assert 0 < np.sum(plain.closest_hit(origins, targets - origins)["primitive"] < 0) < 0.1 * len(targets)
     middles = vertices[faces].mean(axis=1, dtype=np.float32)

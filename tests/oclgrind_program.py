@@ -1,0 +1,68 @@
+"""The small work as a program for Oclgrind, with workarounds for what Oclgrind 21.10 takes for uninitialised.
+
+    python -c 'from tests.oclgrind_program import main; main("cpu", "answers.npz")'
+
+works with the device as with a CPU, and stores what came out, and which kernel files were compiled.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+
+from clrt.device import blocks, program
+from clrt.device.open import Device, open_device
+
+from .small_work import work
+
+#: How a device is worked with, whatever its type.
+DEVICES: dict[str, dict[str, Any]] = {"cpu": {"lanes": 8, "local_size": 1, "layout": "bvh8"},
+                                      "gpu": {"lanes": 1, "local_size": 4, "layout": "cwbvh"}}
+#: Shares so small that even here several work-items get one.
+SHARES = {"SMALLEST_BLOCK": {"cpu": 4, "gpu": 4}, "SCAN_ITEMS": 4, "SCAN_PART": 256}
+ENQUEUE_COPY = cl.enqueue_copy
+
+
+class KeptBuffer(cl.Buffer):
+    """Is never released. What a released buffer had not, Oclgrind takes for never written in the next of its number."""
+
+    kept: list[cl.Buffer] = []
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.kept.append(self)
+
+    def release(self) -> None:
+        """Not now."""
+
+
+def copy_whole(queue: cl.CommandQueue, to: Any, source: Any, **options: Any) -> Any:
+    """enqueue_copy, but all the rest of the buffer is written, too: Oclgrind takes it for never written otherwise."""
+    if not isinstance(to, cl.Buffer):
+        return ENQUEUE_COPY(queue, to, source, **options)
+    whole, first = np.empty(to.size, np.uint8), options.get("dst_offset", 0)
+    part = np.empty(options.get("byte_count") or source.nbytes, np.uint8)
+    ENQUEUE_COPY(queue, whole, to)
+    if isinstance(source, cl.Buffer):
+        ENQUEUE_COPY(queue, part, source)
+    else:
+        part = np.frombuffer(source, np.uint8)
+    whole[first:first + part.size] = part
+    return ENQUEUE_COPY(queue, to, whole)
+
+
+def compiled_files() -> list[str]:
+    """The kernel files of all programs that this process has built."""
+    return sorted({file for built in program._built.values() for file in program.files_of(built.source)})
+
+
+def main(form: str, path: str) -> None:
+    """Works with the device as with a `form` of DEVICES; writes the answers to `path`, an .npz file."""
+    workarounds = {"Buffer": KeptBuffer, "enqueue_copy": copy_whole}
+    for owner, values in ((Device, DEVICES[form]), (blocks, SHARES), (cl, workarounds)):
+        for name, value in values.items():
+            setattr(owner, name, value)
+    answers = {f"{way}/{name}": array for way, found in work(open_device()) for name, array in found.items()}
+    np.savez(path, compiled_files=compiled_files(), **answers)  # type: ignore[arg-type]

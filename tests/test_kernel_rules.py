@@ -1,0 +1,46 @@
+"""What kernels must not do though OpenCL C allows it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+KERNELS = Path(__file__).parents[1] / "kernels"
+TEXTS = {str(path.relative_to(KERNELS)): path.read_text(encoding="utf-8") for path in KERNELS.rglob("*.cl")}
+STRUCTS = {name for text in TEXTS.values() for name in re.findall(r"^typedef struct.*?} (\w+);", text, re.M | re.S)}
+HEAD = r"^(?:__attribute__.*? )?(?:static|kernel) [^;{}]*?\b(\w+)\(([^;{}]*)\)\s*"
+FUNCTION = re.compile(HEAD + r"\{([^\n]*\}$|.*?^\})", re.M | re.S)
+
+
+def changed_parameters(text: str, structs: set[str]) -> Iterator[tuple[str, str]]:
+    """Functions, and structs that they get by value and assign to."""
+    for function, parameters, body in FUNCTION.findall(re.sub(r"//.*", "", text)):
+        for name in re.findall(rf"\b(?:{'|'.join(sorted(structs))}) (\w+)\s*(?:,|$)", parameters):
+            if re.search(rf"(?<![\w.>]){name}\b[.\w\[\]]*\s*(?:[-+*/&|^]|<<|>>)?=(?!=)", body):
+                yield function, name
+
+
+@pytest.mark.parametrize("file", TEXTS)
+def test_structs_that_come_by_value_are_not_changed(file: str) -> None:
+    """Mesa's rusticl (22.3) passes the caller's own."""
+    assert list(changed_parameters(TEXTS[file], STRUCTS)) == []
+
+
+def test_changed_structs_are_found() -> None:
+    text = """
+static float first(Pair p, Pair q, const Pair *r) {
+    float x = p.x == q.x;
+    q.x += x;
+    return q.x;
+}
+__attribute__((always_inline)) static inline float second(Pair p,
+                                                          int i) {
+    p = other[i];
+    return p.x;
+}
+"""
+    assert list(changed_parameters(text, {"Pair"})) == [("first", "q"), ("second", "p")]
+    assert {"real3", "Hit", "Flight", "Box"} <= STRUCTS
