@@ -51,12 +51,17 @@ class DeviceInfo:
 
 
 def find_devices() -> list[tuple[DeviceInfo, cl.Device]]:
-    """Every device of every platform, best first. `chosen` marks the one that is used when none is named."""
+    """Every device of every platform, best first. `chosen` marks the one that is used when none is named.
+
+    That is no simulator, unless there is nothing else: they are a thousand times as slow.
+    """
     found = sorted(_every_device(), key=_rank)
     infos: list[DeviceInfo] = []
     for device in found:
         infos.append(_describe(device, infos))
-    chosen = next((info for info in infos if info.usable and not info.failed), None)
+    usable = [info for info in infos if info.usable]
+    real = [info for info in usable if info.type != "simulator"]
+    chosen = next((info for info in real or usable if not info.failed), None)
     return [(replace(info, chosen=info is chosen), device) for info, device in zip(infos, found)]
 
 

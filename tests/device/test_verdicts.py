@@ -100,8 +100,8 @@ def test_a_device_that_failed_is_used_only_if_named(info: DeviceInfo, caplog: py
 
 def test_the_next_best_is_used(info: DeviceInfo, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of three devices, all alike, the first failed: the second is used, also where only the kind is said."""
-    own = discover._every_device
-    monkeypatch.setattr(discover, "_every_device", lambda: 3 * [next(own())])
+    own = next(device for each, device in find_devices() if each.id == info.id)
+    monkeypatch.setattr(discover, "_every_device", lambda: 3 * [own])
     infos = [info for info, _ in find_devices()]
     assert len({info.id for info in infos}) == 3
     keep_verdict(infos[0], FAILED)
