@@ -102,6 +102,24 @@ def test_coherent_rays_meet_the_same_by_all_traversals(device: Device) -> None:
         np.testing.assert_array_equal(each.any_hit(*rays), first["primitive"] >= 0)
 
 
+@pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh", "list"])
+def test_copies_a_hair_away_are_told_apart(device: Device, layout: str) -> None:
+    """Of nine copies of a triangle the one of lowest index is met, also from where t is little more than rounding."""
+    rng = np.random.default_rng(6)
+    order = rng.permutation(np.tile(np.arange(64), 9))
+    corners = rng.uniform(-1, 1, (64, 3, 3)).astype(np.float32)
+    query = clrt.RayQuery(corners.reshape(-1, 3), np.arange(192, dtype=np.int32).reshape(-1, 3)[order],
+                          device=device.info.index, layout=layout)
+    which = rng.integers(64, size=20_000)
+    directions = rng.normal(size=(20_000, 3)).astype(np.float32)
+    distance = 10.0 ** rng.uniform(-7, -3, (20_000, 1))
+    inside = np.einsum("nk,nkx->nx", rng.dirichlet((1, 1, 1), 20_000), corners[which])
+    hits = query.closest_hit((inside - distance * directions).astype(np.float32), directions)
+    met = hits["primitive"] >= 0
+    first = np.array([np.flatnonzero(order == triangle)[0] for triangle in range(64)])
+    assert np.mean(met) > 0.9 and np.array_equal(hits["primitive"][met], first[order[hits["primitive"][met]]])
+
+
 def test_chunks_and_order_do_not_matter(soup: clrt.RayQuery, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = soup.closest_hit(ORIGINS, DIRECTIONS)
     order = RNG.permutation(len(ORIGINS))

@@ -49,14 +49,18 @@ static inline TriangleRay triangle_ray(const TriangleRays *rays, const Ray *ray,
 
 typedef struct { wide sx, sy, sz, ox, oy, oz; } ShearedRay;
 
-// Six times the volume between the ray's origin and a triangle: the determinant of the corners seen from there.
+// Six times the volume between the ray's origin and a triangle: the determinant of the corners seen from there. What is
+// no more than its own rounding is none: six products of three components are summed, each right to 2^-46 or so.
 static inline wide volume(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray) {
 #define FROM_ORIGIN(p) {wide_difference(p[0], ray->ox), wide_difference(p[1], ray->oy), wide_difference(p[2], ray->oz)}
     TwiceWide a[3] = FROM_ORIGIN(p0), b[3] = FROM_ORIGIN(p1), c[3] = FROM_ORIGIN(p2);
     TwiceWide x = wide_product(a[0], wide_minor(b[1], b[2], c[1], c[2]));
     TwiceWide y = wide_product(a[1], wide_minor(b[2], b[0], c[2], c[0]));
     TwiceWide z = wide_product(a[2], wide_minor(b[0], b[1], c[0], c[1]));
-    return wide_value(wide_sum(wide_sum(x, y), z));
+    wide sum = wide_value(wide_sum(wide_sum(x, y), z));
+#define FARTHEST(p) wide_max3(WIDE_ABS(p[0].hi), WIDE_ABS(p[1].hi), WIDE_ABS(p[2].hi))
+    wide error = FARTHEST(a) * FARTHEST(b) * FARTHEST(c) * 5.6843419e-14f;   // 2^-44
+    return WIDE_ABS(sum) > error ? sum : 0.0f;
 }
 
 // What the shear says. open: where t may be no more than rounding, and settle decides; det: its triangle's area, twice.
@@ -106,9 +110,8 @@ static inline ShearedHit intersect_sheared(const wide p0[3], const wide p1[3], c
     result.hit.v = w * result.inverse_det;
     wide_mask inside = result.hit.hit;
     wide_mask thin = WIDE_ABS(u + v + w) < THIN * wide_max3(WIDE_ABS(u1), WIDE_ABS(v1), WIDE_ABS(w1));
-    result.hit.hit = inside & (result.hit.t > 0.0f) & (result.hit.t <= t_max);
-    wide_mask possible = result.hit.hit | (inside & thin);
-    if (!WIDE_ANY(possible)) return result;
+    wide_mask ahead = inside & (result.hit.t > 0.0f), possible = ahead | (inside & thin);
+    result.hit.hit = ahead & (result.hit.t <= t_max);
     wide_mask beside = possible & (wide_min3(ta, tb, tc) <= 0.0f) & (wide_max3(ta, tb, tc) >= 0.0f);
     if (!WIDE_ANY(beside)) return result;
     wide reach = wide_max3(wide_far(ax, ay), wide_far(bx, by), wide_far(cx, cy));
