@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from .query import RayQuery as RayQuery
     from .rendering.renderer import Renderer as Renderer, State as State
     from .scene.lights import DirectionalLight as DirectionalLight, PointLight as PointLight
-    from .scene.materials import (Diffuse as Diffuse, MetallicRoughness as MetallicRoughness, Mirror as Mirror)
+    from .scene.materials import (Dielectric as Dielectric, Diffuse as Diffuse, MetallicRoughness as MetallicRoughness,
+                                  Mirror as Mirror)
     from .scene.model import (Camera as Camera, Environment as Environment, Mesh as Mesh,
                               RenderSettings as RenderSettings, Scene as Scene, Sphere as Sphere)
     __version__: str
@@ -39,7 +40,7 @@ _HOME = {
     "query": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
     "scene.lights": ("DirectionalLight", "PointLight"),
-    "scene.materials": ("Diffuse", "MetallicRoughness", "Mirror"),
+    "scene.materials": ("Dielectric", "Diffuse", "MetallicRoughness", "Mirror"),
     "scene.model": ("Camera", "Environment", "Mesh", "RenderSettings", "Scene", "Sphere"),
 }
 _MODULES = ("trimesh",)

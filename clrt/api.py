@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .output.denoise import Denoiser, denoised
 from .output.image import Image
-from .rendering.renderer import Renderer
+from .rendering.aov import render_aovs
+from .rendering.renderer import Renderer, planned_spp
 from .rendering.report import render_report
 from .scene.file import load as _load
 from .scene.model import Scene
@@ -21,12 +23,17 @@ def load(path: str | Path) -> Scene:
 
 
 def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | None = None, error: float | None = None,
-           reference: NDArray[np.float32] | None = None, **options: Any) -> Image:
+           reference: NDArray[np.float32] | None = None, denoise: bool = False, **options: Any) -> Image:
     """Renders a scene, or the scene in a file, to the end: see `Renderer.passes` for the stop conditions and
-    `Renderer` for `options`. Raises ClrtError subclasses."""
-    renderer = Renderer(scene if isinstance(scene, Scene) else load(scene), **options)
+    `Renderer` for `options`. denoise: see docs/denoise.md; the image keeps its `raw` pixels. Raises ClrtError
+    subclasses."""
+    denoiser = Denoiser() if denoise else None
+    scene = scene if isinstance(scene, Scene) else load(scene)
+    renderer = Renderer(scene, spp=planned_spp(scene.render, spp, time, error), **options)
+    aovs = render_aovs(renderer.session) if denoiser else {}
     state = None
     for state in renderer.passes(spp=spp, time=time, error=error, reference=reference):
         pass
     assert state is not None  # passes() yields at least once
-    return Image(state.pixels, render_report(renderer, state))
+    image = Image(state.pixels, render_report(renderer, state))
+    return denoised(image, denoiser, aovs, reference) if denoiser else image

@@ -5,38 +5,64 @@
 
 static inline ireal material_index(ireal material, ireal is_type) { return is_type ? material >> 4 : (ireal)(0); }
 
-static inline real3 bsdf_eval(const Scene *scene, ireal material, real3 wo, real3 wi) {
+static inline real3 bsdf_eval(const Scene *scene, ireal material, ireal front, real3 wo, real3 wi) {
     real3 value = splat(ZERO);
 #define EVAL(name, type) { \
         ireal is_type = (material & 15) == type; \
-        if (ANY(is_type)) value = choose(is_type, name##_eval(scene, material_index(material, is_type), wo, wi), value); \
+        if (ANY(is_type)) value = choose(is_type, name##_eval(scene, material_index(material, is_type), front, wo, wi), value); \
     }
     MATERIAL_TYPES(EVAL)
     return value;
 }
 
-static inline real bsdf_pdf(const Scene *scene, ireal material, real3 wo, real3 wi) {
+static inline real bsdf_pdf(const Scene *scene, ireal material, ireal front, real3 wo, real3 wi) {
     real pdf = ZERO;
 #define PDF(name, type) { \
         ireal is_type = (material & 15) == type; \
-        if (ANY(is_type)) pdf = is_type ? name##_pdf(scene, material_index(material, is_type), wo, wi) : pdf; \
+        if (ANY(is_type)) pdf = is_type ? name##_pdf(scene, material_index(material, is_type), front, wo, wi) : pdf; \
     }
     MATERIAL_TYPES(PDF)
     return pdf;
 }
 
-static inline BsdfSample bsdf_sample(const Scene *scene, ireal material, real3 wo, real2 u, real lobe) {
-    BsdfSample sample = {splat(ZERO), vector(ZERO, ZERO, ONE), ZERO, NO_LANES};
+#if TRANSMISSION
+#define SAMPLE_SPREAD(is_type) sample.spread = is_type ? s.spread : sample.spread;
+#else
+#define SAMPLE_SPREAD(is_type)
+#endif
+
+static inline BsdfSample bsdf_sample(const Scene *scene, ireal material, ireal front, real3 wo, real2 u, real lobe) {
+    BsdfSample sample = no_sample();
 #define SAMPLE(name, type) { \
         ireal is_type = (material & 15) == type; \
         if (ANY(is_type)) { \
-            BsdfSample s = name##_sample(scene, material_index(material, is_type), wo, u, lobe); \
+            BsdfSample s = name##_sample(scene, material_index(material, is_type), front, wo, u, lobe); \
             sample.weight = choose(is_type, s.weight, sample.weight); \
             sample.wi = choose(is_type, s.wi, sample.wi); \
             sample.pdf = is_type ? s.pdf : sample.pdf; \
             sample.specular = is_type ? s.specular : sample.specular; \
+            SAMPLE_SPREAD(is_type) \
         } \
     }
     MATERIAL_TYPES(SAMPLE)
     return sample;
+}
+
+static inline real3 bsdf_albedo(const Scene *scene, ireal material) {
+    real3 albedo = splat(ZERO);
+#define ALBEDO(name, type) { \
+        ireal is_type = (material & 15) == type; \
+        if (ANY(is_type)) albedo = choose(is_type, name##_albedo(scene, material_index(material, is_type)), albedo); \
+    }
+    MATERIAL_TYPES(ALBEDO)
+    return albedo;
+}
+
+// Whether a sample leaves to the side of the geometric normal that its direction names; cos_ng: that direction's with it.
+static inline ireal keeps_its_side(const BsdfSample *sample, real cos_ng) {
+#if TRANSMISSION
+    return ((sample->wi.z > 0.0f) & (cos_ng > 0.0f)) | ((sample->wi.z < 0.0f) & (cos_ng < 0.0f));
+#else
+    return cos_ng > 0.0f;
+#endif
 }

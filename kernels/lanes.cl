@@ -46,6 +46,7 @@ typedef PASTE(uint, LANES) ureal;
 
 typedef struct { real x, y; } real2;
 typedef struct { ureal x, y; } ureal2;
+typedef struct { ureal x, y, z, w; } ureal4;
 typedef struct { real x, y, z; } real3;
 
 #define GATHER3(array, index, member) ((real3){GATHER(real, array, index, member[0]), \

@@ -14,7 +14,16 @@ typedef struct {
     real3 p, wi;
     real pdf;
     ireal specular;
+#if TRANSMISSION
+    real spread;   // radiance at the eye over that here, by the media between (bsdf/interface.cl)
+#endif
 } Step;
+
+#if TRANSMISSION
+#define AT_EYE(L) scale(L, step.spread)
+#else
+#define AT_EYE(L) (L)
+#endif
 
 // 1. What glows where the ray ended, weighted against the light sample that could have found it.
 static inline real3 found_light(const Scene *scene, const Step *step, const Surface *surface, real t, ireal hit,
@@ -40,21 +49,21 @@ static inline real3 found_light(const Scene *scene, const Step *step, const Surf
 
 #if LIGHTS
 // 2. Light that arrives by a shadow ray towards a sampled point of a light.
-static inline real3 sampled_light(const Scene *scene, const Surface *surface, Frame shading, real3 ng, real3 wo,
-                                  ireal active, Sampler *sampler, ureal *rays) {
+static inline real3 sampled_light(const Scene *scene, const Surface *surface, Frame shading, real3 wo, ireal active,
+                                  Sampler *sampler, ureal *rays) {
     LightSample light = light_sample(scene, surface->p, sampler);
     real3 wi = to_local(shading, light.wi);
-    ireal above = dot3(light.wi, ng) > 0.0f;
-    real3 f = bsdf_eval(scene, surface->material, wo, wi);
+    ireal above = dot3(light.wi, surface->ng) > 0.0f;
+    real3 f = bsdf_eval(scene, surface->material, surface->front, wo, wi);
     real3 contribution = mul(f, light.radiance);
     ireal useful = active & above & (light.pdf > 0.0f) & is_positive3(contribution);
     if (!ANY(useful)) return splat(ZERO);
-    real3 origin = offset_origin(surface->p, surface->p_error, ng, light.wi);
+    real3 origin = offset_origin(surface->p, surface->p_error, surface->ng, light.wi);
     real3 direction = choose(light.infinite, light.wi, sub(light.target, origin));
     real t_max = light.infinite ? (real)(INFINITY) : ONE;
     *rays += useful ? (ureal)(1) : (ureal)(0);
     ireal blocked = any_hit(scene, origin, direction, t_max, useful);
-    real pdf = bsdf_pdf(scene, surface->material, wo, wi);
+    real pdf = bsdf_pdf(scene, surface->material, surface->front, wo, wi);
     real weight = (light.delta ? ONE : power_heuristic(light.pdf, pdf)) / light.pdf;
     return choose(useful & !blocked, scale(contribution, weight), splat(ZERO));
 }
@@ -63,7 +72,14 @@ static inline real3 sampled_light(const Scene *scene, const Surface *surface, Fr
 static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ireal active, int max_depth,
                              Sampler *sampler, ureal *rays) {
     real3 L = splat(ZERO), beta = splat(ONE), origin = eye;
-    Step step = {eye, direction, ONE, ALL_LANES};
+    Step step;
+    step.p = eye;
+    step.wi = direction;
+    step.pdf = ONE;
+    step.specular = ALL_LANES;
+#if TRANSMISSION
+    step.spread = ONE;
+#endif
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
         Hits hits = closest_hit(scene, origin, step.wi, (real)(INFINITY), active);
@@ -73,36 +89,38 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
         surface = surface_at(scene, origin, step.wi, &hits);
 #endif
         real3 found = found_light(scene, &step, &surface, hits.t, hit, active & !hit);
-        L = add(L, choose(active, mul(beta, found), splat(ZERO)));
+        L = add(L, choose(active, mul(beta, AT_EYE(found)), splat(ZERO)));
         active = hit;
         if (depth >= max_depth || !ANY(active)) return L;
 
 #if PRIMITIVES
-        // Both normals on the side the path came from; a shading normal that faces away is replaced.
         real3 towards = negate(step.wi);
-        real3 ng = choose(dot3(surface.ng, towards) < 0.0f, negate(surface.ng), surface.ng);
-        real3 ns = choose(dot3(surface.ns, ng) < 0.0f, negate(surface.ns), surface.ns);
-        ns = choose(dot3(ns, towards) > 0.0f, ns, ng);
-        Frame shading = frame_around(ns);
+        turn_towards(&surface, towards);
+        Frame shading = frame_around(surface.ns);
         real3 wo = to_local(shading, towards);
 #if LIGHTS
-        real3 direct = sampled_light(scene, &surface, shading, ng, wo, active, sampler, rays);
-        L = add(L, mul(beta, direct));
+        real3 direct = sampled_light(scene, &surface, shading, wo, active, sampler, rays);
+        L = add(L, mul(beta, AT_EYE(direct)));
 #endif
         // 3. Go on in a direction drawn from the material.
         real2 u = next_2d(sampler), choice = next_2d(sampler);
-        BsdfSample sample = bsdf_sample(scene, surface.material, wo, u, choice.x);
+        BsdfSample sample = bsdf_sample(scene, surface.material, surface.front, wo, u, choice.x);
         step.p = surface.p;
         step.wi = to_world(shading, sample.wi);
         step.pdf = sample.pdf;
         step.specular = sample.specular;
-        active = active & (sample.pdf > 0.0f) & is_positive3(sample.weight) & (dot3(step.wi, ng) > 0.0f);
+        active = active & (sample.pdf > 0.0f) & is_positive3(sample.weight)
+               & keeps_its_side(&sample, dot3(step.wi, surface.ng));
         beta = choose(active, mul(beta, sample.weight), beta);
-        origin = offset_origin(surface.p, surface.p_error, ng, step.wi);
+#if TRANSMISSION
+        step.spread *= sample.spread;
+#endif
+        origin = offset_origin(surface.p, surface.p_error, surface.ng, step.wi);
 
-        // 4. Russian roulette: end weak paths, keep the mean (Arvo and Kirk 1990).
+        // 4. Russian roulette: end weak paths, keep the mean (Arvo and Kirk 1990). By the root of the throughput: fewer
+        // are ended than by the throughput itself, and in rooms the error falls by more than the time grows.
         if (depth >= ROULETTE_DEPTH) {
-            real survival = minimum(largest(beta), (real)(0.95f));
+            real survival = minimum(sqrt(largest(beta)), ONE);
             active = active & (choice.y < survival);
             beta = choose(active, scale(beta, 1.0f / survival), beta);
         }
@@ -119,12 +137,12 @@ kernel void path(SCENE_PARAMETERS, global Pixel *film, const Launch launch) {
     ureal index = (ureal)(first) + LANE_INDEX;
     ireal inside = index < end;
     index = inside ? index : (ureal)(first);
-    ureal y = index / launch.width, x = index - y * launch.width;
+    ureal y = index / launch.width, x = index - y * launch.width, code = pixel_code(x, y);
     real3 position = broadcast(launch.position);
     Accumulator pixels = load_pixels(film, AS_INT(index));
     for (uint s = 0; s < launch.sample_count; ++s) {
-        Sampler sampler = {index, (ureal)(launch.first_sample + s), launch.seed, 0};
-        real3 direction = camera_direction(&launch, x, y, next_2d(&sampler));
+        Sampler sampler = sampler_at(code, (ureal)(launch.first_sample + s), launch.seed, launch.block_bits);
+        real3 direction = camera_direction(&scene, &launch, x, y, next_2d(&sampler));
         real3 L = radiance(&scene, position, direction, inside, launch.max_depth, &sampler, &pixels.rays);
         accumulate(&pixels, L, inside);
     }

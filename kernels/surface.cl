@@ -10,6 +10,7 @@ typedef struct {
     real3 ng, ns;         // geometric and shading normal, both on the front side
     ireal material;       // type | index << 4
     ireal light;          // entry of the light table, or -1
+    ireal front;          // whether it is seen from its front side, once it is turned (turn_towards)
 } Surface;
 
 #if TRIANGLES
@@ -95,6 +96,14 @@ static inline Surface surface_at(const Scene *scene, real3 origin, real3 directi
     sphere_surface(scene, origin, direction, hits, primitive, &surface);
 #endif
     return surface;
+}
+
+// Turns both normals to the side of the unit vector `towards`; a shading normal that faces away from it is replaced.
+static inline void turn_towards(Surface *surface, real3 towards) {
+    surface->front = !(dot3(surface->ng, towards) < 0.0f);
+    surface->ng = choose(surface->front, surface->ng, negate(surface->ng));
+    surface->ns = choose(dot3(surface->ns, surface->ng) < 0.0f, negate(surface->ns), surface->ns);
+    surface->ns = choose(dot3(surface->ns, towards) > 0.0f, surface->ns, surface->ng);
 }
 
 #include OFFSET

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.scene.lights import PointLight
-from clrt.scene.materials import Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.pictures import read_picture
 
@@ -89,6 +89,7 @@ MAKERS: dict[str, Callable[[Record], Material]] = {
                                               roughness=record["roughness"], smith="separable"),
     "ggx": _ggx,
     "mirror": lambda record: Mirror(color=_triple(record["color"])),
+    "glass": lambda record: Dielectric(ior=record["ior"]),
 }
 
 

@@ -14,6 +14,7 @@ from clrt.accel.build import build_tree
 from clrt.accel.device_builder import SHAPES
 from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, UPPER_LEVELS, HitTests
 from clrt.device.open import Device
+from clrt.rendering.aov import render_aovs
 from clrt.rendering.compile import OFFSETS, compile_scene
 from clrt.rendering.session import Session
 from clrt.scene.model import Environment, Mesh, RenderSettings, Scene, Sphere
@@ -42,10 +43,15 @@ def scene() -> Scene:
     return replace(full, meshes=[*(mesh for mesh in full.meshes if mesh.normals is None), *smooth], render=SETTINGS)
 
 
+def started(device: Device, what: Scene, **chosen: Any) -> Session:
+    """Ready to render it. chosen: see Choices."""
+    compiled = compile_scene(what, choices(device, **chosen), device=device)
+    return Session(device, compiled, what.render.size, what.render.max_depth, what.render.seed)
+
+
 def picture(device: Device, what: Scene, **chosen: Any) -> Answers:
     """Its mean, (h, w, 3). chosen: see Choices."""
-    compiled = compile_scene(what, choices(device, **chosen), device=device)
-    session = Session(device, compiled, what.render.size, what.render.max_depth, what.render.seed)
+    session = started(device, what, **chosen)
     for _ in session.render(what.render.spp):
         pass
     return {"mean": session.film().mean}
@@ -88,6 +94,7 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     for chosen in variants():
         yield chosen["tests"].triangle, picture(device, scene(), **chosen)
     yield "ball", picture(device, Scene(spheres=[Sphere()], environment=Environment(color=(1, 1, 1)), render=SETTINGS))
+    yield "aovs", {**render_aovs(started(device, scene()), 2)}
     for layout in SHAPES:
         build_tree(device, layout, "ploc", soup(0), spheres(30))
     build_tree(device, device.layout, "reinsertion", soup(120, 0.3))

@@ -20,7 +20,8 @@ FILES = ("floats", "integers", "words", "masks", "memory", "samples")
 def source(file: str, lanes: int, rows: Iterable[str] = ()) -> str:
     """The program of one of FILES, whose kernels number their rows of results in the order of `rows`."""
     values = {"LANES": lanes} | {f"ROW_{row}": number for number, row in enumerate(rows)}
-    return compose("\n".join([defines(values), typedefs({"Pixel": PIXEL})]), f"check/{file}.cl", {})
+    return compose("\n".join([defines(values), typedefs({"Pixel": PIXEL})]), f"check/{file}.cl",
+                   {"SAMPLER": ["sampler/independent.cl"]})
 
 
 class Probe:

@@ -28,7 +28,7 @@ def check_random_numbers(device: Device, findings: Findings) -> None:
 
 
 def pcg4d(*words: Words | np.uint32) -> tuple[Words, Words]:
-    """The first two words of pcg4d (Jarzynski and Olano 2020, listing 4) after its four words' first step."""
+    """The second and third word of pcg4d (Jarzynski and Olano 2020, listing 4) after its four words' first step."""
     with np.errstate(over="ignore"):
         x, y, z, w = (np.uint32(1664525) * v + np.uint32(1013904223) for v in words)
         x, y, z, w = (x + y * w, y, z, w)
@@ -37,7 +37,8 @@ def pcg4d(*words: Words | np.uint32) -> tuple[Words, Words]:
         w = w + y * z
         x, y, z, w = (v ^ v >> np.uint32(16) for v in (x, y, z, w))
         x = x + y * w
-        return x, y + z * x
+        y = y + z * x
+        return y, z + x * y
 
 
 def check_sums(device: Device, findings: Findings) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from .bench_build import build_command
+from .bench_converge import converge_command
 from .bench_hits import hits_command
 from .bench_numerics import numerics_command
 from .bench_peers import peers_command
@@ -13,8 +14,8 @@ from .bench_rays import rays_command
 
 @click.group()
 def command() -> None:
-    """Measure this machine: rays, build, hits, peers, numerics."""
+    """Measure this machine: rays, build, hits, peers, converge, numerics."""
 
 
-for each in (rays_command, build_command, hits_command, peers_command, numerics_command):
+for each in (rays_command, build_command, hits_command, peers_command, converge_command, numerics_command):
     command.add_command(each)

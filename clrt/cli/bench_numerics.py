@@ -25,15 +25,16 @@ def numerics_command(device: str | None, quick: bool, json_file: Path | None, pl
     """
     from ..device.discover import devices
     from ..output.files import check_target
+    from ..output.plots import check_plot
     from ..output.report import write_report
     from ..study.families import measure_families
     from ..study.numerics import chosen_devices, measure_device, measure_together
-    from ..study.plots import check_plots, plot_families
+    from ..study.plots import plot_families
 
-    for target in filter(None, (json_file, plot)):
-        check_target(target)
+    if json_file is not None:
+        check_target(json_file)
     if plot is not None:
-        check_plots()
+        check_plot(plot)
     chosen, known = chosen_devices(device), devices()
     results: list[dict[str, Any]] = []
     for index in chosen:

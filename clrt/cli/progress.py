@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ..rendering.renderer import State
 
 PHASES = {"load": "loading the scene", "build": "building the tree", "compile": "compiling the kernel",
-          "render": "rendering", "write": "writing"}
+          "render": "rendering", "write": "writing", "denoise": "denoising"}
 
 
 class Progress:

@@ -30,8 +30,13 @@ from .progress import Goal, make_progress
 @click.option("--device", "devices", multiple=True, metavar="SEL",
               help="Number, id, part of a name, cpu or gpu; see `clrt devices`.")
 @click.option("--integrator", type=click.Choice(["path", "direct"]), help="What to compute.")
+@click.option("--sampler", type=click.Choice(["sobol", "stratified", "independent"]), help="Where samples come from.")
+@click.option("--filter", "pixel_filter", type=click.Choice(["box", "tent", "blackman_harris"]), help="Pixel filter.")
 @click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error by.")
 @click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what was done.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
+@click.option("--denoise", is_flag=True,
+              help="Denoise the picture; the raw one is kept beside it as <stem>.raw<suffix>.")
 @click.option("--view", default="srgb", show_default=True, metavar="NAME", help="View transform of .png pictures.")
 @click.option("--exposure", default=0.0, metavar="EV", help="Exposure of .png pictures, in stops.")
 @click.option("--progress", "progress_kind", type=click.Choice(["bar", "plain", "json"]), help="Progress on stderr.")
@@ -40,33 +45,42 @@ from .progress import Goal, make_progress
 @tracing_options
 def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None, spp: int | None,
             seconds: float | None, error: float | None, depth: int | None, seed: int | None, devices: tuple[str, ...],
-            integrator: str | None, reference: Path | None, report: Path | None, view: str, exposure: float,
+            integrator: str | None, sampler: str | None, pixel_filter: str | None, reference: Path | None,
+            report: Path | None, plot: Path | None, denoise: bool, view: str, exposure: float,
             progress_kind: str | None, print_kernel: bool, quiet: bool, **tracing: Any) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
-    from ..rendering.renderer import Renderer, check_stops
+    from ..output.denoise import Denoiser, denoised, raw_path
+    from ..output.image import Image
+    from ..rendering.aov import render_aovs
+    from ..rendering.renderer import Renderer, check_stops, planned_spp
+    from ..rendering.report import render_report
     from ..scene.file import load
 
     outputs = outputs or (Path(f"{scene.stem}.png"),)
     if len(devices) > 1:
         raise UsageError(f"--device is given {len(devices)} times; this version renders on one device, so name one")
-    _check_outputs(outputs, report, view, reference)
+    raws = tuple(map(raw_path, outputs)) if denoise else ()
+    _check_outputs(outputs, raws, report, plot, view, reference)
     check_stops(spp, seconds, error)
+    denoiser = Denoiser() if denoise else None
     if quiet:
         logging.disable(logging.WARNING)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's end keeps the picture, too
     options: dict[str, Any] = {
         "size": size, "max_depth": depth, "seed": seed, "device": devices[0] if devices else None,
-        "integrator": integrator, **tracing}
+        "integrator": integrator, "sampler": sampler, "filter": pixel_filter, **tracing}
     with make_progress(progress_kind, quiet) as progress:
         progress.phase("load")
         content = load(scene)
         expected = None if reference is None else _read_reference(reference, size or content.render.size)
-        renderer = Renderer(content, on_phase=progress.phase, **options)
+        renderer = Renderer(content, spp=planned_spp(content.render, spp, seconds, error), on_phase=progress.phase,
+                            **options)
         if print_kernel:
             click.echo(renderer.compiled.source)
             return
+        aovs = render_aovs(renderer.session) if denoiser else {}
         progress.phase("render")
-        goal = Goal(spp or (None if seconds or error else renderer.settings.spp), seconds, error)
+        goal = Goal(planned_spp(renderer.settings, spp, seconds, error), seconds, error)
         try:
             for state in renderer.passes(spp=spp, time=seconds, error=error, reference=expected):
                 progress.state(state, goal)
@@ -74,24 +88,36 @@ def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None
             state = renderer.state(expected)
             renderer.stop_reason = "interrupted"
         progress.phase("write")
-        _write(renderer, state, outputs, report, view, exposure)
+        image = Image(state.pixels, render_report(renderer, state))
+        _save(image, raws or outputs, view, exposure)
+        if denoiser is not None:
+            progress.phase("denoise")
+            image = denoised(image, denoiser, aovs, expected)
+            _save(image, outputs, view, exposure)
+        _write_measures(renderer, image, report, plot)
     if renderer.stop_reason == "interrupted":
         sys.exit(130)
 
 
-def _check_outputs(outputs: tuple[Path, ...], report: Path | None, view: str, reference: Path | None) -> None:
+def _check_outputs(outputs: tuple[Path, ...], raws: tuple[Path, ...], report: Path | None, plot: Path | None,
+                   view: str, reference: Path | None) -> None:
     """Finds out before the render whether its results can be written."""
     from ..output.files import check_target
     from ..output.images import check_writable
+    from ..output.plots import check_plot
     from ..output.view import check_view
 
     check_view(view)
-    for output in outputs:
+    for output in [*outputs, *raws]:
         check_writable(output)
+        if output in raws and output in outputs:
+            raise UsageError(f"{output}: is where the raw picture is kept; name another picture with -o")
         if reference is not None and output.resolve() == reference.resolve():
             raise UsageError(f"{output}: is the reference, and would be overwritten; name another picture with -o")
     if report is not None:
         check_target(report)
+    if plot is not None:
+        check_plot(plot)
 
 
 def _read_reference(path: Path, size: tuple[int, int]) -> Any:
@@ -105,15 +131,17 @@ def _read_reference(path: Path, size: tuple[int, int]) -> Any:
     return pixels
 
 
-def _write(renderer: Any, state: Any, outputs: tuple[Path, ...], report: Path | None, view: str,
-           exposure: float) -> None:
-    from ..output.image import Image
-    from ..output.report import write_report
-    from ..rendering.report import render_report
+def _save(image: Any, paths: tuple[Path, ...], view: str, exposure: float) -> None:
+    for path in paths:
+        click.echo(str(image.save(path, view=view, exposure=exposure)))
 
-    image = Image(state.pixels, render_report(renderer, state))
-    for output in outputs:
-        click.echo(str(image.save(output, view=view, exposure=exposure)))
+
+def _write_measures(renderer: Any, image: Any, report: Path | None, plot: Path | None) -> None:
+    from ..output.plots import plot_history
+    from ..output.report import write_report
+
     if report is not None:
         write_report(report, {**image.report, "total_seconds": time.perf_counter() - STARTED})
         click.echo(str(report))
+    if plot is not None:
+        click.echo(str(plot_history(plot, renderer.scene.name, renderer.history)))

@@ -1,4 +1,4 @@
-"""Files kept between runs: program binaries, and what checks of devices found (verdicts.py).
+"""Files kept between runs: program binaries, what checks of devices found (verdicts.py), and reference pictures.
 
 Whatever is wrong with the folder (absent, read-only, damaged), a file is not there, and what it held is made anew.
 Files are put in place by a rename, so readers never see half of one; a binary follows its SHA-256.
@@ -10,6 +10,9 @@ import hashlib
 import os
 import tempfile
 from pathlib import Path
+
+#: The names of scenes' reference pictures (study/reference.py).
+REFERENCES = "reference-*.npz"
 
 
 def cache_folder() -> Path:

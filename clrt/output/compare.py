@@ -44,8 +44,7 @@ def compare(image: FloatArray, reference: FloatArray, *, hdr: bool = True) -> di
     return {
         "relmse": relmse(image, reference),
         "rmse": float(np.sqrt(np.mean((x - r) ** 2))) if x.size else None,
-        "mean_ratio": [_mean_ratio(image[..., channel], reference[..., channel], valid[..., channel])
-                       for channel in range(3)],
+        "mean_ratio": mean_ratios(image, reference),
         "flip": _flip(np.where(valid, image, 0), np.where(valid, reference, 0), hdr),
         "max_abs": float(np.abs(x - r).max()) if x.size else None,
         "nonfinite": int(np.count_nonzero(~np.isfinite(image))),
@@ -60,9 +59,11 @@ def relmse(image: FloatArray, reference: FloatArray) -> float | None:
     return float(np.mean((x - r) ** 2 / (r**2 + RELMSE_FLOOR))) if x.size else None
 
 
-def _mean_ratio(image: FloatArray, reference: FloatArray, valid: NDArray[np.bool_]) -> float | None:
-    total = float(reference[valid].sum(dtype=np.float64))
-    return float(image[valid].sum(dtype=np.float64)) / total if total else None
+def mean_ratios(image: FloatArray, reference: FloatArray) -> list[float | None]:
+    """`compare`'s mean_ratio alone; both arrays of one shape."""
+    valid = np.isfinite(image) & np.isfinite(reference)
+    means = [np.where(valid, picture, 0).mean((0, 1), np.float64) for picture in (image, reference)]
+    return [float(x) / float(r) if r else None for x, r in zip(*means)]
 
 
 def _flip(image: FloatArray, reference: FloatArray, hdr: bool) -> float | None:

@@ -14,10 +14,12 @@ from .images import write_image
 
 @dataclass(frozen=True)
 class Image:
-    """pixels: (height, width, 3) float32, linear Rec. 709; report: what made it, see `clrt render --report`."""
+    """pixels: (height, width, 3) float32, linear Rec. 709; report: what made it, see `clrt render --report`;
+    raw: the pixels before they were denoised, None where they were not."""
 
     pixels: NDArray[np.float32]
     report: dict[str, Any] = field(default_factory=dict)
+    raw: NDArray[np.float32] | None = None
 
     def save(self, path: str | Path, *, view: str = "srgb", exposure: float = 0.0) -> Path:
         """Writes .exr, .hdr (linear) or .png (through `view` after 2^exposure); OutputError where that fails."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,8 @@ from ..scene.scaling import Frame, frame_of, in_frame
 from ..scene.validate import validate
 from .emitters import SURFACES, TYPES, Emitters, pack_emitters
 from .environment import Sky, pack_sky
-from .records import COUNTS, LAUNCH, NORMALS, PIXEL, SPHERE, TRIANGLE, material_record
+from .filters import filter_quantiles
+from .records import AOV, COUNTS, LAUNCH, NORMALS, PIXEL, SPHERE, TRIANGLE, material_record
 
 
 #: Of a scene's unit, what float32 holds.
@@ -51,11 +53,22 @@ class CompiledScene:
     buffers: Buffers
     counts: NDArray[Any]
     features: list[str]
-    source: str
+    preamble: str
+    chosen_files: dict[str, list[str]]
+    entry: str
     tree: Layout
     choices: Choices
     camera: Camera
     frame: Frame
+
+    @cached_property
+    def source(self) -> str:
+        """The program's text."""
+        return self.source_of(self.entry)
+
+    def source_of(self, entry: str) -> str:
+        """The text of the same scene's program with another kernel file as its entry."""
+        return compose(self.preamble, entry, self.chosen_files)
 
     @property
     def files(self) -> list[str]:
@@ -96,14 +109,18 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
     if len(spheres):
         buffers["spheres"] = ("Sphere", _sphere_records(spheres, codes[len(scene.meshes):], emitters.sphere))
     buffers |= material_buffers | emitters.buffers | sky.buffers
+    if scene.render.filter != "box":
+        buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))
     counts = np.zeros(1, COUNTS)
     counts["triangles"], counts["spheres"], counts["lights"] = len(triangles), len(spheres), emitters.count
 
     used = [m for m in MATERIALS if m.kernel in material_buffers]
     features = _features(scene, used, users, emitters, sky, choices)
-    text = compose(_preamble(buffers, features, used, emitters, choices, tree, frame.unit), entry,
-                   _files(used, emitters, sky, choices, bool(len(triangles)), bool(len(spheres))))
-    return CompiledScene(buffers, counts, sorted(features), text, tree, choices, scene.camera, frame)
+    preamble = _preamble(buffers, features, used, emitters, choices, tree, frame.unit)
+    files = {**_files(used, emitters, sky, choices, bool(len(triangles)), bool(len(spheres))),
+             "SAMPLER": [f"sampler/{scene.render.sampler}.cl"],
+             "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"]}
+    return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame)
 
 
 def _geometry(scene: Scene) -> tuple[NDArray[np.float32], dict[int, NDArray[np.float32]]]:
@@ -189,7 +206,7 @@ def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], 
     return "\n".join([
         defines({"LANES": choices.lanes, **tree_defines(tree), **lengths}),
         defines({feature: 1 for feature in sorted(features)}),
-        typedefs({"Counts": COUNTS, "Pixel": PIXEL, "Launch": LAUNCH}),
+        typedefs({"Counts": COUNTS, "Pixel": PIXEL, "Aov": AOV, "Launch": LAUNCH}),
         scene_struct(buffers),
         type_list("MATERIAL_TYPES", [(kind.kernel, MATERIALS.index(kind)) for kind in used]),
         type_list("LIGHT_TYPES", [(t, TYPES.index(t)) for t in emitters.types]),

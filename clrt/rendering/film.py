@@ -11,6 +11,14 @@ from numpy.typing import NDArray
 RELATIVE_FLOOR = 0.01
 
 
+def relative_to(mean: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
+    """expected² + 0.01 for a picture (h, w, 3); a noisy pixel's neighbours tell what is to be expected of it."""
+    padded = np.pad(mean, ((1, 1), (1, 1), (0, 0)), mode="edge")
+    rows = padded[:-2] + padded[1:-1] + padded[2:]
+    expected = (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]) / 9
+    return np.asarray(expected**2 + RELATIVE_FLOOR)
+
+
 class Film:
     """A copy of the device's film. pixels: (height, width) PIXEL records."""
 
@@ -25,10 +33,10 @@ class Film:
 
     @property
     def noise(self) -> float | None:
-        """Estimate of √relMSE: sqrt(mean(Var[mean] / (mean² + 0.01))) over pixels and channels.
+        """√relMSE that independent samples would have: sqrt(mean(Var[mean] / (expected² + 0.01))) over all values.
 
-        Var[mean] is the sample variance over n; samples are independent. Where squares were too large to be summed
-        (kernels/film.cl) it is taken as mean², the most it can be. None before every pixel has two samples.
+        Var[mean] is the sample variance over n. Where squares were too large to be summed (kernels/film.cl) it is taken
+        as mean², the most it can be. None before every pixel has two samples.
         """
         count = self.pixels["count"].astype(np.float64)[..., None]
         if not count.size or count.min() < 2:
@@ -37,7 +45,7 @@ class Film:
         squares = (self.pixels["square"].astype(np.float64) + self.pixels["square_error"]) / count
         summed = squares >= (1 - 1e-6) * mean**2    # false for NaN, too
         variance = np.where(summed, np.maximum(squares - mean**2, 0) / (count - 1), mean**2)
-        return float(np.sqrt(np.mean(variance / (mean**2 + RELATIVE_FLOOR))))
+        return float(np.sqrt(np.mean(variance / relative_to(mean))))
 
     @property
     def samples(self) -> int:

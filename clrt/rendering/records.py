@@ -30,7 +30,12 @@ COUNTS = record(triangles="i4", spheres="i4", lights="i4", pad="i4")
 PIXEL = record(sum="3f4", count="u4", sum_error="3f4", dropped="u4", square="3f4", rays="u4", square_error="3f4",
                pad="u4")
 LAUNCH = record(position="3f4", width="u4", right="3f4", height="u4", up="3f4", max_depth="i4", forward="3f4",
-                seed="u4", first_pixel="u4", pixel_count="u4", first_sample="u4", sample_count="u4")
+                seed="u4", first_pixel="u4", pixel_count="u4", first_sample="u4", sample_count="u4",
+                block_bits="u4", pad="3u4")
+#: Of a pixel's AOVs (kernels/aov.cl); what is not named pad is a picture of its own.
+AOV = record(albedo="3f4", pad0="i4", normal="3f4", pad1="i4")
+#: A filter's quantile, in pixels from a pixel's edge.
+FILTER = np.dtype([("quantile", "f4")])
 
 
 def material_record(materials: Iterable[Material]) -> np.dtype[Any]:

@@ -18,6 +18,7 @@ from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
 from .compile import OFFSETS, Choices, compile_scene
 from .film import RELATIVE_FLOOR, Film
+from .noise import NoiseEstimate
 from .session import Session
 
 #: With a wanted error the noise is looked at whenever the samples have grown by one part in this.
@@ -47,17 +48,20 @@ class Renderer:
     """A scene on a device, ready to render. Everything not given is taken from `scene.render`.
 
     device: see `clrt devices`; size: (width, height); triangle, box, sphere: see `HitTests`; offset, builder, layout,
-    lanes: see `compile.Choices`.
+    lanes: see `compile.Choices`. spp: how many samples a pixel are planned, if that is known: the sampler then makes
+    neighbouring pixels' errors differ for that many, and later ones begin anew (kernels/sampler).
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
     Raises SceneError, DeviceError, KernelError, UsageError.
     """
 
     def __init__(self, scene: Scene, *, device: str | int | None = None, size: tuple[int, int] | None = None,
-                 max_depth: int | None = None, seed: int | None = None, integrator: str | None = None,
+                 spp: int | None = None, max_depth: int | None = None, seed: int | None = None,
+                 integrator: str | None = None, sampler: str | None = None, filter: str | None = None,
                  triangle: str = "watertight", box: str = "robust", sphere: str = "robust", offset: str = "bound",
                  builder: str | None = None, layout: str | None = None, lanes: int | None = None,
                  on_phase: Callable[[str], None] = lambda phase: None) -> None:
-        given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator}
+        given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
+                                 "sampler": sampler, "filter": filter}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
         self.device = open_device(device)
@@ -70,7 +74,8 @@ class Renderer:
             logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
         on_phase("compile")
         depth = settings.max_depth if settings.integrator == "path" else min(settings.max_depth, 2)
-        self.session = Session(self.device, self.compiled, settings.size, depth, settings.seed)
+        self.session = Session(self.device, self.compiled, settings.size, depth, settings.seed, spp)
+        self._noise = NoiseEstimate(spp)
         self.history: list[dict[str, Any]] = []
         self.stop_reason: str | None = None
         self.seconds = 0.0
@@ -89,8 +94,7 @@ class Renderer:
         first; without any of them at the scene's `spp`. Call it again to go on. reference: (height, width, 3).
         """
         check_stops(spp, time, error)
-        if spp is None and time is None and error is None:
-            spp = self.settings.spp
+        spp = planned_spp(self.settings, spp, time, error)
         self.stop_reason = None
         self._clock = clock.perf_counter() - self.seconds
         next_state, next_check = 0.0, 1
@@ -114,11 +118,13 @@ class Renderer:
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
         film = self.session.film()
+        self._noise.add(film, self.session.samples_done)
         relmse = None
         if reference is not None:
             expected = reference.astype(np.float64)
             relmse = float(np.mean((film.mean - expected) ** 2 / (expected**2 + RELATIVE_FLOOR)))
-        return State(self.session.samples_done, self.seconds, film.noise, relmse, film)
+        done = self.session.samples_done
+        return State(done, self.seconds, self._noise.at(film, done), relmse, film)
 
     def _run_pass(self, spp: int | None, time: float | None, check: int | None) -> None:
         """One pass, not past `check` samples; sets the stop reason where `time` is over, maybe inside the pass."""
@@ -151,6 +157,11 @@ def _check(choices: Choices) -> None:
         if (value := getattr(choices, name)) not in values:
             named = ", ".join(str(known_value) for known_value in values if known_value is not None)
             raise UsageError(f"{name} {value!r} is unknown; choose from {named}")
+
+
+def planned_spp(settings: RenderSettings, spp: int | None, time: float | None, error: float | None) -> int | None:
+    """How many samples a pixel `passes` takes with these stop conditions; None where only time or error ends it."""
+    return settings.spp if spp is None and time is None and error is None else spp
 
 
 def check_stops(spp: int | None, time: float | None, error: float | None) -> None:

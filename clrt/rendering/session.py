@@ -31,10 +31,10 @@ class Session:
     """Renders ranges of samples of one compiled scene at one size. Nothing depends on how the ranges are cut."""
 
     def __init__(self, device: Device, compiled: CompiledScene, size: tuple[int, int], max_depth: int,
-                 seed: int) -> None:
+                 seed: int, planned_spp: int | None = None) -> None:
         self.device, self.compiled, self.size = device, compiled, size
         self.program: BuiltProgram = build(device, compiled.source)
-        self.launch = _launch_record(compiled.camera, size, max_depth, seed)
+        self.launch = _launch_record(compiled.camera, size, max_depth, seed, block_bits(planned_spp))
         self.samples_done = 0
         self._next_pixel, self._pass_samples = 0, 0
         self._launches = Launches(FIRST_LAUNCH_SAMPLES)
@@ -115,7 +115,15 @@ class Session:
         return Film(pixels)
 
 
-def _launch_record(camera: Camera, size: tuple[int, int], max_depth: int, seed: int) -> NDArray[Any]:
+def block_bits(planned_spp: int | None) -> int:
+    """log2 of the samples that a pixel takes from one block of its sampler's sequence (kernels/sampler.cl).
+
+    The least power of two for all `planned_spp`; 32, without an end, where it is not known how many there will be.
+    """
+    return 32 if planned_spp is None else (planned_spp - 1).bit_length()
+
+
+def _launch_record(camera: Camera, size: tuple[int, int], max_depth: int, seed: int, block: int) -> NDArray[Any]:
     """The LAUNCH record with its camera: right and up carry the picture's half extents (kernels/camera.cl)."""
     width, height = size
     forward = np.subtract(camera.look_at, camera.position, dtype=np.float64)
@@ -128,4 +136,5 @@ def _launch_record(camera: Camera, size: tuple[int, int], max_depth: int, seed: 
     record["position"], record["forward"] = camera.position, forward
     record["right"], record["up"] = right * extent * width / height, up * extent
     record["width"], record["height"], record["max_depth"], record["seed"] = width, height, max_depth, seed
+    record["block_bits"] = block
     return record

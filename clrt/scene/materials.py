@@ -132,4 +132,19 @@ class Mirror(Material):
     color: Albedo = (1.0, 1.0, 1.0)
 
 
-MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror)
+@dataclass(frozen=True, kw_only=True)
+class Dielectric(Material):
+    """Smooth glass or water: Fresnel's equations decide between reflection and refraction.
+
+    ior: index of refraction inside over that outside; color: what part of the light that is refracted passes.
+    """
+
+    kernel: ClassVar[str] = "dielectric"
+    color: Albedo = (1.0, 1.0, 1.0)
+    ior: Annotated[float, Ge(0.25), Le(4)] = 1.5
+
+    def features(self) -> frozenset[str]:
+        return frozenset({"TRANSMISSION"})
+
+
+MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror, Dielectric)

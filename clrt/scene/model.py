@@ -18,6 +18,8 @@ FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 Pixels = Annotated[int, Ge(1), Le(65536)]
 Integrator = Literal["path", "direct"]
+Sampler = Literal["sobol", "stratified", "independent"]
+Filter = Literal["box", "tent", "blackman_harris"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +95,8 @@ class RenderSettings:
     max_depth: Annotated[int, Ge(1), Le(1024)] = 8
     seed: Annotated[int, Ge(0), Lt(2**32)] = 0
     integrator: Integrator = "path"
-    filter: Literal["box"] = "box"
+    sampler: Sampler = "sobol"
+    filter: Filter = "box"
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)

@@ -74,10 +74,12 @@ class Bsdfs:
     probe: Probe
     code: NDArray[np.int32]
 
-    def sample(self, which: int, wo: Doubles, numbers: Doubles) -> tuple[Doubles, Doubles, Doubles, Doubles]:
-        """wi (n, 3), weight (n, 3), pdf (n,), specular (n,) for one wo (3,) and numbers (n, 3) in [0, 1)."""
+    def sample(self, which: int, wo: Doubles, numbers: Doubles,
+               front: bool = True) -> tuple[Doubles, Doubles, Doubles, Doubles]:
+        """wi (n, 3), weight (n, 3), pdf (n,), specular (n,) for one wo (3,) or (n, 3) and numbers (n, 3) in [0, 1)."""
         n = len(numbers)
-        out = self.probe("bsdf_sample", 8, np.full(n, self.code[which]), np.broadcast_to(wo, (n, 3)), numbers)
+        out = self.probe("bsdf_sample", 8, np.full(n, self.code[which]), np.broadcast_to(wo, (n, 3)), numbers,
+                         front=front)
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7]
 
     def value(self, which: NDArray[np.intp] | int, wo: Doubles, wi: Doubles) -> tuple[Doubles, Doubles]:

@@ -30,7 +30,7 @@ FLOOR = Mesh(np.array([[-9, 0, -9], [-9, 0, 9], [9, 0, 9], [9, 0, -9]], np.float
 
 def measure_pictures(subject: Subject, *, quick: bool) -> Iterator[Row]:
     """How many means are wrong, and by how many standard errors they are off."""
-    settings = RenderSettings(size=(32, 32), spp=64 if quick else 4096, max_depth=2)
+    settings = RenderSettings(size=(32, 32), spp=64 if quick else 4096, max_depth=2, sampler="independent")
     for case, what, scene, expected in lit_points():
         film = subject.film(replace(scene, camera=POINT, render=settings))
         mean, count = film.mean[..., 0], film.pixels["count"].astype(np.float64)

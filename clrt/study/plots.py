@@ -1,29 +1,21 @@
-"""Pictures of figures, by matplotlib, which is an extra."""
+"""Intersection tests drawn by matplotlib, which is an extra."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from ..errors import UsageError
+from ..output.plots import write_figure
 from .families import FIGURES
 
 #: Zero errors are drawn here, below all that was counted.
 ZERO = 1e-3
 
 
-def check_plots() -> None:
-    """UsageError where matplotlib is not installed."""
-    if find_spec("matplotlib") is None:
-        raise UsageError("plots need matplotlib: install it with `pip install 'clrt[plot]'`")
-
-
 def plot_families(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
     """Error against speed of every test in `results` ({device, families}), a row a device, a column a figure that the
     family is judged by. Returns the path."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     judged = [(family, next(iter(figures.items()))) for family, figures in FIGURES.items()]
@@ -39,6 +31,4 @@ def plot_families(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
             axis.set(yscale="log", xlabel="times as fast as the default", ylabel=title, title=family)
         device = f"{result['device']['name']} ({result['device']['platform']})"
         row[0].annotate(device, (0, 1.12), xycoords="axes fraction")
-    FigureCanvasAgg(figure)
-    figure.savefig(path)
-    return path
+    return write_figure(path, figure)

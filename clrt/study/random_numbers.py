@@ -17,11 +17,10 @@ Draw = Callable[[ArrayLike, ArrayLike, ArrayLike, ArrayLike], Doubles]
 #: The middles of the runs of indices: none, where float32 can no longer count, the end of an 8192² picture, and where
 #: 31 and 32 bits end; there the indices go on from 0.
 MIDDLES = (1 << 23, 1 << 24, 1 << 26, 1 << 31, 1 << 32)
-#: (pixel, sample, dimension, seed) from one number to the next: neighbours, diagonals, picture rows, powers of two. The
-#: first numbers of pairs that are 2^29 and more pixels, samples or seeds apart are correlated: no picture has as many.
+#: (pixel, sample, dimension, seed) from one number to the next: neighbours, diagonals, picture rows, powers of two.
 STEPS = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (2, 0, 0, 0), (64, 0, 0, 0), (1920, 0, 0, 0),
-         (8192, 0, 0, 0), (1 << 16, 0, 0, 0), (1 << 28, 0, 0, 0), (0, 64, 0, 0), (0, 1 << 28, 0, 0), (0, 0, 2, 0),
-         (0, 0, 0, 1 << 28), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, -1, 0), (0, 1, -1, 0), (1, 0, 0, -1), (0, 1, 0, -1))
+         (8192, 0, 0, 0), (1 << 16, 0, 0, 0), (1 << 30, 0, 0, 0), (0, 64, 0, 0), (0, 1 << 30, 0, 0), (0, 0, 2, 0),
+         (0, 0, 0, 1 << 30), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, -1, 0), (0, 1, -1, 0), (1, 0, 0, -1), (0, 1, 0, -1))
 #: Cells along each side of a square, and of a hypercube.
 SIDE, EDGE = 16, 6
 #: Of samples, dimensions and seeds that are tried for each pixel.
@@ -38,7 +37,7 @@ def draw_on(probe: Probe) -> Draw:
         for i, (d, s) in enumerate(scalars.tolist()):
             rows = group.ravel() == i
             p, q = grid[0][rows], grid[1][rows]
-            out[rows] = probe("random", 2, p >> 16, p & 0xffff, q >> 16, q & 0xffff, seed=s, dimension=d)
+            out[rows] = probe("random", 2, p >> 16, p & 0xffff, q >> 16, q & 0xffff, seed=s, dimension=d, block_bits=32)
         return out
 
     return draw

@@ -58,7 +58,7 @@ def measure_samplers(device: Device, *, quick: bool) -> Iterator[Row]:
     yield from _furnaces(device, effort)
     yield from _materials(device, effort)
     yield from _warps_and_lights(device, effort)
-    probe = Probe(device, Scene())
+    probe = Probe(device, Scene(render=RenderSettings(sampler="independent")))
     yield from _sums(probe, effort)
     yield from _dropped(device, probe)
     yield from _random_numbers(probe, effort)

@@ -29,7 +29,8 @@ class Scattered(NamedTuple):
     density: chi-square of the samples over cells of the hemisphere, and one for the failed ones, p; integral: of the
     density; failed: part of the samples below the horizon; energy: that no channel of the furnace exceeds 1, one-sided
     p; weight: largest relative error of the weights as value over density; wrong: samples that are no unit vectors, are
-    below the horizon without having failed or the other way around, or are specular and have a density elsewhere.
+    below the horizon without having failed or the other way around (but of materials that light goes through), or are
+    specular and have more than one direction a side, or a density elsewhere.
     """
 
     name: str
@@ -59,9 +60,10 @@ def scatter(bsdfs: Bsdfs, which: int, cosine: float, samples: int, seed: int) ->
     kept = pdf > 0
     value, density = bsdfs.value(which, wo, wi[kept])
     wrong = np.abs(np.linalg.norm(wi, axis=1) - 1) > ROUNDING
-    wrong |= np.where(kept, wi[:, 2] < 0, (wi[:, 2] > 0) | weight.any(axis=1))
+    through = "TRANSMISSION" in bsdfs.materials[which].features()
+    wrong |= np.where(kept, (wi[:, 2] < 0) & (not through), (wi[:, 2] > 0) | weight.any(axis=1))
     if specular.any():
-        wrong |= (specular == 0) | np.any(wi != wi[0], axis=1)
+        wrong |= (specular == 0) | (len(np.unique(wi, axis=0)) > 1 + through)
         wrong[kept] |= value.any(axis=1) | (density != 0)
         return Scattered(name, 1.0, 1.0, 0.0, _energy(weight), 0.0, int(wrong.sum()), True)
     above = wi[kept, 2] > 0

@@ -148,14 +148,22 @@ static inline real metallic_roughness_density(const MetallicRoughnessLobes *m, r
     return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
 }
 
-static inline real3 metallic_roughness_eval(const Scene *scene, ireal index, real3 wo, real3 wi) {
+static inline real3 metallic_roughness_eval(const Scene *scene, ireal index, ireal front, real3 wo, real3 wi) {
     MetallicRoughnessLobes m = metallic_roughness_lobes(scene, index);
     return metallic_roughness_value(&m, wo, wi);
 }
 
-static inline real metallic_roughness_pdf(const Scene *scene, ireal index, real3 wo, real3 wi) {
+static inline real metallic_roughness_pdf(const Scene *scene, ireal index, ireal front, real3 wo, real3 wi) {
     MetallicRoughnessLobes m = metallic_roughness_lobes(scene, index);
     return metallic_roughness_density(&m, wo, wi);
+}
+
+// As if no light were lost between microfacets: f0, and what goes through the surface twice: (1 − f0) of it straight in,
+// and (1 − f0)·20/21, the cosine-weighted mean of 1 − F, out again.
+static inline real3 metallic_roughness_albedo(const Scene *scene, ireal index) {
+    real3 f0 = GATHER3(scene->metallic_roughness, index, .f0), in = sub(splat(ONE), f0);
+    real3 body = mul(mul(in, in), GATHER3(scene->metallic_roughness, index, .albedo));
+    return mad3(body, (real)(20.0f / 21.0f), f0);
 }
 
 // A normal visible from wo: stretch, draw a point of the cap of directions, unstretch.
@@ -169,11 +177,11 @@ static inline real3 sample_visible_normal(real3 wo, real alpha, real2 u) {
     return normalize3(vector(h.x * alpha, h.y * alpha, maximum(h.z, (real)(1e-30f))));
 }
 
-static inline BsdfSample metallic_roughness_sample(const Scene *scene, ireal index, real3 wo, real2 u, real lobe) {
+static inline BsdfSample metallic_roughness_sample(const Scene *scene, ireal index, ireal front, real3 wo, real2 u, real lobe) {
     MetallicRoughnessLobes m = metallic_roughness_lobes(scene, index);
     real3 h = sample_visible_normal(wo, m.alpha, u);
     real3 reflected = sub(scale(h, 2.0f * dot3(wo, h)), wo);
-    BsdfSample sample;
+    BsdfSample sample = no_sample();
     LobeShares share = lobe_shares(&m, wo);
     sample.wi = choose(lobe < share.specular, reflected, sample_cosine(u));
 #if MULTIPLE_SCATTERING
@@ -182,6 +190,5 @@ static inline BsdfSample metallic_roughness_sample(const Scene *scene, ireal ind
     sample.pdf = metallic_roughness_density(&m, wo, sample.wi);
     real inverse = sample.pdf > 0.0f ? 1.0f / sample.pdf : ZERO;
     sample.weight = scale(metallic_roughness_value(&m, wo, sample.wi), inverse);
-    sample.specular = NO_LANES;
     return sample;
 }

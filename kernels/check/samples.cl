@@ -1,13 +1,14 @@
 // Random numbers and sums of samples, for the host to compare with exact answers.
 #include "check/rows.cl"
 #include "film.cl"
-#include "rng.cl"
+#include "sampler.cl"
 
 // in: pixel, sample. out: two dimensions' bits, then the numbers made of them
 kernel void numbers(uint count, uint block, global const ureal *in, uint seed, uint dimension, global ureal *bits,
                     global real *units) {
     FOR_BLOCK(i) {
-        Sampler sampler = {in[i], in[count + i], seed, dimension};
+        Sampler sampler = sampler_at(in[i], in[count + i], seed, 32);
+        sampler.dimension = dimension;
         ureal2 drawn = next_bits(&sampler);
         bits[i] = drawn.x;
         bits[count + i] = drawn.y;

@@ -48,10 +48,12 @@ kernel void probe_warps(SCENE_PARAMETERS, uint n, global const float *in, global
 }
 
 // in: pixel (of 32 bits, as two halves), sample (as two halves) -> out: u (2)
-kernel void probe_random(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed, uint dimension) {
+kernel void probe_random(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed, uint dimension,
+                         uint block_bits) {
     ELEMENTS
-    Sampler sampler = {(TO_UINT(ROW(in, 0)) << 16) + TO_UINT(ROW(in, 1)),
-                       (TO_UINT(ROW(in, 2)) << 16) + TO_UINT(ROW(in, 3)), seed, dimension};
+    Sampler sampler = sampler_at((TO_UINT(ROW(in, 0)) << 16) + TO_UINT(ROW(in, 1)),
+                                 (TO_UINT(ROW(in, 2)) << 16) + TO_UINT(ROW(in, 3)), seed, block_bits);
+    sampler.dimension = dimension;
     real2 u = next_2d(&sampler);
     put(out, n, 0, u.x);
     put(out, n, 1, u.y);
@@ -72,11 +74,11 @@ kernel void probe_accumulate(SCENE_PARAMETERS, uint n, global const float *in, g
     put(out, n, 13, TO_REAL(a.dropped));
 }
 
-// in: material, wo (3), u (2), lobe -> out: wi (3), weight (3), pdf, specular
-kernel void probe_bsdf_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+// in: material, wo (3), u (2), lobe -> out: wi (3), weight (3), pdf, specular; seen from the front if `front`
+kernel void probe_bsdf_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint front) {
     ELEMENTS
     real2 u = {ROW(in, 4), ROW(in, 5)};
-    BsdfSample sample = bsdf_sample(&scene, TO_INT(ROW(in, 0)), ROW3(in, 1), u, ROW(in, 6));
+    BsdfSample sample = bsdf_sample(&scene, TO_INT(ROW(in, 0)), front ? ALL_LANES : NO_LANES, ROW3(in, 1), u, ROW(in, 6));
     put3(out, n, 0, sample.wi);
     put3(out, n, 3, sample.weight);
     put(out, n, 6, sample.pdf);
@@ -87,8 +89,8 @@ kernel void probe_bsdf_sample(SCENE_PARAMETERS, uint n, global const float *in, 
 kernel void probe_bsdf_value(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     ireal material = TO_INT(ROW(in, 0));
-    put3(out, n, 0, bsdf_eval(&scene, material, ROW3(in, 1), ROW3(in, 4)));
-    put(out, n, 3, bsdf_pdf(&scene, material, ROW3(in, 1), ROW3(in, 4)));
+    put3(out, n, 0, bsdf_eval(&scene, material, ALL_LANES, ROW3(in, 1), ROW3(in, 4)));
+    put(out, n, 3, bsdf_pdf(&scene, material, ALL_LANES, ROW3(in, 1), ROW3(in, 4)));
 }
 
 #if MATERIAL_METALLIC_ROUGHNESS
@@ -140,7 +142,7 @@ kernel void probe_leave(SCENE_PARAMETERS, uint n, global const float *in, global
 // in: p (3) -> out: wi (3), radiance (3), pdf, target (3), infinite, delta. Element i draws the numbers of pixel i.
 kernel void probe_light_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed) {
     ELEMENTS
-    Sampler sampler = {element, (ureal)(0), seed, 0};
+    Sampler sampler = sampler_at(element, (ureal)(0), seed, 32);
     LightSample light = light_sample(&scene, ROW3(in, 0), &sampler);
     put3(out, n, 0, light.wi);
     put3(out, n, 3, light.radiance);
@@ -153,7 +155,7 @@ kernel void probe_light_sample(SCENE_PARAMETERS, uint n, global const float *in,
 // -> out: the entry of the light table that the numbers of pixel i pick
 kernel void probe_alias(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed) {
     ELEMENTS
-    Sampler sampler = {element, (ureal)(0), seed, 0};
+    Sampler sampler = sampler_at(element, (ureal)(0), seed, 32);
     ureal2 bits = next_bits(&sampler);
     ALIAS_PICK(scene.lights, scene.counts.lights, bits, entry)
     put(out, n, 0, TO_REAL(entry));

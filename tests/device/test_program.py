@@ -102,7 +102,8 @@ def test_every_kernel_file_is_used(device: Device) -> None:
                 scene = everything()
                 scene.environment = environment
                 used |= set(compile_scene(scene, choices).files)
-    used |= set(compile_scene(everything(), Choices(), "study/probe.cl").files)
+    for entry in ("aov.cl", "study/probe.cl"):
+        used |= set(compile_scene(everything(), Choices(), entry).files)
     assert sorted(used) == FILES
 
 
@@ -111,10 +112,11 @@ def test_programs_build_without_a_warning(device: Device, capfd: pytest.CaptureF
     scene = everything()
     scene.spheres = scene.spheres + [type(scene.spheres[0])(material=material)
                                      for kind in MATERIALS for material in variants(kind)]
-    source = compile_scene(scene, Choices(device.lanes, device.layout)).source
-    built = build(device, source + "\n// its own text, so that no cache has it")
-    log = built.program.get_build_info(device.cl, cl.program_build_info.LOG)  # type: ignore[no-untyped-call]
-    assert not re.findall(r".*\.cl:\d+:\d+: warning.*", log)
+    for entry in ("path.cl", "aov.cl"):
+        source = compile_scene(scene, Choices(device.lanes, device.layout), entry).source
+        built = build(device, source + "\n// its own text, so that no cache has it")
+        log = built.program.get_build_info(device.cl, cl.program_build_info.LOG)  # type: ignore[no-untyped-call]
+        assert not re.findall(r".*\.cl:\d+:\d+: warning.*", log)
     assert "warning" not in capfd.readouterr().err
 
 

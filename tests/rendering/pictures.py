@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from clrt.device.open import Device
 from clrt.rendering.compile import compile_scene
 from clrt.rendering.film import Film
 from clrt.rendering.session import Session
-from clrt.scene.model import Camera, Mesh, Scene
+from clrt.scene.model import Camera, Mesh, Sampler, Scene
 from clrt.scene.materials import Material
 from clrt.study.significance import mean_test
 from clrt.study.probe import choices
@@ -20,15 +21,18 @@ from clrt.study.probe import choices
 Doubles = NDArray[np.float64]
 
 
-def session(device: Device, scene: Scene, **chosen: Any) -> Session:
-    """The scene with its own settings; `chosen`: see Choices. Programs stay in memory from one to the next."""
-    settings = scene.render
-    return Session(device, compile_scene(scene, choices(device, **chosen)), settings.size,
-                   settings.max_depth, settings.seed)
+def session(device: Device, scene: Scene, sampler: Sampler = "independent", **chosen: Any) -> Session:
+    """The scene with its own settings but for the sampler: statistics are those of independent samples.
+
+    `chosen`: see Choices. Programs stay in memory from one to the next.
+    """
+    settings = replace(scene.render, sampler=sampler)
+    return Session(device, compile_scene(replace(scene, render=settings), choices(device, **chosen)), settings.size,
+                   settings.max_depth, settings.seed, settings.spp)
 
 
 def film(device: Device, scene: Scene, spp: int | None = None, **chosen: Any) -> Film:
-    """The scene's film after spp samples a pixel, or as many as its settings say."""
+    """The scene's film after spp samples a pixel, or as many as its settings say; see `session`."""
     running = session(device, scene, **chosen)
     for _ in running.render(spp or scene.render.spp):
         pass

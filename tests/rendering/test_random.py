@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from clrt.device.open import Device
-from clrt.scene.model import Scene
+from clrt.scene.model import RenderSettings, Scene
 from clrt.study.probe import Probe
 from clrt.study.significance import rejected
 from clrt.study.random_numbers import Draw, draw_on, independence, repetitions, uniformity
@@ -14,17 +14,19 @@ from clrt.study.random_numbers import Draw, draw_on, independence, repetitions, 
 COUNT = 1 << 15
 #: Text of rng.cl and what weakens it: fewer rounds, indices that can be exchanged, that end early, or are forgotten.
 WEAK = {
-    "no second round": ("    x += y * w; y += z * x;\n    return", "    return"),
-    "exchangeable": ("ureal y = sampler->sample * 1664525u + 1013904223u;",
-                     "ureal y = (sampler->sample ^ sampler->pixel) * 1664525u; x = y;"),
-    "24 bits of the pixel": ("sampler->pixel * 1664525u", "(sampler->pixel & 0xffffffu) * 1664525u"),
-    "no seed": ("(ureal)(sampler->seed * 1664525u", "(ureal)(0 * 1664525u"),
+    "no second round": ("    x += y * w; y += z * x; z += x * y; w += y * z;\n    return", "    return"),
+    "exchangeable": ("hash4(sampler->pixel, sampler->sample,", "hash4(sampler->pixel ^ sampler->sample, (ureal)(0),"),
+    "24 bits of the pixel": ("hash4(sampler->pixel,", "hash4(sampler->pixel & 0xffffffu,"),
+    "no seed": ("(ureal)(sampler->seed));", "(ureal)(0));"),
 }
+
+
+INDEPENDENT = Scene(render=RenderSettings(sampler="independent"))
 
 
 @pytest.fixture(scope="module")
 def draw(device: Device) -> Draw:
-    return draw_on(Probe(device, Scene()))
+    return draw_on(Probe(device, INDEPENDENT))
 
 
 def test_numbers_are_uniform(draw: Draw) -> None:
@@ -45,7 +47,7 @@ def test_numbers_do_not_repeat(draw: Draw) -> None:
 
 @pytest.mark.parametrize("what", WEAK)
 def test_weak_generators_are_rejected(device: Device, what: str) -> None:
-    weak = draw_on(Probe(device, Scene(), changes=dict([WEAK[what]])))
+    weak = draw_on(Probe(device, INDEPENDENT, changes=dict([WEAK[what]])))
     wrong = rejected(independence(weak, 1 << 13), 1e-9) or rejected(uniformity(weak, 1 << 14), 1e-9)
     assert wrong or repetitions(weak, 64)
 

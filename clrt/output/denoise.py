@@ -1,0 +1,96 @@
+"""Denoising with Intel Open Image Denoise (Áfra et al., openimagedenoise.org), by the package pyoidn.
+
+Its network was trained on pictures: it takes noise for what pictures do not have, guided by what was seen, and returns
+a likely picture. That is biased, and by how much the report says; the raw picture is kept.
+"""
+
+from __future__ import annotations
+
+import time
+import weakref
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DeviceError, UsageError
+from .compare import mean_ratios, relmse
+from .image import Image
+
+FloatArray = NDArray[np.float32]
+
+
+class Denoiser:
+    """Open Image Denoise on all cores, started. `name`: its version and device.
+
+    UsageError where it is not installed, DeviceError where it fails.
+    """
+
+    def __init__(self) -> None:
+        try:
+            import pyoidn
+        except ImportError as error:
+            raise UsageError("denoising needs the package pyoidn, which is not installed: "
+                             "pip install 'clrt[denoise]', or render without denoising") from error
+        try:
+            self._device = pyoidn.Device()
+        except OSError as error:
+            raise DeviceError(f"Open Image Denoise cannot be loaded: {error}") from error
+        weakref.finalize(self, self._device.release)
+        self._device.commit()
+        self._check()
+        major, minor, patch = (self._device.get_int(f"version{part}") for part in ("Major", "Minor", "Patch"))
+        self.name = f"Open Image Denoise {major}.{minor}.{patch}, CPU"
+
+    def __call__(self, color: FloatArray, albedo: FloatArray, normal: FloatArray) -> FloatArray:
+        """The denoised picture. All arrays are (height, width, 3) float32.
+
+        color: linear, any scale above 1e-8; what is not finite counts as 0. albedo in [0, 1] and normal in [-1, 1] are
+        taken to be free of noise. DeviceError where it fails, as for want of memory.
+        """
+        import pyoidn
+
+        finite = np.nan_to_num(color, nan=0, posinf=0, neginf=0)
+        images = {name: np.ascontiguousarray(image, np.float32)
+                  for name, image in {"color": finite, "albedo": albedo, "normal": normal}.items()}
+        images["output"] = np.empty_like(images["color"])
+        with pyoidn.Filter(self._device) as network:
+            for name, image in images.items():
+                network.set_image(name, image, pyoidn.OIDN_FORMAT_FLOAT3)
+            network.set_bool("hdr", True)
+            network.set_bool("cleanAux", True)
+            network.set_quality(pyoidn.OIDN_QUALITY_HIGH)
+            network.commit()
+            network.execute()
+            self._check()
+        return images["output"]
+
+    def _check(self) -> None:
+        if problem := self._device.get_error():
+            raise DeviceError(f"Open Image Denoise failed: {problem}")
+
+
+def denoised(image: Image, denoiser: Denoiser, aovs: Mapping[str, FloatArray],
+             reference: FloatArray | None = None) -> Image:
+    """The image with denoised pixels, its own as `raw`, and in its report `denoise` (docs/report.md).
+
+    aovs: `albedo` and `normal` of rendering.aov; reference: what the picture should be; all of the image's shape.
+    """
+    start = time.perf_counter()
+    pixels = denoiser(image.pixels, aovs["albedo"], aovs["normal"])
+    done: dict[str, Any] = {"seconds": time.perf_counter() - start, "device": denoiser.name,
+                            "bias": _bias(pixels, image.pixels)}
+    if reference is not None:
+        done |= {"relmse": relmse(pixels, reference), "reference_bias": _bias(pixels, reference)}
+    return Image(pixels, {**image.report, "denoise": done}, image.pixels)
+
+
+def raw_path(path: Path) -> Path:
+    """Where the raw picture is kept beside the denoised one at `path`: <stem>.raw<suffix>."""
+    return path.with_name(f"{path.stem}.raw{path.suffix}")
+
+
+def _bias(pixels: FloatArray, expected: FloatArray) -> list[float | None]:
+    return [None if ratio is None else ratio - 1 for ratio in mean_ratios(pixels, expected)]

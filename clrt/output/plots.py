@@ -1,0 +1,85 @@
+"""Error against time, drawn by matplotlib, which is an extra."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.util import find_spec
+from itertools import cycle
+from math import sqrt
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import OutputError, UsageError
+from .files import check_target, replacing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Seconds, and the error (√relMSE) after them.
+Curve = Sequence[tuple[float, float]]
+
+EXTENSIONS = (".png", ".svg", ".pdf")
+MARKERS = "osD^vP*X"
+#: Inches: of a panel.
+PANEL = (5.0, 3.8)
+DOTS_PER_INCH = 150
+
+
+def check_plot(path: Path) -> None:
+    """Raise OutputError unless a plot can be written at `path`, UsageError where matplotlib is not installed."""
+    check_target(path)
+    if path.suffix.lower() not in EXTENSIONS:
+        raise OutputError(f"{path}: plots are written as {', '.join(EXTENSIONS[:-1])} or {EXTENSIONS[-1]}; "
+                          "name such a file")
+    if find_spec("matplotlib") is None:
+        raise UsageError("plots need matplotlib: install it with `pip install 'clrt[plot]'`")
+
+
+def plot_history(path: Path, title: str, history: Iterable[Mapping[str, Any]]) -> Path:
+    """A render's `history` as `plot_errors` draws it: its own estimate and, where it has them, true errors."""
+    entries = list(history)
+    estimate = [(entry["seconds"], entry["noise"]) for entry in entries if entry["noise"] is not None]
+    true = [(entry["seconds"], sqrt(entry["relmse"])) for entry in entries if "relmse" in entry]
+    return plot_errors(path, {title: {"estimated by the renderer": estimate, "against the reference": true}})
+
+
+def plot_errors(path: Path, panels: Mapping[str, Mapping[str, Curve]]) -> Path:
+    """Error against time on logarithmic axes: a panel by its title, in it a curve by its name. Returns `path`.
+
+    A dotted line falls as errors of independent samples do, with the square root of time. Points that are no positive
+    numbers are left out, and curves without points. Raises OutputError.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    figure = Figure(figsize=(PANEL[0] * len(panels), PANEL[1]), layout="constrained")
+    for axis, (title, curves) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items()):
+        _draw(axis, curves)
+        axis.set(xscale="log", yscale="log", xlabel="seconds", ylabel="error (√relMSE)", title=title)
+        axis.grid(linewidth=0.4, alpha=0.4)
+        for ticks in (axis.xaxis, axis.yaxis):
+            ticks.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            ticks.set_major_formatter("{x:g}")
+            ticks.set_minor_formatter(NullFormatter())
+    return write_figure(path, figure)
+
+
+def write_figure(path: Path, figure: Figure) -> Path:
+    """Writes it in one step (see `replacing`) as the path's extension says. Returns the path; raises OutputError."""
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=DOTS_PER_INCH)
+    return path
+
+
+def _draw(axis: Axes, curves: Mapping[str, Curve]) -> None:
+    drawn = {name: points for name, curve in curves.items()
+             if (points := [(seconds, error) for seconds, error in curve if seconds > 0 and error > 0])}
+    for (name, points), marker in zip(drawn.items(), cycle(MARKERS)):
+        axis.plot(*zip(*points), label=name, marker=marker, markersize=4, linewidth=1.4)
+    if drawn:
+        start, error = next(iter(drawn.values()))[0]
+        end = max(points[-1][0] for points in drawn.values())
+        axis.plot([start, end], [error, error * sqrt(start / end)], ":", color="grey", linewidth=1,
+                  label="slope −½", zorder=0)
+        axis.legend(frameon=False, fontsize="small")

@@ -1,0 +1,43 @@
+"""Pictures beside the picture (AOVs): what the camera sees without its light (kernels/aov.cl)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import NDArray
+
+from ..device.arrays import empty_array
+from ..device.launch import Launches
+from ..device.program import build, make_kernel
+from .records import AOV
+from .session import FEWEST_PIXELS, FIRST_LAUNCH_SAMPLES, Session, block_bits
+
+#: Camera rays a pixel. More make no better guides (docs/denoise.md).
+SAMPLES = 8
+
+
+def render_aovs(session: Session, samples: int = SAMPLES) -> dict[str, NDArray[np.float32]]:
+    """The AOVs of the session's picture by name, each a mean over `samples` camera rays a pixel.
+
+    - albedo (height, width, 3) float32 in [0, 1]: what part of white light the first surface reflects, linear Rec. 709
+    - normal (height, width, 3) float32 in [-1, 1]: its shading normal on the camera's side, in the world's frame
+
+    What mirrors and glass show is followed. The sky has its radiance, up to 1, for albedo, and no normal. KernelError and
+    DeviceError where the device fails.
+    """
+    device, compiled, (width, height) = session.device, session.compiled, session.size
+    kernel = make_kernel(device, build(device, compiled.source_of("aov.cl")), "aov")
+    pixels = empty_array(device, AOV, width * height)
+    launch, launches, done = session.launch.copy(), Launches(FIRST_LAUNCH_SAMPLES), 0
+    launch["sample_count"], launch["block_bits"] = samples, block_bits(samples)
+    while done < len(pixels):
+        count = min(len(pixels) - done, max(FEWEST_PIXELS, launches.size // samples))
+        launch["first_pixel"], launch["pixel_count"] = done, count
+        kernel.set_args(*session._scene, compiled.counts[0], pixels.buffer, launch[0])
+        groups = -(-count // (compiled.choices.lanes * device.local_size))
+        size = (groups * device.local_size,)
+        launches.add(cl.enqueue_nd_range_kernel(device.queue, kernel, size, (device.local_size,)), count * samples)
+        done += count
+    launches.wait()
+    values = pixels.read(device).reshape(height, width)
+    return {name: np.ascontiguousarray(values[name]) for name in AOV.names or () if not name.startswith("pad")}

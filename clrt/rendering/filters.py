@@ -1,0 +1,47 @@
+"""Pixel filters by their quantiles, from which the kernels draw places in and around a pixel (kernels/filter)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .records import FILTER
+
+Doubles = NDArray[np.float64]
+#: Quantiles are 0, 1/CELLS … 1; kernels/filter/table.cl counts as many.
+CELLS = 1024
+#: Steps of bisection, after which a quantile is as exact as a float64.
+BISECTIONS = 54
+
+
+def _tent(t: Doubles) -> Doubles:
+    """∫ of 1 − |t| from −1 on."""
+    return np.where(t < 0, (1 + t) ** 2 / 2, 1 - (1 - t) ** 2 / 2)
+
+
+def _blackman_harris(t: Doubles) -> Doubles:
+    """∫ of the 4-term window with 92 dB (Harris 1978, table 1) over [−1, 1]."""
+    a, x = (0.35875, 0.48829, 0.14128, 0.01168), (t + 1) / 2
+    waves = sum((-1) ** k * a[k] * np.sin(2 * np.pi * k * x) / (2 * np.pi * k) for k in (1, 2, 3))
+    return np.asarray(x + waves / a[0])
+
+
+#: Radius in pixels, and the distribution function over [−1, 1].
+FILTERS: dict[str, tuple[float, Callable[[Doubles], Doubles]]] = {
+    "tent": (1.0, _tent), "blackman_harris": (1.5, _blackman_harris)}
+
+
+def filter_quantiles(name: str) -> NDArray[np.void]:
+    """(CELLS + 1,) FILTER records of a filter of FILTERS: places from a pixel's edge, its middle at 0.5."""
+    radius, distribution = FILTERS[name]
+    wanted = np.arange(CELLS + 1) / CELLS
+    low, high = np.full(CELLS + 1, -1.0), np.full(CELLS + 1, 1.0)
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        below = distribution(middle) < wanted
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    quantiles = np.zeros(CELLS + 1, FILTER)
+    quantiles["quantile"] = 0.5 + radius * high
+    return quantiles

@@ -1,0 +1,137 @@
+"""How fast pictures come near the truth: relMSE by samples and by time, contestants in turns, with several seeds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from math import log, nan
+from statistics import fmean, linear_regression, median
+from typing import Any, NamedTuple
+
+from ..output.compare import mean_ratios, relmse
+from ..scene.model import Scene
+from .contestants import CHOICES, Contestant, Picture, choices_on, peers_of
+from .reference import Reference, render_reference
+
+
+class Effort(NamedTuple):
+    """seconds: that a picture may take; seeds: pictures of each number of samples; steps: see reference.py."""
+
+    seconds: float = 10.0
+    seeds: int = 5
+    steps: int = 32
+
+
+QUICK = Effort(seconds=1.0, seeds=3, steps=2)
+#: Pictures of one scene agree unless all of a channel's means are off by more than this part, to one side.
+AGREES = 0.005
+
+
+class Point(NamedTuple):
+    """What one picture took, and how far it is from the reference; mean_ratio: of each channel."""
+
+    spp: int
+    seconds: float
+    cpu_seconds: float
+    relmse: float
+    mean_ratio: list[float]
+
+
+#: Of each contestant, by samples a pixel, a point a seed.
+Points = dict[str, dict[int, list[Point]]]
+
+
+def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort: Effort, *, peers: bool = False,
+                        choices: Mapping[str, Mapping[str, Any]] = CHOICES,
+                        say: Callable[[str], None] = lambda message: None) -> Iterator[dict[str, Any]]:
+    """The figures of `clrt bench converge`, scene by scene.
+
+    scene, size, max_depth; reference: `spp` and its own `relmse`; missing: why a peer is not among the contestants; and
+    what `figures` returns. say hears of these reasons first, and of each step of a reference that is not kept. Raises
+    what `Renderer` does.
+    """
+    others = [peers_of(scene) if peers else ({}, {}) for scene in scenes]
+    for scene, (_, missing) in zip(scenes, others):
+        for package, why in missing.items():
+            say(f"{scene.name}: without {package}: {why}")
+    for scene, (rivals, missing) in zip(scenes, others):
+        def on_step(step: int, name: str = scene.name) -> None:
+            say(f"{name}: step {step + 1} of {effort.steps} of its reference")
+
+        reference = render_reference(scene, effort.steps, device=devices[0], on_step=on_step)
+        points = take_turns(choices_on(scene, devices, choices) | rivals, reference, effort)
+        yield {"scene": scene.name, "size": scene.render.size, "max_depth": scene.render.max_depth,
+               "reference": {"spp": reference.spp, "relmse": reference.relmse}, "missing": missing,
+               **figures(points, reference)}
+
+
+def take_turns(contestants: Mapping[str, Contestant], reference: Reference, effort: Effort) -> Points:
+    """Pictures of 1, 2, 4 ... samples, of each while twice as many will take no more than the seconds of `effort`."""
+    points: Points = {name: {} for name in contestants}
+    for seed in range(effort.seeds):
+        running, spp = list(contestants), 1
+        while running:
+            for name in running:
+                picture = contestants[name](spp, seed)
+                points[name].setdefault(spp, []).append(_compare(picture, reference))
+            running = [name for name in running if 2 * points[name][spp][-1].seconds <= effort.seconds]
+            spp *= 2
+    return {name: {spp: row for spp, row in rows.items() if len(row) == effort.seeds} for name, rows in points.items()}
+
+
+def _compare(picture: Picture, reference: Reference) -> Point:
+    error = relmse(picture.pixels, reference.pixels)
+    ratios = mean_ratios(picture.pixels, reference.pixels)
+    return Point(picture.spp, picture.seconds, picture.cpu_seconds, nan if error is None else error,
+                 [nan if ratio is None else ratio for ratio in ratios])
+
+
+def figures(points: Points, reference: Reference) -> dict[str, Any]:
+    """Of the seeds' pictures the mean relMSE, less the reference's own, and the median times.
+
+    common_spp: the most samples that all took and that left each an error above the reference's own. Contestants: for
+    each of their planned_spp: spp, seconds, cpu_seconds, relmse; at common_spp: msamples (a second), relmse_seconds and
+    relmse_cpu_seconds (relMSE times seconds, which stays while errors fall with the square root of time), and these
+    over the first contestant's: ratio, cpu_ratio; slope of log relMSE over log samples (−1 where samples are
+    independent); of the pictures of most samples the channels' mean_ratio to the reference, and whether it agrees with
+    1 (see AGREES). NaN where a figure has no meaning.
+    """
+    pixels = reference.total.shape[0] * reference.total.shape[1]
+    rows = {name: _averages(levels, reference.relmse) for name, levels in points.items()}
+    common = _common_spp(rows.values(), reference.relmse)
+    for row in rows.values():
+        at = row["planned_spp"].index(common)
+        seconds, cpu_seconds, error = row["seconds"][at], row["cpu_seconds"][at], row["relmse"][at]
+        row |= {"msamples": 1e-6 * row["spp"][at] * pixels / seconds, "relmse_seconds": error * seconds,
+                "relmse_cpu_seconds": error * cpu_seconds, "slope": _slope(row, reference.relmse)}
+    first = next(iter(rows.values()))
+    for row in rows.values():
+        row |= {"ratio": _over(row["relmse_seconds"], first["relmse_seconds"]),
+                "cpu_ratio": _over(row["relmse_cpu_seconds"], first["relmse_cpu_seconds"])}
+    return {"common_spp": common, "contestants": rows}
+
+
+def _averages(levels: Mapping[int, Sequence[Point]], own: float) -> dict[str, Any]:
+    """own: the reference's relMSE."""
+    channels = list(zip(*(point.mean_ratio for point in levels[max(levels)])))
+    return {"planned_spp": list(levels), "spp": [level[0].spp for level in levels.values()],
+            "seconds": [median(point.seconds for point in level) for level in levels.values()],
+            "cpu_seconds": [median(point.cpu_seconds for point in level) for level in levels.values()],
+            "relmse": [fmean(point.relmse for point in level) - own for level in levels.values()],
+            "mean_ratio": [fmean(channel) for channel in channels],
+            "agrees": not any(min(channel) > 1 + AGREES or max(channel) < 1 - AGREES for channel in channels)}
+
+
+def _common_spp(rows: Collection[Mapping[str, Any]], own: float) -> int:
+    every: set[int] = set.intersection(*(set(row["planned_spp"]) for row in rows))
+    clear = [{spp for spp, error in zip(row["planned_spp"], row["relmse"]) if error > own} for row in rows]
+    return max(every.intersection(*clear) or {min(every)})
+
+
+def _slope(row: Mapping[str, Any], own: float) -> float:
+    """Of the least-squares line through the errors above the reference's own."""
+    clear = [(log(spp), log(error)) for spp, error in zip(row["spp"], row["relmse"]) if error > own]
+    return linear_regression(*zip(*clear)).slope if len(clear) > 1 else nan
+
+
+def _over(value: float, first: float) -> float:
+    return value / first if first > 0 else nan

@@ -1,0 +1,224 @@
+"""A scene as Blender holds it, for Cycles: `bpy.data` and its objects, of Blender 5.
+
+Blender's up is +z: its x, y, z are our z, x, y, which also makes its environment pictures ours. To add a material,
+write its node in BSDFS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import UsageError
+from ..output.images import write_image
+from ..scene.lights import Light, PointLight
+from ..scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
+from .shapes import icosphere
+
+#: How near and far the camera sees, of the distance to where it looks.
+NEAR, FAR = 1e-4, 1e6
+#: Cycles has no spheres: they are 20·4^this triangles with a sphere's normals.
+SUBDIVISIONS = 6
+#: Watt of a point light that sends 1 W/sr everywhere.
+POINT_WATT = 4 * np.pi
+
+
+def check_scene(scene: Scene) -> None:
+    """UsageError names what has no counterpart in Cycles."""
+    owners: list[Mesh | Sphere] = [*scene.meshes, *scene.spheres]
+    for owner in owners:
+        if type(owner.material) not in BSDFS:
+            raise UsageError(f"{owner.name}: Cycles is not told of {owner.material.kernel} yet")
+        if isinstance(owner.material, MetallicRoughness) and not _is_metal(owner.material):
+            raise UsageError(f"{owner.name}: Cycles can draw metallic_roughness that is all metal, with single "
+                             'scattering and smith = "height_correlated"')
+    if scene.render.filter != "box" or scene.render.max_depth < 2:
+        raise UsageError(f'{scene.name}: Cycles is compared with filter = "box", and two path edges or more')
+
+
+def blender_scene(data: Any, scene: Scene, folder: Path) -> Any:
+    """A scene of `data` (bpy.data); pictures that Blender reads are written to `folder`."""
+    made = data.scenes.new(scene.name)
+    _set_up(made, scene)
+    for mesh in scene.meshes:
+        _place(data, made, _mesh(data, mesh.vertices, mesh.faces, mesh.normals, mesh.material))
+    for sphere in scene.spheres:
+        _place(data, made, _mesh(data, *sphere_triangles(sphere), sphere.material))
+    for light in scene.lights:
+        _place(data, made, *_light(data, light))
+    made.camera = _place(data, made, *_camera(data, scene.camera))
+    made.world = _world(data, scene.environment, folder)
+    return made
+
+
+def _set_up(made: Any, scene: Scene) -> None:
+    """No clamping, no denoising, no filter but a pixel's own square; bounces are path edges but the first two."""
+    render, cycles, (width, height) = made.render, made.cycles, scene.render.size
+    depth = scene.render.max_depth if scene.render.integrator == "path" else 2
+    render.engine, render.use_persistent_data = "CYCLES", True
+    render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
+    cycles.device, cycles.pixel_filter_type, cycles.filter_width = "CPU", "BOX", 1.0
+    cycles.max_bounces = depth - 2
+    cycles.diffuse_bounces = cycles.glossy_bounces = cycles.transmission_bounces = depth
+    cycles.use_adaptive_sampling = cycles.use_denoising = False
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+    cycles.blur_glossy = cycles.light_sampling_threshold = 0.0
+    picture = render.image_settings
+    picture.file_format, picture.color_mode, picture.color_depth = "OPEN_EXR", "RGB", "32"
+
+
+class Nodes:
+    """Makes nodes of a material or world, by their type without "ShaderNode"; inputs are values, or outputs to link."""
+
+    def __init__(self, owner: Any) -> None:
+        self._tree = owner.node_tree
+        self._tree.nodes.clear()
+
+    def __call__(self, kind: str, inputs: dict[str | int, Any] | None = None, **settings: Any) -> Any:
+        node = self._tree.nodes.new(f"ShaderNode{kind}")
+        for name, value in settings.items():
+            setattr(node, name, value)
+        for key, value in (inputs or {}).items():
+            if hasattr(value, "links"):
+                self._tree.links.new(value, node.inputs[key])
+            else:
+                node.inputs[key].default_value = value
+        return node
+
+
+def _diffuse(nodes: Nodes, material: Diffuse) -> Any:
+    return nodes("BsdfDiffuse", {"Color": (*material.color, 1), "Roughness": 0.0})
+
+
+def _mirror(nodes: Nodes, material: Mirror) -> Any:
+    return nodes("BsdfAnisotropic", {"Color": (*material.color, 1), "Roughness": 0.0})
+
+
+def _metal(nodes: Nodes, material: MetallicRoughness) -> Any:
+    """The F82 model is Schlick's where its tint is white; roughness is squared there, too."""
+    f0 = material.parameters()["f0"]
+    assert isinstance(f0, tuple)
+    return nodes("BsdfMetallic", {"Base Color": (*f0, 1), "Edge Tint": (1, 1, 1, 1), "Roughness": material.roughness},
+                 fresnel_type="F82", distribution="GGX")
+
+
+def _dielectric(nodes: Nodes, material: Dielectric) -> Any:
+    """Of Blender's glass the colour would also be the reflection's."""
+    reflection = nodes("BsdfAnisotropic", {"Color": (1, 1, 1, 1), "Roughness": 0.0})
+    refraction = nodes("BsdfRefraction", {"Color": (*material.color, 1), "Roughness": 0.0, "IOR": material.ior})
+    part = nodes("Fresnel", {"IOR": material.ior}).outputs[0]
+    return nodes("MixShader", {0: part, 1: refraction.outputs[0], 2: reflection.outputs[0]})
+
+
+BSDFS: dict[type[Material], Callable[[Nodes, Any], Any]] = {
+    Diffuse: _diffuse, Mirror: _mirror, MetallicRoughness: _metal, Dielectric: _dielectric}
+
+
+def _is_metal(material: MetallicRoughness) -> bool:
+    return (not np.any(material.parameters()["albedo"]) and material.smith == "height_correlated"
+            and not material.multiple_scattering)
+
+
+def _material(data: Any, material: Material) -> Any:
+    """Its BSDF, and its emission from the front."""
+    made = data.materials.new(material.kernel)
+    nodes = Nodes(made)
+    shader = BSDFS[type(material)](nodes, material).outputs[0]
+    if any(material.emission):
+        back = nodes("NewGeometry").outputs["Backfacing"]
+        front = nodes("Math", {0: 1.0, 1: back}, operation="SUBTRACT").outputs[0]
+        emission = nodes("Emission", {"Color": (*material.emission, 1), "Strength": front}).outputs[0]
+        shader = nodes("AddShader", {0: shader, 1: emission}).outputs[0]
+        made.cycles.emission_sampling = "FRONT"
+    nodes("OutputMaterial", {"Surface": shader})
+    return made
+
+
+def _mesh(data: Any, vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any] | None,
+          material: Material) -> Any:
+    made = data.meshes.new("mesh")
+    made.from_pydata(turned(vertices).tolist(), [], faces.tolist())
+    made.materials.append(_material(data, material))
+    if normals is None:
+        made.shade_flat()
+    else:
+        made.shade_smooth()
+        made.normals_split_custom_set_from_vertices(turned(normals).tolist())
+    return made
+
+
+def sphere_triangles(sphere: Sphere) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Vertices, faces that are seen from outside, and normals."""
+    normals, faces = icosphere(SUBDIVISIONS)
+    a, b, c = normals[faces].transpose(1, 0, 2)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
+    faces[inward] = faces[inward, ::-1]
+    return np.asarray(sphere.center) + sphere.radius * normals, faces, normals
+
+
+def _light(data: Any, light: Light) -> tuple[Any, NDArray[np.float64]]:
+    """The light and where it stands: it shines along its −z."""
+    if isinstance(light, PointLight):
+        made = data.lights.new("light", "POINT")
+        made.shadow_soft_size, made.energy, made.color = 0.0, POINT_WATT, light.intensity
+        return made, frame_of_axes(np.eye(3), light.position)
+    made = data.lights.new("light", "SUN")
+    made.angle, made.energy, made.color = 0.0, 1.0, light.irradiance
+    z = -np.asarray(light.direction) / np.linalg.norm(light.direction)
+    x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
+    x /= np.linalg.norm(x)
+    return made, frame_of_axes(np.array([x, np.cross(z, x), z]), (0, 0, 0))
+
+
+def _camera(data: Any, camera: Camera) -> tuple[Any, NDArray[np.float64]]:
+    """The camera and where it stands: it looks along its −z, up is +y."""
+    made = data.cameras.new("camera")
+    back = np.subtract(camera.position, camera.look_at, dtype=np.float64)
+    distance = np.linalg.norm(back)
+    right = np.cross(camera.up, back)
+    made.sensor_fit, made.angle = "VERTICAL", np.radians(camera.fov_degrees)
+    made.clip_start, made.clip_end = NEAR * distance, FAR * distance
+    right, back = right / np.linalg.norm(right), back / distance
+    return made, frame_of_axes(np.array([right, np.cross(back, right), back]), camera.position)
+
+
+def _world(data: Any, environment: Environment, folder: Path) -> Any:
+    made = data.worlds.new("world")
+    nodes = Nodes(made)
+    color: Any = (*environment.color, 1)
+    if environment.image is not None:
+        file = folder / "sky.exr"
+        write_image(file, environment.image)
+        angle = -np.radians(environment.rotation_degrees)
+        place = nodes("TexCoord").outputs["Generated"]
+        turned = nodes("Mapping", {"Vector": place, "Rotation": (0, 0, angle)}).outputs[0]
+        color = nodes("TexEnvironment", {"Vector": turned}, image=data.images.load(str(file))).outputs[0]
+    background = nodes("Background", {"Color": color, "Strength": environment.strength}).outputs[0]
+    nodes("OutputWorld", {"Surface": background})
+    return made
+
+
+def _place(data: Any, made: Any, content: Any, frame: NDArray[np.float64] | None = None) -> Any:
+    """Into the scene; frame: (4, 4), to the world."""
+    placed = data.objects.new(content.name, content)
+    made.collection.objects.link(placed)
+    if frame is not None:
+        placed.matrix_world = frame.T.tolist()
+    return placed
+
+
+def frame_of_axes(axes: NDArray[np.float64], origin: ArrayLike) -> NDArray[np.float64]:
+    """(4, 4) to Blender's world, of our (3, 3) axes, one a row."""
+    frame = np.eye(4)
+    frame[:3] = np.column_stack([*turned(axes), turned(origin)])
+    return frame
+
+
+def turned(points: ArrayLike) -> NDArray[np.float64]:
+    """(..., 3) our x, y, z as Blender's."""
+    return np.roll(np.asarray(points, np.float64), 1, axis=-1)

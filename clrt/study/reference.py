@@ -1,0 +1,110 @@
+"""What pictures are measured against: a scene rendered long enough once, and kept between runs.
+
+It is the mean of steps, renders of STEP_SPP samples each with a seed of its own. From how far these differ follows how
+far their mean is from the truth, whatever numbers the samples are drawn with; and a kept one goes on where it ended.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from io import BytesIO
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.cache import REFERENCES, read_file, write_file
+from ..output.compare import RELMSE_FLOOR
+from ..rendering.renderer import Renderer
+from ..scene.model import Scene
+
+STEP_SPP = 128
+#: Of the first step; each next one has the seed below. Renders that are measured count up from 0.
+FIRST_SEED = 2**32 - 1
+
+
+@dataclass(frozen=True)
+class Reference:
+    """total, squares: (h, w, 3) float64, of the steps' pictures and of their squares."""
+
+    steps: int
+    total: NDArray[np.float64]
+    squares: NDArray[np.float64]
+
+    @property
+    def spp(self) -> int:
+        """Samples a pixel."""
+        return self.steps * STEP_SPP
+
+    @property
+    def pixels(self) -> NDArray[np.float32]:
+        """(h, w, 3) float32, linear Rec. 709."""
+        return (self.total / self.steps).astype(np.float32)
+
+    @property
+    def relmse(self) -> float:
+        """Its own, estimated from the variance between steps; it takes two of them."""
+        mean = self.total / self.steps
+        variance = np.maximum(self.squares / self.steps - mean**2, 0) / (self.steps - 1)
+        return float(np.mean(variance / (mean**2 + RELMSE_FLOOR)))
+
+    def plus(self, picture: NDArray[np.float64]) -> Reference:
+        """With one more step."""
+        return Reference(self.steps + 1, self.total + picture, self.squares + picture**2)
+
+
+def render_reference(scene: Scene, steps: int, *, device: str | int | None = None,
+                     on_step: Callable[[int], None] = lambda step: None) -> Reference:
+    """The reference of `scene` with at least `steps` steps (2 or more), as far as possible from the cache.
+
+    Kept by all that makes the picture: kernels, buffers, size, depth and camera; a damaged file counts as none.
+    on_step hears the number of each step that has to be rendered. Raises what `Renderer` does.
+    """
+    renderer = Renderer(scene, device=device)
+    width, height = renderer.settings.size
+    name = REFERENCES.replace("*", _digest(renderer))
+    black = np.zeros((height, width, 3))
+    reference = _kept(name, black.shape) or Reference(0, black, black)
+    while reference.steps < steps:
+        on_step(reference.steps)
+        reference = reference.plus(_render(scene, FIRST_SEED - reference.steps, device))
+        _keep(name, reference)
+    return reference
+
+
+def _render(scene: Scene, seed: int, device: str | int | None) -> NDArray[np.float64]:
+    for state in Renderer(scene, spp=STEP_SPP, seed=seed, device=device).passes(spp=STEP_SPP):
+        pass
+    return state.film.mean
+
+
+def _digest(renderer: Renderer) -> str:
+    compiled, settings = renderer.compiled, renderer.settings
+    digest = hashlib.sha256(compiled.source.encode())
+    digest.update(repr((STEP_SPP, settings.size, settings.max_depth, settings.integrator, compiled.camera)).encode())
+    for array in [compiled.counts, *(array for _, array in compiled.buffers.values())]:
+        if isinstance(array, np.ndarray):  # trees built on the device stay there; no picture depends on them
+            digest.update(array.tobytes())
+    return digest.hexdigest()
+
+
+def _keep(name: str, reference: Reference) -> None:
+    file = BytesIO()
+    np.savez(file, steps=reference.steps, total=reference.total, squares=reference.squares)
+    write_file(name, file.getvalue())
+
+
+def _kept(name: str, shape: tuple[int, ...]) -> Reference | None:
+    """What is kept under `name`; None where nothing is, or nothing that can be read (archives have checksums)."""
+    content = read_file(name)
+    if content is None:
+        return None
+    try:
+        stored: Any = np.load(BytesIO(content))
+        reference = Reference(int(stored["steps"]), stored["total"], stored["squares"])
+    except (OSError, ValueError, EOFError, KeyError, BadZipFile):
+        return None
+    return reference if reference.total.shape == reference.squares.shape == shape else None

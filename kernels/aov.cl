@@ -1,0 +1,79 @@
+// What is seen, without its light: pictures beside the picture (AOVs), which guide a denoiser.
+//
+// One work-item takes LANES pixels and averages `sample_count` camera rays of each. Rays go on from mirrors and glass,
+// there by the likelier of reflection and refraction, since guides are to be free of noise. The first surface that is
+// neither is what is seen, as Open Image Denoise asks, its albedo tinted by their colors. The sky has its radiance, up
+// to 1, for albedo, and no normal. World frame.
+//
+// To add one: a field of the record AOV (clrt/rendering/records.py), its like in Seen, and what it is, below.
+#include "camera.cl"
+#include "film.cl"
+#include "bsdf.cl"
+#include "light.cl"
+
+typedef struct { real3 albedo, normal; } Seen;
+
+static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal active, int max_depth) {
+    Seen seen = {splat(ZERO), splat(ZERO)};
+    real3 origin = eye, direction = view, tint = splat(ONE);
+    for (int depth = 1;; ++depth) {
+        Hits hits = closest_hit(scene, origin, direction, (real)(INFINITY), active);
+        ireal hit = active & (hits.primitive >= 0);
+#if SKY
+        ireal escaped = active & !hit;
+        if (ANY(escaped)) {
+            real pdf;
+            real3 sky = sky_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO)), &pdf);
+            real3 bounded = vector(minimum(sky.x, ONE), minimum(sky.y, ONE), minimum(sky.z, ONE));
+            seen.albedo = choose(escaped, mul(tint, bounded), seen.albedo);
+        }
+#endif
+        if (!ANY(hit)) return seen;
+#if PRIMITIVES
+        Surface surface = surface_at(scene, origin, direction, &hits);
+        real3 towards = negate(direction);
+        turn_towards(&surface, towards);
+        Frame shading = frame_around(surface.ns);
+        real3 wo = to_local(shading, towards);
+        real middle = (real)(0.5f);
+        BsdfSample sample = bsdf_sample(scene, surface.material, surface.front, wo, (real2){middle, middle}, middle);
+        real3 wi = to_world(shading, sample.wi);
+        ireal followed = hit & sample.specular & keeps_its_side(&sample, dot3(wi, surface.ng));
+        ireal ends = hit & !followed;
+        seen.albedo = choose(ends, mul(tint, bsdf_albedo(scene, surface.material)), seen.albedo);
+        seen.normal = choose(ends, surface.ns, seen.normal);
+        if (depth >= max_depth || !ANY(followed)) return seen;
+        tint = choose(followed, mul(tint, sample.weight), tint);
+        origin = offset_origin(surface.p, surface.p_error, surface.ng, wi);
+        direction = wi;
+        active = followed;
+#endif
+    }
+}
+
+__attribute__((vec_type_hint(real)))
+kernel void aov(SCENE_PARAMETERS, global Aov *pixels, const Launch launch) {
+    Scene scene = SCENE_ARGUMENTS;
+    uint first = launch.first_pixel + (uint)get_global_id(0) * LANES;
+    uint end = launch.first_pixel + launch.pixel_count;
+    if (first >= end) return;
+    ureal index = (ureal)(first) + LANE_INDEX;
+    ireal inside = index < end;
+    index = inside ? index : (ureal)(first);
+    ureal y = index / launch.width, x = index - y * launch.width, code = pixel_code(x, y);
+    real3 position = broadcast(launch.position);
+    Seen sum = {splat(ZERO), splat(ZERO)};
+    for (uint s = 0; s < launch.sample_count; ++s) {
+        Sampler sampler = sampler_at(code, (ureal)(s), launch.seed, launch.block_bits);
+        real3 direction = camera_direction(&scene, &launch, x, y, next_2d(&sampler));
+        Seen seen = seen_along(&scene, position, direction, inside, launch.max_depth);
+        sum.albedo = add(sum.albedo, seen.albedo);
+        sum.normal = add(sum.normal, seen.normal);
+    }
+    real share = (real)(1.0f / (float)launch.sample_count);
+    real3 albedo = scale(sum.albedo, share), normal = scale(sum.normal, share);
+    for (uint lane = 0; lane < LANES && first + lane < end; ++lane) {
+        store_rows(pixels[first + lane].albedo, &albedo, lane);
+        store_rows(pixels[first + lane].normal, &normal, lane);
+    }
+}

@@ -1,0 +1,12 @@
+// A filter by its quantiles, so that samples fall with its density and all weigh the same (Ernst, Stamminger and Greiner
+// 2006, "Filter Importance Sampling"). Places are in pixels from the pixel's left or upper edge.
+#include "lanes.cl"
+
+#define FILTER_CELLS 1024
+
+static inline real filter_sample(const Scene *scene, real u) {
+    real place = u * (float)FILTER_CELLS;
+    ireal cell = TO_INT(place);
+    real low = GATHER(real, scene->filter, cell, .quantile), high = GATHER(real, scene->filter, cell + 1, .quantile);
+    return low + (place - TO_REAL(cell)) * (high - low);
+}

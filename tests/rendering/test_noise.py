@@ -1,0 +1,61 @@
+"""The noise that a render tells, beside its true error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from clrt.device.open import Device
+from clrt.rendering.film import RELATIVE_FLOOR
+from clrt.rendering.renderer import Renderer
+from clrt.scene.materials import Diffuse, MetallicRoughness
+from clrt.scene.model import Camera, Environment, RenderSettings, Sampler, Scene, Sphere
+
+from .pictures import box, quad
+
+FLOOR = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse(color=(0.6, 0.5, 0.4)))
+BALLS = [Sphere(center=(0.0, 1.0, 0.0), material=Diffuse(color=(0.7, 0.2, 0.2))),
+         Sphere(center=(-2.0, 0.7, 1.0), radius=0.7, material=MetallicRoughness(metallic=1.0, roughness=0.3))]
+
+
+def room() -> Scene:
+    """A lamp under the ceiling of a closed room with two balls."""
+    lamp = quad([(-1, 3.9, -1), (1, 3.9, -1), (1, 3.9, 1), (-1, 3.9, 1)], Diffuse(emission=(8.0, 7.0, 5.0)))
+    return Scene(meshes=[box(4.0, Diffuse(color=(0.7,) * 3)), FLOOR, lamp], spheres=BALLS,
+                 camera=Camera(position=(0.0, 2.0, 3.9), look_at=(0.0, 1.0, 0.0), fov_degrees=60))
+
+
+def outdoors() -> Scene:
+    """The balls under a sky with a small sun."""
+    image = np.full((16, 32, 3), 0.4, np.float32)
+    image[4, 5] = 150.0
+    return Scene(meshes=[FLOOR], spheres=BALLS, environment=Environment(image=image),
+                 camera=Camera(position=(0.0, 2.0, 6.0), look_at=(0.0, 1.0, 0.0)))
+
+
+@pytest.mark.parametrize("make", [room, outdoors])
+def test_noise_is_the_error(device: Device, make: Callable[[], Scene]) -> None:
+    """√relMSE is told within a factor of 1.2, between powers of two as well.
+
+    The halves of a jittered grid are no grids of their own, so what it tells of the whole is too much. The truth has
+    a 32nd of the variance of the picture with most samples.
+    """
+    scene, index, size = make(), device.info.index, (48, 48)
+    truth = list(Renderer(scene, device=index, size=size, seed=1, spp=2048).passes(spp=2048))[-1].film.mean
+    highest: dict[Sampler, float] = {"sobol": 1.2, "independent": 1.2, "stratified": 2.0}
+    for sampler in highest:
+        renderer = Renderer(scene, device=index, size=size, sampler=sampler, spp=64, seed=4)
+        for spp in (8, 16, 24, 32, 64):
+            state = list(renderer.passes(spp=spp))[-1]
+            error = np.sqrt(np.mean((state.film.mean - truth)**2 / (truth**2 + RELATIVE_FLOOR)))
+            assert state.noise is not None
+            assert 1 / 1.2 < state.noise / error < highest[sampler], (sampler, spp, state.noise, error)
+
+
+def test_noise_of_a_picture_without_any(device: Device) -> None:
+    """A sky that is the same everywhere: no error, and none is told."""
+    scene = Scene(environment=Environment(color=(1.0, 1.0, 1.0)), render=RenderSettings(size=(8, 8), spp=4))
+    noises = [state.noise for state in Renderer(scene, device=device.info.index).passes()]
+    assert noises[0] is None and max(noise for noise in noises if noise is not None) < 1e-6

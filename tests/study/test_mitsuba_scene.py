@@ -1,0 +1,133 @@
+"""What Mitsuba is told of a scene, by its documented meaning; Mitsuba itself is not needed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.errors import UsageError
+from clrt.scene.lights import DirectionalLight, PointLight
+from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.study.mitsuba_renderer import newest_llvm
+from clrt.study.mitsuba_scene import BSDFS, mitsuba_scene, rows_at_poles
+
+RNG = np.random.default_rng(5)
+
+
+def ball(material: Material) -> Scene:
+    return Scene(spheres=[Sphere(material=material, name="the ball")])
+
+
+def bsdf(material: Material) -> Any:
+    """The plugin inside of `twosided`."""
+    plugin = mitsuba_scene(ball(material))["sphere0"]["bsdf"]
+    assert plugin["type"] == "twosided"
+    return plugin["front"]
+
+
+def test_camera_looks_where_it_should_with_its_left_to_the_left() -> None:
+    """Mitsuba's perspective camera looks along +z, +y is up in the picture and +x left."""
+    camera = Camera(position=(1, 2, 5), look_at=(1, 2, -5), fov_degrees=30)
+    sensor = mitsuba_scene(replace(ball(Diffuse()), camera=camera, render=RenderSettings(size=(64, 48))))["sensor"]
+    np.testing.assert_allclose(sensor["to_world"], [[-1, 0, 0, 1], [0, 1, 0, 2], [0, 0, -1, 5], [0, 0, 0, 1]])
+    assert (sensor["fov"], sensor["fov_axis"]) == (30, "y"), "vertical, full angle"
+    assert (sensor["film"]["width"], sensor["film"]["height"], sensor["film"]["rfilter"]) == (64, 48, {"type": "box"})
+    slanted = Camera(position=(1, 2, 5), look_at=(-3, 0.5, 1), up=(0.2, 1, -0.1))
+    matrix = mitsuba_scene(replace(ball(Diffuse()), camera=slanted))["sensor"]["to_world"]
+    np.testing.assert_allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(matrix) == pytest.approx(1) and matrix[:3, 1] @ slanted.up > 0
+    np.testing.assert_allclose(np.cross(matrix[:3, 2], [-4, -1.5, -4]), 0, atol=1e-12)
+
+
+def test_depth_counts_edges_and_direct_light_is_two_of_them() -> None:
+    for settings, depth in [(RenderSettings(max_depth=5), 5), (RenderSettings(max_depth=5, integrator="direct"), 2)]:
+        integrator = mitsuba_scene(replace(ball(Diffuse()), render=settings), "multijitter")["integrator"]
+        assert integrator == {"type": "path", "max_depth": depth}
+
+
+def test_materials_are_told_by_what_they_reflect() -> None:
+    assert bsdf(Diffuse(color=(0.1, 0.2, 0.3)))["reflectance"] == {"type": "rgb", "value": [0.1, 0.2, 0.3]}
+    assert bsdf(Mirror(color=(0.5, 0.7, 0.9))) == {
+        "type": "conductor", "material": "none", "specular_reflectance": {"type": "rgb", "value": [0.5, 0.7, 0.9]}}
+    gold = bsdf(MetallicRoughness(preset="gold", roughness=0.3, smith="separable"))
+    assert (gold["type"], gold["metallic"], gold["base_color"]["value"]) == ("principled", 1, [1.0, 0.71, 0.29])
+    assert gold["roughness"] == pytest.approx(0.3), "principled squares it, too"
+    assert mitsuba_scene(ball(Dielectric(ior=1.3, color=(0.9, 0.8, 0.7))))["sphere0"]["bsdf"] == {
+        "type": "dielectric", "int_ior": 1.3, "ext_ior": 1.0,
+        "specular_transmittance": {"type": "rgb", "value": [0.9, 0.8, 0.7]}}, "not two-sided"
+
+
+@pytest.mark.parametrize(("material", "words"), [
+    (MetallicRoughness(metallic=0.5, smith="separable"), "not all metal"),
+    (MetallicRoughness(metallic=1.0), 'smith = "separable"'),
+    (MetallicRoughness(preset="gold", smith="separable", multiple_scattering=True), "single scattering")])
+def test_what_has_no_counterpart_is_refused_by_name(material: Material, words: str) -> None:
+    with pytest.raises(UsageError, match=f"the ball: Mitsuba cannot draw .*{words}"):
+        mitsuba_scene(ball(material))
+
+
+def test_other_filters_are_refused() -> None:
+    with pytest.raises(UsageError, match='room: .*filter = "box"'):
+        mitsuba_scene(Scene(render=RenderSettings(filter="tent"), name="room"))
+
+
+def test_every_material_is_converted_or_refused() -> None:
+    for kind in set(MATERIALS) - set(BSDFS):
+        with pytest.raises(UsageError, match=f"the ball: .*{kind.kernel}"):
+            mitsuba_scene(ball(kind()))
+    assert {Diffuse, Mirror} <= set(BSDFS)
+
+
+def test_lights_keep_their_units() -> None:
+    lamp = Diffuse(color=(0, 0, 0), emission=(17, 12, 4))
+    scene = Scene(meshes=[Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), lamp)], spheres=[Sphere()],
+                  lights=[PointLight(position=(1, 2, 3), intensity=(4, 5, 6)),
+                          DirectionalLight(direction=(0, -1, 0), irradiance=(3, 2, 1))])
+    told = mitsuba_scene(scene)
+    assert told["mesh0"]["emitter"] == {"type": "area", "radiance": {"type": "rgb", "value": [17, 12, 4]}}
+    assert told["mesh0"]["vertices"] is scene.meshes[0].vertices and told["mesh0"]["normals"] is None
+    assert "emitter" not in told["sphere0"]
+    assert told["light0"] == {"type": "point", "position": [1, 2, 3], "intensity": {"type": "rgb", "value": [4, 5, 6]}}
+    assert told["light1"] == {"type": "directional", "direction": [0, -1, 0],
+                              "irradiance": {"type": "rgb", "value": [3, 2, 1]}}
+    assert "sky" not in told, "a black sky would be sampled as often as the others"
+
+
+def test_skies_turn_counter_clockwise_seen_from_above() -> None:
+    constant = mitsuba_scene(Scene(environment=Environment(color=(1, 2, 3), strength=0.5)))
+    assert constant["sky"] == {"type": "constant", "radiance": {"type": "rgb", "value": [0.5, 1, 1.5]}}
+    image = RNG.uniform(size=(2, 4, 3)).astype(np.float32)
+    sky = mitsuba_scene(Scene(environment=Environment(image=image, strength=2, rotation_degrees=90)))["sky"]
+    assert (sky["type"], sky["scale"]) == ("envmap", 2)
+    np.testing.assert_allclose(sky["to_world"] @ [0, 0, -1, 0], [-1, 0, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(sky["to_world"] @ [0, 1, 0, 1], [0, 1, 0, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("height", [1, 2, 5])
+def test_rows_at_poles_are_the_same_sky(height: int) -> None:
+    """Interpolated as each reads its rows: ours at (row + ½)/h, held beyond the ends, Mitsuba's at row/(H − 1)."""
+    image = RNG.uniform(size=(height, 3, 3)).astype(np.float32)
+    rows = rows_at_poles(image)
+    v = np.linspace(0, 1, 1001)
+
+    def interpolated(pixels: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float64]:
+        columns = pixels.reshape(len(pixels), -1).astype(np.float64).T
+        return np.array([np.interp(v, at, column) for column in columns])
+
+    ours = interpolated(image, (np.arange(height) + 0.5) / height)
+    np.testing.assert_allclose(interpolated(rows, np.arange(len(rows)) / (len(rows) - 1)), ours, atol=1e-6)
+
+
+def test_newest_llvm_is_found_among_others(tmp_path: Path) -> None:
+    assert newest_llvm(tmp_path) == (0, None)
+    folder = tmp_path / "usr/lib/x86_64-linux-gnu"
+    folder.mkdir(parents=True)
+    for name in ("libLLVM-14.0.6.so.1", "libLLVM-9.so", "libLLVM.so.19.1", "libLLVM-15.so", "libLLVMSPIRVLib.so.21"):
+        (folder / name).touch()
+    assert newest_llvm(tmp_path) == (19, folder / "libLLVM.so.19.1")
