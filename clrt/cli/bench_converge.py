@@ -55,24 +55,26 @@ def converge_command(scenes: tuple[Path, ...], peers: bool, selectors: tuple[str
 
 
 def _lines(result: Mapping[str, Any], on_cpu: bool) -> list[str]:
+    from ..study.converge import AGREES
+
     (width, height), reference = result["size"], result["reference"]
-    title = f"at {result['common_spp']} samples a pixel"
     lines = [f"{result['scene']}: {width}x{height}, {result['max_depth']} path edges; reference of {reference['spp']} "
              f"samples a pixel, relMSE {reference['relmse']:.1e}",
-             f"  {title:28}{'Msamples/s':>10}{'seconds':>9}{'relMSE':>10}{'relMSE·s':>10}{'ratio':>7}"
+             f"  {'':28}{'spp':>7}{'seconds':>9}{'Msamples/s':>12}{'relMSE':>10}{'relMSE·s':>10}{'ratio':>7}"
              + " (  CPU)" * on_cpu + f"{'slope':>7}  mean ratio"]
-    lines += [_line(name, row, result["common_spp"], on_cpu) for name, row in result["contestants"].items()]
+    lines += [_line(name, row, on_cpu) for name, row in result["contestants"].items()]
     lines += [f"  {name}: {why}" for name, why in result["missing"].items()]
-    lines += [f"  {name}: its pictures are not of the same mean, so its errors say nothing"
+    lines += [f"  {name}: more than {AGREES:.1%} off in the mean, by too few samples or another scene"
               for name, row in result["contestants"].items() if not row["agrees"]]
     return lines + LEGEND
 
 
-def _line(name: str, row: Mapping[str, Any], spp: int, on_cpu: bool) -> str:
-    at = row["planned_spp"].index(spp)
-    return (f"  {name:28}{row['msamples']:10.3g}{row['seconds'][at]:9.3g}{row['relmse'][at]:10.3g}"
-            f"{row['relmse_seconds']:10.3g}{row['ratio']:7.2f}" + f" ({row['cpu_ratio']:5.2f})" * on_cpu
-            + f"{row['slope']:7.2f}  " + " ".join(f"{ratio:.4f}" for ratio in row["mean_ratio"]))
+def _line(name: str, row: Mapping[str, Any], on_cpu: bool) -> str:
+    last = row["last"]
+    return (f"  {name:28}{row['spp'][last]:7}{row['seconds'][last]:9.3g}{row['msamples']:12.3g}"
+            f"{row['relmse'][last]:10.3g}{row['relmse_seconds']:10.3g}{row['ratio']:7.2f}"
+            + f" ({row['cpu_ratio']:5.2f})" * on_cpu + f"{row['slope']:7.2f}  "
+            + " ".join(f"{ratio:.4f}" for ratio in row["mean_ratio"]))
 
 
 LEGEND = ["  relMSE: mean over seeds, less the reference's own; ratio: of relMSE·s (CPU: processor's) to the first's",

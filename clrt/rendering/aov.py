@@ -12,7 +12,7 @@ from ..device.program import build, make_kernel
 from .records import AOV
 from .session import FEWEST_PIXELS, FIRST_LAUNCH_SAMPLES, Session, block_bits
 
-#: Camera rays a pixel. More make no better guides (docs/denoise.md).
+#: Camera rays a pixel. More cost a denoiser's user more than they bring (docs/denoise.md).
 SAMPLES = 8
 
 
@@ -22,8 +22,8 @@ def render_aovs(session: Session, samples: int = SAMPLES) -> dict[str, NDArray[n
     - albedo (height, width, 3) float32 in [0, 1]: what part of white light the first surface reflects, linear Rec. 709
     - normal (height, width, 3) float32 in [-1, 1]: its shading normal on the camera's side, in the world's frame
 
-    What mirrors and glass show is followed. The sky has its radiance, up to 1, for albedo, and no normal. KernelError and
-    DeviceError where the device fails.
+    Of mirrors and glass it is what they show. The sky has its radiance, up to 1, for albedo, and no normal. KernelError
+    and DeviceError where the device fails.
     """
     device, compiled, (width, height) = session.device, session.compiled, session.size
     kernel = make_kernel(device, build(device, compiled.source_of("aov.cl")), "aov")

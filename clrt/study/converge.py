@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import log, nan
 from statistics import fmean, linear_regression, median
 from typing import Any, NamedTuple
@@ -46,8 +46,8 @@ def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort:
     """The figures of `clrt bench converge`, scene by scene.
 
     scene, size, max_depth; reference: `spp` and its own `relmse`; missing: why a peer is not among the contestants; and
-    what `figures` returns. say hears of these reasons first, and of each step of a reference that is not kept. Raises
-    what `Renderer` does.
+    contestants: what `figures` returns. say hears of these reasons first, and of each step of a reference that is not
+    kept. Raises what `Renderer` does.
     """
     others = [peers_of(scene) if peers else ({}, {}) for scene in scenes]
     for scene, (_, missing) in zip(scenes, others):
@@ -61,7 +61,7 @@ def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort:
         points = take_turns(choices_on(scene, devices, choices) | rivals, reference, effort)
         yield {"scene": scene.name, "size": scene.render.size, "max_depth": scene.render.max_depth,
                "reference": {"spp": reference.spp, "relmse": reference.relmse}, "missing": missing,
-               **figures(points, reference)}
+               "contestants": figures(points, reference)}
 
 
 def take_turns(contestants: Mapping[str, Contestant], reference: Reference, effort: Effort) -> Points:
@@ -85,35 +85,35 @@ def _compare(picture: Picture, reference: Reference) -> Point:
                  [nan if ratio is None else ratio for ratio in ratios])
 
 
-def figures(points: Points, reference: Reference) -> dict[str, Any]:
-    """Of the seeds' pictures the mean relMSE, less the reference's own, and the median times.
+def figures(points: Points, reference: Reference) -> dict[str, dict[str, Any]]:
+    """Of each contestant, by samples: spp, seconds, cpu_seconds, relmse: means over seeds, of the times medians.
 
-    common_spp: the most samples that all took and that left each an error above the reference's own. Contestants: for
-    each of their planned_spp: spp, seconds, cpu_seconds, relmse; at common_spp: msamples (a second), relmse_seconds and
-    relmse_cpu_seconds (relMSE times seconds, which stays while errors fall with the square root of time), and these
-    over the first contestant's: ratio, cpu_ratio; slope of log relMSE over log samples (−1 where samples are
-    independent); of the pictures of most samples the channels' mean_ratio to the reference, and whether it agrees with
-    1 (see AGREES). NaN where a figure has no meaning.
+    From relmse the reference's own is subtracted. last: where in these lists the most samples are whose error is still
+    above the reference's own. There: msamples (a second); relmse_seconds and relmse_cpu_seconds, relMSE times seconds,
+    which stays while errors fall with the square root of time; these over the first contestant's: ratio, cpu_ratio.
+    slope: of log relMSE over log samples, up to last (−1 where samples are independent). Of the most samples of all:
+    each channel's mean_ratio to the reference, and whether it agrees with 1 (see AGREES). NaN: has no meaning.
     """
-    pixels = reference.total.shape[0] * reference.total.shape[1]
     rows = {name: _averages(levels, reference.relmse) for name, levels in points.items()}
-    common = _common_spp(rows.values(), reference.relmse)
+    pixels = reference.total.shape[0] * reference.total.shape[1]
     for row in rows.values():
-        at = row["planned_spp"].index(common)
-        seconds, cpu_seconds, error = row["seconds"][at], row["cpu_seconds"][at], row["relmse"][at]
-        row |= {"msamples": 1e-6 * row["spp"][at] * pixels / seconds, "relmse_seconds": error * seconds,
-                "relmse_cpu_seconds": error * cpu_seconds, "slope": _slope(row, reference.relmse)}
+        clear = [k for k, error in enumerate(row["relmse"]) if error > reference.relmse]
+        last = clear[-1] if clear else 0
+        spp, seconds, cpu_seconds, error = (row[key][last] for key in ("spp", "seconds", "cpu_seconds", "relmse"))
+        row |= {"last": last, "msamples": 1e-6 * spp * pixels / seconds, "relmse_seconds": error * seconds,
+                "relmse_cpu_seconds": error * cpu_seconds,
+                "slope": _slope([row["spp"][k] for k in clear], [row["relmse"][k] for k in clear])}
     first = next(iter(rows.values()))
     for row in rows.values():
         row |= {"ratio": _over(row["relmse_seconds"], first["relmse_seconds"]),
                 "cpu_ratio": _over(row["relmse_cpu_seconds"], first["relmse_cpu_seconds"])}
-    return {"common_spp": common, "contestants": rows}
+    return rows
 
 
 def _averages(levels: Mapping[int, Sequence[Point]], own: float) -> dict[str, Any]:
     """own: the reference's relMSE."""
     channels = list(zip(*(point.mean_ratio for point in levels[max(levels)])))
-    return {"planned_spp": list(levels), "spp": [level[0].spp for level in levels.values()],
+    return {"spp": [level[0].spp for level in levels.values()],
             "seconds": [median(point.seconds for point in level) for level in levels.values()],
             "cpu_seconds": [median(point.cpu_seconds for point in level) for level in levels.values()],
             "relmse": [fmean(point.relmse for point in level) - own for level in levels.values()],
@@ -121,16 +121,9 @@ def _averages(levels: Mapping[int, Sequence[Point]], own: float) -> dict[str, An
             "agrees": not any(min(channel) > 1 + AGREES or max(channel) < 1 - AGREES for channel in channels)}
 
 
-def _common_spp(rows: Collection[Mapping[str, Any]], own: float) -> int:
-    every: set[int] = set.intersection(*(set(row["planned_spp"]) for row in rows))
-    clear = [{spp for spp, error in zip(row["planned_spp"], row["relmse"]) if error > own} for row in rows]
-    return max(every.intersection(*clear) or {min(every)})
-
-
-def _slope(row: Mapping[str, Any], own: float) -> float:
-    """Of the least-squares line through the errors above the reference's own."""
-    clear = [(log(spp), log(error)) for spp, error in zip(row["spp"], row["relmse"]) if error > own]
-    return linear_regression(*zip(*clear)).slope if len(clear) > 1 else nan
+def _slope(samples: Sequence[int], errors: Sequence[float]) -> float:
+    """Of the least-squares line through the logarithms."""
+    return linear_regression([log(n) for n in samples], [log(e) for e in errors]).slope if len(samples) > 1 else nan
 
 
 def _over(value: float, first: float) -> float:

@@ -52,7 +52,7 @@ def scene() -> clrt.Scene:
 
 @pytest.fixture(scope="module")
 def converged() -> Floats:
-    return clrt.render(scene(), spp=512, seed=5).pixels
+    return clrt.render(scene(), spp=256, seed=5).pixels
 
 
 @pytest.fixture(scope="module")

@@ -63,10 +63,9 @@ def test_figures_are_those_of_known_errors() -> None:
     """relMSE = variance/n · mean(1/(r² + 0.01)); of 9216 values it is known to 1.5 %, one standard deviation."""
     contestants = {"first": sampler(0.5, 0.01), "twice as slow": sampler(0.5, 0.02), "steep": sampler(0.5, 0.02, 1.5)}
     points = take_turns(contestants, EXACT, Effort(seconds=0.7, seeds=5, steps=2))
-    result = figures(points, EXACT)
-    rows = result["contestants"]
+    rows = figures(points, EXACT)
     assert rows["first"]["spp"] == [1, 2, 4, 8, 16, 32, 64], "128 samples would take longer than 0.7 s"
-    assert rows["steep"]["spp"] == [1, 2, 4, 8, 16, 32] and result["common_spp"] == 32
+    assert rows["steep"]["spp"] == rows["twice as slow"]["spp"] == [1, 2, 4, 8, 16, 32]
     one = 0.5 * float(np.mean(1 / (TRUTH**2 + 0.01)))
     assert rows["first"]["relmse"] == pytest.approx([one / spp for spp in rows["first"]["spp"]], rel=0.05)
     assert [row["slope"] for row in rows.values()] == pytest.approx([-1, -1, -1.5], abs=0.02)
@@ -74,7 +73,7 @@ def test_figures_are_those_of_known_errors() -> None:
     assert [row["cpu_ratio"] for row in rows.values()] == [row["ratio"] for row in rows.values()]
     for row in rows.values():
         assert row["msamples"] == pytest.approx(1e-6 * 64 * 48 / row["seconds"][0])
-        assert row["relmse_seconds"] == row["relmse"][5] * row["seconds"][5] == row["relmse_cpu_seconds"] / 2
+        assert row["relmse_seconds"] == row["relmse"][-1] * row["seconds"][-1] == row["relmse_cpu_seconds"] / 2
         assert row["mean_ratio"] == pytest.approx([1, 1, 1], abs=1e-2) and row["agrees"]
 
 
@@ -88,23 +87,23 @@ def test_relmse_against_a_reference_with_noise_of_its_own() -> None:
     assert (reference.steps, reference.spp) == (16, 16 * STEP_SPP)
     np.testing.assert_allclose(reference.pixels, np.mean(steps, 0), rtol=1e-6)
     assert reference.relmse == pytest.approx(scale / 16, rel=0.03)
-    row = figures(take_turns({"one": sampler(0.25, 0.4)}, reference, Effort(1, 5, 2)), reference)["contestants"]["one"]
+    row = figures(take_turns({"one": sampler(0.25, 0.4)}, reference, Effort(1, 5, 2)), reference)["one"]
     assert row["relmse"] == pytest.approx([0.25 * scale, 0.125 * scale], rel=0.05), "not 0.3125 and 0.1875"
 
 
-def test_levels_count_that_all_took_and_that_stand_out() -> None:
-    """Errors below the reference's own are no figures; nor is a level that one seed did not reach."""
+def test_figures_end_where_errors_no_longer_stand_out() -> None:
+    """Above the reference's own error; and with the samples that every seed has reached."""
     reference = Reference(2, 2 * TRUTH, 2 * TRUTH**2 + 1e-3 * (TRUTH**2 + 0.01))
     own = reference.relmse
     assert own == pytest.approx(5e-4)
 
-    def level(*errors: float) -> dict[int, list[Point]]:
+    def levels(*errors: float) -> dict[int, list[Point]]:
         return {2**k: [Point(2**k, 2.0**k, 2.0**k, own + error, [1.006, 1, nan])] * 3 for k, error in enumerate(errors)}
 
-    result = figures({"a": level(0.4, 0.2, 0.1, 1e-5), "b": level(0.4, 0.1, 0.025), "c": level(1e-6)}, reference)
-    rows = result["contestants"]
-    assert result["common_spp"] == 1 and [row["agrees"] for row in rows.values()] == [False] * 3
-    assert [rows["a"]["slope"], rows["b"]["slope"], rows["c"]["slope"]] == pytest.approx([-1, -2, nan], nan_ok=True)
+    rows = figures({"a": levels(0.4, 0.2, 0.1, 1e-5), "b": levels(0.4, 0.1), "c": levels(1e-6)}, reference)
+    assert [row["last"] for row in rows.values()] == [2, 1, 0] and not any(row["agrees"] for row in rows.values())
+    assert [row["slope"] for row in rows.values()] == pytest.approx([-1, -2, nan], nan_ok=True)
+    assert [row["ratio"] for row in rows.values()] == pytest.approx([1, 0.5, 1e-6 / 0.4])
     assert rows["a"]["mean_ratio"] == pytest.approx([1.006, 1, nan], nan_ok=True)
 
     def slower(spp: int, seed: int) -> Picture:
@@ -115,7 +114,7 @@ def test_levels_count_that_all_took_and_that_stand_out() -> None:
 
 def test_other_scenes_are_noticed() -> None:
     points = take_turns({"same": sampler(0.01, 0.1), "brighter": sampler(0.01, 0.1, gain=1.02)}, EXACT, Effort(1, 3, 2))
-    rows = figures(points, EXACT)["contestants"]
+    rows = figures(points, EXACT)
     assert rows["same"]["agrees"] and not rows["brighter"]["agrees"]
     assert rows["brighter"]["mean_ratio"] == pytest.approx([1.02] * 3, abs=1e-3)
 
@@ -200,14 +199,14 @@ main(["bench", "converge", "ball.toml", "--quick", "--time", "0.004", "--peers",
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     scene, = json.loads((tmp_path / "c.json").read_text())["scenes"]
-    assert {"scene", "size", "max_depth", "reference", "common_spp", "contestants", "missing"} == set(scene)
+    assert {"scene", "size", "max_depth", "reference", "contestants", "missing"} == set(scene)
     assert scene["missing"] == {name: f"not installed (pip install {name})" for name in ("mitsuba", "bpy")}
     assert all(f"{package}: {why}" in done.stdout for package, why in scene["missing"].items())
     assert "ball: without mitsuba: not installed" in done.stderr
     assert list(scene["contestants"]) == list(CHOICES)
     for name, row in scene["contestants"].items():
-        assert {"planned_spp", "spp", "seconds", "cpu_seconds", "relmse", "msamples", "relmse_seconds",
-                "relmse_cpu_seconds", "ratio", "cpu_ratio", "slope", "mean_ratio", "agrees"} == set(row)
+        assert {"spp", "seconds", "cpu_seconds", "relmse", "last", "msamples", "relmse_seconds", "relmse_cpu_seconds",
+                "ratio", "cpu_ratio", "slope", "mean_ratio", "agrees"} == set(row)
         assert len(row["spp"]) == len(row["seconds"]) == len(row["relmse"])
         assert any(line.startswith(f"  {name}  ") for line in done.stdout.splitlines())
     assert scene["contestants"]["clrt"]["ratio"] == 1
