@@ -93,6 +93,8 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
         yield f"scene {layout}", picture(device, scene(), layout=layout, builder=builder)
     for chosen in variants():
         yield chosen["tests"].triangle, picture(device, scene(), **chosen)
+    for settings in (replace(SETTINGS, sampler="stratified", filter="tent"), replace(SETTINGS, sampler="independent")):
+        yield settings.sampler, picture(device, replace(scene(), render=settings))
     yield "ball", picture(device, Scene(spheres=[Sphere()], environment=Environment(color=(1, 1, 1)), render=SETTINGS))
     yield "aovs", {**render_aovs(started(device, scene()), 2)}
     for layout in SHAPES:

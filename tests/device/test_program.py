@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pyopencl as cl
@@ -21,7 +23,7 @@ from clrt.device.program import build, compose, files_of
 from clrt.errors import KernelError
 from clrt.rendering.compile import OFFSETS, Choices, compile_scene
 from clrt.scene.materials import MATERIALS
-from clrt.scene.model import Environment
+from clrt.scene.model import Environment, Filter, Sampler
 from clrt.study.bsdfs import variants
 
 from ..rendering.test_variants import everything
@@ -102,6 +104,10 @@ def test_every_kernel_file_is_used(device: Device) -> None:
                 scene = everything()
                 scene.environment = environment
                 used |= set(compile_scene(scene, choices).files)
+    for sampler, name in zip(get_args(Sampler), get_args(Filter)):
+        scene = everything()
+        scene.render = replace(scene.render, sampler=sampler, filter=name)
+        used |= set(compile_scene(scene, Choices()).files)
     for entry in ("aov.cl", "study/probe.cl"):
         used |= set(compile_scene(everything(), Choices(), entry).files)
     assert sorted(used) == FILES

@@ -14,8 +14,8 @@ from clrt.device.open import Device
 from clrt.rendering import session as session_module
 from clrt.rendering.compile import OFFSETS, compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight
-from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
-from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror
+from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Sampler, Scene, Sphere
 from clrt.study.probe import choices
 
 from . import rays
@@ -37,7 +37,8 @@ def everything() -> Scene:
         meshes=[floor, lamp, ball],
         spheres=[Sphere(center=(-1.0, 0.7, 0.5), radius=0.7, material=Mirror(color=(0.9, 0.9, 0.9))),
                  Sphere(center=(0.0, 2.2, 0.0), radius=0.2, material=Diffuse(emission=(9.0, 1.0, 1.0))),
-                 Sphere(center=(0.0, 0.3, 1.5), radius=0.3, material=plastic)],
+                 Sphere(center=(0.0, 0.3, 1.5), radius=0.3, material=plastic),
+                 Sphere(center=(0.7, 0.35, 2.0), radius=0.35, material=Dielectric())],
         lights=[PointLight(position=(3.0, 2.0, 2.0), intensity=(5.0, 5.0, 9.0)),
                 DirectionalLight(direction=(1.0, -2.0, -1.0), irradiance=(0.5, 0.4, 0.3))],
         environment=Environment(image=sky, rotation_degrees=30.0),
@@ -63,6 +64,16 @@ def test_lanes_layouts_and_builders_agree(device: Device, reference: Doubles, ch
     picture = film(device, everything(), **wanted).mean
     differs = np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)
     assert np.mean(differs) < 1e-3, np.argwhere(differs)
+
+
+@pytest.mark.parametrize("sampler", ["sobol", "stratified"])
+def test_lanes_agree_with_every_sampler(device: Device, sampler: Sampler) -> None:
+    """As above, of independent samples."""
+    scene = everything()
+    reference = film(device, scene, sampler=sampler, lanes=8).mean
+    for lanes in (1, 16):
+        picture = film(device, scene, sampler=sampler, lanes=lanes).mean
+        assert np.mean(np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)) < 1e-3
 
 
 def test_pictures_do_not_depend_on_passes_and_launches(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
