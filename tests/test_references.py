@@ -87,7 +87,8 @@ def test_constant_light_is_the_environments_color(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("changes, message", [
-    ({"shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "glass"}]}, "glass"),
+    ({"shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}],
+      "materials": {"m": {"type": "velvet"}}}, "velvet"),
     ({"shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}],
       "materials": {"m": {"type": "ggx", "color": [0.5, 1, 1], "alpha": 0.2}}}, "only white"),
     ({"camera": RECORD["camera"] | {"width": 8}}, "square"),

@@ -38,7 +38,7 @@ def render(scene: Scene, device: Device, **options: Any) -> tuple[Doubles, Doubl
     from clrt.rendering.renderer import Renderer
 
     spp = options.pop("spp")
-    renderer = Renderer(scene, device=device.info.index, **options)
+    renderer = Renderer(scene, device=device.info.index, sampler="independent", **options)
     film = list(renderer.passes(spp=spp))[-1].film
     count = film.pixels["count"][..., None].astype(np.float64)
     squares = (film.pixels["square"] + film.pixels["square_error"].astype(np.float64)) / count

@@ -92,7 +92,7 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
 
 @pytest.mark.parametrize("text, sentence", [
     ('[materials.a]\ncolor = [1, 1, 1]', "materials.a: type is missing; write one of"),
-    ('[materials.a]\ntype = "dielectric"', 'materials.a.type: "dielectric" is not supported yet; this version knows'),
+    ('[materials.a]\ntype = "phong"', 'materials.a.type: "phong" is not supported yet; this version knows'),
     ('[materials.a]\ntype = "diffuse"\ncolor = { image = "a.png" }', 'color: { image = "a.png" } is a texture'),
     ('[materials.a]\ntype = "diffuse"\ncolor = "red"', 'materials.a.color: "red" is not a list; write the numbers in'),
     ('[materials]\na = "diffuse"', 'materials.a: "diffuse" is not a table; write its keys below [materials.a]'),
