@@ -1,24 +1,24 @@
-// The lights of the scene: one table of all that can be sampled, and by type what shines when a ray meets it.
+// The lights of the scene: which is sampled and where, and what shines when a ray meets it.
 //
-// LIGHT_TYPES lists the types in use, EMITTER_TYPES those that have a surface; the host includes their files. A light
-// is chosen from the table with `probability`, which is part of every pdf here.
+// LIGHT_TYPES lists the types in use, EMITTER_TYPES those that have a surface; the host includes their files. Lights are
+// numbered type by type in that order. Where there are several, light/choice.cl chooses one; the probability of that is
+// part of every pdf here. p, n: the point that is lit, and its unit normal on the side that is.
 #include "light/interface.cl"
 #include LIGHT_FILES
+#include LIGHT_CHOICE
 
 #if LIGHTS
-static inline ireal light_index(ireal code, ireal is_type) { return is_type ? code >> 4 : (ireal)(0); }
-
-static inline LightSample light_sample(const Scene *scene, real3 p, Sampler *sampler) {
-    ureal2 choice = next_bits(sampler), bits = next_bits(sampler);
+static inline LightSample light_sample(const Scene *scene, real3 p, real3 n, Sampler *sampler) {
+    real probability;
     real2 u = next_2d(sampler);
-    ALIAS_PICK(scene->lights, scene->counts.lights, choice, entry)
-    ireal code = GATHER(ireal, scene->lights, entry, .code);
-    real probability = GATHER(real, scene->lights, entry, .probability);
+    ireal light = pick_light(scene, p, n, sampler, &u.x, &probability);
     LightSample sample = {splat(ZERO), splat(ZERO), ONE, splat(ZERO), NO_LANES, NO_LANES};
+    int first = 0;
 #define SAMPLE_LIGHT(name, type) { \
-        ireal is_type = (code & 15) == type; \
+        ireal index = light - first; \
+        ireal is_type = (index >= 0) & (index < scene->counts.name##_lights); \
         if (ANY(is_type)) { \
-            LightSample s = name##_light_sample(scene, light_index(code, is_type), p, u, bits); \
+            LightSample s = name##_light_sample(scene, is_type ? index : (ireal)(0), p, u); \
             sample.wi = choose(is_type, s.wi, sample.wi); \
             sample.radiance = choose(is_type, s.radiance, sample.radiance); \
             sample.pdf = is_type ? s.pdf : sample.pdf; \
@@ -26,6 +26,7 @@ static inline LightSample light_sample(const Scene *scene, real3 p, Sampler *sam
             sample.infinite = is_type ? s.infinite : sample.infinite; \
             sample.delta = is_type ? s.delta : sample.delta; \
         } \
+        first += scene->counts.name##_lights; \
     }
     LIGHT_TYPES(SAMPLE_LIGHT)
     sample.pdf *= probability;
@@ -36,24 +37,36 @@ static inline LightSample light_sample(const Scene *scene, real3 p, Sampler *sam
 #if EMITTERS
 // Radiance that arrives along wi from the emitters that lanes met at distance t, and the density with which
 // light_sample would have chosen that direction from p.
-static inline real3 emitter_radiance(const Scene *scene, real3 p, real3 wi, real t, const Surface *surface, ireal hit,
-                                     real *pdf) {
+static inline real3 emitter_radiance(const Scene *scene, real3 p, real3 n, real3 wi, real t, const Surface *surface,
+                                     ireal hit, real *pdf) {
     ireal emitter = hit & (surface->light >= 0);
     real3 radiance = splat(ZERO);
     *pdf = ZERO;
     if (!ANY(emitter)) return radiance;
-    ireal entry = emitter ? surface->light : (ireal)(0);
-    ireal code = GATHER(ireal, scene->lights, entry, .code);
+    int first = 0;
 #define EMITTED(name, type) { \
-        ireal is_type = emitter & ((code & 15) == type); \
+        ireal index = surface->light - first; \
+        ireal is_type = emitter & (index >= 0) & (index < scene->counts.name##_lights); \
         if (ANY(is_type)) { \
-            ireal index = light_index(code, is_type); \
+            index = is_type ? index : (ireal)(0); \
             radiance = choose(is_type, name##_light_radiance(scene, index, wi, surface), radiance); \
             *pdf = is_type ? name##_light_pdf(scene, index, p, wi, t, surface) : *pdf; \
         } \
+        first += scene->counts.name##_lights; \
     }
     EMITTER_TYPES(EMITTED)
-    *pdf *= GATHER(real, scene->lights, entry, .probability);
+    *pdf *= light_probability(scene, p, n, emitter ? surface->light : (ireal)(0));
+    return radiance;
+}
+#endif
+
+#if SKY
+// Radiance that arrives along wi from the sky, and the density with which light_sample would have chosen wi at p.
+static inline real3 escaped_radiance(const Scene *scene, real3 p, real3 n, real3 wi, real *pdf) {
+    real3 radiance = sky_radiance(scene, wi, pdf);
+#if LIGHT_SKY
+    *pdf *= light_probability(scene, p, n, (ireal)(scene->counts.lights - 1));   // the sky is the last light
+#endif
     return radiance;
 }
 #endif

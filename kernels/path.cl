@@ -11,7 +11,7 @@
 
 // Where the last direction came from: its density, and whether only it could have found what lies there.
 typedef struct {
-    real3 p, wi;
+    real3 p, n, wi;
     real pdf;
     ireal specular;
 #if TRANSMISSION
@@ -31,7 +31,7 @@ static inline real3 found_light(const Scene *scene, const Step *step, const Surf
     real3 L = splat(ZERO);
 #if EMITTERS
     real emitter_pdf;
-    real3 emitted = emitter_radiance(scene, step->p, step->wi, t, surface, hit, &emitter_pdf);
+    real3 emitted = emitter_radiance(scene, step->p, step->n, step->wi, t, surface, hit, &emitter_pdf);
     real emitter_weight = step->specular ? ONE : power_heuristic(step->pdf, emitter_pdf);
     L = choose(hit, scale(emitted, emitter_weight), L);
 #endif
@@ -39,7 +39,7 @@ static inline real3 found_light(const Scene *scene, const Step *step, const Surf
     if (ANY(escaped)) {
         real3 wi = choose(escaped, step->wi, vector(ZERO, ONE, ZERO));   // an idle lane's may be NaN, and so its texel
         real sky_pdf;
-        real3 radiance = sky_radiance(scene, wi, &sky_pdf);
+        real3 radiance = escaped_radiance(scene, step->p, step->n, wi, &sky_pdf);
         real weight = step->specular ? ONE : power_heuristic(step->pdf, sky_pdf);
         L = choose(escaped, scale(radiance, weight), L);
     }
@@ -51,7 +51,7 @@ static inline real3 found_light(const Scene *scene, const Step *step, const Surf
 // 2. Light that arrives by a shadow ray towards a sampled point of a light.
 static inline real3 sampled_light(const Scene *scene, const Surface *surface, Frame shading, real3 wo, ireal active,
                                   Sampler *sampler, ureal *rays) {
-    LightSample light = light_sample(scene, surface->p, sampler);
+    LightSample light = light_sample(scene, surface->p, surface->ns, sampler);
     real3 wi = to_local(shading, light.wi);
     ireal above = dot3(light.wi, surface->ng) > 0.0f;
     real3 f = bsdf_eval(scene, surface->material, surface->front, wo, wi);
@@ -74,7 +74,7 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
     real3 L = splat(ZERO), beta = splat(ONE), origin = eye;
     Step step;
     step.p = eye;
-    step.wi = direction;
+    step.n = step.wi = direction;
     step.pdf = ONE;
     step.specular = ALL_LANES;
 #if TRANSMISSION
@@ -106,6 +106,7 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
         real2 u = next_2d(sampler), choice = next_2d(sampler);
         BsdfSample sample = bsdf_sample(scene, surface.material, surface.front, wo, u, choice.x);
         step.p = surface.p;
+        step.n = surface.ns;
         step.wi = to_world(shading, sample.wi);
         step.pdf = sample.pdf;
         step.specular = sample.specular;

@@ -22,6 +22,7 @@ from clrt.study.probe import choices
 from clrt.tree_query import TRAVERSALS
 
 from .accel.cases import soup, spheres
+from .rendering.lamps import lamps
 from .rendering.rays import icosphere
 from .rendering.test_variants import everything
 
@@ -95,7 +96,10 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
         yield chosen["tests"].triangle, picture(device, scene(), **chosen)
     for settings in (replace(SETTINGS, sampler="stratified", filter="tent"), replace(SETTINGS, sampler="independent")):
         yield settings.sampler, picture(device, replace(scene(), render=settings))
-    yield "ball", picture(device, Scene(spheres=[Sphere()], environment=Environment(color=(1, 1, 1)), render=SETTINGS))
+    ball = Scene(spheres=[Sphere()], environment=Environment(color=(1, 1, 1)), render=SETTINGS)
+    yield "ball", picture(device, replace(ball, lights=lamps(3).lights))
+    lit = replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)], render=SETTINGS)
+    yield "lamps", picture(device, lit)
     yield "aovs", {**render_aovs(started(device, scene()), 2)}
     for layout in SHAPES:
         build_tree(device, layout, "ploc", soup(0), spheres(30))

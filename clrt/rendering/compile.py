@@ -94,11 +94,9 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
     spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
     tree = build_tree(device, choices.layout, choices.builder, triangles, spheres, choices.tests.triangle)
     sky = pack_sky(scene.environment)
-    emitters = pack_emitters(scene, triangles, sky, _radius(triangles, spheres))
+    emitters = pack_emitters(scene, triangles, sky)
     users = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
     codes, material_buffers = _materials(users)
-    if sky.sampled:
-        sky.buffers["environment"][1]["probability"] = emitters.sky_probability
 
     buffers = tree_buffers(tree)
     if len(triangles):
@@ -113,6 +111,8 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
         buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))
     counts = np.zeros(1, COUNTS)
     counts["triangles"], counts["spheres"], counts["lights"] = len(triangles), len(spheres), emitters.count
+    for kind, count in emitters.counts.items():
+        counts[f"{kind}_lights"] = count
 
     used = [m for m in MATERIALS if m.kernel in material_buffers]
     features = _features(scene, used, users, emitters, sky, choices)
@@ -132,13 +132,6 @@ def _geometry(scene: Scene) -> tuple[NDArray[np.float32], dict[int, NDArray[np.f
             normals[first] = mesh.normals[mesh.faces]
         first += len(mesh.faces)
     return np.concatenate(corners), normals
-
-
-def _radius(triangles: NDArray[np.float32], spheres: NDArray[np.float32]) -> float:
-    """Half the diagonal of the box around everything."""
-    centers, radii = spheres[:, :3], spheres[:, 3:]
-    points = np.concatenate([triangles.reshape(-1, 3), centers - radii, centers + radii])
-    return float(np.linalg.norm(np.ptp(points.astype(np.float64), axis=0)) / 2) if len(points) else 1.0
 
 
 def _materials(users: list[Material]) -> tuple[NDArray[np.int32], dict[str, tuple[str, NDArray[Any]]]]:
@@ -193,6 +186,7 @@ def _features(scene: Scene, used: Iterable[type[Material]], users: Iterable[Mate
     features |= set().union(*(material.features() for material in users))
     has = {"TRIANGLES": bool(scene.meshes), "SPHERES": bool(scene.spheres), "SKY": sky.kernel is not None,
            "PRIMITIVES": bool(scene.meshes or scene.spheres), "LIGHTS": emitters.count > 0,
+           "LIGHT_TREE": emitters.choice.tree,
            "EMITTERS": any(t in SURFACES for t in emitters.types),
            "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes)}
     return features | {name for name, present in has.items() if present}
@@ -205,6 +199,7 @@ def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], 
     surfaces = [t for t in emitters.types if t in SURFACES]
     return "\n".join([
         defines({"LANES": choices.lanes, **tree_defines(tree), **lengths}),
+        defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
         defines({feature: 1 for feature in sorted(features)}),
         typedefs({"Counts": COUNTS, "Pixel": PIXEL, "Aov": AOV, "Launch": LAUNCH}),
         scene_struct(buffers),
@@ -218,4 +213,5 @@ def _files(used: list[type[Material]], emitters: Emitters, sky: Sky, choices: Ch
     lights = [f"light/{t}.cl" for t in emitters.types if t != "sky"]
     return {**tree_files(choices.layout, choices.tests, triangles, spheres), "OFFSET": [OFFSETS[choices.offset]],
             "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in used],
+            "LIGHT_CHOICE": emitters.choice.files, "LIGHT_TREE_FILE": ["light/tree.cl"] if emitters.choice.tree else [],
             "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else [])}

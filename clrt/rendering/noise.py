@@ -17,9 +17,9 @@ class NoiseEstimate:
     A pixel's samples are not independent, so their variance says too much. But the two halves of the first 2n samples
     are alike, which is enough: with E_n the mean of the first n and V(n) its squared error, Cov(E_n, E_2n) = V(2n),
     hence the mean square of E_n − E_2n is V(n) − V(2n). If V falls by r with each doubling that is (r − 1)·V(2n). The
-    ratios of the last such differences tell how fast it fell, and as that always slows down, towards 2 in the end, r is
-    the geometric mean of both. Blocks of 2^k samples, taken for independent of each other, give V between powers of
-    two. It is never more than the samples' variance gives (Film.noise).
+    ratios of the last such differences tell how fast it fell, the slower of one step and two counts, and as that always
+    slows down, towards 2 in the end, r is the geometric mean of both. Blocks of 2^k samples, taken for independent of
+    each other, give V between powers of two. It is never more than the samples' variance gives (Film.noise).
 
     planned_spp: where the sampler begins anew, r is 2 from there on.
     """
@@ -55,6 +55,5 @@ class NoiseEstimate:
         changes = self._changes
         if len(changes) < 2 or changes[-1] <= 0 or 1 << len(changes) > self._planned:
             return LEAST_FALL
-        steps = min(2, len(changes) - 1)
-        measured = np.clip((changes[-1 - steps] / changes[-1]) ** (1 / steps), LEAST_FALL, MOST_FALL)
-        return float(np.sqrt(LEAST_FALL * measured))
+        slowest = min((changes[-1 - steps] / changes[-1]) ** (1 / steps) for steps in range(1, len(changes[-3:])))
+        return float(np.sqrt(LEAST_FALL * np.clip(slowest, LEAST_FALL, MOST_FALL)))

@@ -1,4 +1,4 @@
-"""Samples of lights against their densities: lamps of all sizes, skies, and the tables that lights are picked from."""
+"""Samples of lights against their densities: lamps of all sizes, skies, and the choices among many lights."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..device.open import Device
+from ..scene.lights import DirectionalLight, Light, PointLight
 from ..scene.materials import Diffuse
 from ..scene.model import Environment, Mesh, Scene, Sphere
 from .probe import Doubles, Probe
@@ -16,6 +17,7 @@ from .significance import chi2_test
 from .warps import triangle_test, uniform_test
 
 LAMP = Diffuse(emission=(1.0, 1.0, 1.0))
+UP = (0.0, 1.0, 0.0)
 #: Centers and radii, seen from the origin: large, one that almost touches it, small, tiny and far.
 SPHERES = (((0.0, 0.0, 3.0), 2.0), ((0.0, 0.0, 1.0001), 1.0), ((3.0, -4.0, 12.0), 2.0), ((3.0, -4.0, 12.0), 0.05),
            ((0.0, 0.0, 1e4), 1.0), ((0.0, 0.0, 10.0), 1e-6), ((0.0, 0.0, 1e5 + 1.0), 1e5))
@@ -39,7 +41,7 @@ class LightTest(NamedTuple):
 
 
 def light_tests(device: Device, samples: int, seed: int) -> list[LightTest]:
-    """Each light's samples, and the picks from light tables."""
+    """Each light's samples, and the choices among several."""
     return [test for measure in (lamps, picks, skies) for test in measure(device, samples, seed)]
 
 
@@ -58,7 +60,7 @@ def lamps(device: Device, samples: int, seed: int, changes: Mapping[str, str] | 
 def _sampled(probe: Probe, samples: int, seed: int) -> tuple[Doubles, Doubles]:
     """wi (n, 3) and pdf (n,) of light samples from the origin."""
     origin = probe.compiled.frame.points(np.zeros(3))
-    out = probe("light_sample", 12, np.broadcast_to(origin, (samples, 3)), seed=seed)
+    out = probe("light_sample", 12, np.tile([*origin, *UP], (samples, 1)), seed=seed)
     return out[:, :3], out[:, 6]
 
 
@@ -94,7 +96,8 @@ def skies(device: Device, samples: int, seed: int, changes: Mapping[str, str] | 
         probe = Probe(device, Scene(environment=Environment(image=image, rotation_degrees=degrees)), changes=changes)
         rows, columns = PARTS * image.shape[0], PARTS * image.shape[1]
         v, u = np.meshgrid((np.arange(rows) + 0.5) / rows, (np.arange(columns) + 0.5) / columns, indexing="ij")
-        mass = probe("sky", 4, _direction(u.ravel(), v.ravel(), degrees))[:, 3] * np.sin(np.pi * v.ravel())
+        wi = _direction(u.ravel(), v.ravel(), degrees)
+        mass = probe("sky", 4, np.zeros_like(wi), np.tile(UP, (len(wi), 1)), wi)[:, 3] * np.sin(np.pi * v.ravel())
         mass *= 2 * np.pi**2 / v.size
         x, y = _place(_sampled(probe, samples, seed + k)[0], degrees)
         row, column = (np.minimum((a * n).astype(int), n - 1) for a, n in ((y, rows), (x, columns)))
@@ -104,7 +107,8 @@ def skies(device: Device, samples: int, seed: int, changes: Mapping[str, str] | 
 
 def _pictures() -> dict[str, tuple[NDArray[np.float32], float]]:
     """Pictures (height, width, 3), and by how many degrees they are turned."""
-    uneven = np.random.default_rng(1).uniform(0.1, 2.0, (16, 32, 3)).astype(np.float32)
+    rng = np.random.default_rng(1)
+    uneven = (rng.uniform(0.1, 2.0, (16, 32, 3)) * rng.random((16, 32, 1))**8).astype(np.float32)
     sun = uneven.copy()
     sun[4, 20] = 1e5
     return {"uneven": (uneven, 0.0), "turned": (uneven, 77.0), "sun": (sun, -130.0), "one row": (uneven[:1], 10.0)}
@@ -123,15 +127,27 @@ def _place(wi: Doubles, degrees: float) -> tuple[Doubles, Doubles]:
 
 
 def picks(device: Device, samples: int, seed: int, changes: Mapping[str, str] | None = None) -> Iterator[LightTest]:
-    """The triangles of a lamp are picked by their areas."""
+    """Lights are chosen by the probability that each says it has, and these add up to 1: at the origin, facing up."""
+    for k, (name, lights) in enumerate(_lights().items()):
+        probe = Probe(device, Scene(lights=lights), changes=changes)
+        rows = np.tile([0.0, 0.0, 0.0, *UP], (max(samples, len(lights)), 1))
+        mass = probe("light_probability", 1, rows[:len(lights)], np.arange(len(lights)))[:, 0]
+        picked = probe("pick_light", 3, rows[:samples], seed=seed + k)[:, 0].astype(int)
+        density = chi2_test(np.bincount(picked, minlength=len(lights)), mass / mass.sum() * samples)
+        yield LightTest(f"choice of {name}", density, float(abs(mass.sum() - 1)))
+
+
+def _lights() -> dict[str, list[Light]]:
+    """Point lights all around and infinite ones."""
     rng = np.random.default_rng(7)
-    tables = {"two": np.array([1.0, 3.0]), "equal": np.ones(1000), "random": rng.random(10_000),
-              "sun": np.where(np.arange(20_000) == 777, 1e5, 1.0), "zeros": rng.random(3000) * (rng.random(3000) < 0.5)}
-    for k, (name, areas) in enumerate(tables.items()):
-        vertices = np.zeros((3 * len(areas), 3), np.float32)
-        vertices[1::3, 0], vertices[2::3, 1] = areas, 1
-        lamp = Mesh(vertices, np.arange(len(vertices), dtype=np.int32).reshape(-1, 3), LAMP)
-        probe = Probe(device, Scene(meshes=[lamp]), changes=changes)
-        picked = probe("alias", 1, np.zeros(samples), seed=seed + k)[:, 0].astype(int)
-        counts = np.bincount(picked, minlength=len(areas))
-        yield LightTest(f"picks: {name}", chi2_test(counts, areas / areas.sum() * samples), 0.0)
+    suns: list[Light] = [DirectionalLight(direction=(x, -1.0, 0.5), irradiance=(1.0, 0.5, 1.0)) for x in range(3)]
+    return {f"{count} lights, {k} infinite": [*_points(rng, count), *suns[:k]]
+            for count, k in ((2, 0), (7, 1), (32, 3), (33, 0), (300, 2), (20_000, 0))}
+
+
+def _points(rng: np.random.Generator, count: int) -> list[Light]:
+    """About half of them out of the origin's sight, and some in the same place."""
+    places = rng.normal(size=(count, 3))
+    places[:2, 1], places[:count // 10] = 1.0, places[0]
+    return [PointLight(position=(x, y, z), intensity=(power, power, power))
+            for (x, y, z), power in zip(places.tolist(), rng.pareto(2.0, count).tolist())]

@@ -1,7 +1,7 @@
 // Parallel light from infinitely far away; `direction` is the unit vector towards it. World frame.
 #include "light/interface.cl"
 
-static inline LightSample directional_light_sample(const Scene *scene, ireal index, real3 p, real2 u, ureal2 bits) {
+static inline LightSample directional_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
     LightSample s;
     s.wi = s.target = GATHER3(scene->directional_lights, index, .towards);
     s.radiance = GATHER3(scene->directional_lights, index, .irradiance);

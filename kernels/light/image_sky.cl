@@ -1,8 +1,8 @@
-// Light from a latitude–longitude picture, sampled by its brightness. World frame.
+// Light from a latitude–longitude picture. LIGHT_SKY: sampled where it is brighter than its mean. World frame.
 //
 // u = atan2(x, −z)/2·pi mod 1, v = acos(y)/pi, row 0 on top; bilinear between texel centres, u wraps, v clamps. A
-// texel is drawn with the mean bilinear luminance over its area times its solid angle, the place inside it uniformly
-// in (u, v): density(u, v) per texel is constant, so pdf = density/(2·pi²·sin(pi·v)) (pbrt, 4th ed., 12.5.2).
+// row is drawn, then a texel of it, then the place inside it uniformly in (u, v): density(u, v) per texel is constant, so
+// pdf = density/(2·pi²·sin(pi·v)) (pbrt, 4th ed., 12.5.2). Directions follow the random numbers without jumps.
 #include "light/interface.cl"
 
 static inline real2 sky_uv(const Scene *scene, real3 wi) {
@@ -47,34 +47,52 @@ static inline real3 sky_radiance_uv(const Scene *scene, real2 uv) {
     return (real3){r.all, g.all, b.all};
 }
 
-static inline real sky_pdf_at(const Scene *scene, ireal texel, real sin_theta) {
+#if LIGHT_SKY
+static inline real sky_pdf(const Scene *scene, ireal texel, real sin_theta) {
     real pdf = GATHER(real, scene->sky_texels, texel, .density) / (2.0f * PI * PI * sin_theta);
     return sin_theta > 0.0f ? pdf : ZERO;
 }
 
-static inline real3 sky_radiance(const Scene *scene, real3 wi, real *pdf) {
-    real2 uv = sky_uv(scene, wi);
-    *pdf = scene->environment->probability
-         * sky_pdf_at(scene, sky_texel(scene, uv), sqrt(wi.x * wi.x + wi.z * wi.z));
-    return sky_radiance_uv(scene, uv);
+// The one of n steps, each as high as its probability, that u falls into; u becomes the place inside it. `first`: of the
+// table. A search from where the table says that this n-th of [0, 1) begins (Chen and Asau 1974).
+static inline ireal pick_step(global const SkyStep *table, ireal first, int n, real *u) {
+    ireal step = first + GATHER(ireal, table, first + TO_INT(*u * (float)n), .start);
+    real top = GATHER(real, table, step, .top);
+    for (ireal beyond = *u >= top; ANY(beyond); beyond = *u >= top) {
+        step = beyond ? step + 1 : step;
+        top = GATHER(real, table, step, .top);
+    }
+    real bottom = step > first ? GATHER(real, table, step > first ? step - 1 : step, .top) : ZERO;
+    *u = (*u - bottom) / (top - bottom);
+    return step - first;
 }
 
-static inline LightSample sky_light_sample(const Scene *scene, ireal index, real3 p, real2 u, ureal2 bits) {
+static inline LightSample sky_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
     int width = scene->environment->width, height = scene->environment->height;
-    ALIAS_PICK(scene->sky_aliases, width * height, bits, texel)
-    ireal row = texel / width, column = texel - row * width;
-    real2 uv = {(TO_REAL(column) + u.x) / (float)width, (TO_REAL(row) + u.y) / (float)height};
+    real x = u.x, y = u.y;
+    ireal row = pick_step(scene->sky_steps + width * height, (ireal)(0), height, &y);
+    ireal column = pick_step(scene->sky_steps, row * width, width, &x), texel = row * width + column;
+    real2 uv = {(TO_REAL(column) + x) / (float)width, (TO_REAL(row) + y) / (float)height};
     real sin_phi, cos_phi, sin_theta, cos_theta;
     sincos_turns(uv.x, &sin_phi, &cos_phi);
     sincos_turns(0.5f * uv.y, &sin_theta, &cos_theta);
-    real x = sin_theta * sin_phi, z = -sin_theta * cos_phi;
+    real east = sin_theta * sin_phi, south = -sin_theta * cos_phi;
     real c = (real)(scene->environment->rotation_cos), s = (real)(scene->environment->rotation_sin);
     LightSample sample;
-    sample.wi = vector(c * x + s * z, cos_theta, c * z - s * x);
+    sample.wi = vector(c * east + s * south, cos_theta, c * south - s * east);
     sample.radiance = sky_radiance_uv(scene, uv);
-    sample.pdf = sky_pdf_at(scene, texel, sin_theta);
+    sample.pdf = sky_pdf(scene, texel, sin_theta);
     sample.target = sample.wi;
     sample.infinite = ALL_LANES;
     sample.delta = NO_LANES;
     return sample;
+}
+#else
+static inline real sky_pdf(const Scene *scene, ireal texel, real sin_theta) { return ZERO; }
+#endif
+
+static inline real3 sky_radiance(const Scene *scene, real3 wi, real *pdf) {
+    real2 uv = sky_uv(scene, wi);
+    *pdf = sky_pdf(scene, sky_texel(scene, uv), sqrt(wi.x * wi.x + wi.z * wi.z));
+    return sky_radiance_uv(scene, uv);
 }

@@ -1,7 +1,7 @@
 // A point that shines alike in all directions: intensity/d² (Suchiński 7.4.1). World frame.
 #include "light/interface.cl"
 
-static inline LightSample point_light_sample(const Scene *scene, ireal index, real3 p, real2 u, ureal2 bits) {
+static inline LightSample point_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
     LightSample s;
     s.target = GATHER3(scene->point_lights, index, .position);
     real3 d = sub(s.target, p);

@@ -7,7 +7,7 @@ static inline real sphere_light_cone(real3 to_center, real radius) {
     return sin2 < 1.0f ? sin2 / (1.0f + safe_sqrt(1.0f - sin2)) : ZERO;
 }
 
-static inline LightSample sphere_light_sample(const Scene *scene, ireal index, real3 p, real2 u, ureal2 bits) {
+static inline LightSample sphere_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
     real3 center = GATHER3(scene->sphere_lights, index, .center);
     real radius = GATHER(real, scene->sphere_lights, index, .radius);
     real3 to_center = sub(center, p);

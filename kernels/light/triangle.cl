@@ -1,8 +1,10 @@
-// A triangle that shines from its front side: a point uniform over its area. World frame.
+// A triangle, or the parallelogram of two, that shines from its front side: a point uniform over its area. World frame.
 #include "light/interface.cl"
 
-static inline LightSample triangle_light_sample(const Scene *scene, ireal index, real3 p, real2 u, ureal2 bits) {
+static inline LightSample triangle_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
     real2 b = sample_triangle(u);
+    ireal whole = GATHER(ireal, scene->triangle_lights, index, .parallelogram) != 0;
+    b = (real2){whole ? u.x : b.x, whole ? u.y : b.y};
     real3 q = mad3(GATHER3(scene->triangle_lights, index, .e1), b.x,
               mad3(GATHER3(scene->triangle_lights, index, .e2), b.y, GATHER3(scene->triangle_lights, index, .p0)));
     real3 n = GATHER3(scene->triangle_lights, index, .normal);

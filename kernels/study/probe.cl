@@ -139,11 +139,28 @@ kernel void probe_leave(SCENE_PARAMETERS, uint n, global const float *in, global
 #endif
 
 #if LIGHTS
-// in: p (3) -> out: wi (3), radiance (3), pdf, target (3), infinite, delta. Element i draws the numbers of pixel i.
+// in: p (3), n (3) -> out: the light that the numbers of pixel i choose, the probability of that, and what u becomes
+kernel void probe_pick_light(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed) {
+    ELEMENTS
+    Sampler sampler = sampler_at(element, (ureal)(0), seed, 32);
+    real probability, u = next_1d(&sampler);
+    ireal light = pick_light(&scene, ROW3(in, 0), ROW3(in, 3), &sampler, &u, &probability);
+    put(out, n, 0, TO_REAL(light));
+    put(out, n, 1, probability);
+    put(out, n, 2, u);
+}
+
+// in: p (3), n (3), light -> out: the probability with which it is chosen
+kernel void probe_light_probability(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    put(out, n, 0, light_probability(&scene, ROW3(in, 0), ROW3(in, 3), TO_INT(ROW(in, 6))));
+}
+
+// in: p (3), n (3) -> out: wi (3), radiance (3), pdf, target (3), infinite, delta. Element i draws the numbers of pixel i.
 kernel void probe_light_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed) {
     ELEMENTS
     Sampler sampler = sampler_at(element, (ureal)(0), seed, 32);
-    LightSample light = light_sample(&scene, ROW3(in, 0), &sampler);
+    LightSample light = light_sample(&scene, ROW3(in, 0), ROW3(in, 3), &sampler);
     put3(out, n, 0, light.wi);
     put3(out, n, 3, light.radiance);
     put(out, n, 6, light.pdf);
@@ -151,37 +168,28 @@ kernel void probe_light_sample(SCENE_PARAMETERS, uint n, global const float *in,
     put(out, n, 10, FLAG(light.infinite));
     put(out, n, 11, FLAG(light.delta));
 }
-
-// -> out: the entry of the light table that the numbers of pixel i pick
-kernel void probe_alias(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed) {
-    ELEMENTS
-    Sampler sampler = sampler_at(element, (ureal)(0), seed, 32);
-    ureal2 bits = next_bits(&sampler);
-    ALIAS_PICK(scene.lights, scene.counts.lights, bits, entry)
-    put(out, n, 0, TO_REAL(entry));
-}
 #endif
 
 #if EMITTERS
-// in: p (3), wi (3) -> out: radiance (3) of the emitter met, the density with which light_sample chooses wi, primitive
+// in: p (3), n (3), wi (3) -> out: radiance (3) of the emitter met, the density with which light_sample chooses wi, primitive
 kernel void probe_emitter(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
-    real3 p = ROW3(in, 0), wi = ROW3(in, 3);
+    real3 p = ROW3(in, 0), wi = ROW3(in, 6);
     Hits hits = closest_hit(&scene, p, wi, (real)(INFINITY), active);
     Surface surface = surface_at(&scene, p, wi, &hits);
     real pdf;
-    put3(out, n, 0, emitter_radiance(&scene, p, wi, hits.t, &surface, active & (hits.primitive >= 0), &pdf));
+    put3(out, n, 0, emitter_radiance(&scene, p, ROW3(in, 3), wi, hits.t, &surface, active & (hits.primitive >= 0), &pdf));
     put(out, n, 3, pdf);
     put(out, n, 4, TO_REAL(hits.primitive));
 }
 #endif
 
 #if SKY
-// in: wi (3) -> out: radiance (3), the density with which light_sample chooses wi
+// in: p (3), n (3), wi (3) -> out: radiance (3), the density with which light_sample chooses wi
 kernel void probe_sky(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     real pdf;
-    put3(out, n, 0, sky_radiance(&scene, ROW3(in, 0), &pdf));
+    put3(out, n, 0, escaped_radiance(&scene, ROW3(in, 0), ROW3(in, 3), ROW3(in, 6), &pdf));
     put(out, n, 3, pdf);
 }
 #endif

@@ -26,6 +26,7 @@ from clrt.scene.materials import MATERIALS
 from clrt.scene.model import Environment, Filter, Sampler
 from clrt.study.bsdfs import variants
 
+from ..rendering.lamps import lamps
 from ..rendering.test_variants import everything
 
 KERNELS = Path(str(files("clrt.kernels")))
@@ -108,6 +109,8 @@ def test_every_kernel_file_is_used(device: Device) -> None:
         scene = everything()
         scene.render = replace(scene.render, sampler=sampler, filter=name)
         used |= set(compile_scene(scene, Choices()).files)
+    for count in (1, 40):
+        used |= set(compile_scene(lamps(count), Choices()).files)
     for entry in ("aov.cl", "study/probe.cl"):
         used |= set(compile_scene(everything(), Choices(), entry).files)
     assert sorted(used) == FILES

@@ -67,7 +67,7 @@ def test_records_keep_the_rules(name: str) -> None:
     members = [dtype[field] for field in dtype.names or ()]
     assert sum(member.itemsize for member in members) == dtype.itemsize
     assert all(place % member.base.itemsize == 0 for member, place in zip(members, offsets(dtype)))
-    assert dtype.itemsize % {"records_SKY_ALIAS": 8, "records_FILTER": 4}.get(name, 16) == 0
+    assert dtype.itemsize % {"records_SKY_STEP": 8, "records_FILTER": 4, "records_LIGHT_PLACE": 4}.get(name, 16) == 0
 
 
 def test_typedef() -> None:

@@ -42,12 +42,15 @@ def turned(w: Doubles, degrees: float) -> Doubles:
     return np.asarray(w @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T)
 
 
-def irradiance(image: NDArray[np.float32], normal: Doubles, rotation_degrees: float = 0.0, steps: int = 24) -> Doubles:
-    """(3,) ∫ L max(w·normal, 0) dω by the midpoint rule, steps by steps points a texel."""
+def irradiance(image: NDArray[np.float32], normal: Doubles, rotation_degrees: float = 0.0, steps: int = 24,
+               where: NDArray[np.bool_] | None = None) -> Doubles:
+    """(3,) ∫ L max(w·normal, 0) dω by the midpoint rule, steps by steps points a texel; of some texels (h, w) alone."""
     height, width = image.shape[:2]
     u = (np.arange(width * steps) + 0.5) / (width * steps)
     v = (np.arange(height * steps) + 0.5) / (height * steps)
     grid_u, grid_v = (grid.ravel() for grid in np.meshgrid(u, v))
     w = from_uv(grid_u, grid_v)
     weight = np.maximum(turned(w, rotation_degrees) @ normal, 0) * np.sin(np.pi * grid_v)
+    if where is not None:
+        weight *= np.kron(where, np.ones((steps, steps))).ravel()
     return np.asarray(lookup(image, w).T @ weight * 2 * np.pi**2 / len(w))

@@ -29,7 +29,7 @@ def irradiances(probe: Probe, points: Doubles, normal: Doubles = UP) -> tuple[Do
     """Mean and variance, (m, 3) each, of COUNT samples' radiance·cos/pdf at points (m, 3)."""
     parts = []
     for seed, point in enumerate(probe.compiled.frame.points(points)):
-        out = probe("light_sample", 12, np.tile(point, (COUNT, 1)), seed=seed)
+        out = probe("light_sample", 12, np.tile(np.concatenate([point, normal]), (COUNT, 1)), seed=seed)
         parts.append(out[:, 3:6] * (np.maximum(out[:, :3] @ normal, 0) / out[:, 6])[:, None])
     return np.mean(parts, axis=1), np.var(parts, axis=1)
 
@@ -79,7 +79,7 @@ def test_sphere(device: Device, center: tuple[float, float, float], radius: floa
 def test_inside_a_sphere_light_is_darkness(device: Device) -> None:
     probe = Probe(device, Scene(spheres=[Sphere(radius=2.0, material=LAMP)]))
     inside = np.array([[0.1, 0.2, 0.3], [0.0, 0.0, 0.0], [1.9, 0.0, 0.0]])
-    assert not probe("light_sample", 12, inside, seed=0)[:, 3:6].any()
+    assert not probe("light_sample", 12, inside, np.tile(UP, (3, 1)), seed=0)[:, 3:6].any()
 
 
 @pytest.mark.parametrize("side", [(-1.0, 0.7, -0.4, 1.5), (0.25, 0.25 + 2.0**-10, -0.5, 2.0**-10 - 0.5)],
@@ -111,7 +111,7 @@ def test_directional(device: Device) -> None:
     cosine = 2 / np.sqrt(1 + 4 + 0.25)
     mean, _ = irradiances(probe, POINTS)
     np.testing.assert_allclose(mean, np.tile([3 * cosine, 2 * cosine, cosine], (3, 1)), rtol=1e-6)
-    assert np.all(probe("light_sample", 12, POINTS, seed=0)[:, 10:] == 1)
+    assert np.all(probe("light_sample", 12, POINTS, np.tile(UP, (3, 1)), seed=0)[:, 10:] == 1)
 
 
 def test_all_together(device: Device) -> None:
@@ -129,9 +129,9 @@ def test_all_together(device: Device) -> None:
 def test_a_met_lamp_has_the_density_of_its_samples(device: Device) -> None:
     """A ray along a sample's direction meets the lamp, and finds the density and radiance that the sample reported."""
     probe = Probe(device, scattered_lamps())
-    points = np.random.default_rng(0).uniform(-1, 1, (1 << 16, 3)).astype(np.float32)
-    sample = probe("light_sample", 12, points, seed=1)
-    met = probe("emitter", 5, points, sample[:, :3])
+    points, normals = points_and_normals(1 << 16)
+    sample = probe("light_sample", 12, points, normals, seed=1)
+    met = probe("emitter", 5, points, normals, sample[:, :3])
     # A sample at a lamp's very edge may round past it.
     hit = met[:, 4] >= 0
     assert np.mean(~hit) < 1e-4
@@ -142,10 +142,17 @@ def test_a_met_lamp_has_the_density_of_its_samples(device: Device) -> None:
 def test_shadow_rays_end_before_their_lamp(device: Device) -> None:
     """Nothing lies between a point and the target of its light sample, nor does the lamp shade itself."""
     probe = Probe(device, scattered_lamps())
-    points = np.random.default_rng(0).uniform(-1, 1, (1 << 18, 3)).astype(np.float32).astype(np.float64)
-    sample = probe("light_sample", 12, points, seed=2)
+    points, normals = points_and_normals(1 << 18)
+    sample = probe("light_sample", 12, points, normals, seed=2)
     to_target = sample[:, 7:10] - points
     assert not probe("any_hit", 1, points, to_target, np.ones(len(points))).any()
+
+
+def points_and_normals(count: int) -> tuple[Doubles, Doubles]:
+    """(count, 3) each: in the unit cube, as float32 has them, and every direction."""
+    rng = np.random.default_rng(0)
+    points, normals = rng.uniform(-1, 1, (count, 3)).astype(np.float32).astype(np.float64), rng.normal(size=(count, 3))
+    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def scattered_lamps() -> Scene:

@@ -23,8 +23,9 @@ WRONG_WARPS = {
 }
 WRONG_LIGHTS = {
     "sphere": ("return sin2 < 1.0f ? sin2 /", "return sin2 < 1.0f ? 0.9f * sin2 /"),
-    "alias": ("unit_interval(bits.y) < GATHER", "0.9f * unit_interval(bits.y) < GATHER"),
-    "sky": ("(TO_REAL(column) + u.x)", "(TO_REAL(column) + 0.9f * u.x)"),
+    "few": ("below += chances[i];", "below += 1.01f * chances[i];"),
+    "many": ("real chances[NODE], chance;", "real chances[NODE], chance; u *= 0.9f;"),
+    "sky": ("(TO_REAL(column) + x)", "(TO_REAL(column) + 0.9f * x)"),
 }
 
 
@@ -40,10 +41,10 @@ def test_warps_follow_their_densities(probe: Probe) -> None:
 
 
 def test_lights_follow_their_densities(device: Device) -> None:
-    """Spheres and triangles of all sizes, skies, and what is picked from light tables. A lamp's density is its closed
-    form, a sky's integrates to 1."""
+    """Spheres and triangles of all sizes, skies, and choices among lights. A lamp's density is its closed form, a sky's
+    integrates to 1, and the probabilities of all lights add up to it."""
     tests = light_tests(device, SAMPLES, 1)
-    assert len(tests) == 20 and not rejected({test.name: test.density for test in tests})
+    assert len(tests) == 21 and not rejected({test.name: test.density for test in tests})
     assert max(test.error for test in tests) < DENSITY
 
 
@@ -56,7 +57,7 @@ def test_a_wrong_warp_is_rejected(device: Device, what: str) -> None:
 
 @pytest.mark.parametrize("what", WRONG_LIGHTS)
 def test_a_wrong_light_is_rejected(device: Device, what: str) -> None:
-    measure = {"sphere": lamps, "alias": picks, "sky": skies}[what]
+    measure = {"sphere": lamps, "few": picks, "many": picks, "sky": skies}[what]
     tests = measure(device, SAMPLES, 1, dict([WRONG_LIGHTS[what]]))
     assert rejected({test.name: test.density for test in tests}, 1e-9)
 

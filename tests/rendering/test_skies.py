@@ -16,10 +16,18 @@ from . import skies
 Doubles = NDArray[np.float64]
 COUNT, FAMILY = 1 << 19, 1e-3
 HEIGHT, WIDTH = 16, 32
+UP = np.array([0.0, 1.0, 0.0])
 
 
 def gradient() -> NDArray[np.float32]:
-    """Brighter downwards and around, in each channel differently."""
+    """Much brighter downwards and around, in each channel differently."""
+    v, u = np.meshgrid((np.arange(HEIGHT) + 0.5) / HEIGHT, (np.arange(WIDTH) + 0.5) / WIDTH, indexing="ij")
+    bright = 0.1 + v**3 * (1.5 + np.sin(2 * np.pi * u))**2
+    return np.stack([bright, 2 * bright, bright * (1.2 + np.cos(2 * np.pi * u))], axis=-1).astype(np.float32)
+
+
+def smooth() -> NDArray[np.float32]:
+    """A third of the light, or less, is above the mean."""
     v, u = np.meshgrid((np.arange(HEIGHT) + 0.5) / HEIGHT, (np.arange(WIDTH) + 0.5) / WIDTH, indexing="ij")
     return np.stack([0.1 + v, 1.5 + np.sin(2 * np.pi * u), 1.2 + v * np.cos(2 * np.pi * u)], axis=-1).astype(np.float32)
 
@@ -36,7 +44,9 @@ def texel(values: tuple[float, float, float]) -> NDArray[np.float32]:
 
 
 SKIES = {"gradient": (gradient(), 0.0), "turned": (gradient(), 77.0), "sun": (sun(), -130.0),
-         "one_texel": (texel((0.5, 1.0, 2.0)), 10.0)}
+         "smooth": (smooth(), 30.0), "one_texel": (texel((0.5, 1.0, 2.0)), 10.0)}
+#: Those that are left to the surfaces' own directions.
+EVEN = ("smooth", "one_texel")
 
 
 @pytest.fixture(scope="module", params=SKIES)
@@ -48,6 +58,16 @@ def name(request: pytest.FixtureRequest) -> str:
 def probe(device: Device, name: str) -> Probe:
     image, rotation = SKIES[name]
     return Probe(device, Scene(environment=Environment(image=image, rotation_degrees=rotation)))
+
+
+def seen(probe: Probe, w: Doubles) -> Doubles:
+    """(n, 4): radiance from directions (n, 3), and the density with which light samples choose them."""
+    return probe("sky", 4, np.zeros_like(w), np.tile([0.0, 1.0, 0.0], (len(w), 1)), w)
+
+
+def sampled(probe: Probe, normal: Doubles, seed: int) -> Doubles:
+    """(COUNT, 12): see probe_light_sample."""
+    return probe("light_sample", 12, np.zeros((COUNT, 3)), np.tile(normal, (COUNT, 1)), seed=seed)
 
 
 def directions(count: int) -> Doubles:
@@ -63,7 +83,7 @@ def test_radiance_follows_the_convention(probe: Probe, name: str) -> None:
     """An angle is off by 4e-7 at most (atan2 of OpenCL: 6 ulp); that moves radiance by the image's steepest step."""
     image, rotation = SKIES[name]
     w = directions(100_000)
-    found = probe("sky", 4, w)[:, :3]
+    found = seen(probe, w)[:, :3]
     steps = [np.abs(np.diff(image.astype(np.float64), axis=axis, append=image.take([0], axis=axis))).max(initial=0)
              for axis in (0, 1)]
     # Near the poles the azimuth is as uncertain as the direction's last digits are large beside its sine.
@@ -75,42 +95,69 @@ def test_radiance_follows_the_convention(probe: Probe, name: str) -> None:
     assert np.isfinite(found).all()
 
 
-def test_density_integrates_to_one(probe: Probe) -> None:
+def test_density_integrates_to_one(probe: Probe, name: str) -> None:
     """∫ pdf dω by the midpoint rule: 8 by 8 points a texel, inside which pdf·sin θ is constant."""
     v, u = np.meshgrid((np.arange(8 * HEIGHT) + 0.5) / (8 * HEIGHT), (np.arange(8 * WIDTH) + 0.5) / (8 * WIDTH),
                        indexing="ij")
-    pdf = probe("sky", 4, skies.from_uv(u.ravel(), v.ravel()))[:, 3]
+    pdf = seen(probe, skies.from_uv(u.ravel(), v.ravel()))[:, 3]
     integral = np.sum(pdf * np.sin(np.pi * v.ravel())) * 2 * np.pi**2 / v.size
-    assert abs(integral - 1) < 2e-6 * WIDTH   # where the sky is turned, edges of texels round to either side
+    # Where it is turned, edges of texels round to either side.
+    assert abs(integral - (name not in EVEN)) < 2e-6 * WIDTH
 
 
+def test_even_skies_are_not_sampled(probe: Probe, name: str) -> None:
+    assert ("LIGHT_SKY" in probe.compiled.features) == (name not in EVEN)
+    assert ("sky_steps" in probe.compiled.buffers) == (name not in EVEN)
+
+
+@pytest.mark.parametrize("name", sorted(SKIES.keys() - EVEN), indirect=True)
 def test_samples_follow_the_density(probe: Probe, name: str) -> None:
     """Chi-square over the texels; each sample reports the density and radiance that its direction has."""
     image, rotation = SKIES[name]
     height, width = image.shape[:2]
-    sample = probe("light_sample", 12, np.zeros((COUNT, 3)), seed=3)
+    sample = sampled(probe, UP, seed=3)
     u, v = skies.to_uv(skies.turned(sample[:, :3], -rotation))
     cell = np.minimum((v * height).astype(int), height - 1) * width + np.minimum((u * width).astype(int), width - 1)
     density = probe.compiled.buffers["sky_texels"][1]["density"].astype(np.float64)
     found = np.bincount(cell, minlength=density.size)
-    assert density.size == 1 or chi2_test(found, density / density.sum() * COUNT) > 1e-4
+    edges = np.bincount(cell[density[cell] == 0], minlength=density.size)    # rounded to the other side of one
+    assert edges.sum() < 1e-5 * COUNT
+    assert chi2_test(found - edges, density / density.sum() * (COUNT - edges.sum())) > 1e-4
 
-    looked_up = probe("sky", 4, sample[:, :3])
+    looked_up = seen(probe, sample[:, :3])
     inside = np.all([np.abs(x * size % 1 - 0.5) < 0.499 for x, size in ((u, width), (v, height))], axis=0)
     inside &= np.hypot(sample[:, 0], sample[:, 2]) > 0.01
     np.testing.assert_allclose(looked_up[inside, 3], sample[inside, 6], rtol=2e-5)
     np.testing.assert_allclose(looked_up[inside, :3], sample[inside, 3:6], rtol=1e-3, atol=1e-5 * image.max())
 
 
+@pytest.mark.parametrize("name", sorted(SKIES.keys() - EVEN), indirect=True)
+def test_what_is_brighter_than_the_mean_is_sampled(probe: Probe, name: str) -> None:
+    """Texels whose mean luminance is below the sky's are not, the others in proportion to what is above it."""
+    image, rotation = SKIES[name]
+    height, width = image.shape[:2]
+    steps = 24
+    v, u = np.meshgrid((np.arange(height * steps) + 0.5) / (height * steps),
+                       (np.arange(width * steps) + 0.5) / (width * steps), indexing="ij")
+    light = skies.lookup(image, skies.from_uv(u.ravel(), v.ravel())) @ [0.2126, 0.7152, 0.0722]
+    texels = light.reshape(height, steps, width, steps).mean(axis=(1, 3))
+    angle = -np.diff(np.cos(np.pi * np.arange(height + 1) / height))[:, None] * np.ones((1, width))
+    expected = np.maximum(texels - np.average(texels, weights=angle), 0) * angle
+    density = probe.compiled.buffers["sky_texels"][1]["density"].reshape(height, width)
+    np.testing.assert_allclose(density / density.sum(), expected / expected.sum(), atol=2e-4)
+
+
+@pytest.mark.parametrize("name", sorted(SKIES.keys() - EVEN), indirect=True)
 def test_irradiance(probe: Probe, name: str) -> None:
-    """The samples' mean of radiance·cos/pdf against a quadrature in float64."""
+    """The samples' mean of radiance·cos/pdf against a quadrature in float64 over the texels that are sampled."""
     image, rotation = SKIES[name]
     normals = np.array([[0.0, 1.0, 0.0], [0.6, 0.0, -0.8], [-0.48, -0.6, 0.64]])
+    where = probe.compiled.buffers["sky_texels"][1]["density"].reshape(image.shape[:2]) > 0
     p_values = []
     for seed, normal in enumerate(normals):
-        sample = probe("light_sample", 12, np.zeros((COUNT, 3)), seed=seed)
+        sample = sampled(probe, normal, seed)
         values = sample[:, 3:6] * (np.maximum(sample[:, :3] @ normal, 0) / sample[:, 6])[:, None]
-        expected = skies.irradiance(image, normal, rotation, steps=24 if image.size > 3 else 1000)
+        expected = skies.irradiance(image, normal, rotation, where=where)
         variance = values.var(axis=0) + COUNT * (3e-5 * expected)**2   # and the quadrature's own error
         p_values.append(mean_test(values.mean(axis=0), variance, COUNT, expected))
     assert np.min(p_values) > sidak(FAMILY, np.size(p_values))
@@ -119,7 +166,7 @@ def test_irradiance(probe: Probe, name: str) -> None:
 def test_constant_sky(device: Device) -> None:
     """The same from everywhere, and left to the surfaces' own directions."""
     probe = Probe(device, Scene(environment=Environment(color=(0.5, 0.25, 2.0), strength=3.0)))
-    out = probe("sky", 4, directions(100))
+    out = seen(probe, directions(100))
     assert np.all(out == [1.5, 0.75, 6.0, 0.0])
     assert probe.compiled.counts["lights"] == 0
 

@@ -32,7 +32,7 @@ def everything() -> Scene:
     ball = Mesh(vertices + np.array([1.2, 0.8, 0], np.float32), faces, gold, normals=vertices)
     lamp = quad([(-1, 4, -1), (1, 4, -1), (1, 4, 1), (-1, 4, 1)], Diffuse(emission=(6.0, 5.0, 4.0)))
     floor = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse(color=(0.7, 0.6, 0.5)))
-    sky = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)
+    sky = (2 * np.random.default_rng(0).random((8, 16, 1))**6 * [1.0, 0.8, 0.6]).astype(np.float32)
     return Scene(
         meshes=[floor, lamp, ball],
         spheres=[Sphere(center=(-1.0, 0.7, 0.5), radius=0.7, material=Mirror(color=(0.9, 0.9, 0.9))),

@@ -1,0 +1,84 @@
+"""What is known of lights when one of them is to be chosen: where they are, where they shine, and how brightly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..accel.tree import Tree
+
+Doubles = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LightGroups:
+    """n groups of one or more lights each, as kernels/light/importance.cl sees them.
+
+    low, high: (n, 3), the boxes around them. radius: (n,), of a sphere around the box's middle that holds them. axis:
+    (n, 3), unit, or 0. cos_cone: (n,), the cosine of the angle from the axis within which all their normals lie, −1
+    where these point everywhere. intensity: (n,), luminance of radiance times area, or of W/sr, all together.
+    """
+
+    low: Doubles
+    high: Doubles
+    radius: Doubles
+    axis: Doubles
+    cos_cone: Doubles
+    intensity: Doubles
+
+    def __len__(self) -> int:
+        return len(self.intensity)
+
+
+def flat_lights(corners: Doubles, normal: Doubles, intensity: Doubles) -> LightGroups:
+    """Flat lights with corners (n, k, 3) that shine on the side of their unit normals (n, 3)."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    return LightGroups(low, high, _half_diagonal(low, high), normal, np.ones(len(normal)), intensity)
+
+
+def round_lights(center: Doubles, radius: Doubles, intensity: Doubles) -> LightGroups:
+    """Balls, (n, 3) and (n,), that shine everywhere."""
+    around = radius[:, None]
+    everywhere = -np.ones(len(center))
+    return LightGroups(center - around, center + around, radius, np.zeros_like(center), everywhere, intensity)
+
+
+def joined(parts: Sequence[LightGroups]) -> LightGroups:
+    """All groups of the parts."""
+    return LightGroups(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(LightGroups)))
+
+
+def groups_of_nodes(tree: Tree, lights: LightGroups) -> LightGroups:
+    """The groups that the nodes of a tree over `lights`, one a leaf, stand for.
+
+    The axis is the mean of the normals, weighted by intensity; the cone around it is as narrow as can be.
+    """
+    levels, leaf = list(tree.levels()), tree.leaf
+    own = tree.order[tree.left_first[leaf]]
+    first, count = np.where(leaf, tree.left_first, 0), leaf.astype(np.int64)
+    intensity, axis = np.zeros(len(leaf)), np.zeros((len(leaf), 3))
+    intensity[leaf], axis[leaf] = lights.intensity[own], (lights.axis * lights.intensity[:, None])[own]
+    for level in reversed(levels):
+        inner = level[~leaf[level]]
+        left = tree.left_first[inner]
+        first[inner] = first[left]
+        for values in (count, intensity, axis):
+            values[inner] = values[left] + values[left + 1]
+    norm = np.linalg.norm(axis, axis=1)
+    axis /= np.where(norm > 0, norm, 1)[:, None]
+    low, high = tree.aabb_min.astype(np.float64), tree.aabb_max.astype(np.float64)
+    radius, cos_cone = _half_diagonal(low, high), np.empty(len(leaf))
+    radius[leaf] = lights.radius[own]
+    for level in levels:
+        start = np.cumsum(count[level]) - count[level]
+        inside = tree.order[np.arange(count[level].sum()) + np.repeat(first[level] - start, count[level])]
+        cosine = np.einsum("ij,ij->i", lights.axis[inside], np.repeat(axis[level], count[level], axis=0))
+        cos_cone[level] = np.minimum.reduceat(np.where(lights.cos_cone[inside] < 0, -1.0, cosine), start)
+    return LightGroups(low, high, radius, axis, np.clip(cos_cone, -1, 1), intensity)
+
+
+def _half_diagonal(low: Doubles, high: Doubles) -> Doubles:
+    return np.asarray(np.linalg.norm(high - low, axis=1) / 2)

@@ -1,0 +1,85 @@
+"""Packs emissive triangles. Two that make a parallelogram, as most lamps are made of, become one light."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scene.model import Mesh
+from .environment import LUMINANCE
+from .light_groups import Doubles, LightGroups, flat_lights
+from .records import TRIANGLE_LIGHT
+
+#: By how many roundings of their largest coordinate four corners may miss a parallelogram.
+ROUNDINGS = 4
+
+Integers = NDArray[np.int64]
+
+
+class TriangleLights(NamedTuple):
+    """records: of n lights. groups: what they are chosen by. light: (m,) int32, of each triangle, or −1."""
+
+    records: NDArray[Any]
+    groups: LightGroups
+    light: NDArray[np.int32]
+
+
+def pack_triangle_lights(meshes: list[Mesh], triangles: NDArray[np.float32]) -> TriangleLights:
+    """triangles: (m, 3, 3) float32, the meshes' in order. What is black, or has no area in float32, is no light."""
+    mesh = np.repeat(np.arange(len(meshes)), [len(each.faces) for each in meshes])
+    emission = np.array([each.material.emission for each in meshes], np.float64).reshape(-1, 3)
+    lamps = np.flatnonzero(emission[mesh].any(axis=1))
+    lamps = lamps[(_normals(triangles[lamps].astype(np.float64))[1] / 2).astype(np.float32) > 0]
+    corners, whole = _joined(triangles[lamps].astype(np.float64), mesh[lamps], lamps)
+    begins = np.ones(len(lamps), bool)
+    begins[1:] = ~whole[:-1]
+    light = np.full(len(triangles), -1, np.int32)
+    light[lamps] = np.cumsum(begins) - 1
+    return TriangleLights(*_packed(corners[begins], whole[begins], emission[mesh[lamps[begins]]]), light)
+
+
+def _packed(corners: Doubles, whole: NDArray[np.bool_], radiance: Doubles) -> tuple[NDArray[Any], LightGroups]:
+    """Of triangles with corners (n, 3, 3) or, where `whole` (n,), the parallelograms that have these three."""
+    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal, area = _normals(corners)
+    area = np.where(whole, area, area / 2)
+    records = np.zeros(len(corners), TRIANGLE_LIGHT)
+    records["p0"], records["e1"], records["e2"] = corners[:, 0], e1, e2
+    records["area"], records["normal"], records["radiance"] = area, normal, radiance
+    records["parallelogram"] = whole
+    fourth = corners[:, 1] + np.where(whole[:, None], e2, 0)
+    outline = np.concatenate([corners, fourth[:, None]], axis=1)
+    return records, flat_lights(outline, normal, area * (radiance @ LUMINANCE))
+
+
+def _normals(corners: Doubles) -> tuple[Doubles, Doubles]:
+    """Unit normals (k, 3), 0 where there is none, and twice the areas (k,) of triangles (k, 3, 3)."""
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    norm = np.linalg.norm(cross, axis=1)
+    return cross / np.where(norm > 0, norm, 1)[:, None], norm
+
+
+def _joined(corners: Doubles, mesh: Integers, face: Integers) -> tuple[Doubles, NDArray[np.bool_]]:
+    """Which of k triangles make a parallelogram with the next one, (k,), none of them with two.
+
+    Their corners, (k, 3, 3), are turned so that they begin with the one that is not the other's. mesh, face: (k,).
+    """
+    following = np.roll(corners, -1, axis=0)
+    error = ROUNDINGS * 2.0**-24 * np.abs(corners).max(axis=(1, 2), initial=0)
+    apex = np.full(len(corners), -1)
+    for i in range(3):
+        a = np.roll(corners, -i, axis=1)
+        for j in range(3):
+            b = np.roll(following, -j, axis=1)
+            shared = np.all((a[:, 1] == b[:, 2]) & (a[:, 2] == b[:, 1]), axis=1)
+            missed = np.abs(a[:, 0] + b[:, 0] - a[:, 1] - a[:, 2]).max(axis=1, initial=0)
+            apex[shared & (missed <= error)] = i
+    joined = (apex >= 0) & (np.roll(face, -1) == face + 1) & (np.roll(mesh, -1) == mesh)
+    # Where each of several in a row could be joined with the next, every other one is.
+    here = np.arange(len(joined))
+    since = here - np.maximum.accumulate(np.where(joined, -1, here))
+    joined &= since % 2 == 1
+    order = (np.where(joined, apex, 0)[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(corners, order[..., None], axis=1), joined

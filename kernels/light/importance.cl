@@ -1,0 +1,72 @@
+// How much light a group of lights can bring to a point, were nothing in between, and choices in proportion to it.
+//
+// A group is what lies in a sphere and shines within 90 degrees of normals that lie in a cone. Its importance is the
+// irradiance by it as if all came from its middle, with both cosines at their best: 0 only where it can bring none
+// (after Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", eq. 3).
+// World frame.
+#include "vector.cl"
+
+#define BELOW_ONE ((real)(0.99999994f))     // the largest float that is
+
+// The best cosine towards a sphere of radius r; `along` is distance·cos for its middle. Not quite that of the angle less
+// the sphere's own, but easier, 0 for the same spheres, and as good to choose by.
+static inline real best_cosine(real along, real distance, real r) { return (along + r) / (distance + r); }
+
+// distance·cos of the angle to the nearest direction in a cone; `along` is that to its axis.
+static inline real along_cone(real along, real distance, real cos_cone) {
+    real turned = along * cos_cone + safe_sqrt((distance * distance - along * along) * (1.0f - cos_cone * cos_cone));
+    return along > cos_cone * distance ? distance : turned;
+}
+
+// Of scene->light_groups[group] at p. n: unit, on the side of the surface that is lit. Inlined, or it costs half as much
+// again.
+__attribute__((always_inline)) static inline real importance(const Scene *scene, ireal group, real3 p, real3 n) {
+    real3 d = sub(GATHER3(scene->light_groups, group, .center), p), axis = GATHER3(scene->light_groups, group, .axis);
+    real r = GATHER(real, scene->light_groups, group, .radius);
+    real d2 = maximum(dot3(d, d), (real)(1e-30f)), distance = sqrt(d2);
+    real lit = best_cosine(dot3(n, d), distance, r);
+    real along = along_cone(-dot3(axis, d), distance, GATHER(real, scene->light_groups, group, .cos_cone));
+    real shining = best_cosine(along, distance, r);
+    real brought = GATHER(real, scene->light_groups, group, .intensity) * lit * shining / maximum(d2, r * r);
+    ireal brings = (lit > 0.0f) & (shining > 0.0f);
+    return brings ? brought : ZERO;
+}
+
+// Makes chances, which add up to 1, of the importances of n things. A part of them, `evenly`, is shared alike by all that
+// have any importance; where none has, the first gets all.
+static inline void make_chances(real *chances, int n, float evenly) {
+    real total = ZERO, able = ZERO;
+    for (int i = 0; i < n; ++i) {
+        total += chances[i];
+        able += chances[i] > 0.0f ? ONE : ZERO;
+    }
+    ireal some = total > 1e-37f;    // its inverse is a number
+    real scale = (1.0f - evenly) / total, share = evenly / able;
+    for (int i = 0; i < n; ++i) {
+        ireal has = some & (chances[i] > 0.0f);
+        chances[i] = has ? chances[i] * scale + share : ZERO;
+    }
+    chances[0] = some ? chances[0] : ONE;
+}
+
+// The one of n things whose chance u falls into, never one without any; u becomes the place inside that.
+static inline ireal draw(const real *chances, int n, real *u, real *probability) {
+    ireal drawn = (ireal)(0);
+    real below = ZERO, start = ZERO, chance = ONE;
+    for (int i = 0; i < n; ++i) {
+        ireal here = (chances[i] > 0.0f) & (*u >= below);
+        drawn = here ? (ireal)(i) : drawn;
+        chance = here ? chances[i] : chance;
+        start = here ? below : start;
+        below += chances[i];
+    }
+    *u = minimum((*u - start) / chance, BELOW_ONE);
+    *probability = chance;
+    return drawn;
+}
+
+static inline real chance_of(const real *chances, int n, ireal which) {
+    real chance = ZERO;
+    for (int i = 0; i < n; ++i) chance = which == i ? chances[i] : chance;
+    return chance;
+}

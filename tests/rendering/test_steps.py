@@ -1,0 +1,50 @@
+"""Tables of steps: probabilities, and searches that start in time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.rendering.steps import LEVELS, steps
+
+RNG = np.random.default_rng(0)
+WEIGHTS = {
+    "one": np.array([3.0]),
+    "two": np.array([1.0, 3.0]),
+    "equal": np.ones(1000),
+    "thirds": np.ones(3),
+    "random": RNG.random(777),
+    "zeros": RNG.random(1000) * (RNG.random(1000) < 0.3),
+    "ends in zeros": np.array([0.0, 0.0, 1.0, 2.0, 0.0, 0.0]),
+    "peak": np.where(np.arange(2000) == 777, 1e6, 1.0),
+    "tiny": np.where(np.arange(5) == 2, 1e-12, 1.0),
+    "rows": RNG.random((5, 300))**8,
+}
+
+
+@pytest.mark.parametrize("weights", WEIGHTS.values(), ids=WEIGHTS)
+def test_probabilities(weights: NDArray[np.float64]) -> None:
+    """Whole numbers of levels, each within one of the exact share, that add up to 1; what has no weight has none."""
+    table, probability = steps(weights)
+    assert np.all(probability * LEVELS % 1 == 0) and np.all(probability >= 0) and np.all(probability[weights == 0] == 0)
+    assert np.all(probability.sum(axis=-1) == 1) and np.all(table["top"][..., -1] == 1)
+    assert np.abs(probability - weights / weights.sum(axis=-1, keepdims=True)).max() <= 1 / LEVELS
+    np.testing.assert_array_equal(np.cumsum(probability, axis=-1), table["top"])
+
+
+@pytest.mark.parametrize("weights", WEIGHTS.values(), ids=WEIGHTS)
+def test_searches_start_in_time(weights: NDArray[np.float64]) -> None:
+    """At or before the step that each u falls into, u·n being a float32 product; and hardly before it on average."""
+    rows = np.atleast_2d(weights)
+    table, _ = steps(rows)
+    n = rows.shape[1]
+    edges = np.round(np.arange(n) / n * LEVELS)[:, None] + np.arange(-2, 3)    # where that product may be rounded up
+    levels = np.concatenate([edges.ravel(), RNG.integers(0, LEVELS, 1 << 16), [0, LEVELS - 1]])
+    u = (levels[(levels >= 0) & (levels < LEVELS)] / LEVELS).astype(np.float32)
+    cell = (u * np.float32(n)).astype(int)
+    assert cell.max() < n
+    for row in table:
+        step = np.searchsorted(row["top"], u, side="right")
+        assert np.all(row["start"][cell] <= step)
+        assert np.mean(step - row["start"][cell]) < 1.5
