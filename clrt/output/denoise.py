@@ -47,14 +47,16 @@ class Denoiser:
     def __call__(self, color: FloatArray, albedo: FloatArray, normal: FloatArray) -> FloatArray:
         """The denoised picture. All arrays are (height, width, 3) float32.
 
-        color: linear, any scale above 1e-8; what is not finite counts as 0. albedo in [0, 1] and normal in [-1, 1] are
+        color: linear, in any unit; what is not finite counts as 0. albedo in [0, 1] and normal in [-1, 1] are
         taken to be free of noise. DeviceError where it fails, as for want of memory.
         """
         import pyoidn
 
         finite = np.nan_to_num(color, nan=0, posinf=0, neginf=0)
+        # It takes less than 1e-8 for black, so the picture is brought to a mean near 1 by a power of two.
+        exponent = -int(np.frexp(np.mean(finite, dtype=np.float64))[1])
         images = {name: np.ascontiguousarray(image, np.float32)
-                  for name, image in {"color": finite, "albedo": albedo, "normal": normal}.items()}
+                  for name, image in {"color": np.ldexp(finite, exponent), "albedo": albedo, "normal": normal}.items()}
         images["output"] = np.empty_like(images["color"])
         with pyoidn.Filter(self._device) as network:
             for name, image in images.items():
@@ -65,7 +67,7 @@ class Denoiser:
             network.commit()
             network.execute()
             self._check()
-        return images["output"]
+        return np.asarray(np.ldexp(images["output"], -exponent))
 
     def _check(self) -> None:
         if problem := self._device.get_error():

@@ -125,9 +125,9 @@ def test_arrays_need_not_be_contiguous(image: clrt.Image, guides: dict[str, Floa
     assert np.array_equal(other, denoise(image.raw, **guides))
 
 
-@pytest.mark.parametrize("scale", [2.0**-23, 2.0**30])
+@pytest.mark.parametrize("scale", [2.0**-60, 2.0**30])
 def test_any_unit_will_do(image: clrt.Image, guides: dict[str, Floats], scale: float) -> None:
-    """Ten million times darker and a billion times brighter: the same picture."""
+    """10^18 times darker and a billion times brighter: the same picture."""
     assert image.raw is not None
     scaled = Denoiser()(image.raw * np.float32(scale), **guides)
     np.testing.assert_allclose(scaled / scale, image.pixels, rtol=1e-3, atol=1e-3)
