@@ -54,26 +54,21 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
 __attribute__((vec_type_hint(real)))
 kernel void aov(SCENE_PARAMETERS, global Aov *pixels, const Launch launch) {
     Scene scene = SCENE_ARGUMENTS;
-    uint first = launch.first_pixel + (uint)get_global_id(0) * LANES;
-    uint end = launch.first_pixel + launch.pixel_count;
-    if (first >= end) return;
-    ureal index = (ureal)(first) + LANE_INDEX;
-    ireal inside = index < end;
-    index = inside ? index : (ureal)(first);
-    ureal y = index / launch.width, x = index - y * launch.width, code = pixel_code(x, y);
+    LanePixels own = lane_pixels(&launch);
+    if (own.first >= own.end) return;
     real3 position = broadcast(launch.position);
     Seen sum = {splat(ZERO), splat(ZERO)};
     for (uint s = 0; s < launch.sample_count; ++s) {
-        Sampler sampler = sampler_at(code, (ureal)(s), launch.seed, launch.block_bits);
-        real3 direction = camera_direction(&scene, &launch, x, y, next_2d(&sampler));
-        Seen seen = seen_along(&scene, position, direction, inside, launch.max_depth);
+        Sampler sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
+        real3 direction = camera_direction(&scene, &launch, own.x, own.y, next_2d(&sampler));
+        Seen seen = seen_along(&scene, position, direction, own.inside, launch.max_depth);
         sum.albedo = add(sum.albedo, seen.albedo);
         sum.normal = add(sum.normal, seen.normal);
     }
     real share = (real)(1.0f / (float)launch.sample_count);
     real3 albedo = scale(sum.albedo, share), normal = scale(sum.normal, share);
-    for (uint lane = 0; lane < LANES && first + lane < end; ++lane) {
-        store_rows(pixels[first + lane].albedo, &albedo, lane);
-        store_rows(pixels[first + lane].normal, &normal, lane);
+    for (uint lane = 0; lane < LANES && own.first + lane < own.end; ++lane) {
+        store_rows(pixels[own.first + lane].albedo, &albedo, lane);
+        store_rows(pixels[own.first + lane].normal, &normal, lane);
     }
 }

@@ -132,20 +132,15 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
 __attribute__((vec_type_hint(real)))
 kernel void path(SCENE_PARAMETERS, global Pixel *film, const Launch launch) {
     Scene scene = SCENE_ARGUMENTS;
-    uint first = launch.first_pixel + (uint)get_global_id(0) * LANES;
-    uint end = launch.first_pixel + launch.pixel_count;
-    if (first >= end) return;
-    ureal index = (ureal)(first) + LANE_INDEX;
-    ireal inside = index < end;
-    index = inside ? index : (ureal)(first);
-    ureal y = index / launch.width, x = index - y * launch.width, code = pixel_code(x, y);
+    LanePixels own = lane_pixels(&launch);
+    if (own.first >= own.end) return;
     real3 position = broadcast(launch.position);
-    Accumulator pixels = load_pixels(film, AS_INT(index));
+    Accumulator pixels = load_pixels(film, AS_INT(own.index));
     for (uint s = 0; s < launch.sample_count; ++s) {
-        Sampler sampler = sampler_at(code, (ureal)(launch.first_sample + s), launch.seed, launch.block_bits);
-        real3 direction = camera_direction(&scene, &launch, x, y, next_2d(&sampler));
-        real3 L = radiance(&scene, position, direction, inside, launch.max_depth, &sampler, &pixels.rays);
-        accumulate(&pixels, L, inside);
+        Sampler sampler = sampler_at(own.code, (ureal)(launch.first_sample + s), launch.seed, launch.block_bits);
+        real3 direction = camera_direction(&scene, &launch, own.x, own.y, next_2d(&sampler));
+        real3 L = radiance(&scene, position, direction, own.inside, launch.max_depth, &sampler, &pixels.rays);
+        accumulate(&pixels, L, own.inside);
     }
-    store_pixels(film, first, end, &pixels);
+    store_pixels(film, own.first, own.end, &pixels);
 }

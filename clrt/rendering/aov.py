@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pyopencl as cl
 from numpy.typing import NDArray
 
 from ..device.arrays import empty_array
@@ -25,18 +24,16 @@ def render_aovs(session: Session, samples: int = SAMPLES) -> dict[str, NDArray[n
     Of mirrors and glass it is what they show. The sky has its radiance, up to 1, for albedo, and no normal. KernelError
     and DeviceError where the device fails.
     """
-    device, compiled, (width, height) = session.device, session.compiled, session.size
-    kernel = make_kernel(device, build(device, compiled.source_of("aov.cl")), "aov")
+    device, (width, height) = session.device, session.size
+    kernel = make_kernel(device, build(device, session.compiled.source_of("aov.cl")), "aov")
     pixels = empty_array(device, AOV, width * height)
     launch, launches, done = session.launch.copy(), Launches(FIRST_LAUNCH_SAMPLES), 0
     launch["sample_count"], launch["block_bits"] = samples, block_bits(samples)
     while done < len(pixels):
         count = min(len(pixels) - done, max(FEWEST_PIXELS, launches.size // samples))
         launch["first_pixel"], launch["pixel_count"] = done, count
-        kernel.set_args(*session._scene, compiled.counts[0], pixels.buffer, launch[0])
-        groups = -(-count // (compiled.choices.lanes * device.local_size))
-        size = (groups * device.local_size,)
-        launches.add(cl.enqueue_nd_range_kernel(device.queue, kernel, size, (device.local_size,)), count * samples)
+        kernel.set_args(*session.scene_arguments, pixels.buffer, launch[0])
+        launches.add(session.enqueue(kernel, count), count * samples)
         done += count
     launches.wait()
     values = pixels.read(device).reshape(height, width)

@@ -41,12 +41,14 @@ class Session:
         width, height = size
         self._check_memory()
         try:
-            self._scene = [on_device(device, array) for _, array in compiled.buffers.values()]
+            scene = [on_device(device, array) for _, array in compiled.buffers.values()]
             self._film = on_device(device, np.zeros(width * height, PIXEL))
         except cl.Error as error:
             raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes do not fit: {error}") from error
         self._kernel = make_kernel(device, self.program, "path")
-        self._kernel.set_args(*self._scene, compiled.counts[0], self._film, self.launch[0])
+        #: What every kernel of the scene takes first (SCENE_PARAMETERS).
+        self.scene_arguments = [*scene, compiled.counts[0]]
+        self._kernel.set_args(*self.scene_arguments, self._film, self.launch[0])
         self._warm_up()
 
     def _check_memory(self) -> None:
@@ -91,10 +93,14 @@ class Session:
 
     def _launch(self) -> cl.Event:
         """Enqueues the kernel for the range in the launch record."""
-        self._kernel.set_arg(len(self._scene) + 2, self.launch[0])
+        self._kernel.set_arg(len(self.scene_arguments) + 1, self.launch[0])
+        return self.enqueue(self._kernel, int(self.launch["pixel_count"][0]))
+
+    def enqueue(self, kernel: cl.Kernel, pixel_count: int) -> cl.Event:
+        """Enqueues a kernel of the scene, whose arguments are set, for as many pixels."""
         local = self.device.local_size
-        groups = max(1, -(-int(self.launch["pixel_count"][0]) // (self.compiled.choices.lanes * local)))
-        event = cl.enqueue_nd_range_kernel(self.device.queue, self._kernel, (groups * local,), (local,))
+        groups = max(1, -(-pixel_count // (self.compiled.choices.lanes * local)))
+        event = cl.enqueue_nd_range_kernel(self.device.queue, kernel, (groups * local,), (local,))
         self.device.queue.flush()
         return event
 
