@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accel.build import build_tree
+from ..accel.build import build_tree, fitting_layout
 from ..accel.kernels import HitTests, tree_buffers, tree_defines, tree_files
 from ..accel.layouts import Layout
 from ..device.open import Device
@@ -34,10 +34,13 @@ OFFSETS = {"bound": "offset/bound.cl", "ulp": "offset/ulp.cl", "fixed": "offset/
 
 @dataclass(frozen=True)
 class Choices:
-    """What a device or a user chooses about the program. lanes: paths a work-item (1, 8 or 16); offset: see OFFSETS."""
+    """What a device or a user chooses about the program. lanes: paths a work-item (1, 8 or 16); offset: see OFFSETS.
+
+    layout: a name in LAYOUTS, or None for the one that fits the device and the scene.
+    """
 
     lanes: int = 8
-    layout: str = "bvh8"
+    layout: str | None = None
     builder: str | None = None
     tests: HitTests = HitTests()
     offset: str = "bound"
@@ -92,7 +95,8 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
     scene = in_frame(scene, frame)
     triangles, normals = _geometry(scene)
     spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
-    tree = build_tree(device, choices.layout, choices.builder, triangles, spheres, choices.tests.triangle)
+    layout = choices.layout or fitting_layout(device, len(triangles), len(spheres), choices.tests.triangle)
+    tree = build_tree(device, layout, choices.builder, triangles, spheres, choices.tests.triangle)
     sky = pack_sky(scene.environment)
     emitters = pack_emitters(scene, triangles, sky)
     users = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
@@ -117,7 +121,7 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
     used = [m for m in MATERIALS if m.kernel in material_buffers]
     features = _features(scene, used, users, emitters, sky, choices)
     preamble = _preamble(buffers, features, used, emitters, choices, tree, frame.unit)
-    files = {**_files(used, emitters, sky, choices, bool(len(triangles)), bool(len(spheres))),
+    files = {**_files(used, emitters, sky, choices, tree.name, bool(len(triangles)), bool(len(spheres))),
              "SAMPLER": [f"sampler/{scene.render.sampler}.cl"],
              "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"]}
     return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame)
@@ -208,10 +212,10 @@ def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], 
         type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces])])
 
 
-def _files(used: list[type[Material]], emitters: Emitters, sky: Sky, choices: Choices, triangles: bool,
-           spheres: bool) -> dict[str, list[str]]:
+def _files(used: list[type[Material]], emitters: Emitters, sky: Sky, choices: Choices, layout: str,
+           triangles: bool, spheres: bool) -> dict[str, list[str]]:
     lights = [f"light/{t}.cl" for t in emitters.types if t != "sky"]
-    return {**tree_files(choices.layout, choices.tests, triangles, spheres), "OFFSET": [OFFSETS[choices.offset]],
+    return {**tree_files(layout, choices.tests, triangles, spheres), "OFFSET": [OFFSETS[choices.offset]],
             "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in used],
             "LIGHT_CHOICE": emitters.choice.files, "LIGHT_TREE_FILE": ["light/tree.cl"] if emitters.choice.tree else [],
             "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else [])}

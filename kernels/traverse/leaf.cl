@@ -75,7 +75,7 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
         return;
     }
     const float *t = (const float *)&found.t, *u = (const float *)&found.u, *v = (const float *)&found.v;
-    for (uint inside = mask_bits(found.hit); inside; inside &= inside - 1) {
+    for (uint inside = wide_bits(found.hit); inside; inside &= inside - 1) {
         int i = first_bit(inside);
         keep_closest(ray, hit, t[i], u[i], v[i], leaf->primitive[i]);
     }
