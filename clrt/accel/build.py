@@ -19,15 +19,17 @@ from .triangle_forms import in_form
 DEVICE_BUILDERS = {"ploc": 0, "reinsertion": 2}
 #: From so many primitives on a device's tree is done before numpy's, kernels loaded from the cache included.
 LARGE = 1 << 14
+#: Up to so many spheres are met one after another by all lanes' rays together (kernels/traverse/lone_spheres.cl).
+FEW_SPHERES = 16
 #: Up to so many triangles are met without a tree as fast as with one, and up to half as many 1.5 times as fast.
 FEW = 4 * PACK
 
 
 def fitting_layout(device: Device | None, triangles: int, spheres: int, triangle: str = "watertight") -> str:
-    """The device's layout, or "packs" where that needs vectors and the scene is so small that it needs no tree."""
+    """The device's layout, or "packs" for vectors if what is to be in the tree, so many, is too little for one."""
     layout = device.layout if device else "bvh8"
-    few = triangles + PACK * spheres <= FEW and triangle == "watertight"
-    return "packs" if layout == "bvh8" and triangles and few else layout
+    few = 0 < triangles <= FEW and not spheres and triangle == "watertight"
+    return "packs" if layout == "bvh8" and few else layout
 
 
 def build_tree(device: Device | None, layout: str, builder: str | None, triangles: FloatArray,

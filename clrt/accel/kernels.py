@@ -61,11 +61,18 @@ def tree_defines(tree: Layout) -> dict[str, int]:
     return defines | ({"COUNT_VISITS": 1} if "visits" in tree.buffers else {})
 
 
-def tree_files(layout: str, tests: HitTests, triangles: bool, spheres: bool,
+def tree_features(triangles: bool, spheres: bool, lone: bool = False) -> dict[str, bool]:
+    """What the kernels of kernels/traverse ask of the scene; lone: its spheres are not in the tree."""
+    return {"TRIANGLES": triangles, "LEAF_SPHERES": spheres and not lone, "LONE_SPHERES": spheres and lone,
+            "IN_TREE": triangles or (spheres and not lone), "PRIMITIVES": triangles or spheres}
+
+
+def tree_files(layout: str, tests: HitTests, triangles: bool, spheres: bool, lone: bool = False,
                instances: bool = False) -> dict[str, list[str]]:
     """What the includes of kernels/traverse stand for, in a scene that has triangles or spheres or neither."""
     triangle_test = PACKS_TEST if layout == "packs" else TRIANGLE_TESTS[tests.triangle]
-    return {"TREE": [TREES[layout][0]] if triangles or spheres else [],
+    return {"TREE": [TREES[layout][0]] if triangles or (spheres and not lone) else [],
+            "LONE_SPHERES_FILE": ["traverse/lone_spheres.cl"] if lone else [],
             "BOX_TEST": [BOX_TESTS[tests.box]],
             "TRIANGLE_TEST": [triangle_test] if triangles else [],
             "UPPER_LEVEL": [UPPER_LEVELS[layout]] if instances else [],

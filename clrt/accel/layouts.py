@@ -111,7 +111,7 @@ def pack(layout: str, builder: str, triangles: FloatArray, spheres: FloatArray) 
 
 def _list(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     buffers = _filled(leaf_triangles=_leaf_triangles(triangles, np.arange(len(triangles), dtype=np.int32)),
-                      leaf_spheres=_leaf_spheres(spheres, np.arange(len(spheres), dtype=np.int32), len(triangles)))
+                      leaf_spheres=leaf_spheres(spheres, np.arange(len(spheres), dtype=np.int32), len(triangles)))
     return Layout("list", buffers, stack=0, nodes=0, depth=0, work=float(len(triangles) + len(spheres)))
 
 
@@ -120,15 +120,15 @@ def _packs(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     packs = _filled_packs(LONE_PACK, triangles, np.arange(len(triangles), dtype=np.int32), first,
                           np.minimum(len(triangles) - first, PACK).astype(np.int32))
     packs["extent"] = np.abs(triangles).max(initial=0.0)
-    buffers = _filled(packs=packs, leaf_spheres=_leaf_spheres(spheres, np.arange(len(spheres), dtype=np.int32),
-                                                              len(triangles)))
+    every = np.arange(len(spheres), dtype=np.int32)
+    buffers = _filled(packs=packs, leaf_spheres=leaf_spheres(spheres, every, len(triangles)))
     return Layout("packs", buffers, stack=0, nodes=0, depth=0, work=float(len(packs) + len(spheres)))
 
 
 def _bvh2(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     tree = _tree(builder, triangles, spheres, LEAF_SIZES[builder], 1)
     buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
-                      leaf_spheres=_leaf_spheres(spheres, tree.sphere_order, len(triangles)))
+                      leaf_spheres=leaf_spheres(spheres, tree.sphere_order, len(triangles)))
     return Layout("bvh2", {"nodes": bvh2_nodes(tree)} | buffers, stack=tree.stack_bound, nodes=len(tree.count),
                   depth=tree.depth, work=tree.sah_cost(), level_sizes=_level_sizes(tree))
 
@@ -142,7 +142,7 @@ def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     child = wide.child.copy()
     child[leaf] = leaf_reference(first, sphere, count)
     nodes = wide_nodes(wide, child)
-    buffers = _filled(packs=packs, leaf_spheres=_leaf_spheres(spheres, wide.sphere_order, len(triangles)))
+    buffers = _filled(packs=packs, leaf_spheres=leaf_spheres(spheres, wide.sphere_order, len(triangles)))
     return Layout("bvh8", {"nodes": nodes} | buffers, stack=wide.stack_bound, nodes=len(nodes),
                   depth=wide.depth, work=wide.sah_cost(LANES), level_sizes=_level_sizes(wide))
 
@@ -151,7 +151,7 @@ def _cwbvh(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     # A leaf at the price of a node, whatever it holds: a third fewer nodes than at one a triangle, and no slower.
     tree = compress(_tree(builder, triangles, spheres, MAX_LEAF, MAX_LEAF))
     buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
-                      leaf_spheres=_leaf_spheres(spheres, tree.sphere_order, len(triangles)))
+                      leaf_spheres=leaf_spheres(spheres, tree.sphere_order, len(triangles)))
     return Layout("cwbvh", {"nodes": tree.nodes} | buffers, stack=tree.stack, nodes=len(tree.nodes),
                   depth=tree.wide.depth, work=tree.wide.sah_cost(MAX_LEAF))
 
@@ -221,7 +221,8 @@ def _leaf_triangles(triangles: FloatArray, order: IntArray) -> Records:
     return records
 
 
-def _leaf_spheres(spheres: FloatArray, order: IntArray, first_primitive: int) -> Records:
+def leaf_spheres(spheres: FloatArray, order: IntArray, first_primitive: int) -> Records:
+    """LEAF_SPHERE records of spheres (s, 4) float32 in this order; their primitives begin at `first_primitive`."""
     records = np.zeros(len(order), LEAF_SPHERE)
     records["center"], records["radius"] = spheres[order, :3], spheres[order, 3]
     records["primitive"] = first_primitive + order

@@ -15,9 +15,10 @@ __attribute__((noinline)) static Hit meet_packs_exactly(const LeafRay *leaf, glo
 }
 #endif
 
-static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first) {
+__attribute__((always_inline))
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
+                           Hit hit) {
     LeafRay leaf = leaf_ray(rays, ray, lane);
-    Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
 #if TRIANGLES
     int packs = (scene->counts.triangles + WIDTH - 1) / WIDTH;
     for (int i = 0; i < packs; ++i) VISIT(tests);
@@ -28,7 +29,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
         hit = meet_packs_exactly(&leaf, scene->packs, packs, stop_at_first, hit);
 #endif
 #endif
-#if SPHERES
+#if LEAF_SPHERES
     if (!(stop_at_first && hit.primitive >= 0)) hit_spheres(&leaf, scene->leaf_spheres, scene->counts.spheres, &hit);
 #endif
     return hit;

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS
 from clrt.device.open import Device
+from clrt.rendering import compile as compile_module
 from clrt.rendering import session as session_module
 from clrt.rendering.compile import OFFSETS, compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight
@@ -62,6 +63,18 @@ def test_lanes_layouts_and_builders_agree(device: Device, reference: Doubles, ch
     """
     wanted: dict[str, Any] = {"lanes": 8, "layout": "bvh8"} | chosen
     picture = film(device, everything(), **wanted).mean
+    differs = np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)
+    assert np.mean(differs) < 1e-3, np.argwhere(differs)
+
+
+@pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh", "list"])
+def test_spheres_in_the_tree_and_out_of_it_agree(device: Device, reference: Doubles, layout: str,
+                                                 monkeypatch: pytest.MonkeyPatch) -> None:
+    """As above; few spheres are met before the tree, many in it."""
+    assert "LONE_SPHERES" in session(device, everything(), layout=layout).compiled.features
+    monkeypatch.setattr(compile_module, "FEW_SPHERES", 0)
+    assert "LEAF_SPHERES" in session(device, everything(), layout=layout).compiled.features
+    picture = film(device, everything(), layout=layout).mean
     differs = np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)
     assert np.mean(differs) < 1e-3, np.argwhere(differs)
 
