@@ -6,15 +6,15 @@ The scene file and scenes built in Python pass through here, so both meet the sa
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, asdict, fields
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin, get_type_hints
+from types import NoneType
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-    from pydantic_core import ErrorDetails
+    from pydantic_core import CoreSchema, ErrorDetails, SchemaValidator
 
 #: Fields whose values are no plain data; whoever holds them checks them.
 ELSEWHERE = frozenset({"image", "material"})
@@ -32,11 +32,11 @@ def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[st
     Finds missing and unknown fields, wrong types, values outside the limits of the type, and numbers that float32
     cannot hold (NaN, Inf and beyond). Numbers may be numpy scalars; sequences must be tuples.
     """
-    from pydantic import ValidationError
+    from pydantic_core import ValidationError
 
     plain = {name: _plain(value) for name, value in values.items()}
     try:
-        _model(kind).model_validate(plain)
+        _validator(kind).validate_python(plain)
     except ValidationError as error:
         details = error.errors(include_url=False)
         problems = list(dict(_sentence(kind, where, detail) for detail in details).values())
@@ -75,16 +75,45 @@ def show(value: object) -> str:
 
 
 @lru_cache
-def _model(kind: type) -> type[BaseModel]:
-    """A pydantic model with the fields of the dataclass `kind`: strict, closed, finite."""
-    from pydantic import ConfigDict, create_model
+def _validator(kind: type) -> SchemaValidator:
+    """What checks the fields of the dataclass `kind`: strict, closed, finite.
+
+    It is made without pydantic's models, whose import takes longer than all else that reads a small scene.
+    """
+    from pydantic_core import SchemaValidator, core_schema
 
     hints = get_type_hints(kind, include_extras=True)
-    columns: dict[str, Any] = {
-        field.name: (Any if field.name in ELSEWHERE else hints[field.name], None if _optional(field) else ...)
-        for field in fields(kind)}
-    config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False, protected_namespaces=())
-    return create_model(kind.__name__, __config__=config, **columns)
+    columns = {field.name: core_schema.typed_dict_field(
+        core_schema.any_schema() if field.name in ELSEWHERE else _schema(hints[field.name]),
+        required=not _optional(field)) for field in fields(kind)}
+    config = core_schema.CoreConfig(strict=True, allow_inf_nan=False)
+    return SchemaValidator(core_schema.typed_dict_schema(columns, extra_behavior="forbid", config=config))
+
+
+def _schema(hint: Any) -> CoreSchema:
+    """pydantic's schema of a type: a number, text, words, a tuple, one of these within limits, or one of these or None.
+    """
+    from pydantic_core import core_schema
+
+    origin, parts = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        schema: Any = dict(_schema(parts[0]))
+        for limit in parts[1:]:
+            schema |= asdict(limit)
+        return cast("CoreSchema", schema)
+    if origin is Literal:
+        return core_schema.literal_schema(list(parts))
+    if origin is tuple:
+        several = parts[-1] is ...
+        return core_schema.tuple_schema([_schema(part) for part in parts if part is not ...],
+                                        variadic_item_index=0 if several else None)
+    if NoneType in parts:
+        return core_schema.nullable_schema(_schema(parts[0]))
+    return _PLAIN[hint]
+
+
+_PLAIN: dict[type, CoreSchema] = {float: {"type": "float"}, int: {"type": "int"}, str: {"type": "str"},
+                                  bool: {"type": "bool"}}
 
 
 def _optional(field: Any) -> bool:
