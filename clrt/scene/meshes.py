@@ -1,4 +1,4 @@
-"""Read model files as meshes. OBJ, PLY, STL and OFF go through trimesh's parsers; glTF has its own reader.
+"""Read model files as meshes. OBJ, STL, OFF and uncommon PLY go through trimesh's parsers; other readers are our own.
 
 The parsers are called directly, since a trimesh.Trimesh no longer tells whether the file had normals. They hand on NaN
 and wrong indices and raise whatever Python raises, so all they return is checked here.
@@ -16,6 +16,7 @@ from ..errors import SceneError
 from .model import Mesh
 from .normals import Normals, choose_normals
 from .obj import obj_material, parse_obj
+from .ply import plain_ply
 from .validate import index_problems, mesh_problems
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
@@ -48,6 +49,8 @@ def _parse(path: Path, suffix: str) -> dict[str, Any]:
             parts: dict[str, Any]
             if suffix == ".obj":
                 parts = parse_obj(path)
+            elif suffix == ".ply" and (plain := plain_ply(path)):
+                parts = plain
             elif suffix == ".ply":
                 from trimesh.exchange.ply import load_ply
                 parts = load_ply(file, skip_materials=True)

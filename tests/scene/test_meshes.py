@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from trimesh.exchange.ply import load_ply
 
 from clrt.errors import SceneError
 from clrt.scene.materials import Diffuse
 from clrt.scene.meshes import read_mesh
 from clrt.scene.model import Mesh
+from clrt.scene.ply import plain_ply
 from .shapes import cube, icosphere, volume
 
 VERTICES, FACES = icosphere(1)
@@ -103,6 +105,37 @@ def test_every_format_gives_back_the_ball(name: str, tmp_path: Path) -> None:
     smooth = read_mesh(tmp_path / name, "smooth")[0]
     assert smooth.normals is not None
     assert np.einsum("ij,ij->i", smooth.normals, smooth.vertices).min() > 0.98
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_a_ply_file_says_the_same_to_both_readers(encoding: str, tmp_path: Path) -> None:
+    """Colours, flags and double precision beside what is drawn; quads, damage and textures are left to trimesh."""
+    order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[encoding]
+    vertices = np.zeros(3, [("x", f"{order}f8"), ("y", f"{order}f8"), ("z", f"{order}f8"), ("red", "u1"),
+                            *((name, f"{order}f4") for name in ("nx", "ny", "nz"))])
+    faces = np.zeros(2, [("flags", "u1"), ("count", "u1"), ("vertex_index", f"{order}u2", 3)])
+    vertices["x"], vertices["y"], vertices["nz"] = [0.1, 1, 0], [0, 0, 1], [1, 2, 3]
+    faces["count"], faces["vertex_index"] = 3, [[0, 1, 2], [2, 1, 0]]
+    header = "\n".join([f"ply\nformat {encoding} 1.0\ncomment a pair\nelement vertex 3",
+                        *(f"property double {name}" for name in "xyz"), "property uchar red",
+                        *(f"property float n{name}" for name in "xyz"), "element face 2", "property uchar flags",
+                        "property list uchar ushort vertex_index\nend_header\n"])
+    rows = [" ".join(str(value) for field in row for value in np.ravel(field)) for row in [*vertices, *faces]]
+    body = ("\n".join(rows) + "\n").encode() if encoding == "ascii" else vertices.tobytes() + faces.tobytes()
+    path = tmp_path / "pair.ply"
+    path.write_bytes(header.encode() + body)
+    ours = plain_ply(path)
+    with path.open("rb") as file:
+        theirs = load_ply(file)
+    assert ours is not None
+    for name in ("vertices", "faces", "vertex_normals"):
+        np.testing.assert_array_equal(ours[name], theirs[name])
+    for old, new in [(b"uchar red", b"uchar u"), (b"list uchar ushort", b"list uchar what"), (b"end_header", b"end"),
+                     (b"element face 2", b"element face 0"), (b"element vertex 3", b"element vertex 4")]:
+        path.write_bytes((header.encode() + body).replace(old, new))
+        assert plain_ply(path) is None
+    path.write_bytes(header.encode() + body[:-9])
+    assert plain_ply(path) is None
 
 
 def test_polygons_are_cut_into_fans(tmp_path: Path) -> None:

@@ -1,0 +1,77 @@
+"""Read the common PLY files, those of triangles alone, in a few array operations.
+
+trimesh reads the others; its import alone takes longer than such a file of a hundred thousand triangles.
+The format: G. Turk, "The PLY Polygon File Format", 1994.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+_END = b"\nend_header\n"
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
+          "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+          "float32": "f4", "float64": "f8"}
+#: With texture coordinates trimesh takes vertices apart.
+_TEXTURE = {"u", "v", "s", "t", "texture_u", "texture_v"}
+
+
+def plain_ply(path: Path) -> dict[str, Any] | None:
+    """trimesh's keyword arguments for the file: vertices (n, 3), faces (m, 3), and vertex_normals (n, 3) if it has any.
+
+    None for all but an undamaged file of vertices without texture coordinates and then faces, each with three indices
+    and no other list.
+    """
+    content = path.read_bytes()
+    start = content.find(_END) + len(_END)
+    try:
+        (vertex_count, vertex), (face_count, face) = _elements(content[:start].decode().splitlines())
+        if b"\nformat ascii " in content[:start]:
+            content, start = np.array(content[start:].split(), np.float64).tobytes(), 0
+    except (ValueError, KeyError, IndexError):
+        return None
+    names, middle = set(vertex.names or ()), start + vertex_count * vertex.itemsize
+    if (not {"x", "y", "z"} <= names or names & _TEXTURE or "corners list" not in (face.names or ())
+            or min(vertex_count, face_count) < 1 or len(content) != middle + face_count * face.itemsize):
+        return None
+    vertices = np.frombuffer(content, vertex, vertex_count, start)
+    corners = np.frombuffer(content, face, face_count, middle)["corners list"]
+    if np.any(corners["count"] != 3):
+        return None
+    parts = {"vertices": np.column_stack([vertices[axis] for axis in ("x", "y", "z")]),
+             "faces": corners["indices"].astype(np.int64)}
+    if {"nx", "ny", "nz"} <= names:
+        parts["vertex_normals"] = np.column_stack([vertices[axis] for axis in ("nx", "ny", "nz")])
+    return parts
+
+
+def _elements(header: list[str]) -> list[tuple[int, np.dtype[np.void]]]:
+    """Of vertices and faces how many there are, and the record of one; in text all its values are float64.
+
+    ValueError, KeyError or IndexError for a header that is not a plain one.
+    """
+    magic, encoding, *lines = (line.split() for line in header if not line.startswith(("comment", "obj_info")))
+    order = _ORDERS[encoding[1]]
+    kinds = {name: order + kind if order else "f8" for name, kind in _TYPES.items()}
+    names: list[str] = []
+    counts: list[int] = []
+    records: list[list[Any]] = []
+    for line in lines[:-1]:
+        match line:
+            case ["element", name, count]:
+                names.append(name)
+                counts.append(int(count))
+                records.append([])
+            case ["property", "list", count, index, "vertex_indices" | "vertex_index"]:
+                records[-1].append(("corners list", [("count", kinds[count]), ("indices", kinds[index], 3)]))
+            case ["property", kind, name]:
+                records[-1].append((name, kinds[kind]))
+            case _:
+                raise ValueError(f"not plain: {line}")
+    if magic != ["ply"] or names != ["vertex", "face"]:
+        raise ValueError("not plain")
+    return [(count, np.dtype(record)) for count, record in zip(counts, records)]
