@@ -27,7 +27,11 @@ def choose_normals(wanted: Normals, vertices: FloatArray, faces: IntArray, store
     normals = unit(stored)
     useless = ~normals.any(axis=1)
     if useless.any():
-        normals[useless] = smooth_normals(vertices, faces)[useless]
+        points, count = weld(vertices)
+        lacking = np.zeros(count, np.bool_)
+        lacking[points[useless]] = True
+        around = lacking[points[faces]].any(axis=1)
+        normals[useless] = smooth_normals(vertices, faces[around])[useless]
     return normals.astype(np.float32)
 
 
