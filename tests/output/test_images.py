@@ -61,6 +61,7 @@ def test_png_holds_the_view_exactly(tmp_path: Path, layout: str) -> None:
 
 def test_png_is_srgb_unless_told_otherwise(tmp_path: Path) -> None:
     write_image(tmp_path / "grey.png", np.full((3, 2, 3), 0.18, np.float32))
+    assert b"\0\0\0\1sRGB" in (tmp_path / "grey.png").read_bytes()
     assert png_samples(tmp_path / "grey.png").tolist() == np.full((3, 2, 3), 118).tolist()
     assert read_image(tmp_path / "grey.png") == pytest.approx(0.18, abs=0.5 / 255)
 
