@@ -42,7 +42,8 @@ static inline TreeRays tree_rays(real3 origin, real3 direction) {
 }
 
 static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
-                           Hit hit) {
+                           const Hit *nearest) {
+    Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
     SlabRay slabs = slab_ray(&rays->slabs, ray, lane);
     int waiting[STACK_SIZE];

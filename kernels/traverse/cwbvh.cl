@@ -87,7 +87,8 @@ static inline TreeRays tree_rays(real3 origin, real3 direction) {
 }
 
 static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
-                           Hit hit) {
+                           const Hit *nearest) {
+    Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
     SlabRay slabs = slab_ray(&rays->slabs, ray, lane);
     uint order = (slabs.backward[0] ? 0 : 1) | (slabs.backward[1] ? 0 : 2) | (slabs.backward[2] ? 0 : 4);

@@ -5,7 +5,8 @@ typedef LeafRays TreeRays;
 static inline TreeRays tree_rays(real3 origin, real3 direction) { return leaf_rays(origin, direction); }
 
 static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
-                           Hit hit) {
+                           const Hit *nearest) {
+    Hit hit = *nearest;
     LeafRay leaf = leaf_ray(rays, ray, lane);
 #if TRIANGLES
     for (int i = 0; i < scene->counts.triangles && !(stop_at_first && hit.primitive >= 0); ++i) {

@@ -7,26 +7,26 @@ static inline TreeRays tree_rays(real3 origin, real3 direction) { return leaf_ra
 
 #if TRIANGLES
 // Seldom called, unless hits behind others are asked for.
-__attribute__((noinline)) static Hit meet_packs_exactly(const LeafRay *leaf, global const Triangles *packs, int count,
-                                                        const bool stop_at_first, Hit hit) {
-    for (int i = 0; i < count && !(stop_at_first && hit.primitive >= 0); ++i)
-        hit_triangles(leaf, packs + i, stop_at_first, &hit);
-    return hit;
+__attribute__((noinline)) static void meet_packs_exactly(const LeafRay *leaf, global const Triangles *packs, int count,
+                                                         const bool stop_at_first, Hit *hit) {
+    for (int i = 0; i < count && !(stop_at_first && hit->primitive >= 0); ++i)
+        hit_triangles(leaf, packs + i, stop_at_first, hit);
 }
 #endif
 
 __attribute__((always_inline))
 static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
-                           Hit hit) {
+                           const Hit *nearest) {
+    Hit hit = *nearest;
     LeafRay leaf = leaf_ray(rays, ray, lane);
 #if TRIANGLES
     int packs = (scene->counts.triangles + WIDTH - 1) / WIDTH;
     for (int i = 0; i < packs; ++i) VISIT(tests);
 #if NEXT_HIT
-    hit = meet_packs_exactly(&leaf, scene->packs, packs, stop_at_first, hit);
+    meet_packs_exactly(&leaf, scene->packs, packs, stop_at_first, &hit);
 #else
     if (!meet_packs(&leaf.triangle_ray, scene->packs, packs, stop_at_first, &hit))
-        hit = meet_packs_exactly(&leaf, scene->packs, packs, stop_at_first, hit);
+        meet_packs_exactly(&leaf, scene->packs, packs, stop_at_first, &hit);
 #endif
 #endif
 #if LEAF_SPHERES

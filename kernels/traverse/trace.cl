@@ -71,7 +71,8 @@ static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction
         ray.after_instance = LANE_INT(after->instance, lane);
 #endif
 #endif
-        Hit hit = traverse(scene, &rays, &ray, lane, false, (Hit){t.lane[lane], 0.0f, 0.0f, primitive.lane[lane]});
+        const Hit nearest = {t.lane[lane], 0.0f, 0.0f, primitive.lane[lane]};
+        Hit hit = traverse(scene, &rays, &ray, lane, false, &nearest);
         t.lane[lane] = hit.t;
         u.lane[lane] = hit.u;
         v.lane[lane] = hit.v;
@@ -100,7 +101,8 @@ static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, r
     for (int lane = 0; lane < LANES; ++lane) {
         if (!LANE_INT(enabled, lane)) continue;
         Ray ray = one_ray(&origin, &direction, &t_max, lane);
-        found.lane[lane] = traverse(scene, &rays, &ray, lane, true, (Hit){ray.t_max, 0.0f, 0.0f, -1}).primitive;
+        const Hit none = {ray.t_max, 0.0f, 0.0f, -1};
+        found.lane[lane] = traverse(scene, &rays, &ray, lane, true, &none).primitive;
     }
     blocked = blocked | (found.all >= 0);
 #endif
