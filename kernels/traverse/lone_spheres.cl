@@ -12,12 +12,12 @@ static inline Hits meet_spheres(const Scene *scene, real3 origin, real3 directio
     for (int i = 0; i < scene->counts.spheres; ++i) {
         global const LeafSphere *sphere = scene->leaf_spheres + i;
         const real f[3] = {o[0] - sphere->center[0], o[1] - sphere->center[1], o[2] - sphere->center[2]};
-        ireal meets = enabled & lone_may_meet(f, d, sphere->radius);
+        ireal meets = enabled ? lone_may_meet(f, d, sphere->radius) : NO_LANES;   // idle lanes hold no rays
         if (!ANY(meets)) continue;
         real near, far;
         lone_roots(o, d, sphere->center, sphere->radius, &near, &far);
         real t = near > 0.0f ? near : far;
-        meets = meets & (t > 0.0f) & (t < hits.t);   // of equal ones the first stays
+        meets = meets ? (t > 0.0f) & (t < hits.t) : NO_LANES;   // of equal ones the first stays
         hits.t = meets ? t : hits.t;
         hits.primitive = meets ? (ireal)(sphere->primitive) : hits.primitive;
     }
