@@ -74,12 +74,12 @@ static inline Sheared shear(const wide p[3], const ShearedRay *ray) {
 // The two products of each edge, of which the greater says on which side of it the ray passes.
 typedef struct { wide u1, u2, v1, v2, w1, w2; } Edges;
 
-static inline Edges edges_of(Sheared a, Sheared b, Sheared c) {
-    return (Edges){c.x * b.y, c.y * b.x, a.x * c.y, a.y * c.x, b.x * a.y, b.y * a.x};
+static inline Edges edges_of(const Sheared *a, const Sheared *b, const Sheared *c) {
+    return (Edges){c->x * b->y, c->y * b->x, a->x * c->y, a->y * c->x, b->x * a->y, b->y * a->x};
 }
 
-static inline wide_mask inside_edges(Edges e) {
-    return ((e.u1 >= e.u2) & (e.v1 >= e.v2) & (e.w1 >= e.w2)) | ((e.u1 <= e.u2) & (e.v1 <= e.v2) & (e.w1 <= e.w2));
+static inline wide_mask inside_edges(const Edges *e) {
+    return ((e->u1 >= e->u2) & (e->v1 >= e->v2) & (e->w1 >= e->w2)) | ((e->u1 <= e->u2) & (e->v1 <= e->v2) & (e->w1 <= e->w2));
 }
 
 static inline wide weighted(wide u, wide v, wide w, wide ta, wide tb, wide tc) { return fma(w, tc, fma(v, tb, u * ta)); }
@@ -101,9 +101,9 @@ static inline wide wide_far(wide x, wide y) { return WIDE_ABS(x) > WIDE_ABS(y) ?
 static inline ShearedHit intersect_sheared(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray,
                                            wide t_max) {
     const Sheared a = shear(p0, ray), b = shear(p1, ray), c = shear(p2, ray);
-    const Edges edges = edges_of(a, b, c);
+    const Edges edges = edges_of(&a, &b, &c);
     ShearedHit result;
-    result.hit.hit = inside_edges(edges);
+    result.hit.hit = inside_edges(&edges);
     result.open = (wide_mask)(0);
     if (!WIDE_ANY(result.hit.hit)) return result;
 

@@ -25,8 +25,8 @@ static inline bool meet_packs(const TriangleRay *ray, global const Triangles *pa
         global const Triangles *leaf = packs + i;
         PACK_CORNERS
         const Sheared a = shear(p0, &sheared_ray), b = shear(p1, &sheared_ray), c = shear(p2, &sheared_ray);
-        const Edges edges = edges_of(a, b, c);
-        wide_mask inside = inside_edges(edges);
+        const Edges edges = edges_of(&a, &b, &c);
+        wide_mask inside = inside_edges(&edges);
         wide at_a = edges.u1 - edges.u2, at_b = edges.v1 - edges.v2, at_c = edges.w1 - edges.w2, det = at_a + at_b + at_c;
         wide inverse = 1.0f / det;
         wide volume = weighted(at_a, at_b, at_c, a.z * ray->sz, b.z * ray->sz, c.z * ray->sz);
