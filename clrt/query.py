@@ -22,7 +22,7 @@ class RayQuery(TreeQuery):
     vertices: (n, 3) float32, or float64 if far from the origin; faces: (m, 3) int32; spheres: (s, 4) float32, centre
     and radius, the primitives m … m + s − 1, with u = v = 0. Answers depend on none of the first four choices:
     device: a number, an id, a part of a name, "cpu" or "gpu", see `clrt.devices()`; None takes the best.
-    layout: "bvh8", "bvh2", "cwbvh" or "list" (no tree); None takes bvh8 on CPUs and cwbvh on GPUs.
+    layout: "bvh8", "bvh2", "cwbvh", "packs" or "list" (no tree); None takes bvh8 on CPUs and cwbvh on GPUs.
     builder: "sah" or "midpoint" in numpy, "ploc" or "reinsertion" on the device; None takes sah for small meshes and
     ploc for large ones.
     traversal: "single", "packet" or "pool", of bvh8 alone: see `TreeQuery`.

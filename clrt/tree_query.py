@@ -12,7 +12,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import ArrayLike, NDArray
 
-from .accel.kernels import HitTests, tree_buffers, tree_defines, tree_files
+from .accel.kernels import HitTests, tree_buffers, tree_defines, tree_features, tree_files
 from .accel.layouts import LANES, Layout
 from .accel.wide import EMPTY
 from .device.arrays import resident
@@ -179,8 +179,7 @@ class TreeQuery:
         _check("traversal", traversal, TRAVERSALS)
         triangles, spheres = bool(self._counts["triangles"]), bool(self._counts["spheres"])
         instances = self._hit is INSTANCE_HIT
-        has = {"TRIANGLES": triangles, "SPHERES": spheres, "PRIMITIVES": triangles or spheres, "INSTANCES": instances,
-               "NEXT_HIT": name == "next_hit"}
+        has = tree_features(triangles, spheres) | {"INSTANCES": instances, "NEXT_HIT": name == "next_hit"}
         fetched = max((array.dtype.itemsize for array in self.tree.buffers.values()), default=0)
         values = {"LANES": self.device.lanes, **tree_defines(self.tree)}
         values |= {feature: 1 for feature, present in has.items() if present}
@@ -189,7 +188,7 @@ class TreeQuery:
                             "FETCH_LINES": -(-fetched // CACHE_LINE)}}[traversal]
         preamble = "\n".join([defines(values), f"#define QUERY_NAME query_{name}",
                               typedefs({"Counts": COUNTS, "RayHit": self._hit}), scene_struct(tree_buffers(self.tree))])
-        files = tree_files(self.tree.name, self._tests, triangles, spheres, instances)
+        files = tree_files(self.tree.name, self._tests, triangles, spheres, instances=instances)
         return compose(preamble, "query_pool.cl" if traversal == "pool" else "query.cl",
                        files | {"PACKETS": ["traverse/packet.cl"] if traversal == "packet" else []})
 

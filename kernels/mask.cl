@@ -1,14 +1,20 @@
-// Eight lanes' masks as bits: bit i is set where lane i is true (−1). And what only CPUs have: one instruction for that,
-// one for putting lanes side by side, and prefetching; elsewhere the same is said in portable words.
+// Masks of eight and sixteen lanes as bits: bit i is set where lane i is true (−1). And what only CPUs have: one
+// instruction for that, one for putting lanes side by side, and prefetching; elsewhere the same is said in portable words.
 //
 // __AVX__ and the like are defined where a compiler makes code for such a processor directly.
 
 #if defined(__AVX__) && !PORTABLE_MASK
 static inline uint mask_bits(int8 mask) { return (uint)__builtin_ia32_movmskps256(as_float8(mask)); }
+static inline uint mask_bits16(int16 mask) { return mask_bits(mask.lo) | mask_bits(mask.hi) << 8; }
 #else
 static inline uint mask_bits(int8 mask) {
     ulong bytes = as_ulong(convert_char8(mask));
     return (uint)(((bytes & 0x8040201008040201UL) * 0x0101010101010101UL) >> 56);
+}
+// By bytes: Oclgrind takes the upper half of sixteen lanes for uninitialised.
+static inline uint mask_bits16(int16 mask) {
+    ulong2 bits = ((as_ulong2(convert_char16(mask)) & 0x8040201008040201UL) * 0x0101010101010101UL) >> 56;
+    return (uint)(bits.x | bits.y << 8);
 }
 #endif
 

@@ -24,7 +24,8 @@ ORIGINS = RNG.uniform(-2, 2, (3000, 3)).astype(np.float32)
 DIRECTIONS = (RNG.normal(size=(3000, 3)) * RNG.uniform(0.1, 10, (3000, 1))).astype(np.float32)
 
 
-@pytest.fixture(params=["bvh8-single", "bvh8-packet", "bvh8-pool", "bvh2-single", "cwbvh-single", "list-single"])
+@pytest.fixture(params=["bvh8-single", "bvh8-packet", "bvh8-pool", "bvh2-single", "cwbvh-single", "packs-single",
+                        "list-single"])
 def soup(request: pytest.FixtureRequest, device: Device) -> clrt.RayQuery:
     """In each layout, by each traversal."""
     layout, traversal = request.param.split("-")
@@ -102,7 +103,7 @@ def test_coherent_rays_meet_the_same_by_all_traversals(device: Device) -> None:
         np.testing.assert_array_equal(each.any_hit(*rays), first["primitive"] >= 0)
 
 
-@pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh", "list"])
+@pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh", "packs", "list"])
 def test_copies_a_hair_away_are_told_apart(device: Device, layout: str) -> None:
     """Of nine copies of a triangle the one of lowest index is met, also from where t is little more than rounding."""
     rng = np.random.default_rng(6)

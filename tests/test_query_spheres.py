@@ -14,7 +14,8 @@ from clrt.device.open import Device
 from .accel.cases import soup, spheres
 from .rendering.rays import hit_spheres, hit_triangles
 
-WAYS = [("bvh8", "single"), ("bvh8", "packet"), ("bvh8", "pool"), ("bvh2", None), ("cwbvh", None), ("list", None)]
+WAYS = [("bvh8", "single"), ("bvh8", "packet"), ("bvh8", "pool"), ("bvh2", None), ("cwbvh", None), ("packs", None),
+        ("list", None)]
 NO_MESH = np.zeros((0, 3)), np.zeros((0, 3), int)
 BALLS = np.concatenate([spheres(60, seed=4), [[0.5, 0.5, 0.5, 0.9], [0.2, 0.2, 3.0, 0.05]]]).astype(np.float32)
 CORNERS = soup(200, 0.3)

@@ -11,7 +11,7 @@ from ..device.open import Device
 from ..errors import UsageError
 from . import device_builder
 from .builders import BUILDERS
-from .layouts import LEAF_SPHERE, Layout, pack
+from .layouts import LEAF_SPHERE, PACK, Layout, pack
 from .tree import FloatArray
 from .triangle_forms import in_form
 
@@ -19,6 +19,17 @@ from .triangle_forms import in_form
 DEVICE_BUILDERS = {"ploc": 0, "reinsertion": 2}
 #: From so many primitives on a device's tree is done before numpy's, kernels loaded from the cache included.
 LARGE = 1 << 14
+#: Up to so many spheres are met one after another by all lanes' rays together (kernels/traverse/lone_spheres.cl).
+FEW_SPHERES = 16
+#: Up to so many triangles are met without a tree as fast as with one, and up to half as many 1.5 times as fast.
+FEW = 4 * PACK
+
+
+def fitting_layout(device: Device | None, triangles: int, spheres: int, triangle: str = "watertight") -> str:
+    """The device's layout, or "packs" for vectors if what is to be in the tree, so many, is too little for one."""
+    layout = device.layout if device else "bvh8"
+    few = 0 < triangles <= FEW and not spheres and triangle == "watertight"
+    return "packs" if layout == "bvh8" and few else layout
 
 
 def build_tree(device: Device | None, layout: str, builder: str | None, triangles: FloatArray,
@@ -27,8 +38,10 @@ def build_tree(device: Device | None, layout: str, builder: str | None, triangle
 
     builder: a name in BUILDERS or DEVICE_BUILDERS; None takes the fastest. Without a device, and for fewer than two
     primitives, those on the device are stood in for by `sah`. triangle: the test that the leaves are for. Raises
-    UsageError for unknown names and for layouts that the builder cannot make.
+    UsageError for unknown names and for layouts that the builder, or the test, cannot use.
     """
+    if layout == "packs" and triangle != "watertight":
+        raise UsageError(f"the layout packs is for the watertight triangle test, not {triangle}: take another layout")
     spheres = np.zeros((0, 4), np.float32) if spheres is None else spheres
     return in_form(_over_corners(device, layout, builder, triangles, spheres), triangle, device)
 

@@ -8,11 +8,13 @@ from typing import Any
 from ..errors import UsageError
 from .build import DEVICE_BUILDERS
 from .builders import BUILDERS
-from .layouts import Layout
+from .layouts import PACK, Layout
 
 #: Files of the tree layouts, and how many primitives of a leaf they test at a time.
 TREES = {"bvh8": ("traverse/bvh8.cl", 8), "bvh2": ("traverse/bvh2.cl", 1), "cwbvh": ("traverse/cwbvh.cl", 1),
-         "list": ("traverse/list.cl", 1)}
+         "list": ("traverse/list.cl", 1), "packs": ("traverse/packs.cl", PACK)}
+#: Layouts without a tree, whose cost a ray grows with the number of primitives.
+TREELESS = ("packs", "list")
 #: How their rays come to instances.
 UPPER_LEVELS = {"bvh8": "traverse/instance.cl", "bvh2": "traverse/slab_instance.cl",
                 "cwbvh": "traverse/slab_instance.cl"}
@@ -20,6 +22,8 @@ UPPER_LEVELS = {"bvh8": "traverse/instance.cl", "bvh2": "traverse/slab_instance.
 BUILDER_NAMES = [*DEVICE_BUILDERS, *BUILDERS]
 TRIANGLE_TESTS = {name: f"geometry/triangle_{name}.cl"
                   for name in ("watertight", "moller_trumbore", "precomputed", "baldwin_weber")}
+#: Of the layout packs, which has one only.
+PACKS_TEST = "geometry/triangle_watertight_packs.cl"
 BOX_TESTS = {"robust": "geometry/box_robust.cl", "plain": "geometry/box_plain.cl"}
 SPHERE_TESTS = {"robust": "geometry/sphere.cl", "textbook": "geometry/sphere_textbook.cl"}
 RECORDS = {"nodes": "Node", "packs": "Triangles", "leaf_triangles": "Triangles", "leaf_spheres": "LeafSphere",
@@ -57,11 +61,19 @@ def tree_defines(tree: Layout) -> dict[str, int]:
     return defines | ({"COUNT_VISITS": 1} if "visits" in tree.buffers else {})
 
 
-def tree_files(layout: str, tests: HitTests, triangles: bool, spheres: bool,
+def tree_features(triangles: bool, spheres: bool, lone: bool = False) -> dict[str, bool]:
+    """What the kernels of kernels/traverse ask of the scene; lone: its spheres are not in the tree."""
+    return {"TRIANGLES": triangles, "LEAF_SPHERES": spheres and not lone, "LONE_SPHERES": spheres and lone,
+            "IN_TREE": triangles or (spheres and not lone), "PRIMITIVES": triangles or spheres}
+
+
+def tree_files(layout: str, tests: HitTests, triangles: bool, spheres: bool, lone: bool = False,
                instances: bool = False) -> dict[str, list[str]]:
     """What the includes of kernels/traverse stand for, in a scene that has triangles or spheres or neither."""
-    return {"TREE": [TREES[layout][0]] if triangles or spheres else [],
+    triangle_test = PACKS_TEST if layout == "packs" else TRIANGLE_TESTS[tests.triangle]
+    return {"TREE": [TREES[layout][0]] if triangles or (spheres and not lone) else [],
+            "LONE_SPHERES_FILE": ["traverse/lone_spheres.cl"] if lone else [],
             "BOX_TEST": [BOX_TESTS[tests.box]],
-            "TRIANGLE_TEST": [TRIANGLE_TESTS[tests.triangle]] if triangles else [],
+            "TRIANGLE_TEST": [triangle_test] if triangles else [],
             "UPPER_LEVEL": [UPPER_LEVELS[layout]] if instances else [],
             "SPHERE_TEST": [SPHERE_TESTS[tests.sphere]] if spheres else []}

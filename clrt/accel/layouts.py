@@ -5,6 +5,7 @@ and device agree on every offset. Triangles have the primitives 0 … m − 1, s
 area stay in; they are never hit. A scene without triangles, or without spheres, has no buffer for them.
 
 - list: no tree; leaf_triangles and leaf_spheres in the order of the scene.
+- packs: no tree; packs (of PACK triangles) and leaf_spheres in the order of the scene.
 - bvh2: nodes (BVH2_NODE), leaf_triangles and leaf_spheres in the order of the tree.
 - bvh8: nodes (BVH8_NODE), packs (one a triangle leaf), leaf_spheres in the order of the tree.
 - cwbvh: nodes (cwbvh.CWBVH_NODE), leaf_triangles and leaf_spheres in the order of the tree.
@@ -32,8 +33,10 @@ from .wide import Wide, collapse, leaf_fields, leaf_reference
 
 Records = NDArray[np.void]
 
-#: Children of a wide node, and triangles of a pack.
+#: Children of a wide node, and triangles of its packs.
 LANES = 8
+#: Triangles of a pack where there is no tree.
+PACK = 16
 
 #: `count`: 0 in an interior node, n in a leaf of n triangles, −n in a leaf of n spheres. `left_first`: the leaf's first
 #: record, or the left child: always even, so that two siblings share 64 bytes (node 1, beside the root, is unused).
@@ -48,6 +51,9 @@ TRIANGLE_PAD = 2.0**-21
 #: Unused lanes have NaN vertices and primitive −1.
 TRIANGLE_PACK = np.dtype([("p0", "f4", (3, LANES)), ("p1", "f4", (3, LANES)), ("p2", "f4", (3, LANES)),
                           ("primitive", "i4", LANES)])
+#: extent: no coordinate of the whole list is greater, by amount.
+LONE_PACK = np.dtype([("p0", "f4", (3, PACK)), ("p1", "f4", (3, PACK)), ("p2", "f4", (3, PACK)),
+                      ("primitive", "i4", PACK), ("extent", "f4"), ("pad", "f4", PACK - 1)])
 LEAF_SPHERE = np.dtype([("center", "f4", 3), ("radius", "f4"), ("primitive", "i4"), ("pad", "i4", 3)])
 
 #: Primitives of a leaf whose primitives are intersected one by one; Nadolny 2026, 5.4.4 for the midpoint.
@@ -105,14 +111,24 @@ def pack(layout: str, builder: str, triangles: FloatArray, spheres: FloatArray) 
 
 def _list(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     buffers = _filled(leaf_triangles=_leaf_triangles(triangles, np.arange(len(triangles), dtype=np.int32)),
-                      leaf_spheres=_leaf_spheres(spheres, np.arange(len(spheres), dtype=np.int32), len(triangles)))
+                      leaf_spheres=leaf_spheres(spheres, np.arange(len(spheres), dtype=np.int32), len(triangles)))
     return Layout("list", buffers, stack=0, nodes=0, depth=0, work=float(len(triangles) + len(spheres)))
+
+
+def _packs(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
+    first = np.arange(0, len(triangles), PACK, dtype=np.int32)
+    packs = _filled_packs(LONE_PACK, triangles, np.arange(len(triangles), dtype=np.int32), first,
+                          np.minimum(len(triangles) - first, PACK).astype(np.int32))
+    packs["extent"] = np.abs(triangles).max(initial=0.0)
+    every = np.arange(len(spheres), dtype=np.int32)
+    buffers = _filled(packs=packs, leaf_spheres=leaf_spheres(spheres, every, len(triangles)))
+    return Layout("packs", buffers, stack=0, nodes=0, depth=0, work=float(len(packs) + len(spheres)))
 
 
 def _bvh2(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     tree = _tree(builder, triangles, spheres, LEAF_SIZES[builder], 1)
     buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
-                      leaf_spheres=_leaf_spheres(spheres, tree.sphere_order, len(triangles)))
+                      leaf_spheres=leaf_spheres(spheres, tree.sphere_order, len(triangles)))
     return Layout("bvh2", {"nodes": bvh2_nodes(tree)} | buffers, stack=tree.stack_bound, nodes=len(tree.count),
                   depth=tree.depth, work=tree.sah_cost(), level_sizes=_level_sizes(tree))
 
@@ -121,12 +137,12 @@ def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     wide = collapse(_tree(builder, triangles, spheres, LANES, LANES), LANES, LANES)
     leaf = wide.child < 0
     first, sphere, count = leaf_fields(wide.child[leaf])
-    packs = _packs(triangles, wide.order, first[~sphere], count[~sphere])
+    packs = _filled_packs(TRIANGLE_PACK, triangles, wide.order, first[~sphere], count[~sphere])
     first[~sphere] = np.arange(len(packs))
     child = wide.child.copy()
     child[leaf] = leaf_reference(first, sphere, count)
     nodes = wide_nodes(wide, child)
-    buffers = _filled(packs=packs, leaf_spheres=_leaf_spheres(spheres, wide.sphere_order, len(triangles)))
+    buffers = _filled(packs=packs, leaf_spheres=leaf_spheres(spheres, wide.sphere_order, len(triangles)))
     return Layout("bvh8", {"nodes": nodes} | buffers, stack=wide.stack_bound, nodes=len(nodes),
                   depth=wide.depth, work=wide.sah_cost(LANES), level_sizes=_level_sizes(wide))
 
@@ -135,13 +151,13 @@ def _cwbvh(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     # A leaf at the price of a node, whatever it holds: a third fewer nodes than at one a triangle, and no slower.
     tree = compress(_tree(builder, triangles, spheres, MAX_LEAF, MAX_LEAF))
     buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
-                      leaf_spheres=_leaf_spheres(spheres, tree.sphere_order, len(triangles)))
+                      leaf_spheres=leaf_spheres(spheres, tree.sphere_order, len(triangles)))
     return Layout("cwbvh", {"nodes": tree.nodes} | buffers, stack=tree.stack, nodes=len(tree.nodes),
                   depth=tree.wide.depth, work=tree.wide.sah_cost(MAX_LEAF))
 
 
-LAYOUTS: dict[str, Callable[[str, FloatArray, FloatArray], Layout]] = {"list": _list, "bvh2": _bvh2, "bvh8": _bvh8,
-                                                                       "cwbvh": _cwbvh}
+LAYOUTS: dict[str, Callable[[str, FloatArray, FloatArray], Layout]] = {
+    "list": _list, "packs": _packs, "bvh2": _bvh2, "bvh8": _bvh8, "cwbvh": _cwbvh}
 
 
 def _tree(builder: str, triangles: FloatArray, spheres: FloatArray, leaf_size: int, lanes: int) -> Tree:
@@ -205,19 +221,21 @@ def _leaf_triangles(triangles: FloatArray, order: IntArray) -> Records:
     return records
 
 
-def _leaf_spheres(spheres: FloatArray, order: IntArray, first_primitive: int) -> Records:
+def leaf_spheres(spheres: FloatArray, order: IntArray, first_primitive: int) -> Records:
+    """LEAF_SPHERE records of spheres (s, 4) float32 in this order; their primitives begin at `first_primitive`."""
     records = np.zeros(len(order), LEAF_SPHERE)
     records["center"], records["radius"] = spheres[order, :3], spheres[order, 3]
     records["primitive"] = first_primitive + order
     return records
 
 
-def _packs(triangles: FloatArray, order: IntArray, first: IntArray, count: IntArray) -> Records:
+def _filled_packs(dtype: np.dtype[np.void], triangles: FloatArray, order: IntArray, first: IntArray,
+                  count: IntArray) -> Records:
     """Triangles order[first:first + count] of each leaf as a pack."""
-    lane = np.arange(LANES, dtype=np.int32)
+    lane = np.arange(dtype["primitive"].shape[0], dtype=np.int32)
     live = lane < count[:, None]
     primitive = np.where(live, order[np.where(live, first[:, None] + lane, 0)], -1)
-    packs = np.zeros(len(first), TRIANGLE_PACK)
+    packs = np.zeros(len(first), dtype)
     for corner, name in enumerate(("p0", "p1", "p2")):
         packs[name] = np.where(live[..., None], triangles[primitive, corner], np.nan).transpose(0, 2, 1)
     packs["primitive"] = primitive

@@ -22,8 +22,9 @@ def check_masks(device: Device, findings: Findings) -> None:
     findings.same(lanes.ravel(), np.where(mask, -1, 0).ravel(), "lanes of a comparison", a.ravel(), b.ravel())
     first = np.where(mask.any(axis=1), mask.argmax(axis=1), -1)
     least = np.where(mask.any(axis=1), np.where(mask, b, 9).argmin(axis=1), 7)
+    sixteen = np.concatenate([mask, ~mask], axis=1) @ (1 << np.arange(16))
     for column, (name, truth) in enumerate({"bits": mask @ (1 << np.arange(8)), "number of lanes": mask.sum(axis=1),
-                                            "first lane": first, "least lane": least}.items()):
+                                            "first lane": first, "least lane": least, "sixteen bits": sixteen}.items()):
         findings.same(facts[:, column], truth, f"{name} of a mask", mask.astype(int), b)
     for row, kept in enumerate(mask):
         truth = np.append(a[row][kept].view(np.int32), np.full(8 - kept.sum(), -1))

@@ -16,7 +16,7 @@ from .options import box_option, triangle_option
 @click.option("--rays", type=click.Path(path_type=Path), metavar="FILE.npz",
               help="origins (n, 3), directions (n, 3), t_max (n,); default: four kinds, in a closed room.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
-@click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "list"]),
+@click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "packs", "list"]),
               help="Tree layout; default: all of them or, with --rays, the device's.")
 @triangle_option
 @box_option

@@ -24,7 +24,7 @@ def command(scene: Path, as_json: bool, lanes: int | None, triangle: str, box: s
     from ..scene.file import load
 
     content = load(scene)
-    choices = Choices(lanes or 8, layout or "bvh8", builder, HitTests(triangle, box, sphere), offset)
+    choices = Choices(lanes or 8, layout, builder, HitTests(triangle, box, sphere), offset)
     compiled = compile_scene(content, choices)
     tree = compiled.tree
     materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}

@@ -43,8 +43,8 @@ def tracing_options(command: F) -> F:
                      help="Where rays leave a surface: beyond its rounding, some ulps away, or 0.001."),
         click.option("--builder", type=click.Choice(["ploc", "reinsertion", "sah", "midpoint"]),
                      help="Tree builder; default: sah for small scenes, ploc on the device for large ones."),
-        click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "list"]),
-                     help="Tree layout; list is no tree."),
+        click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "packs", "list"]),
+                     help="Tree layout; packs (for small scenes) and list are no tree."),
     ]:
         command = option(command)
     return command

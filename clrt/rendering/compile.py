@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accel.build import build_tree
-from ..accel.kernels import HitTests, tree_buffers, tree_defines, tree_files
-from ..accel.layouts import Layout
+from ..accel.build import FEW_SPHERES, build_tree, fitting_layout
+from ..accel.kernels import HitTests, tree_buffers, tree_defines, tree_features, tree_files
+from ..accel.layouts import Layout, leaf_spheres
 from ..device.open import Device
 from ..device.preamble import Buffers, defines, scene_struct, type_list, typedefs
 from ..device.program import compose, files_of
@@ -34,10 +34,13 @@ OFFSETS = {"bound": "offset/bound.cl", "ulp": "offset/ulp.cl", "fixed": "offset/
 
 @dataclass(frozen=True)
 class Choices:
-    """What a device or a user chooses about the program. lanes: paths a work-item (1, 8 or 16); offset: see OFFSETS."""
+    """What a device or a user chooses about the program. lanes: paths a work-item (1, 8 or 16); offset: see OFFSETS.
+
+    layout: a name in LAYOUTS, or None for the one that fits the device and the scene.
+    """
 
     lanes: int = 8
-    layout: str = "bvh8"
+    layout: str | None = None
     builder: str | None = None
     tests: HitTests = HitTests()
     offset: str = "bound"
@@ -92,13 +95,19 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
     scene = in_frame(scene, frame)
     triangles, normals = _geometry(scene)
     spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
-    tree = build_tree(device, choices.layout, choices.builder, triangles, spheres, choices.tests.triangle)
+    lone = 0 < len(spheres) <= FEW_SPHERES
+    in_tree = spheres[:0] if lone else spheres
+    layout = choices.layout or fitting_layout(device, len(triangles), len(in_tree), choices.tests.triangle)
+    tree = build_tree(device, layout, choices.builder, triangles, in_tree, choices.tests.triangle)
     sky = pack_sky(scene.environment)
     emitters = pack_emitters(scene, triangles, sky)
     users = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
     codes, material_buffers = _materials(users)
 
     buffers = tree_buffers(tree)
+    if lone:
+        every = np.arange(len(spheres), dtype=np.int32)
+        buffers["leaf_spheres"] = ("LeafSphere", leaf_spheres(spheres, every, len(triangles)))
     if len(triangles):
         per_mesh = np.repeat(np.arange(len(scene.meshes)), [len(mesh.faces) for mesh in scene.meshes])
         buffers["triangles"] = ("Triangle", _triangle_records(triangles, codes[per_mesh], emitters.triangle, normals))
@@ -115,9 +124,9 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
         counts[f"{kind}_lights"] = count
 
     used = [m for m in MATERIALS if m.kernel in material_buffers]
-    features = _features(scene, used, users, emitters, sky, choices)
+    features = _features(scene, used, users, emitters, sky, lone)
     preamble = _preamble(buffers, features, used, emitters, choices, tree, frame.unit)
-    files = {**_files(used, emitters, sky, choices, bool(len(triangles)), bool(len(spheres))),
+    files = {**_files(used, emitters, sky, choices, tree.name, bool(len(triangles)), bool(len(spheres)), lone),
              "SAMPLER": [f"sampler/{scene.render.sampler}.cl"],
              "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"]}
     return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame)
@@ -180,13 +189,12 @@ def _sphere_records(spheres: NDArray[np.float32], materials: NDArray[np.int32],
 
 
 def _features(scene: Scene, used: Iterable[type[Material]], users: Iterable[Material], emitters: Emitters, sky: Sky,
-              choices: Choices) -> set[str]:
+              lone: bool) -> set[str]:
     """The names that are defined while compiling: what the scene has, and the parts of materials that it uses."""
     features = {f"MATERIAL_{kind.kernel.upper()}" for kind in used} | {f"LIGHT_{t.upper()}" for t in emitters.types}
     features |= set().union(*(material.features() for material in users))
-    has = {"TRIANGLES": bool(scene.meshes), "SPHERES": bool(scene.spheres), "SKY": sky.kernel is not None,
-           "PRIMITIVES": bool(scene.meshes or scene.spheres), "LIGHTS": emitters.count > 0,
-           "LIGHT_TREE": emitters.choice.tree,
+    has = {**tree_features(bool(scene.meshes), bool(scene.spheres), lone), "SPHERES": bool(scene.spheres),
+           "SKY": sky.kernel is not None, "LIGHTS": emitters.count > 0, "LIGHT_TREE": emitters.choice.tree,
            "EMITTERS": any(t in SURFACES for t in emitters.types),
            "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes)}
     return features | {name for name, present in has.items() if present}
@@ -208,10 +216,10 @@ def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], 
         type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces])])
 
 
-def _files(used: list[type[Material]], emitters: Emitters, sky: Sky, choices: Choices, triangles: bool,
-           spheres: bool) -> dict[str, list[str]]:
+def _files(used: list[type[Material]], emitters: Emitters, sky: Sky, choices: Choices, layout: str,
+           triangles: bool, spheres: bool, lone: bool) -> dict[str, list[str]]:
     lights = [f"light/{t}.cl" for t in emitters.types if t != "sky"]
-    return {**tree_files(choices.layout, choices.tests, triangles, spheres), "OFFSET": [OFFSETS[choices.offset]],
+    return {**tree_files(layout, choices.tests, triangles, spheres, lone), "OFFSET": [OFFSETS[choices.offset]],
             "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in used],
             "LIGHT_CHOICE": emitters.choice.files, "LIGHT_TREE_FILE": ["light/tree.cl"] if emitters.choice.tree else [],
             "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else [])}

@@ -65,7 +65,7 @@ class Renderer:
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
         self.device = open_device(device)
-        choices = Choices(lanes or self.device.lanes, layout or self.device.layout, builder,
+        choices = Choices(lanes or self.device.lanes, layout, builder,
                           HitTests(triangle, box, sphere), offset)
         _check(choices)
         on_phase("build")
@@ -151,8 +151,8 @@ class Renderer:
 
 
 def _check(choices: Choices) -> None:
-    known: dict[str, Sequence[object]] = {"layout": list(TREES), "builder": [None, *BUILDER_NAMES], "lanes": (1, 8, 16),
-                                          "offset": list(OFFSETS)}
+    known: dict[str, Sequence[object]] = {"layout": [None, *TREES], "builder": [None, *BUILDER_NAMES],
+                                          "lanes": (1, 8, 16), "offset": list(OFFSETS)}
     for name, values in known.items():
         if (value := getattr(choices, name)) not in values:
             named = ", ".join(str(known_value) for known_value in values if known_value is not None)

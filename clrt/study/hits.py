@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accel.kernels import BUILDER_NAMES, TREES
+from ..accel.kernels import BUILDER_NAMES, TREELESS, TREES
 from ..device.discover import choose, find_devices
 from ..errors import ClrtError, UsageError
 from ..query import RayQuery
@@ -78,7 +78,7 @@ def measure_case(case: Case, devices: list[int], effort: Effort) -> dict[str, An
     names = np.repeat(np.arange(len(kinds)), effort.rays)
     first, ways = None, []
     for way in _ways(devices):
-        step = -(-len(names) * triangles // effort.list_tests) if way.layout == "list" else 1
+        step = -(-len(names) * triangles // effort.list_tests) if way.layout in TREELESS else 1
         try:
             hits, blocked = _answers(case.mesh, way, every(step, rays))
         except UsageError:
@@ -103,7 +103,7 @@ def _ways(devices: list[int]) -> Iterator[Way]:
     """The first one is what all others are compared with."""
     for device in devices:
         for layout in TREES:
-            for builder in ("sah",) if layout == "list" else BUILDER_NAMES:
+            for builder in ("sah",) if layout in TREELESS else BUILDER_NAMES:
                 for traversal in TRAVERSALS if layout == "bvh8" else ("single",):
                     yield Way(device, layout, builder, traversal)
 

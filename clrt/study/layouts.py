@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..accel.kernels import TREELESS
 from ..query import RayQuery
 from ..tree_query import TRAVERSALS
 from .race import Contestant, race
@@ -18,9 +19,10 @@ from .workloads import Faces, Workload, closed_room, workloads
 #: Layout and traversal.
 CONTESTANTS: dict[str, tuple[str, str | None]] = {
     **{f"bvh8, {traversal}": ("bvh8", traversal) for traversal in TRAVERSALS},
-    "bvh2": ("bvh2", None), "cwbvh": ("cwbvh", None), "list": ("list", None)}
+    "bvh2": ("bvh2", None), "cwbvh": ("cwbvh", None),
+    **{layout: (layout, None) for layout in TREELESS}}
 SIZE, QUICK_SIZE = (800, 800), (128, 128)
-#: Rays times triangles for a list, which gets as many of all rays, evenly.
+#: Rays times triangles without a tree, which gets as many of all rays, evenly.
 LIST_TESTS = 1 << 24
 COUNTED = 16
 ROUNDS, QUICK_ROUNDS = 7, 3
@@ -30,7 +32,7 @@ def measure_layouts(vertices: Floats, faces: Faces, *, layout: str | None = None
                     quick: bool = False, **options: Any) -> dict[str, Any]:
     """The figures of `clrt bench rays` without rays from a file: the mesh in a closed room, see `workloads`.
 
-    vertices: (n, 3); faces: (m, 3); layout: this one alone; builder: for layouts other than lists; options: see
+    vertices: (n, 3); faces: (m, 3); layout: this one alone; builder: for layouts that are trees; options: see
     RayQuery. trees: of each contestant; kinds: for each kind of rays what `race` returns of each contestant, and
     mrays_call: whole calls from Python; hits: the part of its rays that hit; differ: for how many of its rays the
     answer is not bit by bit the first contestant's; nodes, tests: see `visits_a_ray`, of every COUNTED-th ray.
@@ -40,8 +42,8 @@ def measure_layouts(vertices: Floats, faces: Faces, *, layout: str | None = None
     trees, queries = {}, {}
     for name, (each, traversal) in chosen.items():
         start = time.perf_counter()
-        queries[name] = RayQuery(*scene, layout=each, builder=None if each == "list" else builder, traversal=traversal,
-                                 **options)
+        queries[name] = RayQuery(*scene, layout=each, builder=None if each in TREELESS else builder,
+                                 traversal=traversal, **options)
         trees[name] = _tree(queries[name], time.perf_counter() - start, len(scene[1]))
     first = next(iter(queries.values()))
     kinds = workloads(*scene, vertices, first.closest_hit, QUICK_SIZE if quick else SIZE)
@@ -61,7 +63,7 @@ def _tree(query: RayQuery, seconds: float, triangles: int) -> dict[str, Any]:
 
 def _measure(queries: dict[str, RayQuery], kind: Workload, triangles: int, rounds: int) -> dict[str, dict[str, Any]]:
     few = -(-len(kind.rays[2]) * triangles // LIST_TESTS)
-    steps = {name: few if query.tree.name == "list" else 1 for name, query in queries.items()}
+    steps = {name: few if query.tree.name in TREELESS else 1 for name, query in queries.items()}
     runs = {name: Run(query, query.any_hit if kind.any_hit else query.closest_hit, every(steps[name], kind.rays))
             for name, query in queries.items()}
     result = race({name: Contestant(run, len(run.answers)) for name, run in runs.items()}, rounds)

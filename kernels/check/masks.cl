@@ -1,6 +1,6 @@
 // The masks of eight lanes by which trees are walked (mask.cl). Each i has three rows of eight: the lanes' masks of
-// a < b; the lanes of a that are set, put side by side, then −1; the mask's bits, how many and the first of them, and the
-// lane of those with the least b.
+// a < b; the lanes of a that are set, put side by side, then −1; the mask's bits, how many and the first of them, the lane
+// of those with the least b, and the bits of sixteen lanes, whose upper eight are the others.
 #include "check/rows.cl"
 
 // in: a, b, eight of each; b >= 0
@@ -14,6 +14,7 @@ kernel void masks(uint count, uint block, global const float8 *in, global int8 *
         for (uint k = ones; k < 8; ++k) stored[k] = -1;
         out[i] = mask;
         out[count + i] = vload8(0, stored);
-        out[2 * count + i] = (int8)((int)bits, (int)ones, bits ? first_bit(bits) : -1, least_lane(b, mask), 0, 0, 0, 0);
+        out[2 * count + i] = (int8)((int)bits, (int)ones, bits ? first_bit(bits) : -1, least_lane(b, mask),
+                                    (int)mask_bits16((int16)(mask, ~mask)), 0, 0, 0);
     }
 }

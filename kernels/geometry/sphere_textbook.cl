@@ -1,20 +1,19 @@
-// Ray against a sphere by the quadratic formula of textbooks (Nadolny 1.8): a·t² + b·t + c = 0, nearest root beyond t_min.
-// It loses digits where b² and 4ac, or −b and the root, nearly cancel: small or far spheres, and huge ones near by.
-#include "geometry/wide.cl"
+// Ray against a sphere by the quadratic formula of textbooks (Nadolny 1.8): a·t² + b·t + c = 0, both roots. It loses
+// digits where b² and 4ac, or −b and the root, nearly cancel: small or far spheres, and huge ones near by.
+#include "vector.cl"
 
-static inline bool intersect_sphere(const Ray *ray, global const LeafSphere *sphere, float t_min, float t_max,
-                                    float *t) {
-    const float *d = ray->direction;
-    float fx = ray->origin[0] - sphere->center[0];
-    float fy = ray->origin[1] - sphere->center[1];
-    float fz = ray->origin[2] - sphere->center[2];
-    float a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-    float b = 2.0f * (fx * d[0] + fy * d[1] + fz * d[2]);
-    float c = fx * fx + fy * fy + fz * fz - sphere->radius * sphere->radius;
-    float discriminant = b * b - 4.0f * a * c;
-    if (!(discriminant >= 0.0f)) return false;
-    float root = sqrt(discriminant);
-    float near = (-b - root) / (2.0f * a), far = (-b + root) / (2.0f * a);
-    *t = near > t_min ? near : far;
-    return *t > t_min && *t <= t_max;
-}
+#define SPHERE_OF(type, mask, Twice, name) \
+    static inline mask name##_may_meet(const type f[3], const type d[3], float radius) { \
+        type a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2], b = f[0] * d[0] + f[1] * d[1] + f[2] * d[2]; \
+        return b * b >= a * (f[0] * f[0] + f[1] * f[1] + f[2] * f[2] - radius * radius); \
+    } \
+    static inline void name##_roots(const type origin[3], const type d[3], global const float *center, float radius, \
+                                    type *near, type *far) { \
+        type fx = origin[0] - center[0], fy = origin[1] - center[1], fz = origin[2] - center[2]; \
+        type a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]; \
+        type b = 2.0f * (fx * d[0] + fy * d[1] + fz * d[2]); \
+        type c = fx * fx + fy * fy + fz * fz - radius * radius; \
+        type root = sqrt(b * b - 4.0f * a * c);   /* a NaN where the ray misses */ \
+        *near = (-b - root) / (2.0f * a); \
+        *far = (-b + root) / (2.0f * a); \
+    }

@@ -63,6 +63,27 @@ static inline wide volume(const wide p0[3], const wide p1[3], const wide p2[3], 
     return WIDE_ABS(sum) > error ? sum : 0.0f;
 }
 
+// A corner as the ray sees it: beside it in x and y, along it in z.
+typedef struct { wide x, y, z; } Sheared;
+
+static inline Sheared shear(const wide p[3], const ShearedRay *ray) {
+    wide z = p[2] - ray->oz;
+    return (Sheared){fma(-ray->sx, z, p[0] - ray->ox), fma(-ray->sy, z, p[1] - ray->oy), z};
+}
+
+// The two products of each edge, of which the greater says on which side of it the ray passes.
+typedef struct { wide u1, u2, v1, v2, w1, w2; } Edges;
+
+static inline Edges edges_of(const Sheared *a, const Sheared *b, const Sheared *c) {
+    return (Edges){c->x * b->y, c->y * b->x, a->x * c->y, a->y * c->x, b->x * a->y, b->y * a->x};
+}
+
+static inline wide_mask inside_edges(const Edges *e) {
+    return ((e->u1 >= e->u2) & (e->v1 >= e->v2) & (e->w1 >= e->w2)) | ((e->u1 <= e->u2) & (e->v1 <= e->v2) & (e->w1 <= e->w2));
+}
+
+static inline wide weighted(wide u, wide v, wide w, wide ta, wide tb, wide tc) { return fma(w, tc, fma(v, tb, u * ta)); }
+
 // What the shear says. open: where t may be no more than rounding, and settle decides; det: its triangle's area, twice.
 typedef struct { WideHit hit; wide_mask open; wide inverse_det; } ShearedHit;
 
@@ -79,43 +100,33 @@ static inline wide wide_far(wide x, wide y) { return WIDE_ABS(x) > WIDE_ABS(y) ?
 // Corners with permuted components, one triangle in each lane against one ray, or one for all lanes against a ray in each.
 static inline ShearedHit intersect_sheared(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray,
                                            wide t_max) {
-    wide az = p0[2] - ray->oz, bz = p1[2] - ray->oz, cz = p2[2] - ray->oz;
-    wide ax = fma(-ray->sx, az, p0[0] - ray->ox), ay = fma(-ray->sy, az, p0[1] - ray->oy);
-    wide bx = fma(-ray->sx, bz, p1[0] - ray->ox), by = fma(-ray->sy, bz, p1[1] - ray->oy);
-    wide cx = fma(-ray->sx, cz, p2[0] - ray->ox), cy = fma(-ray->sy, cz, p2[1] - ray->oy);
-
-    wide u1 = cx * by, u2 = cy * bx;
-    wide v1 = ax * cy, v2 = ay * cx;
-    wide w1 = bx * ay, w2 = by * ax;
-    wide_mask front = (u1 >= u2) & (v1 >= v2) & (w1 >= w2);
-    wide_mask back = (u1 <= u2) & (v1 <= v2) & (w1 <= w2);
+    const Sheared a = shear(p0, ray), b = shear(p1, ray), c = shear(p2, ray);
+    const Edges edges = edges_of(&a, &b, &c);
     ShearedHit result;
-    result.hit.hit = front | back;
+    result.hit.hit = inside_edges(&edges);
     result.open = (wide_mask)(0);
     if (!WIDE_ANY(result.hit.hit)) return result;
 
-    wide u = u1 - u2, v = v1 - v2, w = w1 - w2;
+    wide u = edges.u1 - edges.u2, v = edges.v1 - edges.v2, w = edges.w1 - edges.w2;
     if (WIDE_ANY(result.hit.hit & (u * v * w == 0.0f))) {
-        u = u == 0.0f ? fma(cx, by, -u1) - fma(cy, bx, -u2) : u;
-        v = v == 0.0f ? fma(ax, cy, -v1) - fma(ay, cx, -v2) : v;
-        w = w == 0.0f ? fma(bx, ay, -w1) - fma(by, ax, -w2) : w;
-        front = (u >= 0.0f) & (v >= 0.0f) & (w >= 0.0f);
-        back = (u <= 0.0f) & (v <= 0.0f) & (w <= 0.0f);
-        result.hit.hit = front | back;
+        u = u == 0.0f ? fma(c.x, b.y, -edges.u1) - fma(c.y, b.x, -edges.u2) : u;
+        v = v == 0.0f ? fma(a.x, c.y, -edges.v1) - fma(a.y, c.x, -edges.v2) : v;
+        w = w == 0.0f ? fma(b.x, a.y, -edges.w1) - fma(b.y, a.x, -edges.w2) : w;
+        result.hit.hit = ((u >= 0.0f) & (v >= 0.0f) & (w >= 0.0f)) | ((u <= 0.0f) & (v <= 0.0f) & (w <= 0.0f));
     }
     result.inverse_det = 1.0f / (u + v + w);   // of a triangle without an area infinite, so that t is a NaN
-    wide ta = az * ray->sz, tb = bz * ray->sz, tc = cz * ray->sz;
-    result.hit.t = (u * ta + v * tb + w * tc) * result.inverse_det;
+    wide ta = a.z * ray->sz, tb = b.z * ray->sz, tc = c.z * ray->sz;
+    result.hit.t = weighted(u, v, w, ta, tb, tc) * result.inverse_det;
     result.hit.u = v * result.inverse_det;
     result.hit.v = w * result.inverse_det;
     wide_mask inside = result.hit.hit;
-    wide_mask thin = WIDE_ABS(u + v + w) < THIN * wide_max3(WIDE_ABS(u1), WIDE_ABS(v1), WIDE_ABS(w1));
+    wide_mask thin = WIDE_ABS(u + v + w) < THIN * wide_max3(WIDE_ABS(edges.u1), WIDE_ABS(edges.v1), WIDE_ABS(edges.w1));
     wide_mask ahead = inside & (result.hit.t > 0.0f), possible = ahead | (inside & thin);
     result.hit.hit = ahead & (result.hit.t <= t_max);
     wide_mask beside = possible & (wide_min3(ta, tb, tc) <= 0.0f) & (wide_max3(ta, tb, tc) >= 0.0f);
     if (!WIDE_ANY(beside)) return result;
-    wide reach = wide_max3(wide_far(ax, ay), wide_far(bx, by), wide_far(cx, cy));
-    wide depth = wide_max3(WIDE_ABS(az), WIDE_ABS(bz), WIDE_ABS(cz));
+    wide reach = wide_max3(wide_far(a.x, a.y), wide_far(b.x, b.y), wide_far(c.x, c.y));
+    wide depth = wide_max3(WIDE_ABS(a.z), WIDE_ABS(b.z), WIDE_ABS(c.z));
     wide error = T_ERROR * reach * (reach + wide_far(ray->sx, ray->sy) * depth) * WIDE_ABS(result.inverse_det);
     result.open = beside & (WIDE_ABS(result.hit.t) <= error * depth * WIDE_ABS(ray->sz))
                 & ((result.hit.t > 0.0f) | (error > THIN));

@@ -1,4 +1,4 @@
-// The primitives of a leaf are tested WIDTH at a time: 1 where a leaf is a list, 8 where it is a pack.
+// Primitives are tested WIDTH at a time: 1 where they are stored one by one, 8 where a leaf is a pack, 16 without a tree.
 // `wide` holds one float of each; LOAD_WIDE reads a row of a record, whatever the width.
 #include "mask.cl"
 
@@ -8,12 +8,24 @@ typedef int wide_mask;
 #define LOAD_WIDE(row) (row)
 #define WIDE_ANY(mask) (mask)
 #define WIDE_ABS(x) fabs(x)
-#else
+#elif WIDTH == 8
 typedef float8 wide;
 typedef int8 wide_mask;
 #define LOAD_WIDE(row) vload8(0, row)
-#define WIDE_ANY(mask) (mask_bits(mask) != 0)
-#define WIDE_ABS(x) as_float8(as_int8(x) & 0x7fffffff)
+#define WIDE_BITS(x) as_int8(x)
+#define WIDE_FLOATS(x) as_float8(x)
+static inline uint wide_bits(wide_mask mask) { return mask_bits(mask); }
+#else
+typedef float16 wide;
+typedef int16 wide_mask;
+#define LOAD_WIDE(row) vload16(0, row)
+#define WIDE_BITS(x) as_int16(x)
+#define WIDE_FLOATS(x) as_float16(x)
+static inline uint wide_bits(wide_mask mask) { return mask_bits16(mask); }
+#endif
+#if WIDTH > 1
+#define WIDE_ANY(mask) (wide_bits(mask) != 0)
+#define WIDE_ABS(x) WIDE_FLOATS(WIDE_BITS(x) & 0x7fffffff)
 #endif
 
 typedef struct {

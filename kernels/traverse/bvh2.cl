@@ -21,7 +21,7 @@ static inline float enter_box(const SlabRay *ray, global const Node *node, float
 }
 
 static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int first, int count, const bool stop_at_first, Hit *hit) {
-#if SPHERES
+#if LEAF_SPHERES
     if (count < 0) {
         hit_spheres(ray, scene->leaf_spheres + first, -count, hit);
         return;
@@ -41,10 +41,11 @@ static inline TreeRays tree_rays(real3 origin, real3 direction) {
     return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
 }
 
-static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first) {
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
+                           const Hit *nearest) {
+    Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
     SlabRay slabs = slab_ray(&rays->slabs, ray, lane);
-    Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
     int waiting[STACK_SIZE];
     float distance[STACK_SIZE];
     int top = 0, node = 0;

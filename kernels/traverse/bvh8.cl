@@ -10,7 +10,7 @@
 
 static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int reference, const bool stop_at_first, Hit *hit) {
     int leaf = ~reference;
-#if SPHERES
+#if LEAF_SPHERES
 #if TRIANGLES
     if (leaf & 8)
 #endif
@@ -48,14 +48,16 @@ static inline TreeRays tree_rays(real3 origin, real3 direction) {
     return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
 }
 
-__attribute__((always_inline)) static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first) {
+__attribute__((always_inline))
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
+                           const Hit *nearest) {
+    Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
     SlabRay slabs = slab_ray(&rays->slabs, ray, lane);
 #if INSTANCES
     const LeafRay world_leaf = leaf;
     const SlabRay world_slabs = slabs;
 #endif
-    Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
     int waiting[STACK_SIZE];
     float distance[STACK_SIZE];
     int top = 0, reference = 0;

@@ -64,7 +64,7 @@ static inline void enter_node(const SlabRay *ray, global const Node *node, uint 
 }
 
 static inline void hit_primitive(const Scene *scene, const LeafRay *ray, int i, const bool stop_at_first, Hit *hit) {
-#if SPHERES
+#if LEAF_SPHERES
     int sphere = i - scene->counts.triangles;
 #if TRIANGLES
     if (sphere >= 0)
@@ -86,10 +86,11 @@ static inline TreeRays tree_rays(real3 origin, real3 direction) {
     return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
 }
 
-static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first) {
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
+                           const Hit *nearest) {
+    Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
     SlabRay slabs = slab_ray(&rays->slabs, ray, lane);
-    Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
     uint order = (slabs.backward[0] ? 0 : 1) | (slabs.backward[1] ? 0 : 2) | (slabs.backward[2] ? 0 : 4);
     Group waiting[STACK_SIZE];
     Group nodes = {0, 0x80000000}, primitives;   // the root

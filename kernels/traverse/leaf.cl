@@ -8,7 +8,7 @@
 #include SPHERE_TEST
 
 // Triangles alone need the ray only in the form of their test.
-#define WHOLE_RAY (SPHERES || NEXT_HIT || INSTANCES)
+#define WHOLE_RAY (LEAF_SPHERES || NEXT_HIT || INSTANCES)
 
 typedef struct {
 #if WHOLE_RAY
@@ -75,7 +75,7 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
         return;
     }
     const float *t = (const float *)&found.t, *u = (const float *)&found.u, *v = (const float *)&found.v;
-    for (uint inside = mask_bits(found.hit); inside; inside &= inside - 1) {
+    for (uint inside = wide_bits(found.hit); inside; inside &= inside - 1) {
         int i = first_bit(inside);
         keep_closest(ray, hit, t[i], u[i], v[i], leaf->primitive[i]);
     }
@@ -83,7 +83,20 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
 }
 #endif
 
-#if SPHERES
+#if LEAF_SPHERES
+SPHERE_OF(float, int, Twice, sphere)
+
+// The nearest root beyond t_min and not beyond t_max, if there is one.
+static inline bool intersect_sphere(const Ray *ray, global const LeafSphere *sphere, float t_min, float t_max, float *t) {
+    const float f[3] = {ray->origin[0] - sphere->center[0], ray->origin[1] - sphere->center[1],
+                        ray->origin[2] - sphere->center[2]};
+    if (!sphere_may_meet(f, ray->direction, sphere->radius)) return false;
+    float near, far;
+    sphere_roots(ray->origin, ray->direction, sphere->center, sphere->radius, &near, &far);
+    *t = near > t_min ? near : far;
+    return *t > t_min && *t <= t_max;
+}
+
 static inline void hit_spheres(const LeafRay *ray, global const LeafSphere *spheres, int count, Hit *hit) {
     for (int i = 0; i < count; ++i) {
         float t = 0.0f;

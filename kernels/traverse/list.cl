@@ -4,16 +4,17 @@
 typedef LeafRays TreeRays;
 static inline TreeRays tree_rays(real3 origin, real3 direction) { return leaf_rays(origin, direction); }
 
-static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first) {
+static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
+                           const Hit *nearest) {
+    Hit hit = *nearest;
     LeafRay leaf = leaf_ray(rays, ray, lane);
-    Hit hit = {ray->t_max, 0.0f, 0.0f, -1};
 #if TRIANGLES
     for (int i = 0; i < scene->counts.triangles && !(stop_at_first && hit.primitive >= 0); ++i) {
         VISIT(tests);
         hit_triangles(&leaf, scene->leaf_triangles + i, stop_at_first, &hit);
     }
 #endif
-#if SPHERES
+#if LEAF_SPHERES
     if (!(stop_at_first && hit.primitive >= 0)) hit_spheres(&leaf, scene->leaf_spheres, scene->counts.spheres, &hit);
 #endif
     return hit;

@@ -24,7 +24,7 @@ static inline void fetch(const Scene *scene, int reference) {
 #if TRIANGLES
     node = reference < 0 ? (global const void *)(scene->packs + (~reference >> 4)) : node;
 #endif
-#if SPHERES
+#if LEAF_SPHERES
     node = reference < 0 && (~reference & 8) ? (global const void *)(scene->leaf_spheres + (~reference >> 4)) : node;
 #endif
     PREFETCH(node, FETCH_LINES * 64)

@@ -2,11 +2,13 @@
 //
 // A scene without primitives has no tree: every ray escapes, and none of this is compiled.
 #include "vector.cl"
-#include TREE
 
 typedef struct { real t, u, v; ireal primitive, instance; } Hits;   // primitive < 0: nothing was hit
 
-#if PRIMITIVES
+#include TREE
+#include LONE_SPHERES_FILE
+
+#if IN_TREE
 static inline Ray one_ray(const real3 *origin, const real3 *direction, const real *t_max, int lane) {
     Ray ray;
     ray.origin[0] = LANE(origin->x, lane);
@@ -43,17 +45,24 @@ static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction
                                , const Hits *after
 #endif
 ) {
-    RealLanes t, u, v;
-    IntLanes primitive, instance, enabled;
-    t.all = (real)(INFINITY);
-    u.all = v.all = ZERO;
-    primitive.all = (ireal)(-1);
-    instance.all = (ireal)(0);
+    Hits hits = {(real)(INFINITY), ZERO, ZERO, (ireal)(-1), (ireal)(0)};
 #if PRIMITIVES
-    enabled.all = active & is_ray(origin, direction);
+    ireal enabled = active & is_ray(origin, direction);
+#if LONE_SPHERES
+    hits = meet_spheres(scene, origin, direction, t_max, enabled);
+#else
+    hits.t = t_max;
+#endif
+#if IN_TREE
+    RealLanes t, u, v;
+    IntLanes primitive, instance;
+    t.all = hits.t;
+    u.all = v.all = ZERO;
+    primitive.all = hits.primitive;
+    instance.all = (ireal)(0);
     TreeRays rays = tree_rays(origin, direction);
     for (int lane = 0; lane < LANES; ++lane) {
-        if (!enabled.lane[lane]) continue;
+        if (!LANE_INT(enabled, lane)) continue;
         Ray ray = one_ray(&origin, &direction, &t_max, lane);
 #if NEXT_HIT
         ray.after_t = LANE(after->t, lane);
@@ -62,31 +71,41 @@ static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction
         ray.after_instance = LANE_INT(after->instance, lane);
 #endif
 #endif
-        Hit hit = traverse(scene, &rays, &ray, lane, false);
+        const Hit nearest = {t.lane[lane], 0.0f, 0.0f, primitive.lane[lane]};
+        Hit hit = traverse(scene, &rays, &ray, lane, false, &nearest);
         t.lane[lane] = hit.t;
         u.lane[lane] = hit.u;
         v.lane[lane] = hit.v;
         primitive.lane[lane] = hit.primitive;
         instance.lane[lane] = INSTANCE_OF(&hit);
     }
+    hits = (Hits){t.all, u.all, v.all, primitive.all, instance.all};
 #endif
-    return (Hits){t.all, u.all, v.all, primitive.all, instance.all};
+#endif
+    return hits;
 }
 
 // Which active lanes meet anything with 0 < t < t_max.
 static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active) {
     ireal blocked = NO_LANES;
 #if PRIMITIVES
+    ireal enabled = active & is_ray(origin, direction);
+#if LONE_SPHERES
+    blocked = meet_spheres(scene, origin, direction, t_max, enabled).primitive >= 0;
+    enabled = enabled & !blocked;
+#endif
+#if IN_TREE
     TreeRays rays = tree_rays(origin, direction);
-    IntLanes enabled, found;
-    enabled.all = active & is_ray(origin, direction);
+    IntLanes found;
     found.all = (ireal)(-1);
     for (int lane = 0; lane < LANES; ++lane) {
-        if (!enabled.lane[lane]) continue;
+        if (!LANE_INT(enabled, lane)) continue;
         Ray ray = one_ray(&origin, &direction, &t_max, lane);
-        found.lane[lane] = traverse(scene, &rays, &ray, lane, true).primitive;
+        const Hit none = {ray.t_max, 0.0f, 0.0f, -1};
+        found.lane[lane] = traverse(scene, &rays, &ray, lane, true, &none).primitive;
     }
-    blocked = found.all >= 0;
+    blocked = blocked | (found.all >= 0);
+#endif
 #endif
     return blocked;
 }

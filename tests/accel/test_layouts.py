@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from clrt.accel.builders import BUILDERS
 from clrt.accel.cwbvh import CWBVH_NODE
-from clrt.accel.layouts import (BVH2_NODE, BVH8_NODE, LAYOUTS, LEAF_SPHERE, LEAF_TRIANGLE, TRIANGLE_PACK, Layout, pack,
-                                sphere_boxes)
+from clrt.accel.kernels import TREELESS
+from clrt.accel.layouts import (BVH2_NODE, BVH8_NODE, LAYOUTS, LEAF_SPHERE, LEAF_TRIANGLE, LONE_PACK, TRIANGLE_PACK,
+                                Layout, pack, sphere_boxes)
 from clrt.accel.tree import FloatArray
 from clrt.accel.wide import EMPTY
 from clrt.errors import UsageError
@@ -105,6 +106,10 @@ def sphere_records(records: NDArray[np.void], ray: Ray) -> Hit:
                        records["primitive"], ray)
 
 
+def packed_records(records: NDArray[np.void], ray: Ray) -> Hit:
+    return min(pack_record(record, ray) for record in records)
+
+
 def visit_bvh2(layout: Layout, reference: int, ray: Ray) -> Visit:
     nodes = layout.buffers["nodes"]
     first, count = int(nodes[reference]["left_first"]), int(nodes[reference]["count"])
@@ -163,8 +168,8 @@ def enters(box: Box, ray: Ray) -> bool:
 
 def trace(layout: Layout, ray: Ray) -> Hit:
     """Closest hit through the records, with a stack that may hold no more than the layout says; groups: test_cwbvh."""
-    if layout.name == "list":
-        readers = {"leaf_triangles": triangle_records, "leaf_spheres": sphere_records}
+    if layout.name in TREELESS:
+        readers = {"leaf_triangles": triangle_records, "packs": packed_records, "leaf_spheres": sphere_records}
         return min([readers[name](records, ray) for name, records in layout.buffers.items()] + [MISS])
     visit = {"bvh2": visit_bvh2, "bvh8": visit_bvh8, "cwbvh": visit_cwbvh}[layout.name]
     stack, closest = [0], MISS
@@ -191,8 +196,8 @@ def test_rays_hit_what_brute_force_hits(layout: str, builder: str, scene: str) -
 def test_buffers_hold_every_primitive_once(layout: str, scene: str) -> None:
     triangles, balls = SCENES[scene]
     buffers = pack(layout, "sah", triangles, balls).buffers
-    names = {"nodes"} if layout != "list" else set()
-    names |= {"packs" if layout == "bvh8" else "leaf_triangles"} if len(triangles) else set()
+    names = {"nodes"} if layout not in TREELESS else set()
+    names |= {"packs" if layout in ("bvh8", "packs") else "leaf_triangles"} if len(triangles) else set()
     names |= {"leaf_spheres"} if len(balls) else set()
     assert set(buffers) == names
 
@@ -224,7 +229,8 @@ def test_a_tree_of_nothing_cannot_be_entered() -> None:
 
 
 def test_records_have_the_sizes_that_the_device_expects() -> None:
-    sizes = {BVH2_NODE: 32, BVH8_NODE: 256, LEAF_TRIANGLE: 48, LEAF_SPHERE: 32, TRIANGLE_PACK: 320, CWBVH_NODE: 80}
+    sizes = {BVH2_NODE: 32, BVH8_NODE: 256, LEAF_TRIANGLE: 48, LEAF_SPHERE: 32, TRIANGLE_PACK: 320, LONE_PACK: 704,
+             CWBVH_NODE: 80}
     assert all(dtype.itemsize == size for dtype, size in sizes.items())
 
 
@@ -248,7 +254,7 @@ def test_boxes_of_spheres_contain_them(balls: FloatArray) -> None:
                 assert Fraction(float(inner[0])) >= exact_low and Fraction(float(inner[1])) <= exact_high
 
 
-@pytest.mark.parametrize("layout, builder, message", [("bvh3", "sah", "'bvh3'.*list, bvh2, bvh8, cwbvh"),
+@pytest.mark.parametrize("layout, builder, message", [("bvh3", "sah", "'bvh3'.*list, packs, bvh2, bvh8, cwbvh"),
                                                       ("bvh2", "shah", "'shah'.*sah, midpoint")])
 def test_unknown_names_are_refused(layout: str, builder: str, message: str) -> None:
     with pytest.raises(UsageError, match=message):

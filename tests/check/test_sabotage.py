@@ -27,7 +27,7 @@ SABOTAGES = {
     "another hash": ("random numbers", r"1664525u", "1664527u"),
     "sums without their errors": ("sums", r"real s = \*sum \+ x;[^}]*", "*sum += x;"),
     "boxes inside out": ("rays", r"t_near <= t_far", "t_near > t_far"),
-    "cracks between triangles": ("rays", r"u1 >= u2\)(.*\n.*)u1 <= u2\)", r"u1 > u2)\1u1 < u2)"),
+    "cracks between triangles": ("rays", r"e->u1 >= e->u2\)(.*)e->u1 <= e->u2\)", r"e->u1 > e->u2)\1e->u1 < e->u2)"),
     "the far child forgotten": ("binary tree", r"distance\[top\+\+\] = far;", ""),
     "boxes too small": ("tree builder", r"box_union\(Box a, Box b\) \{", r"\g<0>\n    b = a;"),
     "paint that swallows light": ("furnace", r"sample.weight = (GATHER3\(scene->diffuse.*\));",

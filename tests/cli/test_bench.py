@@ -44,7 +44,7 @@ def test_rays_of_four_kinds(tmp_path: Path) -> None:
     assert figures["triangles"] == 16
     assert list(figures["kinds"]) == ["primary", "bounce", "shadow", "occluded"]
     for kind, rows in figures["kinds"].items():
-        assert set(rows) == set(figures["trees"]) >= {"bvh2", "cwbvh", "list"}
+        assert set(rows) == set(figures["trees"]) >= {"bvh2", "cwbvh", "packs", "list"}
         assert all({"mrays", "mrays_call", "ratio", "cpu_ratio", "differ", "hits", "rays"} <= set(row)
                    for row in rows.values())
         assert not any(row["differ"] for row in rows.values()) and f"{kind}: " in printed
@@ -73,7 +73,7 @@ def test_hits_that_must_be_the_same(tmp_path: Path) -> None:
     figures, printed = bench("hits", "--device", "cpu", cwd=tmp_path)
     assert [mesh["mesh"] for mesh in figures["meshes"]] == ["icosphere", "bumpy ball", "soup"]
     for mesh in figures["meshes"]:
-        assert {way["layout"] for way in mesh["ways"]} >= {"bvh8", "bvh2", "cwbvh", "list"}
+        assert {way["layout"] for way in mesh["ways"]} >= {"bvh8", "bvh2", "cwbvh", "packs", "list"}
         assert all(list(way["differ"]) == mesh["kinds"] for way in mesh["ways"]) and mesh["rays"] == 4 * 4096
         assert f"float64: {mesh['exact']['wrong']} of {mesh['exact']['rays']} answers impossible" in printed
     assert [mesh["escaped"] for mesh in figures["meshes"]] == [0, 0, None]

@@ -105,6 +105,7 @@ def test_every_kernel_file_is_used(device: Device) -> None:
                 scene = everything()
                 scene.environment = environment
                 used |= set(compile_scene(scene, choices).files)
+    used |= set(compile_scene(everything(), Choices(layout="packs")).files)
     for sampler, name in zip(get_args(Sampler), get_args(Filter)):
         scene = everything()
         scene.render = replace(scene.render, sampler=sampler, filter=name)

@@ -21,7 +21,7 @@ from . import rays
 
 Doubles = NDArray[np.float64]
 HOUSE = Path(__file__).parents[2]
-LAYOUTS = ("bvh8", "bvh2", "cwbvh", "list")
+LAYOUTS = ("bvh8", "bvh2", "cwbvh", "packs", "list")
 TREES = tuple(product(("bvh8", "bvh2", "cwbvh"), ("sah", "midpoint")))
 
 
@@ -64,7 +64,7 @@ def test_closed_mesh_has_no_cracks(device: Device, layout: str, offset: float) -
     assert np.abs(found[:, 0] - 1).max() < 0.01 + offset * 1e-6   # a facet is a ten-thousandth flatter than the sphere
 
 
-@pytest.mark.parametrize(("layout", "builder"), [*TREES, ("list", "sah")])
+@pytest.mark.parametrize(("layout", "builder"), [*TREES, ("packs", "sah"), ("list", "sah")])
 def test_triangles_as_in_float64(device: Device, layout: str, builder: str) -> None:
     """2000 rays against 600 triangles: hits, t, u and v, wherever float32 can decide."""
     corners = np.concatenate([soup(300, 0.3, seed=1), soup(300, 0.05, seed=2)])
@@ -116,7 +116,7 @@ def test_ties_are_broken_alike(device: Device, kind: str) -> None:
         scene = Scene(meshes=[mesh(triangles)], spheres=repeated if kind == "mixed" else [])
         origin, direction = random_rays(20_000, 6)
     found = {tree: Probe(device, scene, layout=tree[0], builder=tree[1])("closest_hit", 4, origin, direction)
-             for tree in (*TREES, ("list", "sah"))}
+             for tree in (*TREES, ("packs", "sah"), ("list", "sah"))}
     reference = found.pop(("list", "sah"))
     for tree, hits in found.items():
         differ = np.any(hits != reference, axis=1)
@@ -228,10 +228,11 @@ for layout in {LAYOUTS}:
     assert done.returncode == 0, f"exit status {done.returncode}\n{done.stderr[-500:]}"
 
 
-def test_portable_mask_gives_the_same_hits(device: Device) -> None:
+@pytest.mark.parametrize(("layout", "triangles"), [("bvh8", 2000), ("packs", 60)])
+def test_portable_mask_gives_the_same_hits(device: Device, layout: str, triangles: int) -> None:
     """The multiplication that gathers mask bits on processors without an instruction for it."""
-    scene = Scene(meshes=[mesh(soup(2000, 0.1))], spheres=balls(spheres(50)))
+    scene = Scene(meshes=[mesh(soup(triangles, 0.1))], spheres=balls(spheres(50)))
     origin, direction = random_rays(50_000, 8)
-    default, portable = (Probe(device, scene, defines, layout="bvh8", lanes=8)("closest_hit", 4, origin, direction)
+    default, portable = (Probe(device, scene, defines, layout=layout, lanes=8)("closest_hit", 4, origin, direction)
                          for defines in ("", "#define PORTABLE_MASK 1"))
     assert np.array_equal(default, portable)

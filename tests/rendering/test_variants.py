@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS
 from clrt.device.open import Device
+from clrt.rendering import compile as compile_module
 from clrt.rendering import session as session_module
 from clrt.rendering.compile import OFFSETS, compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight
@@ -51,8 +52,8 @@ def reference(device: Device) -> Doubles:
     return film(device, everything(), lanes=8, layout="bvh8").mean
 
 
-@pytest.mark.parametrize("chosen", [{"lanes": 1}, {"lanes": 16}, {"layout": "bvh2"}, {"layout": "list"},
-                                    {"builder": "midpoint"}, {"lanes": 1, "layout": "bvh2"},
+@pytest.mark.parametrize("chosen", [{"lanes": 1}, {"lanes": 16}, {"layout": "bvh2"}, {"layout": "packs"},
+                                    {"layout": "list"}, {"builder": "midpoint"}, {"lanes": 1, "layout": "bvh2"},
                                     *({"lanes": lanes, "layout": "cwbvh"} for lanes in (1, 8, 16))], ids=str)
 def test_lanes_layouts_and_builders_agree(device: Device, reference: Doubles, chosen: dict[str, Any]) -> None:
     """To float rounding: a sample is a chain of some hundred operations, so most pixels agree to 1e-5.
@@ -62,6 +63,18 @@ def test_lanes_layouts_and_builders_agree(device: Device, reference: Doubles, ch
     """
     wanted: dict[str, Any] = {"lanes": 8, "layout": "bvh8"} | chosen
     picture = film(device, everything(), **wanted).mean
+    differs = np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)
+    assert np.mean(differs) < 1e-3, np.argwhere(differs)
+
+
+@pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh", "list"])
+def test_spheres_in_the_tree_and_out_of_it_agree(device: Device, reference: Doubles, layout: str,
+                                                 monkeypatch: pytest.MonkeyPatch) -> None:
+    """As above; few spheres are met before the tree, many in it."""
+    assert "LONE_SPHERES" in session(device, everything(), layout=layout).compiled.features
+    monkeypatch.setattr(compile_module, "FEW_SPHERES", 0)
+    assert "LEAF_SPHERES" in session(device, everything(), layout=layout).compiled.features
+    picture = film(device, everything(), layout=layout).mean
     differs = np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)
     assert np.mean(differs) < 1e-3, np.argwhere(differs)
 
@@ -110,7 +123,7 @@ def test_empty_scene_is_the_sky(device: Device) -> None:
     assert not black.mean.any() and black.samples == 1000
 
 
-@pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh", "list"])
+@pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh", "packs", "list"])
 def test_a_scene_compiles_to_what_it_needs(device: Device, layout: str) -> None:
     """Files, features and buffers of a scene of spheres, of one of triangles, and of an empty one."""
     triangle = quad([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], Diffuse())
@@ -130,7 +143,7 @@ def test_a_scene_compiles_to_what_it_needs(device: Device, layout: str) -> None:
         assert not [file for file in program.files if file.startswith("light/") and file != "light/interface.cl"]
         assert not {"LIGHTS", "EMITTERS", "SKY", "SMOOTH_NORMALS"} & set(program.features)
         assert "bsdf/mirror.cl" not in program.files and "bsdf/metallic_roughness.cl" not in program.files
-    trees = ("geometry/", "traverse/bvh", "traverse/cwbvh", "traverse/list")
+    trees = ("geometry/", "traverse/bvh", "traverse/cwbvh", "traverse/packs", "traverse/list")
     assert not [file for file in compiled["empty"].files if file.startswith(trees)]
 
 

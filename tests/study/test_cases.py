@@ -29,7 +29,7 @@ def test_nothing_is_wrong(device: Device, measure: object) -> None:
     assert [row for row in rows if row.wrong] == []
 
 
-@pytest.mark.parametrize("layout", ["bvh2", "cwbvh", "list"])
+@pytest.mark.parametrize("layout", ["bvh2", "cwbvh", "packs", "list"])
 def test_other_trees_let_nothing_out_of_slivers(device: Device, layout: str) -> None:
     assert misses(Subject(device.info.index, layout=layout), sliver_tube(64), 20_000) == 0
 

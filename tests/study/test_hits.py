@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import clrt
+from clrt.accel.kernels import TREELESS
 from clrt.device.open import Device
 from clrt.study.aimed import all_rays, rays_of_kinds
 from clrt.study.hits import Case, Effort, measure_case
@@ -24,10 +25,10 @@ def test_nothing_differs_and_every_way_is_taken(device: Device, name: str) -> No
     ways = {(way["layout"], way["builder"], way["traversal"]) for way in result["ways"]}
     trees = {(layout, builder, "single") for layout in ("bvh8", "bvh2", "cwbvh") for builder in ("sah", "midpoint")}
     trees |= {("bvh8", builder, way) for builder in ("ploc", "reinsertion", "sah") for way in ("packet", "pool")}
-    assert ways >= trees | {("list", "sah", "single"), ("bvh8", "ploc", "single")}
+    assert ways >= trees | {("list", "sah", "single"), ("packs", "sah", "single"), ("bvh8", "ploc", "single")}
     assert len(result["ways"]) == 2 * len(ways) and not any("error" in way for way in result["ways"])
     assert all(way["differ"] == {"random": 0, "vertices": 0, "edges": 0, "axes": 0} for way in result["ways"])
-    few = {way["rays"] for way in result["ways"] if way["layout"] == "list"}
+    few = {way["rays"] for way in result["ways"] if way["layout"] in TREELESS}
     assert result["rays"] == 1200 and few == {-(-1200 // -(-1200 * result["triangles"] // EFFORT.list_tests))}
     assert result["exact"]["wrong"] == 0 and 0.2 < result["exact"]["decided"] / result["exact"]["rays"] <= 1
     assert result["escaped"] == (0 if case.closed else None)

@@ -1,0 +1,63 @@
+// One ray against all triangles of a scene that has few, in packs, without a branch: what geometry/triangle_watertight.cl
+// says, for less where nothing is close.
+//
+// Left to the exact test is whatever may need it: a ray through an edge, and a t that may be no more than rounding. How
+// small a volume is no more than that is said once a ray, for corners as far away as any of the scene is.
+#include "geometry/triangle_watertight.cl"
+
+static inline float wide_least(wide x) {
+    float8 lo = vload8(0, (const float *)&x), hi = vload8(1, (const float *)&x), eight = lo < hi ? lo : hi;
+    float4 four = eight.lo < eight.hi ? eight.lo : eight.hi;
+    float2 two = four.lo < four.hi ? four.lo : four.hi;
+    return two.x < two.y ? two.x : two.y;
+}
+
+// The closest hit, or whether there is any. False where that is left open.
+static inline bool meet_packs(const TriangleRay *ray, global const Triangles *packs, int count, const bool stop_at_first,
+                              Hit *hit) {
+    // As in intersect_sheared, with reach <= 2 far and depth <= far.
+    float far = packs->extent + fabs(ray->ox) + fabs(ray->oy) + fabs(ray->oz);
+    float error = T_ERROR * 6.0f * far * far, rounding = error * far, thin = error / THIN;
+    // A hit so far is of a primitive behind all these, and gives way to one at the same t.
+    wide t = hit->primitive < 0 ? hit->t : as_float(as_int(hit->t) + 1), u = 0.0f, v = 0.0f;
+    wide_mask pack = (wide_mask)(-1), open = (wide_mask)(0);
+    for (int i = 0; i < count; ++i) {
+        global const Triangles *leaf = packs + i;
+        PACK_CORNERS
+        const Sheared a = shear(p0, &sheared_ray), b = shear(p1, &sheared_ray), c = shear(p2, &sheared_ray);
+        const Edges edges = edges_of(&a, &b, &c);
+        wide_mask inside = inside_edges(&edges);
+        wide at_a = edges.u1 - edges.u2, at_b = edges.v1 - edges.v2, at_c = edges.w1 - edges.w2, det = at_a + at_b + at_c;
+        wide inverse = 1.0f / det;
+        wide volume = weighted(at_a, at_b, at_c, a.z * ray->sz, b.z * ray->sz, c.z * ray->sz);
+        wide pack_t = volume * inverse;
+        wide_mask ahead = pack_t > 0.0f;
+        wide_mask beside = ((WIDE_BITS(a.z) ^ WIDE_BITS(b.z)) | (WIDE_BITS(a.z) ^ WIDE_BITS(c.z))) < 0;
+        open |= inside & ((at_a * at_b * at_c == 0.0f)
+                          | (beside & (WIDE_ABS(volume) <= rounding) & (ahead | (WIDE_ABS(det) < thin))));
+        wide_mask closer = inside & ahead & (pack_t < t);
+        t = closer ? pack_t : t;
+        u = closer ? at_b * inverse : u;
+        v = closer ? at_c * inverse : v;
+        pack = closer ? (wide_mask)(i) : pack;
+    }
+    uint found = wide_bits(pack >= 0);
+    if (WIDE_ANY(open)) return false;
+    if (!found) return true;
+    if (stop_at_first) {
+        hit->primitive = 0;
+        return true;
+    }
+    float least = wide_least(t);
+    found &= wide_bits(t == (wide)(least));
+    hit->t = least;
+    hit->primitive = INT_MAX;
+    for (; found; found &= found - 1) {
+        int i = first_bit(found), primitive = packs[((const int *)&pack)[i]].primitive[i];
+        if (primitive > hit->primitive) continue;
+        hit->primitive = primitive;
+        hit->u = ((const float *)&u)[i];
+        hit->v = ((const float *)&v)[i];
+    }
+    return true;
+}

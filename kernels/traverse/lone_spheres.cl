@@ -1,0 +1,25 @@
+// Spheres of a scene that has few: the rays of all lanes meet each of them, before any goes through the tree alone. One
+// costs a ray less than a node of the tree.
+#include "vector.cl"
+#include SPHERE_TEST
+
+SPHERE_OF(real, ireal, TwiceReal, lone)
+
+// The closest hits of enabled lanes nearer than t_max among the spheres, or their t_max and no primitive.
+static inline Hits meet_spheres(const Scene *scene, real3 origin, real3 direction, real t_max, ireal enabled) {
+    Hits hits = {t_max, ZERO, ZERO, (ireal)(-1), (ireal)(0)};
+    const real o[3] = {origin.x, origin.y, origin.z}, d[3] = {direction.x, direction.y, direction.z};
+    for (int i = 0; i < scene->counts.spheres; ++i) {
+        global const LeafSphere *sphere = scene->leaf_spheres + i;
+        const real f[3] = {o[0] - sphere->center[0], o[1] - sphere->center[1], o[2] - sphere->center[2]};
+        ireal meets = enabled ? lone_may_meet(f, d, sphere->radius) : NO_LANES;   // idle lanes hold no rays
+        if (!ANY(meets)) continue;
+        real near, far;
+        lone_roots(o, d, sphere->center, sphere->radius, &near, &far);
+        real t = near > 0.0f ? near : far;
+        meets = meets ? (t > 0.0f) & (t < hits.t) : NO_LANES;   // of equal ones the first stays
+        hits.t = meets ? t : hits.t;
+        hits.primitive = meets ? (ireal)(sphere->primitive) : hits.primitive;
+    }
+    return hits;
+}
