@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
-import gc
 import sys
 import time
 from importlib import import_module
@@ -37,7 +35,6 @@ def commands() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs a command and exits: 0 done, 2 usage, 3 scene, 4 device, 5 kernel, 6 output, 130 interrupted."""
-    atexit.register(gc.freeze)  # else Python, as it ends, searches all modules' objects for garbage, in 0.05 s
     try:
         commands.main(arguments, prog_name="clrt", standalone_mode=False)
     except click.exceptions.Exit as stop:
