@@ -52,10 +52,10 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
 }
 
 __attribute__((vec_type_hint(real)))
-kernel void aov(SCENE_PARAMETERS, global Aov *pixels, const Launch launch) {
+kernel void aov(SCENE_PARAMETERS, global Aov *pixels, global const uint *tiles, const Launch launch) {
     Scene scene = SCENE_ARGUMENTS;
-    LanePixels own = lane_pixels(&launch);
-    if (own.first >= own.end) return;
+    LanePixels own;
+    if (!lane_pixels(&launch, tiles, &own)) return;
     real3 position = broadcast(launch.position);
     Seen sum = {splat(ZERO), splat(ZERO)};
     for (uint s = 0; s < launch.sample_count; ++s) {
@@ -67,8 +67,10 @@ kernel void aov(SCENE_PARAMETERS, global Aov *pixels, const Launch launch) {
     }
     real share = (real)(1.0f / (float)launch.sample_count);
     real3 albedo = scale(sum.albedo, share), normal = scale(sum.normal, share);
-    for (uint lane = 0; lane < LANES && own.first + lane < own.end; ++lane) {
-        store_rows(pixels[own.first + lane].albedo, &albedo, lane);
-        store_rows(pixels[own.first + lane].normal, &normal, lane);
+    for (int lane = 0; lane < LANES; ++lane) {
+        if (!LANE_INT(own.inside, lane)) continue;
+        global Aov *pixel = pixels + LANE_UINT(own.index, lane);
+        store_rows(pixel->albedo, &albedo, lane);
+        store_rows(pixel->normal, &normal, lane);
     }
 }

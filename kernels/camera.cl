@@ -5,25 +5,30 @@
 #include "vector.cl"
 #include FILTER
 
-// What the lanes of a work-item see: pixels in a row from `first` on. A lane past the launch's `end` is given the first one
-// and is not `inside`.
+// What the lanes of a work-item see: LANES pixels of a tile of TILE x TILE. A launch takes those from first_pixel on,
+// counted tile by tile as `tiles` lists them, row by row in each. A lane past the picture's edge is given its first lane's
+// pixel and is not `inside`.
 typedef struct {
-    uint first, end;
-    ureal index, x, y, code;
+    ureal index, x, y, code;   // index: of the pixel in the picture
     ireal inside;
 } LanePixels;
 
-static inline LanePixels lane_pixels(const Launch *launch) {
-    LanePixels p;
-    p.first = launch->first_pixel + (uint)get_global_id(0) * LANES;
-    p.end = launch->first_pixel + launch->pixel_count;
-    p.index = (ureal)(p.first) + LANE_INDEX;
-    p.inside = p.index < p.end;
-    p.index = p.inside ? p.index : (ureal)(p.first);
-    p.y = p.index / launch->width;
-    p.x = p.index - p.y * launch->width;
-    p.code = pixel_code(p.x, p.y);
-    return p;
+// False where there are none.
+static inline bool lane_pixels(const Launch *launch, global const uint *tiles, LanePixels *p) {
+    uint first = (uint)get_global_id(0) * LANES;
+    if (first >= launch->pixel_count) return false;
+    first += launch->first_pixel;
+    uint across = (launch->width + TILE - 1) / TILE, tile = tiles[first / (TILE * TILE)];
+    uint first_x = tile % across * TILE + first % TILE, first_y = tile / across * TILE + first / TILE % TILE;
+    p->x = first_x + LANE_INDEX % TILE;
+    p->y = first_y + LANE_INDEX / TILE;
+    p->inside = (p->x < launch->width) & (p->y < launch->height);
+    if (!ANY(p->inside)) return false;
+    p->x = p->inside ? p->x : first_x;
+    p->y = p->inside ? p->y : first_y;
+    p->index = p->y * launch->width + p->x;
+    p->code = pixel_code(p->x, p->y);
+    return true;
 }
 
 static inline real3 camera_direction(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u) {

@@ -49,9 +49,10 @@ static inline void store_rows(global float *row, const real3 *value, int lane) {
     row[2] = LANE(value->z, lane);
 }
 
-static inline void store_pixels(global Pixel *film, uint first, uint end, const Accumulator *a) {
-    for (uint lane = 0; lane < LANES && first + lane < end; ++lane) {
-        global Pixel *pixel = film + first + lane;
+static inline void store_pixels(global Pixel *film, ureal index, ireal stored, const Accumulator *a) {
+    for (int lane = 0; lane < LANES; ++lane) {
+        if (!LANE_INT(stored, lane)) continue;
+        global Pixel *pixel = film + LANE_UINT(index, lane);
         store_rows(pixel->sum, &a->sum, lane);
         store_rows(pixel->sum_error, &a->sum_error, lane);
         store_rows(pixel->square, &a->square, lane);

@@ -130,10 +130,10 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
 }
 
 __attribute__((vec_type_hint(real)))
-kernel void path(SCENE_PARAMETERS, global Pixel *film, const Launch launch) {
+kernel void path(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles, const Launch launch) {
     Scene scene = SCENE_ARGUMENTS;
-    LanePixels own = lane_pixels(&launch);
-    if (own.first >= own.end) return;
+    LanePixels own;
+    if (!lane_pixels(&launch, tiles, &own)) return;
     real3 position = broadcast(launch.position);
     Accumulator pixels = load_pixels(film, AS_INT(own.index));
     for (uint s = 0; s < launch.sample_count; ++s) {
@@ -142,5 +142,5 @@ kernel void path(SCENE_PARAMETERS, global Pixel *film, const Launch launch) {
         real3 L = radiance(&scene, position, direction, own.inside, launch.max_depth, &sampler, &pixels.rays);
         accumulate(&pixels, L, own.inside);
     }
-    store_pixels(film, own.first, own.end, &pixels);
+    store_pixels(film, own.index, own.inside, &pixels);
 }

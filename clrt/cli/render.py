@@ -34,6 +34,7 @@ from .progress import Goal, make_progress
 @click.option("--integrator", type=click.Choice(["path", "direct"]), help="What to compute.")
 @click.option("--sampler", type=click.Choice(["sobol", "stratified", "independent"]), help="Where samples come from.")
 @click.option("--filter", "pixel_filter", type=click.Choice(["box", "tent", "blackman_harris"]), help="Pixel filter.")
+@click.option("--adaptive", is_flag=True, default=None, help="More samples where the error is larger.")
 @click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error by.")
 @click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what was done.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
@@ -47,8 +48,8 @@ from .progress import Goal, make_progress
 @tracing_options
 def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None, spp: int | None,
             seconds: float | None, error: float | None, depth: int | None, seed: int | None, devices: tuple[str, ...],
-            integrator: str | None, sampler: str | None, pixel_filter: str | None, reference: Path | None,
-            report: Path | None, plot: Path | None, denoise: bool, view: str, exposure: float,
+            integrator: str | None, sampler: str | None, pixel_filter: str | None, adaptive: bool | None,
+            reference: Path | None, report: Path | None, plot: Path | None, denoise: bool, view: str, exposure: float,
             progress_kind: str | None, print_kernel: bool, quiet: bool, **tracing: Any) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
     from ..output.denoise import Denoiser, denoised, raw_path
@@ -71,7 +72,8 @@ def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's end keeps the picture, too
     options: dict[str, Any] = {
         "size": size, "max_depth": depth, "seed": seed, "device": devices[0] if devices else None,
-        "integrator": integrator, "sampler": sampler, "filter": pixel_filter, **tracing}
+        "integrator": integrator, "sampler": sampler, "filter": pixel_filter,
+        "adaptive": adaptive, **tracing}
     with make_progress(progress_kind, quiet) as progress:
         progress.phase("load")
         content = load(scene)

@@ -24,6 +24,7 @@ from .emitters import SURFACES, TYPES, Emitters, pack_emitters
 from .environment import Sky, pack_sky
 from .filters import filter_quantiles
 from .records import AOV, COUNTS, LAUNCH, NORMALS, PIXEL, SPHERE, TRIANGLE, material_record
+from .tiles import TILE
 
 
 #: Of a scene's unit, what float32 holds.
@@ -206,7 +207,7 @@ def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], 
     lengths = {} if choices.offset == "bound" else {"SCENE_UNIT": min(unit, LARGEST_UNIT)}
     surfaces = [t for t in emitters.types if t in SURFACES]
     return "\n".join([
-        defines({"LANES": choices.lanes, **tree_defines(tree), **lengths}),
+        defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(tree), **lengths}),
         defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
         defines({feature: 1 for feature in sorted(features)}),
         typedefs({"Counts": COUNTS, "Pixel": PIXEL, "Aov": AOV, "Launch": LAUNCH}),

@@ -6,20 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .film import Film, relative_to
+from .tiles import over_pixels, tile_sums
 
 #: By how much the squared error falls when samples double: as for independent ones, up to the third power.
 LEAST_FALL, MOST_FALL = 2.0, 8.0
 
 
 class NoiseEstimate:
-    """Estimates √relMSE at any number of samples from the pictures at powers of two.
+    """Estimates √relMSE at any number of samples from the pictures at powers of two, tile by tile.
 
     A pixel's samples are not independent, so their variance says too much. But the two halves of the first 2n samples
     are alike, which is enough: with E_n the mean of the first n and V(n) its squared error, Cov(E_n, E_2n) = V(2n),
     hence the mean square of E_n − E_2n is V(n) − V(2n). If V falls by r with each doubling that is (r − 1)·V(2n). The
-    ratios of the last such differences tell how fast it fell, the slower of one step and two counts, and as that always
-    slows down, towards 2 in the end, r is the geometric mean of both. Blocks of 2^k samples, taken for independent of
-    each other, give V between powers of two. It is never more than the samples' variance gives (Film.noise).
+    ratios of the last such differences, over all tiles that have as many samples, tell how fast it fell, the slower of
+    one step and two counts, and as that always slows down, towards 2 in the end, r is the geometric mean of both.
+    Blocks of 2^k samples, taken for independent of each other, give V between powers of two. It is never more than the
+    samples' variance gives (Film.noise).
 
     planned_spp: where the sampler begins anew, r is 2 from there on.
     """
@@ -27,32 +29,53 @@ class NoiseEstimate:
     def __init__(self, planned_spp: int | None = None) -> None:
         self._planned = planned_spp or 1 << 32
         self._mean: NDArray[np.float32] | None = None
-        self._changes: list[float] = []     # V(n/2) − V(n) at n = 2, 4, 8 …
+        #: V(n/2) − V(n) at n = 2, 4, 8 …, sums over a tile's values (rows, columns), NaN where it has fewer samples.
+        self._changes: list[NDArray[np.float64]] = []
+        #: How many of these each tile has, −1 before its first sample.
+        self._level: NDArray[np.int64] = np.zeros((0, 0), np.int64)
 
-    def add(self, film: Film, spp: int) -> None:
-        """The film at `spp` samples a pixel; counts only if that is the next power of two."""
-        if spp != 1 << (len(self._changes) + (self._mean is not None)):
-            return
+    def add(self, film: Film, tile_samples: NDArray[np.int64]) -> None:
+        """The film, with samples (rows, columns) of each tile; counts only where those are the next power of two."""
         mean = film.mean
-        if self._mean is not None:
-            self._changes.append(float(np.mean((mean - self._mean) ** 2 / relative_to(mean))))
-        self._mean = mean.astype(np.float32)
+        if self._mean is None:
+            self._mean, self._level = np.zeros(mean.shape, np.float32), np.full(tile_samples.shape, -1)
+        due = tile_samples == 2 ** (self._level + 1)
+        if not due.any():
+            return
+        change = tile_sums((mean - self._mean) ** 2 / relative_to(mean))
+        level = self._level[due]
+        self._changes += [np.full(due.shape, np.nan) for _ in range(max(level) + 1 - len(self._changes))]
+        for k in np.unique(level[level >= 0]):
+            at_k = due & (self._level == k)
+            self._changes[k][at_k] = change[at_k]
+        self._level[due] += 1
+        np.copyto(self._mean, mean, where=over_pixels(due, mean.shape[1::-1])[..., None])
 
-    def at(self, film: Film, spp: int) -> float | None:
-        """Estimated √relMSE of the film at `spp` samples a pixel; None before there are two."""
+    def at(self, film: Film, tile_samples: NDArray[np.int64]) -> float | None:
+        """Estimated √relMSE of the film with so many samples in each tile; None before there are two."""
         limit = film.noise
-        if limit is None or not self._changes:
+        if limit is None or not self._changes or self._level.min() < 1:
             return limit
-        fall = self._fall()
-        last = len(self._changes)           # log2 of the samples of the last change
-        at_power = self._changes[-1] / (fall - 1)
-        blocks = [bit for bit in range(spp.bit_length()) if spp >> bit & 1]
-        square = sum(4.0**bit * at_power * fall ** (last - bit) for bit in blocks) / spp**2
-        return min(limit, float(np.sqrt(square)))
+        return min(limit, float(np.sqrt(np.sum(self.tile_errors(tile_samples)) / film.mean.size)))
 
-    def _fall(self) -> float:
-        """V(n/2)/V(n) at the last power of two."""
-        changes = self._changes
+    def tile_errors(self, tile_samples: NDArray[np.int64]) -> NDArray[np.float64]:
+        """(rows, columns) estimated sums over a tile's values of squared error / (expected² + 0.01).
+
+        All tiles must have had two samples.
+        """
+        errors = np.zeros(tile_samples.shape)
+        for spp, level in {*zip(tile_samples.ravel().tolist(), self._level.ravel().tolist())}:
+            alike = (tile_samples == spp) & (self._level == level)
+            fall = self._fall(level)
+            at_power = self._changes[level - 1][alike] / (fall - 1)
+            blocks = [bit for bit in range(spp.bit_length()) if spp >> bit & 1]
+            errors[alike] = at_power * sum(4.0**bit * fall ** (level - bit) for bit in blocks) / spp**2
+        return errors
+
+    def _fall(self, level: int) -> float:
+        """V(n/2)/V(n) at n = 2^level, over all tiles that came so far."""
+        there = self._level >= level
+        changes = [float(np.sum(change[there])) for change in self._changes[:level]]
         if len(changes) < 2 or changes[-1] <= 0 or 1 << len(changes) > self._planned:
             return LEAST_FALL
         slowest = min((changes[-1 - steps] / changes[-1]) ** (1 / steps) for steps in range(1, len(changes[-3:])))

@@ -16,21 +16,26 @@ from ..accel.kernels import BUILDER_NAMES, TREES, HitTests
 from ..device.open import open_device
 from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
+from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
 from .compile import OFFSETS, Choices, compile_scene
 from .film import RELATIVE_FLOOR, Film
 from .noise import NoiseEstimate
 from .session import Session
+from .tiles import tile_pixels, tile_sums
 
 #: With a wanted error the noise is looked at whenever the samples have grown by one part in this.
 CHECK_FRACTION = 8
 #: Between two states at least this long passes, and this many times what making a state costs.
 STATE_SECONDS = 0.5
 STATE_COST = 20
+#: Where sampling is adaptive, by how much some tiles' samples may exceed what is planned before they begin anew.
+MOST_TIMES_PLANNED = 4
 
 
 @dataclass(frozen=True)
 class State:
-    """The picture so far. noise: estimated √relMSE, None below 2 samples; relmse: against the reference, if given."""
+    """The picture so far. spp: samples a pixel, the mean where sampling is adaptive; noise: estimated √relMSE, None
+    below 2 samples; relmse: against the reference, if given."""
 
     spp: int
     seconds: float
@@ -49,7 +54,8 @@ class Renderer:
 
     device: see `clrt devices`; size: (width, height); triangle, box, sphere: see `HitTests`; offset, builder, layout,
     lanes: see `compile.Choices`. spp: how many samples a pixel are planned, if that is known: the sampler then makes
-    neighbouring pixels' errors differ for that many, and later ones begin anew (kernels/sampler).
+    neighbouring pixels' errors differ for that many, and later ones begin anew (kernels/sampler). adaptive: whether
+    tiles get samples by their error, from the pictures so far.
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
     Raises SceneError, DeviceError, KernelError, UsageError.
     """
@@ -57,11 +63,11 @@ class Renderer:
     def __init__(self, scene: Scene, *, device: str | int | None = None, size: tuple[int, int] | None = None,
                  spp: int | None = None, max_depth: int | None = None, seed: int | None = None,
                  integrator: str | None = None, sampler: str | None = None, filter: str | None = None,
-                 triangle: str = "watertight", box: str = "robust", sphere: str = "robust", offset: str = "bound",
-                 builder: str | None = None, layout: str | None = None, lanes: int | None = None,
-                 on_phase: Callable[[str], None] = lambda phase: None) -> None:
+                 adaptive: bool | None = None, triangle: str = "watertight", box: str = "robust",
+                 sphere: str = "robust", offset: str = "bound", builder: str | None = None, layout: str | None = None,
+                 lanes: int | None = None, on_phase: Callable[[str], None] = lambda phase: None) -> None:
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
-                                 "sampler": sampler, "filter": filter}
+                                 "sampler": sampler, "filter": filter, "adaptive": adaptive}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
         self.device = open_device(device)
@@ -74,6 +80,8 @@ class Renderer:
             logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
         on_phase("compile")
         depth = settings.max_depth if settings.integrator == "path" else min(settings.max_depth, 2)
+        if spp is not None and settings.adaptive:
+            spp *= MOST_TIMES_PLANNED
         self.session = Session(self.device, self.compiled, settings.size, depth, settings.seed, spp)
         self._noise = NoiseEstimate(spp)
         self.history: list[dict[str, Any]] = []
@@ -105,7 +113,7 @@ class Renderer:
                 self.stop_reason = "spp"
             now, done = clock.perf_counter(), self.session.samples_done
             due = now >= next_state or done & (done - 1) == 0 or (error is not None and done >= next_check)
-            if self.stop_reason is None and not due:
+            if self.stop_reason is None and not due and not self._adapts:
                 continue
             next_check = done + 1 + done // CHECK_FRACTION
             state = self._record_state(reference)
@@ -117,23 +125,44 @@ class Renderer:
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
-        film = self.session.film()
-        self._noise.add(film, self.session.samples_done)
+        film, tile_samples = self.session.film(), self.session.tile_samples
+        self._noise.add(film, tile_samples)
         relmse = None
         if reference is not None:
             expected = reference.astype(np.float64)
             relmse = float(np.mean((film.mean - expected) ** 2 / (expected**2 + RELATIVE_FLOOR)))
-        done = self.session.samples_done
-        return State(done, self.seconds, self._noise.at(film, done), relmse, film)
+        noise = self._noise.at(film, tile_samples)
+        self._last = State(self.session.samples_done, self.seconds, noise, relmse, film)
+        return self._last
 
     def _run_pass(self, spp: int | None, time: float | None, check: int | None) -> None:
         """One pass, not past `check` samples; sets the stop reason where `time` is over, maybe inside the pass."""
-        ends = [end for end in (spp, check) if end is not None]
-        for _ in self.session.render(self._pass_size(self.session.samples_done, min(ends, default=None))):
+        for _ in self._adaptive_pass(spp) if self._adapts else self._even_pass(spp, check):
             self.seconds = clock.perf_counter() - self._clock
             if time is not None and self.seconds >= time and self.session.samples_done:
                 self.stop_reason = "time"
                 return
+
+    @property
+    def _adapts(self) -> bool:
+        """Whether the next pass goes by the error of the tiles; the picture so far is `_last` then."""
+        return self.settings.adaptive and self.session.samples_done >= FLOOR_SPP
+
+    def _adaptive_pass(self, spp: int | None) -> Iterator[None]:
+        """Doubles the samples of those tiles where that takes most error away; ends the render at `spp`."""
+        session, film = self.session, self._last.film
+        samples = session.tile_samples * tile_pixels(session.size)
+        done = int(samples.sum())
+        most = GROWTH * done if spp is None else min(GROWTH * done, spp * film.pixels.size - done)
+        tiles = worth_doubling(self._noise.tile_errors(session.tile_samples), tile_sums(film.pixels["rays"]), samples,
+                               most)
+        if len(tiles) == 0:
+            self.stop_reason = "spp"
+        yield from session.double(tiles)
+
+    def _even_pass(self, spp: int | None, check: int | None) -> Iterator[None]:
+        ends = [end for end in (spp, check) if end is not None]
+        return self.session.render(self._pass_size(self.session.samples_done, min(ends, default=None)))
 
     def _record_state(self, reference: NDArray[np.float32] | None) -> State:
         self.session.wait()

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ..device.arrays import on_device
+from ..device.arrays import on_device, resident
 from ..device.launch import Launches, wait_for
 from ..device.open import Device
 from ..device.program import BuiltProgram, build, make_kernel
@@ -19,36 +20,51 @@ from ..scene.model import Camera
 from .compile import CompiledScene
 from .film import Film
 from .records import LAUNCH, PIXEL
+from .tiles import TILE_PIXELS, tile_pixels, tiles_of
 
-#: Pixels of a launch, at least.
-FEWEST_PIXELS = 1024
+#: Tiles of a launch, at least.
+FEWEST_TILES = 16
 #: Launches of a pass, about, unless a single sample a pixel takes more.
 PASS_LAUNCHES = 4
 FIRST_LAUNCH_SAMPLES = 1 << 15
 
 
+class Part(NamedTuple):
+    """Work in hand: tiles first … end − 1 of those on the device get `more` samples beside the `samples` they have."""
+
+    first: int
+    end: int
+    samples: int
+    more: int
+
+
 class Session:
-    """Renders ranges of samples of one compiled scene at one size. Nothing depends on how the ranges are cut."""
+    """Renders samples of one compiled scene at one size. Nothing depends on how the work is cut into launches.
+
+    tile_samples: (rows, columns) samples that the pixels of each tile have, or had before the work in hand.
+    """
 
     def __init__(self, device: Device, compiled: CompiledScene, size: tuple[int, int], max_depth: int,
                  seed: int, planned_spp: int | None = None) -> None:
         self.device, self.compiled, self.size = device, compiled, size
         self.program: BuiltProgram = build(device, compiled.source)
         self.launch = _launch_record(compiled.camera, size, max_depth, seed, block_bits(planned_spp))
-        self.samples_done = 0
-        self._next_pixel, self._pass_samples = 0, 0
+        self.tile_samples = np.zeros(tiles_of(size), np.int64)
+        self._in_hand: deque[Part] = deque()
+        self._next_tile, self._then = 0, self.tile_samples
         self._launches = Launches(FIRST_LAUNCH_SAMPLES)
         width, height = size
         self._check_memory()
         try:
             scene = [on_device(device, array) for _, array in compiled.buffers.values()]
             self._film = on_device(device, np.zeros(width * height, PIXEL))
+            self._tiles = resident(device, np.arange(self.tile_samples.size, dtype=np.uint32))
         except cl.Error as error:
             raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes do not fit: {error}") from error
         self._kernel = make_kernel(device, self.program, "path")
         #: What every kernel of the scene takes first (SCENE_PARAMETERS).
         self.scene_arguments = [*scene, compiled.counts[0]]
-        self._kernel.set_args(*self.scene_arguments, self._film, self.launch[0])
+        self._kernel.set_args(*self.scene_arguments, self._film, self._tiles.buffer, self.launch[0])
         self._warm_up()
 
     def _check_memory(self) -> None:
@@ -71,29 +87,58 @@ class Session:
         """Memory of all buffers on the device."""
         return self.compiled.bytes + self.size[0] * self.size[1] * PIXEL.itemsize
 
+    @property
+    def samples_done(self) -> int:
+        """Samples a pixel, the mean over all, rounded."""
+        width, height = self.size
+        return round(int(np.sum(self.tile_samples * tile_pixels(self.size))) / (width * height))
+
     def render(self, samples: int) -> Iterator[None]:
         """Adds the next `samples` samples to every pixel, in bounded launches; yields after each.
 
-        If it is left before its end, the next call first ends that pass.
+        All tiles must have as many. If it is left before its end, the next call, of `double` too, first ends that.
         """
-        pixels = self.size[0] * self.size[1]
-        if self._next_pixel == 0:
-            self._pass_samples = samples
-        samples, done = self._pass_samples, self.samples_done
-        while self.samples_done == done:
-            first = self._next_pixel
-            count = min(pixels - first, max(FEWEST_PIXELS, self._launches.size // samples))
-            self.launch["first_pixel"], self.launch["pixel_count"] = first, count
-            self.launch["first_sample"], self.launch["sample_count"] = done, samples
+        if not self._in_hand:
+            every, done = np.arange(self.tile_samples.size), int(self.tile_samples[0, 0])
+            self._take_in_hand(every, [Part(0, len(every), done, samples)])
+        yield from self._work()
+
+    def double(self, tiles: NDArray[np.intp]) -> Iterator[None]:
+        """Doubles the samples of these tiles, by their number in `tile_samples`; otherwise like `render`."""
+        if not self._in_hand:
+            samples = self.tile_samples.ravel()[tiles]
+            order = np.argsort(samples, kind="stable")
+            levels, firsts = (found.tolist() for found in np.unique(samples[order], return_index=True))
+            self._take_in_hand(tiles[order], [Part(first, end, level, level) for first, end, level
+                                              in zip(firsts, [*firsts[1:], len(tiles)], levels)])
+        yield from self._work()
+
+    def _take_in_hand(self, tiles: NDArray[np.intp], parts: list[Part]) -> None:
+        self._tiles.write(self.device, tiles.astype(np.uint32))
+        self._in_hand.extend(parts)
+        self._next_tile, self._then = 0, self.tile_samples.copy()
+        for part in parts:
+            self._then.ravel()[tiles[part.first:part.end]] += part.more
+
+    def _work(self) -> Iterator[None]:
+        """Launches what is in hand."""
+        while self._in_hand:
+            part, first = self._in_hand[0], self._next_tile
+            wanted = max(FEWEST_TILES, self._launches.size // (part.more * TILE_PIXELS))
+            self._next_tile = end = min(part.end, first + wanted)
+            self.launch["first_pixel"], self.launch["pixel_count"] = first * TILE_PIXELS, (end - first) * TILE_PIXELS
+            self.launch["first_sample"], self.launch["sample_count"] = part.samples, part.more
             event = self._launch()
-            self._next_pixel = (first + count) % pixels
-            self.samples_done += samples if self._next_pixel == 0 else 0
-            self._launches.add(event, count * samples)
+            if end == part.end:
+                self._in_hand.popleft()
+            if not self._in_hand:
+                self.tile_samples = self._then
+            self._launches.add(event, (end - first) * TILE_PIXELS * part.more)
             yield
 
     def _launch(self) -> cl.Event:
         """Enqueues the kernel for the range in the launch record."""
-        self._kernel.set_arg(len(self.scene_arguments) + 1, self.launch[0])
+        self._kernel.set_arg(len(self.scene_arguments) + 2, self.launch[0])
         return self.enqueue(self._kernel, int(self.launch["pixel_count"][0]))
 
     def enqueue(self, kernel: cl.Kernel, pixel_count: int) -> cl.Event:
@@ -111,7 +156,7 @@ class Session:
     def pass_limit(self) -> int:
         """The most samples a pixel that one pass should add, so that ending inside a pass leaves an even picture."""
         pixels, work = self.size[0] * self.size[1], self._launches.size
-        return max(1, min(PASS_LAUNCHES * work // pixels, work // min(pixels, FEWEST_PIXELS)))
+        return max(1, min(PASS_LAUNCHES * work // pixels, work // min(pixels, FEWEST_TILES * TILE_PIXELS)))
 
     def film(self) -> Film:
         """The film so far; waits for the launches in flight."""

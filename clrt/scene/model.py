@@ -97,6 +97,7 @@ class RenderSettings:
     integrator: Integrator = "path"
     sampler: Sampler = "sobol"
     filter: Filter = "box"
+    adaptive: bool = False
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)

@@ -156,7 +156,7 @@ def test_lanes_and_launches_agree(device: Device, monkeypatch: pytest.MonkeyPatc
     for name, picture in pictures[1].items():
         assert np.mean(np.abs(picture - pictures[0][name]).max(axis=2) > 1e-5) < 1e-3, name
     monkeypatch.setattr(aov, "FIRST_LAUNCH_SAMPLES", 1)
-    monkeypatch.setattr(aov, "FEWEST_PIXELS", 100)
+    monkeypatch.setattr(aov, "FEWEST_TILES", 2)
     for name, picture in aovs(device, everything(), lanes=8).items():
         assert picture.tobytes() == pictures[0][name].tobytes(), name
 

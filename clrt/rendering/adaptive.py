@@ -1,0 +1,26 @@
+"""Adaptive sampling: which tiles' samples to double next."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Samples that all pixels get before any tile gets more than others.
+FLOOR_SPP = 16
+#: By what part of all samples so far a round adds to them.
+GROWTH = 0.5
+
+
+def worth_doubling(errors: NDArray[np.float64], rays: NDArray[np.float64], samples: NDArray[np.int64],
+                   most: float) -> NDArray[np.intp]:
+    """The tiles whose doubling takes most error away for what it costs, by number, of `most` samples together at most.
+
+    All arrays (rows, columns), sums over a tile's values or pixels: squared error, which falls by half or so with each
+    doubling; rays so far, which is what as many samples cost again; samples so far. What does not fit is passed over.
+    """
+    best, costs, chosen = np.argsort(-(errors / np.maximum(rays, 1)).ravel(), kind="stable"), samples.ravel(), []
+    for tile, cost in zip(best.tolist(), costs[best].tolist()):
+        if cost <= most:
+            chosen.append(tile)
+            most -= cost
+    return np.array(chosen, np.intp)

@@ -1,0 +1,118 @@
+"""Adaptive sampling: samples go where they take most error away, and the picture stays the same one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.device.open import Device
+from clrt.output.compare import relmse
+from clrt.rendering.adaptive import FLOOR_SPP, worth_doubling
+from clrt.rendering.renderer import Renderer, State
+from clrt.rendering.tiles import TILE, over_pixels, tile_pixels, tile_sums, tiles_of
+from clrt.scene.file import load
+from clrt.scene.model import Scene
+
+from .test_noise import outdoors, room
+
+SIZE = (61, 44)
+
+
+def renderer(device: Device, scene: Scene, seed: int = 1, spp: int | None = 64, adaptive: bool = True) -> Renderer:
+    """At SIZE, for `spp` planned samples."""
+    return Renderer(scene, device=device.info.index, size=SIZE, spp=spp, seed=seed, adaptive=adaptive)
+
+
+def end(running: Renderer, **stops: float) -> State:
+    """Where it ends with these stop conditions."""
+    return list(running.passes(**stops))[-1]  # type: ignore[arg-type]
+
+
+def truth(device: Device, scene: Scene) -> NDArray[np.float32]:
+    """A picture of many samples."""
+    return end(renderer(device, scene, 99, 1024, adaptive=False), spp=1024).pixels
+
+
+def test_tiles_of_a_picture_that_they_do_not_divide() -> None:
+    """Sums and pixels by tile, told by a loop over the pixels."""
+    rng = np.random.default_rng(1)
+    values, (rows, columns) = rng.random((SIZE[1], SIZE[0], 3)), tiles_of(SIZE)
+    sums, pixels, numbers = np.zeros((rows, columns)), np.zeros((rows, columns)), rng.random((rows, columns))
+    for y, x in np.ndindex(values.shape[:2]):
+        sums[y // TILE, x // TILE] += values[y, x].sum()
+        pixels[y // TILE, x // TILE] += 1
+        assert over_pixels(numbers, SIZE)[y, x] == numbers[y // TILE, x // TILE]
+    np.testing.assert_allclose(tile_sums(values), sums, rtol=1e-12)
+    np.testing.assert_allclose(tile_sums(values[..., 0]) + tile_sums(values[..., 1:]), sums, rtol=1e-12)
+    assert np.array_equal(tile_pixels(SIZE), pixels)
+
+
+@pytest.mark.parametrize("most", [0, 15, 100, 3000, 1e9])
+def test_what_is_worth_doubling(most: float) -> None:
+    """Nothing left out is worth more than what is chosen, unless it did not fit; errors may be 0."""
+    rng = np.random.default_rng(2)
+    samples, rays = 2 ** rng.integers(4, 9, (5, 6)), rng.integers(0, 2000, (5, 6)).astype(float)
+    errors = rng.exponential(size=(5, 6)) * (rng.random((5, 6)) > 0.2)
+    chosen = worth_doubling(errors, rays, samples, most)
+    costs, worth = samples.ravel(), (errors / np.maximum(rays, 1)).ravel()
+    left = np.setdiff1d(np.arange(samples.size), chosen)
+    assert len(set(chosen)) == len(chosen) and costs[chosen].sum() <= most
+    for tile in left:
+        assert costs[tile] > most - costs[chosen[worth[chosen] >= worth[tile]]].sum()
+
+
+@pytest.mark.parametrize("scene", [room(), outdoors()], ids=["room", "outdoors"])
+def test_less_error_for_as_many_samples(device: Device, scene: Scene) -> None:
+    """And what it tells of it is true: for single pictures of so few tiles to a third or so."""
+    expected, errors, told = truth(device, scene), {True: 0.0, False: 0.0}, []
+    for seed in range(4):
+        for adaptive in errors:
+            state = end(renderer(device, scene, seed, adaptive=adaptive), spp=64)
+            found = relmse(state.pixels, expected)
+            assert found is not None and state.noise is not None
+            errors[adaptive] += found
+            told += [state.noise / found**0.5] if adaptive else []
+    assert errors[True] < 0.95 * errors[False]
+    assert 1 / 1.4 < min(told) and max(told) < 1.4
+
+
+def test_samples_double_by_tiles(device: Device) -> None:
+    """All pixels of a tile have the same power of two, some many times others', together what was asked for."""
+    running = renderer(device, outdoors())
+    state = end(running, spp=64)
+    count = state.film.pixels["count"]
+    assert np.array_equal(count, over_pixels(running.session.tile_samples, SIZE)) and state.film.nonfinite_samples == 0
+    levels = np.unique(count)
+    assert np.all(levels & levels - 1 == 0) and levels[0] >= FLOOR_SPP and levels[-1] >= 4 * levels[0]
+    assert 0.97 * 64 * count.size < count.sum() <= 64 * count.size
+    assert running.stop_reason == "spp" and state.spp == round(count.sum() / count.size)
+
+
+def test_interrupted_and_cut_it_is_the_same_picture(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bit for bit, by however many calls it got there, and stopped inside a pass."""
+    at_once = end(renderer(device, room()), spp=64).film.pixels
+    running = renderer(device, room())
+    monkeypatch.setattr("clrt.rendering.session.FEWEST_TILES", 4)
+    monkeypatch.setattr("clrt.device.launch.TARGET_SECONDS", 1e-9)
+    stops = 0
+    while (state := end(running, spp=64, time=running.seconds + 1e-6)) and running.stop_reason == "time":
+        stops += 1
+    assert stops > 20 and state.film.pixels.tobytes() == at_once.tobytes()
+
+
+def test_it_stops_at_an_error(device: Device) -> None:
+    """With no number of samples planned."""
+    running = renderer(device, outdoors(), spp=None)
+    state = end(running, error=0.03)
+    assert running.stop_reason == "error" and state.noise is not None and state.noise <= 0.03 and state.spp > FLOOR_SPP
+
+
+def test_the_scene_file_may_ask_for_it(tmp_path: Path) -> None:
+    """Off unless it does."""
+    file = tmp_path / "sky.toml"
+    for text, asked in (("", False), ("adaptive = true", True)):
+        file.write_text(f"[environment]\ncolor = [1, 1, 1]\n[render]\nspp = 1\n{text}\n")
+        assert load(file).render.adaptive == asked
