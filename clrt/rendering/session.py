@@ -11,7 +11,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ..device.arrays import on_device, resident
+from ..device.arrays import on_device
 from ..device.launch import Launches, wait_for
 from ..device.open import Device
 from ..device.program import BuiltProgram, build, make_kernel
@@ -58,13 +58,13 @@ class Session:
         try:
             scene = [on_device(device, array) for _, array in compiled.buffers.values()]
             self._film = on_device(device, np.zeros(width * height, PIXEL))
-            self._tiles = resident(device, np.arange(self.tile_samples.size, dtype=np.uint32))
+            self._tiles = on_device(device, np.zeros(1, np.uint32))
         except cl.Error as error:
             raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes do not fit: {error}") from error
         self._kernel = make_kernel(device, self.program, "path")
         #: What every kernel of the scene takes first (SCENE_PARAMETERS).
         self.scene_arguments = [*scene, compiled.counts[0]]
-        self._kernel.set_args(*self.scene_arguments, self._film, self._tiles.buffer, self.launch[0])
+        self._kernel.set_args(*self.scene_arguments, self._film, self._tiles, self.launch[0])
         self._warm_up()
 
     def _check_memory(self) -> None:
@@ -114,7 +114,8 @@ class Session:
         yield from self._work()
 
     def _take_in_hand(self, tiles: NDArray[np.intp], parts: list[Part]) -> None:
-        self._tiles.write(self.device, tiles.astype(np.uint32))
+        self._tiles = on_device(self.device, tiles.astype(np.uint32))   # not the last one's, which may be in use
+        self._kernel.set_arg(len(self.scene_arguments) + 1, self._tiles)
         self._in_hand.extend(parts)
         self._next_tile, self._then = 0, self.tile_samples.copy()
         for part in parts:

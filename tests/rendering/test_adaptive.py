@@ -52,12 +52,18 @@ def test_tiles_of_a_picture_that_they_do_not_divide() -> None:
 
 @pytest.mark.parametrize("most", [0, 15, 100, 3000, 1e9])
 def test_what_is_worth_doubling(most: float) -> None:
-    """Nothing left out is worth more than what is chosen, unless it did not fit; errors may be 0."""
+    """Nothing left out is worth more than what is chosen, unless it did not fit; errors may be 0.
+
+    A tile's error counts as much as those of its four neighbours together; beyond the edge they are as it is.
+    """
     rng = np.random.default_rng(2)
     samples, rays = 2 ** rng.integers(4, 9, (5, 6)), rng.integers(0, 2000, (5, 6)).astype(float)
     errors = rng.exponential(size=(5, 6)) * (rng.random((5, 6)) > 0.2)
     chosen = worth_doubling(errors, rays, samples, most)
-    costs, worth = samples.ravel(), (errors / np.maximum(rays, 1)).ravel()
+    smooth = np.array([[(errors[y, x] + sum(errors[min(max(y + i, 0), 4), min(max(x + j, 0), 5)] for i, j in
+                                            ((-1, 0), (1, 0), (0, -1), (0, 1))) / 4) / 2
+                        for x in range(6)] for y in range(5)])
+    costs, worth = samples.ravel(), (smooth / np.maximum(rays, 1)).ravel()
     left = np.setdiff1d(np.arange(samples.size), chosen)
     assert len(set(chosen)) == len(chosen) and costs[chosen].sum() <= most
     for tile in left:
