@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import chisquare, kstest, norm
+from scipy.stats import chisquare, kstest, norm, t
 
-from clrt.study.significance import chi2_test, family_row, mean_test, rejected, sidak
+from clrt.study.significance import FAMILY, chi2_test, corrected, family_row, mean_test, rejected, sidak, t_test
 
 CELLS = np.array([0.3, 0.2, 0.2, 0.1, 0.1, 0.06, 0.04])
 
@@ -79,9 +79,20 @@ def test_mean_without_variance_must_be_exact() -> None:
     assert mean_test(np.array([0.5, 0.5]), 0.0, 16, np.array([0.5, 0.25])).tolist() == [1, 0]
 
 
+@pytest.mark.parametrize("freedom", [1, 1.7, 2, 4.5, 30, 95.3, 4000])
+def test_t_p_values_are_students(freedom: float) -> None:
+    for value in (0.0, 0.3, -1.0, 4.0, 9.0):
+        assert t_test(value, freedom) == pytest.approx(2 * t.sf(abs(value), freedom), rel=1e-9)
+
+
 @pytest.mark.parametrize("tests", [1, 7, 10**6])
 def test_sidak_keeps_the_error_of_all_tests_together(tests: int) -> None:
     assert 1 - (1 - sidak(0.01, tests)) ** tests == pytest.approx(0.01, rel=1e-6)
+
+
+def test_corrected_p_values_are_sidaks() -> None:
+    assert corrected(sidak(FAMILY, 15), 15) == pytest.approx(FAMILY)
+    assert corrected(1.0, 3) == 1 and corrected(0.0, 3) == 0
 
 
 def test_a_family_rejects_those_below_its_own_significance() -> None:

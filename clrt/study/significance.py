@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -32,11 +33,15 @@ def rejected(p_values: Mapping[str, float], alpha: float = FAMILY) -> dict[str, 
     return {name: p for name, p in p_values.items() if not p >= limit}
 
 
+def corrected(p: float, tests: int) -> float:
+    """The p-value of the least of `tests` independent ones: below alpha where p is below `sidak(alpha, tests)`."""
+    return -math.expm1(tests * math.log1p(-p)) if p < 1 else 1.0
+
+
 def family_row(case: str, what: str, p_values: Mapping[str, float]) -> Row:
     """How many of a family of tests are rejected; the figure is the least p-value, corrected for their number."""
-    least = min(p_values.values())
-    corrected = -math.expm1(len(p_values) * math.log1p(-least)) if least < 1 else 1.0
-    return Row(case, what, len(p_values), len(rejected(p_values)), corrected, "least p, corrected")
+    least = corrected(min(p_values.values()), len(p_values))
+    return Row(case, what, len(p_values), len(rejected(p_values)), least, "least p, corrected")
 
 
 def chi2_test(observed: ArrayLike, expected: ArrayLike, min_expected: float = 5.0) -> float:
@@ -65,6 +70,26 @@ def mean_test(mean: Numbers, variance: Numbers, count: Numbers, expected: Number
     with np.errstate(divide="ignore", invalid="ignore"):
         z = np.where(difference == 0, 0.0, difference / error)
     return np.asarray(np.vectorize(math.erfc, otypes=[np.float64])(z / np.sqrt(2)))
+
+
+def t_test(t: float, freedom: float) -> float:
+    """Two-sided: the p-value of Student's t, a mean over its standard error as `freedom` (>= 1) numbers tell that.
+
+    With t = √freedom·tan θ its density is as cos^(freedom − 1) θ, whose integral from θ on is divided by the whole.
+    """
+    nodes, weights = _gauss()
+
+    def above(start: float) -> float:
+        width = math.pi / 2 - start
+        return float(np.sum(weights * np.sin(width * (1 - nodes) / 2) ** (freedom - 1))) * width
+
+    return above(math.atan(abs(t) / math.sqrt(freedom))) / above(0.0)
+
+
+@cache
+def _gauss() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    nodes, weights = np.polynomial.legendre.leggauss(256)
+    return nodes, weights
 
 
 def _pooled(counts: NDArray[np.float64], means: NDArray[np.float64],
