@@ -3,82 +3,92 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
-from math import sqrt
+from math import ceil, inf, sqrt
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+from .options import Size
+
+if TYPE_CHECKING:
+    from ..study.converge import Effort
+
+#: Of contestants.py, there after "clrt, ".
+CHOICES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "lanes 8", "lanes 16", "unplanned"]
 
 
 @click.command("converge")
 @click.argument("scenes", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SCENE...")
+@click.option("--choice", "names", multiple=True, type=click.Choice(CHOICES),
+              help="Compare these alone, with the first; may be repeated. Default: up to bvh2.")
 @click.option("--peers", is_flag=True, help="Beside other renderers, where installed: Mitsuba, Cycles.")
 @click.option("--device", "selectors", multiple=True, metavar="SEL", help="See `clrt devices`; may be repeated.")
+@click.option("--size", type=Size(), help="Picture size in pixels.")
 @click.option("--time", "seconds", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
-              help="That a picture may take; default: 10, with --quick 1.")
+              help="That a picture may take; default: 10, with --quick 1, with --spp any.")
+@click.option("--spp", multiple=True, type=click.IntRange(min=1),
+              help="Samples a pixel, instead of 1, 2, 4 ...; may be repeated.")
+@click.option("--seeds", type=click.IntRange(min=1), help="Pictures of each; default: 5, with --quick 3.")
+@click.option("--reference-spp", type=click.IntRange(min=2),
+              help="Samples a pixel of the reference; default: 4096, with --quick 256.")
 @click.option("--quick", is_flag=True, help="Fewer seeds and a rougher reference.")
 @click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
-def converge_command(scenes: tuple[Path, ...], peers: bool, selectors: tuple[str, ...], seconds: float | None,
-                     quick: bool, json_file: Path | None, plot: Path | None) -> None:
+def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], peers: bool, selectors: tuple[str, ...],
+                     size: tuple[int, int] | None, json_file: Path | None, plot: Path | None, **asked: Any) -> None:
     """How fast pictures of each SCENE come near a reference of many samples, which is rendered once and kept.
 
-    Pictures of 1, 2, 4 ... samples a pixel by all contestants in turns, with several seeds.
+    Pictures of 1, 2, 4 ... samples a pixel by all contestants in turns, with several seeds. Also whether the error that
+    clrt estimates is the true one, and whether a contestant is biased (ask for many seeds of one number of samples).
     """
     from ..device.discover import choose
     from ..output.files import check_target
     from ..output.plots import check_plot, plot_errors
     from ..output.report import write_report
     from ..scene.file import load
-    from ..study.converge import QUICK, Effort, measure_convergence
+    from ..study.calibration import calibrations
+    from ..study.contestants import CHOICES, MORE_CHOICES
+    from ..study.converge import measure_convergence
+    from .converge_tables import calibration_lines, scene_lines
 
     if json_file is not None:
         check_target(json_file)
     if plot is not None:
         check_plot(plot)
-    effort = QUICK if quick else Effort()
     devices = [choose(selector)[0] for selector in selectors or (None,)]
     for device in devices:
         click.echo(f"device {device.index}: {device.name} ({device.platform}, {device.driver})")
+    loaded = [load(scene) for scene in scenes]
+    if size is not None:
+        loaded = [replace(scene, render=replace(scene.render, size=size)) for scene in loaded]
+    chosen = [name if name == "clrt" else f"clrt, {name}" for name in names] or list(CHOICES)
     results = []
     for result in measure_convergence(
-            [load(scene) for scene in scenes], [device.index for device in devices], peers=peers,
-            effort=effort._replace(seconds=seconds or effort.seconds), say=partial(click.echo, err=True)):
-        click.echo("\n".join(_lines(result, all(device.type == "cpu" for device in devices))) + "\n")
+            loaded, [device.index for device in devices], _effort(**asked), peers=peers,
+            choices={name: (CHOICES | MORE_CHOICES)[name] for name in chosen}, say=partial(click.echo, err=True)):
+        click.echo("\n".join(scene_lines(result, all(device.type == "cpu" for device in devices))) + "\n")
         results.append(result)
+    told = calibrations(results)
+    for line in calibration_lines(told):
+        click.echo(line)
     if plot is not None:
         click.echo(str(plot_errors(plot, {result["scene"]: _curves(result) for result in results})))
     if json_file is not None:
-        write_report(json_file, {"quick": quick, "scenes": results})
+        write_report(json_file, {"quick": asked["quick"], "scenes": results, "calibration": told})
         click.echo(str(json_file))
 
 
-def _lines(result: Mapping[str, Any], on_cpu: bool) -> list[str]:
-    from ..study.converge import AGREES
+def _effort(quick: bool, seconds: float | None, spp: tuple[int, ...], seeds: int | None,
+            reference_spp: int | None) -> Effort:
+    from ..study.converge import QUICK, Effort
 
-    (width, height), reference = result["size"], result["reference"]
-    lines = [f"{result['scene']}: {width}x{height}, {result['max_depth']} path edges; reference of {reference['spp']} "
-             f"samples a pixel, relMSE {reference['relmse']:.1e}",
-             f"  {'':28}{'spp':>7}{'seconds':>9}{'Msamples/s':>12}{'relMSE':>10}{'relMSE·s':>10}{'ratio':>7}"
-             + " (  CPU)" * on_cpu + f"{'slope':>7}  mean ratio"]
-    lines += [_line(name, row, on_cpu) for name, row in result["contestants"].items()]
-    lines += [f"  {name}: {why}" for name, why in result["missing"].items()]
-    lines += [f"  {name}: more than {AGREES:.1%} off in the mean, by too few samples or another scene"
-              for name, row in result["contestants"].items() if not row["agrees"]]
-    return lines + LEGEND
-
-
-def _line(name: str, row: Mapping[str, Any], on_cpu: bool) -> str:
-    last = row["last"]
-    return (f"  {name:28}{row['spp'][last]:7}{row['seconds'][last]:9.3g}{row['msamples']:12.3g}"
-            f"{row['relmse'][last]:10.3g}{row['relmse_seconds']:10.3g}{row['ratio']:7.2f}"
-            + f" ({row['cpu_ratio']:5.2f})" * on_cpu + f"{row['slope']:7.2f}  "
-            + " ".join(f"{ratio:.4f}" for ratio in row["mean_ratio"]))
-
-
-LEGEND = ["  relMSE: mean over seeds, less the reference's own; ratio: of relMSE·s (CPU: processor's) to the first's",
-          "  slope: of log relMSE over log samples; mean ratio: to the reference, by channel"]
+    usual = QUICK if quick else Effort()
+    return Effort(seconds=seconds or (inf if spp else usual.seconds), seeds=seeds or usual.seeds, steps=usual.steps,
+                  step_spp=ceil(reference_spp / usual.steps) if reference_spp else usual.step_spp,
+                  spp=sorted(set(spp)) or usual.spp)
 
 
 def _curves(result: Mapping[str, Any]) -> dict[str, list[tuple[float, float]]]:

@@ -15,22 +15,26 @@ from ..errors import UsageError
 from ..rendering.renderer import Renderer
 from ..scene.model import Scene
 
-#: Choices of the renderer by name; the first is what the others are compared with.
+#: Choices of the renderer by name, for its keywords; the first is what the others are compared with.
 CHOICES: dict[str, dict[str, Any]] = {
     "clrt": {}, "clrt, stratified": {"sampler": "stratified"}, "clrt, independent": {"sampler": "independent"},
     "clrt, lanes 1": {"lanes": 1}, "clrt, bvh2": {"layout": "bvh2"}}
+#: Those that are compared only if asked for; unplanned: as with --time or --error, when no `spp` is known.
+MORE_CHOICES: dict[str, dict[str, Any]] = {
+    "clrt, lanes 8": {"lanes": 8}, "clrt, lanes 16": {"lanes": 16}, "clrt, unplanned": {"spp": None}}
 #: Other renderers: what pip calls them, and the module beside this one whose `contestants(scene)` they are.
 PEERS = {"mitsuba": "mitsuba_renderer", "bpy": "cycles_renderer"}
 
 
 class Picture(NamedTuple):
     """pixels: (h, w, 3) float32 of so many samples; seconds, cpu_seconds (of all cores): what they took once all was
-    loaded and compiled."""
+    loaded and compiled. noise: √relMSE as the renderer tells it, where it does."""
 
     spp: int
     seconds: float
     cpu_seconds: float
     pixels: NDArray[np.float32]
+    noise: float | None = None
 
 
 #: Renders a picture with so many samples a pixel, or few more, and a seed.
@@ -59,11 +63,16 @@ def peers_of(scene: Scene) -> tuple[dict[str, Contestant], dict[str, str]]:
 
 
 def _render(scene: Scene, device: int, options: Mapping[str, Any], spp: int, seed: int) -> Picture:
-    """Without the states that `Renderer.passes` makes on the way."""
-    session = Renderer(scene, device=device, spp=spp, seed=seed, **options).session
-    start, cpu = time.perf_counter(), time.process_time()
-    while session.samples_done < spp:
-        for _ in session.render(min(spp - session.samples_done, session.pass_limit())):
-            pass
-    film = session.film()
-    return Picture(spp, time.perf_counter() - start, time.process_time() - cpu, film.mean.astype(np.float32))
+    """The clock stands still while states are made: at powers of two of the samples, for the noise that they tell."""
+    renderer = Renderer(scene, device=device, **{"spp": spp, "seed": seed, **options})
+    session, seconds, cpu_seconds = renderer.session, 0.0, 0.0
+    for end in [*(1 << k for k in range((spp - 1).bit_length())), spp]:
+        start, cpu = time.perf_counter(), time.process_time()
+        while session.samples_done < end:
+            for _ in session.render(min(end - session.samples_done, session.pass_limit())):
+                pass
+        session.wait()
+        seconds += time.perf_counter() - start
+        cpu_seconds += time.process_time() - cpu
+        state = renderer.state()
+    return Picture(spp, seconds, cpu_seconds, state.pixels, state.noise)

@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from math import log, nan
+from math import inf, log, nan
 from statistics import fmean, linear_regression, median
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..output.compare import mean_ratios, relmse
 from ..scene.model import Scene
+from .bias import mean_tests
+from .calibration import noise_ratio
 from .contestants import CHOICES, Contestant, Picture, choices_on, peers_of
-from .reference import Reference, render_reference
+from .reference import STEP_SPP, Reference, render_reference
+
+#: Samples a pixel, until there is no more time.
+POWERS = [2**power for power in range(32)]
 
 
 class Effort(NamedTuple):
-    """seconds: that a picture may take; seeds: pictures of each number of samples; steps: see reference.py."""
+    """seconds: that a picture may take; seeds: pictures of each number of samples; steps, step_spp: see reference.py.
+
+    spp: the numbers of samples a pixel, ascending.
+    """
 
     seconds: float = 10.0
     seeds: int = 5
     steps: int = 32
+    step_spp: int = STEP_SPP
+    spp: Sequence[int] = POWERS
 
 
 QUICK = Effort(seconds=1.0, seeds=3, steps=2)
@@ -27,13 +39,17 @@ AGREES = 0.005
 
 
 class Point(NamedTuple):
-    """What one picture took, and how far it is from the reference; mean_ratio: of each channel."""
+    """What one picture took, and how far it is from the reference; mean_ratio: of each channel.
+
+    noise: the √relMSE that the renderer told; NaN where it tells none.
+    """
 
     spp: int
     seconds: float
     cpu_seconds: float
     relmse: float
     mean_ratio: list[float]
+    noise: float = nan
 
 
 #: Of each contestant, by samples a pixel, a point a seed.
@@ -57,7 +73,7 @@ def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort:
         def on_step(step: int, name: str = scene.name) -> None:
             say(f"{name}: step {step + 1} of {effort.steps} of its reference")
 
-        reference = render_reference(scene, effort.steps, device=devices[0], on_step=on_step)
+        reference = render_reference(scene, effort.steps, device=devices[0], step_spp=effort.step_spp, on_step=on_step)
         points = take_turns(choices_on(scene, devices, choices) | rivals, reference, effort)
         yield {"scene": scene.name, "size": scene.render.size, "max_depth": scene.render.max_depth,
                "reference": {"spp": reference.spp, "relmse": reference.relmse}, "missing": missing,
@@ -65,16 +81,15 @@ def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort:
 
 
 def take_turns(contestants: Mapping[str, Contestant], reference: Reference, effort: Effort) -> Points:
-    """Pictures of 1, 2, 4 ... samples, of each while twice as many will take no more than the seconds of `effort`."""
+    """Pictures of effort's numbers of samples, of each while the next will take no more than effort's seconds."""
     points: Points = {name: {} for name in contestants}
     for seed in range(effort.seeds):
-        running, spp = list(contestants), 1
-        while running:
+        running = list(contestants)
+        for spp, following in zip(effort.spp, [*effort.spp[1:], inf]):
             for name in running:
                 picture = contestants[name](spp, seed)
                 points[name].setdefault(spp, []).append(_compare(picture, reference))
-            running = [name for name in running if 2 * points[name][spp][-1].seconds <= effort.seconds]
-            spp *= 2
+            running = [name for name in running if points[name][spp][-1].seconds * following / spp <= effort.seconds]
     return {name: {spp: row for spp, row in rows.items() if len(row) == effort.seeds} for name, rows in points.items()}
 
 
@@ -82,7 +97,8 @@ def _compare(picture: Picture, reference: Reference) -> Point:
     error = relmse(picture.pixels, reference.pixels)
     ratios = mean_ratios(picture.pixels, reference.pixels)
     return Point(picture.spp, picture.seconds, picture.cpu_seconds, nan if error is None else error,
-                 [nan if ratio is None else ratio for ratio in ratios])
+                 [nan if ratio is None else ratio for ratio in ratios],
+                 nan if picture.noise is None else picture.noise)
 
 
 def figures(points: Points, reference: Reference) -> dict[str, dict[str, Any]]:
@@ -92,7 +108,8 @@ def figures(points: Points, reference: Reference) -> dict[str, dict[str, Any]]:
     above the reference's own. There: msamples (a second); relmse_seconds and relmse_cpu_seconds, relMSE times seconds,
     which stays while errors fall with the square root of time; these over the first contestant's: ratio, cpu_ratio.
     slope: of log relMSE over log samples, up to last (−1 where samples are independent). Of the most samples of all:
-    each channel's mean_ratio to the reference, and whether it agrees with 1 (see AGREES). NaN: has no meaning.
+    each channel's mean_ratio to the reference, whether it agrees with 1 (see AGREES), and what `mean_tests` says of it.
+    noise_ratio: by samples and seeds, see `noise_ratio`. NaN: has no meaning.
     """
     rows = {name: _averages(levels, reference.relmse) for name, levels in points.items()}
     pixels = reference.total.shape[0] * reference.total.shape[1]
@@ -107,7 +124,9 @@ def figures(points: Points, reference: Reference) -> dict[str, dict[str, Any]]:
     for row in rows.values():
         row |= {"ratio": _over(row["relmse_seconds"], first["relmse_seconds"]),
                 "cpu_ratio": _over(row["relmse_cpu_seconds"], first["relmse_cpu_seconds"])}
-    return rows
+    tests = mean_tests({name: np.array([point.mean_ratio for point in levels[max(levels)]])
+                        for name, levels in points.items()}, reference.means)
+    return {name: row | tests[name] for name, row in rows.items()}
 
 
 def _averages(levels: Mapping[int, Sequence[Point]], own: float) -> dict[str, Any]:
@@ -117,6 +136,8 @@ def _averages(levels: Mapping[int, Sequence[Point]], own: float) -> dict[str, An
             "seconds": [median(point.seconds for point in level) for level in levels.values()],
             "cpu_seconds": [median(point.cpu_seconds for point in level) for level in levels.values()],
             "relmse": [fmean(point.relmse for point in level) - own for level in levels.values()],
+            "noise_ratio": [[noise_ratio(point.noise, point.relmse, own) for point in level]
+                            for level in levels.values()],
             "mean_ratio": [fmean(channel) for channel in channels],
             "agrees": not any(min(channel) > 1 + AGREES or max(channel) < 1 - AGREES for channel in channels)}
 

@@ -28,16 +28,25 @@ FIRST_SEED = 2**32 - 1
 
 @dataclass(frozen=True)
 class Reference:
-    """total, squares: (h, w, 3) float64, of the steps' pictures and of their squares."""
+    """total, squares: (h, w, 3) float64, of the steps' pictures and of their squares; means: (steps, 3), of each.
 
-    steps: int
+    step_spp: samples a pixel of a step.
+    """
+
+    means: NDArray[np.float64]
     total: NDArray[np.float64]
     squares: NDArray[np.float64]
+    step_spp: int = STEP_SPP
+
+    @property
+    def steps(self) -> int:
+        """How many pictures it is the mean of."""
+        return len(self.means)
 
     @property
     def spp(self) -> int:
         """Samples a pixel."""
-        return self.steps * STEP_SPP
+        return self.steps * self.step_spp
 
     @property
     def pixels(self) -> NDArray[np.float32]:
@@ -53,38 +62,41 @@ class Reference:
 
     def plus(self, picture: NDArray[np.float64]) -> Reference:
         """With one more step."""
-        return Reference(self.steps + 1, self.total + picture, self.squares + picture**2)
+        return Reference(np.append(self.means, [picture.mean((0, 1))], 0), self.total + picture,
+                         self.squares + picture**2, self.step_spp)
 
 
-def render_reference(scene: Scene, steps: int, *, device: str | int | None = None,
+def render_reference(scene: Scene, steps: int, *, device: str | int | None = None, step_spp: int = STEP_SPP,
                      on_step: Callable[[int], None] = lambda step: None) -> Reference:
     """The reference of `scene` with at least `steps` steps (2 or more), as far as possible from the cache.
+
+    step_spp: samples a pixel of a step; the more, the sooner errors fall, as a step's samples know of each other.
 
     Kept by all that makes the picture: kernels, buffers, size, depth and camera; a damaged file counts as none.
     on_step hears the number of each step that has to be rendered. Raises what `Renderer` does.
     """
     renderer = Renderer(scene, device=device)
     width, height = renderer.settings.size
-    name = REFERENCES.replace("*", _digest(renderer))
+    name = REFERENCES.replace("*", _digest(renderer, step_spp))
     black = np.zeros((height, width, 3))
-    reference = _kept(name, black.shape) or Reference(0, black, black)
+    reference = _kept(name, black.shape, step_spp) or Reference(np.zeros((0, 3)), black, black, step_spp)
     while reference.steps < steps:
         on_step(reference.steps)
-        reference = reference.plus(_render(scene, FIRST_SEED - reference.steps, device))
+        reference = reference.plus(_render(scene, step_spp, FIRST_SEED - reference.steps, device))
         _keep(name, reference)
     return reference
 
 
-def _render(scene: Scene, seed: int, device: str | int | None) -> NDArray[np.float64]:
-    for state in Renderer(scene, spp=STEP_SPP, seed=seed, device=device).passes(spp=STEP_SPP):
+def _render(scene: Scene, spp: int, seed: int, device: str | int | None) -> NDArray[np.float64]:
+    for state in Renderer(scene, spp=spp, seed=seed, device=device).passes(spp=spp):
         pass
     return state.film.mean
 
 
-def _digest(renderer: Renderer) -> str:
+def _digest(renderer: Renderer, step_spp: int) -> str:
     compiled, settings = renderer.compiled, renderer.settings
     digest = hashlib.sha256(compiled.source.encode())
-    digest.update(repr((STEP_SPP, settings.size, settings.max_depth, settings.integrator, compiled.camera)).encode())
+    digest.update(repr((step_spp, settings.size, settings.max_depth, settings.integrator, compiled.camera)).encode())
     for array in [compiled.counts, *(array for _, array in compiled.buffers.values())]:
         if isinstance(array, np.ndarray):  # trees built on the device stay there; no picture depends on them
             digest.update(array.tobytes())
@@ -93,18 +105,18 @@ def _digest(renderer: Renderer) -> str:
 
 def _keep(name: str, reference: Reference) -> None:
     file = BytesIO()
-    np.savez(file, steps=reference.steps, total=reference.total, squares=reference.squares)
+    np.savez(file, means=reference.means, total=reference.total, squares=reference.squares)
     write_file(name, file.getvalue())
 
 
-def _kept(name: str, shape: tuple[int, ...]) -> Reference | None:
+def _kept(name: str, shape: tuple[int, ...], step_spp: int) -> Reference | None:
     """What is kept under `name`; None where nothing is, or nothing that can be read (archives have checksums)."""
     content = read_file(name)
     if content is None:
         return None
     try:
         stored: Any = np.load(BytesIO(content))
-        reference = Reference(int(stored["steps"]), stored["total"], stored["squares"])
+        reference = Reference(stored["means"], stored["total"], stored["squares"], step_spp)
     except (OSError, ValueError, EOFError, KeyError, BadZipFile):
         return None
     return reference if reference.total.shape == reference.squares.shape == shape else None

@@ -12,16 +12,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from clrt.cli.bench_converge import CHOICES as NAMES
+from clrt.cli.bench_converge import converge_command
 from clrt.device.cache import REFERENCES
 from clrt.device.open import Device
 from clrt.output.images import read_image
 from clrt.rendering.renderer import Renderer
 from clrt.scene.file import load
 from clrt.scene.model import Camera, Scene
-from clrt.study.contestants import CHOICES, Contestant, Picture, choices_on
+from clrt.study.contestants import CHOICES, MORE_CHOICES, Picture, choices_on
 from clrt.study.converge import Effort, Point, figures, measure_convergence, take_turns
 from clrt.study.reference import FIRST_SEED, STEP_SPP, Reference, render_reference
+
+from .known import EXACT, MEANS, TRUTH, sampler
 
 SCENE = """
 [camera]
@@ -45,18 +50,6 @@ material = "white"
 center = [-2, 5, 2]
 material = "lamp"
 """
-RNG = np.random.default_rng(3)
-TRUTH = RNG.uniform(0, 2, (48, 64, 3))
-EXACT = Reference(2, 2 * TRUTH, 2 * TRUTH**2)
-
-
-def sampler(variance: float, seconds: float, power: float = 1.0, gain: float = 1.0) -> Contestant:
-    """A renderer whose error is known: pictures of this variance over samples**power, and of seconds a sample."""
-    def render(spp: int, seed: int) -> Picture:
-        noise = np.random.default_rng([seed, spp]).normal(size=TRUTH.shape) * np.sqrt(variance / spp**power)
-        return Picture(spp, seconds * spp, 2 * seconds * spp, (gain * TRUTH + noise).astype(np.float32))
-
-    return render
 
 
 def test_figures_are_those_of_known_errors() -> None:
@@ -79,13 +72,15 @@ def test_figures_are_those_of_known_errors() -> None:
 
 def test_relmse_against_a_reference_with_noise_of_its_own() -> None:
     """16 steps of variance 1: it estimates its error as 1/16 · mean(1/(r² + 0.01)), which is then subtracted."""
-    steps = [TRUTH + RNG.normal(size=TRUTH.shape) for _ in range(16)]
-    reference = Reference(0, np.zeros_like(TRUTH), np.zeros_like(TRUTH))
+    rng = np.random.default_rng(7)
+    steps = [TRUTH + rng.normal(size=TRUTH.shape) for _ in range(16)]
+    reference = Reference(np.zeros((0, 3)), np.zeros_like(TRUTH), np.zeros_like(TRUTH))
     for step in steps:
         reference = reference.plus(step)
     scale = float(np.mean(1 / (np.mean(steps, 0) ** 2 + 0.01)))
     assert (reference.steps, reference.spp) == (16, 16 * STEP_SPP)
     np.testing.assert_allclose(reference.pixels, np.mean(steps, 0), rtol=1e-6)
+    np.testing.assert_allclose(reference.means, np.mean(steps, (1, 2)), rtol=1e-12)
     assert reference.relmse == pytest.approx(scale / 16, rel=0.03)
     row = figures(take_turns({"one": sampler(0.25, 0.4)}, reference, Effort(1, 5, 2)), reference)["one"]
     assert row["relmse"] == pytest.approx([0.25 * scale, 0.125 * scale], rel=0.05), "not 0.3125 and 0.1875"
@@ -93,7 +88,7 @@ def test_relmse_against_a_reference_with_noise_of_its_own() -> None:
 
 def test_figures_end_where_errors_no_longer_stand_out() -> None:
     """Above the reference's own error; and with the samples that every seed has reached."""
-    reference = Reference(2, 2 * TRUTH, 2 * TRUTH**2 + 1e-3 * (TRUTH**2 + 0.01))
+    reference = Reference(MEANS, 2 * TRUTH, 2 * TRUTH**2 + 1e-3 * (TRUTH**2 + 0.01))
     own = reference.relmse
     assert own == pytest.approx(5e-4)
 
@@ -159,7 +154,7 @@ def test_damaged_references_are_rendered_anew(damage: str, scene: Scene, device:
     content[len(content) // 2] ^= 1
     file.write_bytes({"cut": content[:len(content) // 2], "changed": content}.get(damage, b""))
     if damage == "others":
-        np.savez(file, steps=9, total=np.zeros((2, 2, 3)), squares=np.zeros((2, 2, 3)))
+        np.savez(file, means=np.zeros((9, 3)), total=np.zeros((2, 2, 3)), squares=np.zeros((2, 2, 3)))
     anew, heard = rendered(scene, 2, device)
     assert heard == [0, 1]
     np.testing.assert_array_equal(anew.pixels, whole.pixels)
@@ -198,7 +193,9 @@ main(["bench", "converge", "ball.toml", "--quick", "--time", "0.004", "--peers",
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    scene, = json.loads((tmp_path / "c.json").read_text())["scenes"]
+    written = json.loads((tmp_path / "c.json").read_text())
+    scene, = written["scenes"]
+    assert list(written) == ["quick", "scenes", "calibration"] and set(written["calibration"]) <= set(CHOICES)
     assert {"scene", "size", "max_depth", "reference", "contestants", "missing"} == set(scene)
     assert scene["missing"] == {name: f"not installed (pip install {name})" for name in ("mitsuba", "bpy")}
     assert all(f"{package}: {why}" in done.stdout for package, why in scene["missing"].items())
@@ -206,17 +203,41 @@ main(["bench", "converge", "ball.toml", "--quick", "--time", "0.004", "--peers",
     assert list(scene["contestants"]) == list(CHOICES)
     for name, row in scene["contestants"].items():
         assert {"spp", "seconds", "cpu_seconds", "relmse", "last", "msamples", "relmse_seconds", "relmse_cpu_seconds",
-                "ratio", "cpu_ratio", "slope", "mean_ratio", "agrees"} == set(row)
-        assert len(row["spp"]) == len(row["seconds"]) == len(row["relmse"])
+                "ratio", "cpu_ratio", "slope", "mean_ratio", "agrees", "noise_ratio", "z", "p", "biased"} == set(row)
+        assert len(row["spp"]) == len(row["seconds"]) == len(row["relmse"]) == len(row["noise_ratio"])
         assert any(line.startswith(f"  {name}  ") for line in done.stdout.splitlines())
     assert scene["contestants"]["clrt"]["ratio"] == 1
     assert done.stdout.splitlines()[-2:] == ["c.png", "c.json"] and read_image(tmp_path / "c.png").std() > 0.05
     assert "ball: step 1 of 2 of its reference" in done.stderr and "step" not in done.stdout
 
 
+def test_command_does_what_is_asked(tmp_path: Path) -> None:
+    """Numbers of samples, seeds, size, choices and reference; independent samples have errors as they are told."""
+    (tmp_path / "ball.toml").write_text(SCENE)
+    asked = ["--choice", "independent", "--choice", "unplanned", "--spp", "8", "--spp", "3", "--seeds", "4",
+             "--size", "32x16", "--reference-spp", "2000", "--quick", "--json", str(tmp_path / "c.json")]
+    done = CliRunner().invoke(converge_command, [str(tmp_path / "ball.toml"), *asked])
+    assert done.exit_code == 0, done.output
+    written = json.loads((tmp_path / "c.json").read_text())
+    scene, = written["scenes"]
+    assert scene["size"] == [32, 16] and scene["reference"]["spp"] == 2000
+    rows = scene["contestants"]
+    assert list(rows) == list(written["calibration"]) == ["clrt, independent", "clrt, unplanned"]
+    for name, row in rows.items():
+        assert row["spp"] == [3, 8] and [len(ratios) for ratios in row["noise_ratio"]] == [4, 4]
+        assert written["calibration"][name]["pictures"] == 8 and not row["biased"]
+    assert written["calibration"]["clrt, independent"]["median"] == pytest.approx(1, abs=0.15)
+    assert "3: " in done.output and "pictures  to 1.2x   median    worst" in done.output
+
+
+def test_command_knows_all_choices() -> None:
+    assert [f"clrt, {name}".removesuffix(", clrt") for name in NAMES] == [*CHOICES, *MORE_CHOICES]
+
+
 @pytest.mark.parametrize(("arguments", "code", "words"), [
     (["no.toml"], 3, "no.toml"), (["no.toml", "--plot", "a/b.png"], 6, "a/b.png"), ([], 2, "SCENE"),
-    (["no.toml", "--device", "nonesuch"], 4, "nonesuch"), (["no.toml", "--time", "0"], 2, "--time")])
+    (["no.toml", "--device", "nonesuch"], 4, "nonesuch"), (["no.toml", "--time", "0"], 2, "--time"),
+    (["no.toml", "--choice", "lanes"], 2, "'lanes 1'")])
 def test_mistakes_end_in_one_message(arguments: list[str], code: int, words: str, tmp_path: Path) -> None:
     done: Any = subprocess.run([sys.executable, "-m", "clrt", "bench", "converge", *arguments], cwd=tmp_path,
                                capture_output=True, text=True)
