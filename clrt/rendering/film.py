@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,19 @@ from numpy.typing import NDArray
 RELATIVE_FLOOR = 0.01
 
 
-def relative_to(mean: NDArray[np.floating[Any]]) -> NDArray[np.floating[Any]]:
-    """expected² + 0.01 for a picture (h, w, 3); a noisy pixel's neighbours tell what is to be expected of it."""
+def relative_to(mean: NDArray[np.float64], variance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """expected² + 0.01 for a picture (h, w, 3) with the variance of its values.
+
+    What is expected of a pixel is the mean of the eight around it, so that one bright by chance does not count itself;
+    and from there on towards its own as far as its variance cannot explain the difference (James and Stein 1961).
+    """
     padded = np.pad(mean, ((1, 1), (1, 1), (0, 0)), mode="edge")
     rows = padded[:-2] + padded[1:-1] + padded[2:]
-    expected = (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]) / 9
-    return np.asarray(expected**2 + RELATIVE_FLOOR)
+    around = (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:] - mean) / 8
+    difference = mean - around
+    with np.errstate(divide="ignore", invalid="ignore"):
+        own = np.nan_to_num(np.maximum(1 - variance / difference**2, 0))
+    return np.asarray((around + own * difference) ** 2 + RELATIVE_FLOOR)
 
 
 class Film:
@@ -25,27 +33,39 @@ class Film:
     def __init__(self, pixels: NDArray[Any]) -> None:
         self.pixels = pixels
 
-    @property
+    @cached_property
     def mean(self) -> NDArray[np.float64]:
         """(height, width, 3): mean of the samples kept; 0 where there are none."""
         total = self.pixels["sum"].astype(np.float64) + self.pixels["sum_error"]
         return np.asarray(total / np.maximum(self.pixels["count"], 1)[..., None])
 
+    @cached_property
+    def variance(self) -> NDArray[np.float64]:
+        """(height, width, 3): of the mean, the sample variance over n; NaN of fewer than two samples.
+
+        Where squares were too large to be summed (kernels/film.cl) it is taken as mean², the most it can be.
+        """
+        count = self.pixels["count"].astype(np.float64)[..., None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            squares = (self.pixels["square"].astype(np.float64) + self.pixels["square_error"]) / count
+            summed = squares >= (1 - 1e-6) * self.mean**2    # false for NaN, too
+            return np.where(summed, np.maximum(squares - self.mean**2, 0) / (count - 1), self.mean**2)
+
+    @cached_property
+    def relative_to(self) -> NDArray[np.float64]:
+        """(height, width, 3): what squared errors are divided by in relMSE, as far as this picture tells."""
+        return relative_to(self.mean, self.variance)
+
     @property
     def noise(self) -> float | None:
         """√relMSE that independent samples would have: sqrt(mean(Var[mean] / (expected² + 0.01))) over all values.
 
-        Var[mean] is the sample variance over n. Where squares were too large to be summed (kernels/film.cl) it is taken
-        as mean², the most it can be. None before every pixel has two samples.
+        None before every pixel has two samples.
         """
-        count = self.pixels["count"].astype(np.float64)[..., None]
+        count = self.pixels["count"]
         if not count.size or count.min() < 2:
             return None
-        mean = self.mean
-        squares = (self.pixels["square"].astype(np.float64) + self.pixels["square_error"]) / count
-        summed = squares >= (1 - 1e-6) * mean**2    # false for NaN, too
-        variance = np.where(summed, np.maximum(squares - mean**2, 0) / (count - 1), mean**2)
-        return float(np.sqrt(np.mean(variance / relative_to(mean))))
+        return float(np.sqrt(np.mean(self.variance / self.relative_to)))
 
     @property
     def samples(self) -> int:

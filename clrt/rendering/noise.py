@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .film import Film, relative_to
+from .film import Film
 from .tiles import over_pixels, tile_sums
 
 #: By how much the squared error falls when samples double: as for independent ones, up to the third power.
 LEAST_FALL, MOST_FALL = 2.0, 8.0
+#: And while only two samples are known.
+FIRST_FALL = 2.4
 
 
 class NoiseEstimate:
@@ -18,8 +20,8 @@ class NoiseEstimate:
     A pixel's samples are not independent, so their variance says too much. But the two halves of the first 2n samples
     are alike, which is enough: with E_n the mean of the first n and V(n) its squared error, Cov(E_n, E_2n) = V(2n),
     hence the mean square of E_n − E_2n is V(n) − V(2n). If V falls by r with each doubling that is (r − 1)·V(2n). The
-    ratios of the last such differences, over all tiles that have as many samples, tell how fast it fell, the slower of
-    one step and two counts, and as that always slows down, towards 2 in the end, r is the geometric mean of both.
+    last three such differences, over all tiles that have as many samples, tell how fast it fell, and as that always
+    slows down, towards 2 in the end, r is the geometric mean of both.
     Blocks of 2^k samples, taken for independent of each other, give V between powers of two. It is never more than the
     samples' variance gives (Film.noise).
 
@@ -42,7 +44,7 @@ class NoiseEstimate:
         due = tile_samples == 2 ** (self._level + 1)
         if not due.any():
             return
-        change = tile_sums((mean - self._mean) ** 2 / relative_to(mean))
+        change = tile_sums((mean - self._mean) ** 2 / film.relative_to)
         level = self._level[due]
         self._changes += [np.full(due.shape, np.nan) for _ in range(max(level) + 1 - len(self._changes))]
         for k in np.unique(level[level >= 0]):
@@ -76,7 +78,10 @@ class NoiseEstimate:
         """V(n/2)/V(n) at n = 2^level, over all tiles that came so far."""
         there = self._level >= level
         changes = [float(np.sum(change[there])) for change in self._changes[:level]]
-        if len(changes) < 2 or changes[-1] <= 0 or 1 << len(changes) > self._planned:
+        if changes[-1] <= 0 or 1 << level > self._planned:
             return LEAST_FALL
-        slowest = min((changes[-1 - steps] / changes[-1]) ** (1 / steps) for steps in range(1, len(changes[-3:])))
-        return float(np.sqrt(LEAST_FALL * np.clip(slowest, LEAST_FALL, MOST_FALL)))
+        if level < 2:
+            return FIRST_FALL
+        steps = min(level - 1, 2)
+        measured = (changes[-1 - steps] / changes[-1]) ** (1 / steps)
+        return float(np.sqrt(LEAST_FALL * np.clip(measured, LEAST_FALL, MOST_FALL)))
