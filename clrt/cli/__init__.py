@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from importlib import import_module
@@ -35,6 +36,8 @@ def commands() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Runs a command and exits: 0 done, 2 usage, 3 scene, 4 device, 5 kernel, 6 output, 130 interrupted."""
+    # numpy's OpenBLAS starts a thread a core as it is loaded, and these spin for a while. No command has work for them.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         commands.main(arguments, prog_name="clrt", standalone_mode=False)
     except click.exceptions.Exit as stop:
