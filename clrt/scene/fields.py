@@ -5,16 +5,16 @@ The scene file and scenes built in Python pass through here, so both meet the sa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, asdict, fields
+import math
+import operator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import MISSING, fields
 from functools import lru_cache
 from types import NoneType
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from pydantic_core import CoreSchema, ErrorDetails, SchemaValidator
+from annotated_types import Ge, Gt, Le, Lt
 
 #: Fields whose values are no plain data; whoever holds them checks them.
 ELSEWHERE = frozenset({"image", "material"})
@@ -32,14 +32,16 @@ def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[st
     Finds missing and unknown fields, wrong types, values outside the limits of the type, and numbers that float32
     cannot hold (NaN, Inf and beyond). Numbers may be numpy scalars; sequences must be tuples.
     """
-    from pydantic_core import ValidationError
-
     plain = {name: _plain(value) for name, value in values.items()}
-    try:
-        _validator(kind).validate_python(plain)
-    except ValidationError as error:
-        details = error.errors(include_url=False)
-        problems = list(dict(_sentence(kind, where, detail) for detail in details).values())
+    hints = _hints(kind)
+    problems: list[str] = []
+    for field in fields(kind):
+        if field.name in plain:
+            problems += _problems(hints[field.name], plain[field.name], f"{where}.{field.name}")
+        elif field.default is MISSING and field.default_factory is MISSING:
+            problems.append(f"{where}: {field.name} is missing; add it")
+    problems += [f'{where}: key "{name}" {unknown(name, hints)}' for name in plain if name not in hints]
+    if problems:
         more = [f"{where}: {len(problems) - MOST} more mistakes like these"] if len(problems) > MOST else []
         return problems[:MOST] + more
     return [f"{where}.{name}: {show(value)} is beyond the range of float32; write a smaller number"
@@ -75,49 +77,64 @@ def show(value: object) -> str:
 
 
 @lru_cache
-def _validator(kind: type) -> SchemaValidator:
-    """What checks the fields of the dataclass `kind`: strict, closed, finite.
-
-    It is made without pydantic's models, whose import takes longer than all else that reads a small scene.
-    """
-    from pydantic_core import SchemaValidator, core_schema
-
+def _hints(kind: type) -> dict[str, Any]:
+    """The types of a dataclass's fields, with their limits."""
     hints = get_type_hints(kind, include_extras=True)
-    columns = {field.name: core_schema.typed_dict_field(
-        core_schema.any_schema() if field.name in ELSEWHERE else _schema(hints[field.name]),
-        required=not _optional(field)) for field in fields(kind)}
-    config = core_schema.CoreConfig(strict=True, allow_inf_nan=False)
-    return SchemaValidator(core_schema.typed_dict_schema(columns, extra_behavior="forbid", config=config))
+    return {field.name: Any if field.name in ELSEWHERE else hints[field.name] for field in fields(kind)}
 
 
-def _schema(hint: Any) -> CoreSchema:
-    """pydantic's schema of a type: a number, text, words, a tuple, one of these within limits, or one of these or None.
+def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
+    """Where `value` is not what the type asks for: a number, text, words, a tuple, one of these within limits, or None.
     """
-    from pydantic_core import core_schema
-
     origin, parts = get_origin(hint), get_args(hint)
     if origin is Annotated:
-        schema: Any = dict(_schema(parts[0]))
-        for limit in parts[1:]:
-            schema |= asdict(limit)
-        return cast("CoreSchema", schema)
-    if origin is Literal:
-        return core_schema.literal_schema(list(parts))
-    if origin is tuple:
-        several = parts[-1] is ...
-        return core_schema.tuple_schema([_schema(part) for part in parts if part is not ...],
-                                        variadic_item_index=0 if several else None)
-    if NoneType in parts:
-        return core_schema.nullable_schema(_schema(parts[0]))
-    return _PLAIN[hint]
+        yield from _problems(parts[0], value, path) if _fault(parts[0], value) else _outside(parts[1:], value, path)
+    elif NoneType in parts:
+        yield from () if value is None else _problems(parts[0], value, path)
+    elif origin is Literal:
+        if not (isinstance(value, str) and value in parts):
+            yield f"{path}: {show(value)} {unknown(value, parts)}"
+    elif origin is tuple and isinstance(value, tuple):
+        kinds = (parts[0],) * len(value) if parts[-1] is ... else parts
+        if len(value) <= len(kinds):
+            for i, (kind, entry) in enumerate(zip(kinds, value)):
+                yield from _problems(kind, entry, f"{path}[{i}]")
+        if len(value) != len(kinds):
+            yield f"{path}: {show(value)} has {len(value)} entries; write {len(kinds)}"
+    elif hint is not Any and (fault := _fault(origin or hint, value)):
+        yield f"{path}: {show(value)} {fault}"
 
 
-_PLAIN: dict[type, CoreSchema] = {float: {"type": "float"}, int: {"type": "int"}, str: {"type": "str"},
-                                  bool: {"type": "bool"}}
+def _outside(limits: Iterable[Any], value: float, path: str) -> Iterator[str]:
+    """The limits (annotated_types) that a number does not keep."""
+    for limit in limits:
+        name, keeps, is_wrong, remedy = _LIMITS[type(limit)]
+        if not keeps(value, bound := getattr(limit, name)):
+            yield f"{path}: {show(value)} {is_wrong} {bound:g}; {remedy} {bound:g}"
 
 
-def _optional(field: Any) -> bool:
-    return field.default is not MISSING or field.default_factory is not MISSING
+def _fault(kind: Any, value: Any) -> str:
+    """Why a value is none of a plain type, and the remedy; empty where it is one."""
+    if isinstance(value, _ACCEPTED[kind]) and isinstance(value, bool) == (kind is bool):
+        finite = not isinstance(value, float) or math.isfinite(value)
+        return "" if finite else "is not a finite number; write one"
+    if kind is tuple and isinstance(value, dict) and "image" in value:
+        return "is a texture, which is not supported yet; write [red, green, blue]"
+    if kind is tuple and isinstance(value, (list, np.ndarray)):
+        return f"is a {type(value).__name__}; write a tuple"
+    return _REMEDIES[kind]
+
+
+_ACCEPTED: dict[Any, Any] = {float: (float, int), int: int, str: str, bool: bool, tuple: tuple}
+_REMEDIES = {float: "is not a number; write one without quotes",
+             int: "is not a whole number; write one without quotes or decimal point",
+             str: "is not a text; write it in quotes",
+             bool: "is neither true nor false; write one of them",
+             tuple: "is not a list; write the numbers in brackets"}
+_LIMITS: dict[type, tuple[str, Callable[[float, float], bool], str, str]] = {
+    Ge: ("ge", operator.ge, "is below", "write at least"), Le: ("le", operator.le, "is above", "write at most"),
+    Gt: ("gt", operator.gt, "is not above", "write more than"),
+    Lt: ("lt", operator.lt, "is not below", "write less than")}
 
 
 def _plain(value: Any) -> Any:
@@ -130,54 +147,4 @@ def _plain(value: Any) -> Any:
 def _too_large(value: Any) -> bool:
     if isinstance(value, tuple):
         return any(map(_too_large, value))
-    return isinstance(value, float) and abs(value) > FLOAT32_MAX
-
-
-def _sentence(kind: type, where: str, error: ErrorDetails) -> tuple[str, str]:
-    """One mistake that pydantic found: the path of the value, and "path: value is ...; remedy"."""
-    field, *entries = error["loc"]
-    value, fault = error["input"], error["type"]
-    if fault == "extra_forbidden":
-        return f"{where}.{field}", f'{where}: key "{field}" {unknown(field, [f.name for f in fields(kind)])}'
-    if fault == "missing" and not entries:
-        return f"{where}.{field}", f"{where}: {field} is missing; add it"
-    wanted = error.get("ctx", {}).get("max_length")
-    if fault == "missing":  # one of a tuple's entries; the last one says how many it should have
-        wanted = int(entries.pop()) + 1
-    path = f"{where}.{field}" + "".join(f"[{entry}]" for entry in entries)
-    if wanted is not None:
-        return path, f"{path}: {show(value)} has {len(value)} entries; write {wanted}"
-    if fault == "literal_error":
-        return path, f"{path}: {show(value)} {unknown(value, _choices(kind, str(field)))}"
-    return path, f"{path}: {show(value)} {_fault(error)}"
-
-
-def _choices(kind: type, field: str) -> list[str]:
-    """The words that a field of the type Literal, or Literal | None, may hold."""
-    hint = get_type_hints(kind)[field]
-    return [word for part in (hint, *get_args(hint)) if get_origin(part) is Literal for word in get_args(part)]
-
-
-def _fault(error: ErrorDetails) -> str:
-    """What is wrong with one value, and the remedy."""
-    fault, value, limits = error["type"], error["input"], error.get("ctx", {})
-    if fault in _LIMITS:
-        name, is_wrong, remedy = _LIMITS[fault]
-        limit = f"{limits[name]:g}"
-        return f"{is_wrong} {limit}; {remedy} {limit}"
-    if fault == "tuple_type" and isinstance(value, dict) and "image" in value:
-        return "is a texture, which is not supported yet; write [red, green, blue]"
-    if fault == "tuple_type" and isinstance(value, (list, np.ndarray)):
-        return f"is a {type(value).__name__}; write a tuple"
-    return _TYPES.get(fault) or f"is wrong: {error['msg']}"
-
-
-_LIMITS = {"greater_than_equal": ("ge", "is below", "write at least"),
-           "less_than_equal": ("le", "is above", "write at most"),
-           "greater_than": ("gt", "is not above", "write more than"),
-           "less_than": ("lt", "is not below", "write less than")}
-_TYPES = {"finite_number": "is not a finite number; write one",
-          "float_type": "is not a number; write one without quotes",
-          "int_type": "is not a whole number; write one without quotes or decimal point",
-          "string_type": "is not a text; write it in quotes",
-          "tuple_type": "is not a list; write the numbers in brackets"}
+    return isinstance(value, (float, int)) and abs(value) > FLOAT32_MAX
