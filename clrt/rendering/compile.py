@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -99,8 +100,10 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
     lone = 0 < len(spheres) <= FEW_SPHERES
     in_tree = spheres[:0] if lone else spheres
     layout = choices.layout or fitting_layout(device, len(triangles), len(in_tree), choices.tests.triangle)
-    tree = build_tree(device, layout, choices.builder, triangles, in_tree, choices.tests.triangle)
-    sky = pack_sky(scene.environment)
+    with ThreadPoolExecutor(1) as beside:  # a sky takes as long as a tree, and neither needs all cores
+        packing = beside.submit(pack_sky, scene.environment)
+        tree = build_tree(device, layout, choices.builder, triangles, in_tree, choices.tests.triangle)
+        sky = packing.result()
     emitters = pack_emitters(scene, triangles, sky)
     users = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
     codes, material_buffers = _materials(users)
