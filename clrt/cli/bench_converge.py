@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..study.converge import Effort
 
 #: Of contestants.py, there after "clrt, ".
-CHOICES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "lanes 8", "lanes 16", "unplanned"]
+CHOICES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "lanes 8", "lanes 16", "unplanned"]
 
 
 @click.command("converge")

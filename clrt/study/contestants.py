@@ -21,7 +21,8 @@ CHOICES: dict[str, dict[str, Any]] = {
     "clrt, lanes 1": {"lanes": 1}, "clrt, bvh2": {"layout": "bvh2"}}
 #: Those that are compared only if asked for; unplanned: as with --time or --error, when no `spp` is known.
 MORE_CHOICES: dict[str, dict[str, Any]] = {
-    "clrt, lanes 8": {"lanes": 8}, "clrt, lanes 16": {"lanes": 16}, "clrt, unplanned": {"spp": None}}
+    "clrt, adaptive": {"adaptive": True}, "clrt, lanes 8": {"lanes": 8}, "clrt, lanes 16": {"lanes": 16},
+    "clrt, unplanned": {"spp": None}}
 #: Other renderers: what pip calls them, and the module beside this one whose `contestants(scene)` they are.
 PEERS = {"mitsuba": "mitsuba_renderer", "bpy": "cycles_renderer"}
 
@@ -63,16 +64,30 @@ def peers_of(scene: Scene) -> tuple[dict[str, Contestant], dict[str, str]]:
 
 
 def _render(scene: Scene, device: int, options: Mapping[str, Any], spp: int, seed: int) -> Picture:
-    """The clock stands still while states are made: at powers of two of the samples, for the noise that they tell."""
+    """The clock stands still while states are made: at powers of two of the samples, for the noise that they tell.
+
+    Adaptive sampling needs the states, so there it runs.
+    """
     renderer = Renderer(scene, device=device, **{"spp": spp, "seed": seed, **options})
-    session, seconds, cpu_seconds = renderer.session, 0.0, 0.0
-    for end in [*(1 << k for k in range((spp - 1).bit_length())), spp]:
+    seconds, cpu_seconds = 0.0, 0.0
+    for work in [partial(_passes, renderer, spp)] if renderer.settings.adaptive else [
+            partial(_even_samples, renderer, end) for end in [*(1 << k for k in range((spp - 1).bit_length())), spp]]:
         start, cpu = time.perf_counter(), time.process_time()
-        while session.samples_done < end:
-            for _ in session.render(min(end - session.samples_done, session.pass_limit())):
-                pass
-        session.wait()
+        work()
+        renderer.session.wait()
         seconds += time.perf_counter() - start
         cpu_seconds += time.process_time() - cpu
         state = renderer.state()
     return Picture(spp, seconds, cpu_seconds, state.pixels, state.noise)
+
+
+def _passes(renderer: Renderer, spp: int) -> None:
+    for _ in renderer.passes(spp=spp):
+        pass
+
+
+def _even_samples(renderer: Renderer, spp: int) -> None:
+    session = renderer.session
+    while session.samples_done < spp:
+        for _ in session.render(min(spp - session.samples_done, session.pass_limit())):
+            pass
