@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pyopencl as cl
@@ -21,6 +20,7 @@ from .compile import CompiledScene
 from .film import Film
 from .records import LAUNCH, PIXEL
 from .tiles import TILE_PIXELS, tile_pixels, tiles_of
+from .work import Part, Work
 
 #: Tiles of a launch, at least.
 FEWEST_TILES = 16
@@ -29,29 +29,15 @@ PASS_LAUNCHES = 4
 FIRST_LAUNCH_SAMPLES = 1 << 15
 
 
-class Part(NamedTuple):
-    """Work in hand: tiles first … end − 1 of those on the device get `more` samples beside the `samples` they have."""
-
-    first: int
-    end: int
-    samples: int
-    more: int
-
-
 class Session:
-    """Renders samples of one compiled scene at one size. Nothing depends on how the work is cut into launches.
-
-    tile_samples: (rows, columns) samples that the pixels of each tile have, or had before the work in hand.
-    """
+    """Renders samples of one compiled scene at one size. Nothing depends on how the work is cut into launches."""
 
     def __init__(self, device: Device, compiled: CompiledScene, size: tuple[int, int], max_depth: int,
                  seed: int, planned_spp: int | None = None) -> None:
         self.device, self.compiled, self.size = device, compiled, size
         self.program: BuiltProgram = build(device, compiled.source)
         self.launch = _launch_record(compiled.camera, size, max_depth, seed, block_bits(planned_spp))
-        self.tile_samples = np.zeros(tiles_of(size), np.int64)
-        self._in_hand: deque[Part] = deque()
-        self._next_tile, self._then = 0, self.tile_samples
+        self.work = Work(np.zeros(tiles_of(size), np.int64))
         self._launches = Launches(FIRST_LAUNCH_SAMPLES)
         width, height = size
         self._check_memory()
@@ -88,6 +74,11 @@ class Session:
         return self.compiled.bytes + self.size[0] * self.size[1] * PIXEL.itemsize
 
     @property
+    def tile_samples(self) -> NDArray[np.int64]:
+        """(rows, columns) samples that the pixels of each tile have, or had before the work in hand."""
+        return self.work.samples
+
+    @property
     def samples_done(self) -> int:
         """Samples a pixel, the mean over all, rounded."""
         width, height = self.size
@@ -98,14 +89,14 @@ class Session:
 
         All tiles must have as many. If it is left before its end, the next call, of `double` too, first ends that.
         """
-        if not self._in_hand:
+        if not self.work.parts:
             every, done = np.arange(self.tile_samples.size), int(self.tile_samples[0, 0])
             self._take_in_hand(every, [Part(0, len(every), done, samples)])
         yield from self._work()
 
     def double(self, tiles: NDArray[np.intp]) -> Iterator[None]:
         """Doubles the samples of these tiles, by their number in `tile_samples`; otherwise like `render`."""
-        if not self._in_hand:
+        if not self.work.parts:
             samples = self.tile_samples.ravel()[tiles]
             order = np.argsort(samples, kind="stable")
             levels, firsts = (found.tolist() for found in np.unique(samples[order], return_index=True))
@@ -114,27 +105,23 @@ class Session:
         yield from self._work()
 
     def _take_in_hand(self, tiles: NDArray[np.intp], parts: list[Part]) -> None:
-        self._tiles = on_device(self.device, tiles.astype(np.uint32))   # not the last one's, which may be in use
-        self._kernel.set_arg(len(self.scene_arguments) + 1, self._tiles)
-        self._in_hand.extend(parts)
-        self._next_tile, self._then = 0, self.tile_samples.copy()
-        for part in parts:
-            self._then.ravel()[tiles[part.first:part.end]] += part.more
+        self.work.take(tiles, parts)
+        self._upload_tiles()
+
+    def _upload_tiles(self) -> None:
+        if len(self.work.tiles):
+            self._tiles = on_device(self.device, self.work.tiles)   # not the last one's, which may be in use
+            self._kernel.set_arg(len(self.scene_arguments) + 1, self._tiles)
 
     def _work(self) -> Iterator[None]:
         """Launches what is in hand."""
-        while self._in_hand:
-            part, first = self._in_hand[0], self._next_tile
-            wanted = max(FEWEST_TILES, self._launches.size // (part.more * TILE_PIXELS))
-            self._next_tile = end = min(part.end, first + wanted)
-            self.launch["first_pixel"], self.launch["pixel_count"] = first * TILE_PIXELS, (end - first) * TILE_PIXELS
-            self.launch["first_sample"], self.launch["sample_count"] = part.samples, part.more
-            event = self._launch()
-            if end == part.end:
-                self._in_hand.popleft()
-            if not self._in_hand:
-                self.tile_samples = self._then
-            self._launches.add(event, (end - first) * TILE_PIXELS * part.more)
+        while self.work.parts:
+            samples = self.work.parts[0].more * TILE_PIXELS
+            share = self.work.cut(max(FEWEST_TILES, self._launches.size // samples))
+            tiles = share.end - share.first
+            self.launch["first_pixel"], self.launch["pixel_count"] = share.first * TILE_PIXELS, tiles * TILE_PIXELS
+            self.launch["first_sample"], self.launch["sample_count"] = share.samples, share.more
+            self._launches.add(self._launch(), tiles * samples)
             yield
 
     def _launch(self) -> cl.Event:
@@ -165,6 +152,12 @@ class Session:
         pixels = np.empty((self.size[1], self.size[0]), PIXEL)
         wait_for(cl.enqueue_copy(self.device.queue, pixels, self._film, is_blocking=False))
         return Film(pixels)
+
+    def restore(self, film: Film, work: Work) -> None:
+        """Goes on from a film of this size and the work that it was rendered by."""
+        self.work = work
+        self._upload_tiles()
+        wait_for(cl.enqueue_copy(self.device.queue, self._film, film.pixels, is_blocking=False))
 
 
 def block_bits(planned_spp: int | None) -> int:
