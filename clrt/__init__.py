@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from . import trimesh as trimesh
     from .api import load as load, render as render
     from .device.discover import devices as devices
-    from .errors import (ClrtError as ClrtError, DeviceError as DeviceError, KernelError as KernelError,
-                         OutputError as OutputError, SceneError as SceneError, UsageError as UsageError)
+    from .errors import (CheckpointError as CheckpointError, ClrtError as ClrtError, DeviceError as DeviceError,
+                         KernelError as KernelError, OutputError as OutputError, SceneError as SceneError,
+                         UsageError as UsageError)
     from .instances import InstancedRayQuery as InstancedRayQuery
     from .output.compare import compare as compare
     from .output.image import Image as Image
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 _HOME = {
     "api": ("load", "render"),
     "device.discover": ("devices",),
-    "errors": ("ClrtError", "DeviceError", "KernelError", "OutputError", "SceneError", "UsageError"),
+    "errors": ("CheckpointError", "ClrtError", "DeviceError", "KernelError", "OutputError", "SceneError", "UsageError"),
     "instances": ("InstancedRayQuery",),
     "output.compare": ("compare",),
     "output.image": ("Image",),

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
 from .rendering.aov import render_aovs
-from .rendering.renderer import Renderer, planned_spp
+from .rendering.renderer import Renderer
 from .rendering.report import render_report
+from .rendering.stops import planned_spp
 from .scene.file import load as _load
 from .scene.model import Scene
 

@@ -3,6 +3,7 @@
     ClrtError
     ├── UsageError    a wrong option or combination of options        exit code 2
     ├── SceneError    a scene, model or picture file, or its content  exit code 3
+    ├── CheckpointError  a checkpoint to go on from                   exit code 3
     ├── DeviceError   no such device, or the device failed            exit code 4
     ├── KernelError   the device's compiler refused the program       exit code 5
     └── OutputError   a picture or report could not be written        exit code 6
@@ -33,6 +34,12 @@ class SceneError(ClrtError):
     def __init__(self, problems: str | list[str]) -> None:
         self.problems = [problems] if isinstance(problems, str) else list(problems)
         super().__init__("\n".join(self.problems))
+
+
+class CheckpointError(ClrtError):
+    """A checkpoint is damaged, or of another render."""
+
+    exit_code = 3
 
 
 class DeviceError(ClrtError):

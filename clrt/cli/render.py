@@ -55,8 +55,9 @@ def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None
     from ..output.denoise import Denoiser, denoised, raw_path
     from ..output.image import Image
     from ..rendering.aov import render_aovs
-    from ..rendering.renderer import Renderer, check_stops, planned_spp
+    from ..rendering.renderer import Renderer
     from ..rendering.report import render_report
+    from ..rendering.stops import check_stops, planned_spp
     from ..scene.file import load
 
     atexit.register(gc.freeze)  # else Python, as it ends, searches all modules' objects for garbage, in 0.05 s

@@ -36,6 +36,16 @@ class NoiseEstimate:
         #: How many of these each tile has, −1 before its first sample.
         self._level: NDArray[np.int64] = np.zeros((0, 0), np.int64)
 
+    def arrays(self) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.int64]]:
+        """All that it knows: the picture's mean (height, width, 3), the changes (k, rows, columns), and how many of
+        these each tile has; empty arrays before the first picture."""
+        mean = np.zeros((0, 0, 3), np.float32) if self._mean is None else self._mean
+        return mean, np.array(self._changes).reshape(len(self._changes), *self._level.shape), self._level
+
+    def restore(self, mean: NDArray[np.float32], changes: NDArray[np.float64], level: NDArray[np.int64]) -> None:
+        """Goes on from what `arrays` gave."""
+        self._mean, self._changes, self._level = mean if mean.size else None, list(changes), level
+
     def add(self, film: Film, tile_samples: NDArray[np.int64]) -> None:
         """The film, with samples (rows, columns) of each tile; counts only where those are the next power of two."""
         mean = film.mean

@@ -7,6 +7,7 @@ import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,14 +18,15 @@ from ..device.open import open_device
 from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
 from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
+from .checkpoint import open_checkpoints
 from .compile import OFFSETS, Choices, compile_scene
 from .film import RELATIVE_FLOOR, Film
+from .kept import Kept
 from .noise import NoiseEstimate
 from .session import Session
+from .stops import check_step, check_stops, low_enough, planned_spp
 from .tiles import tile_pixels, tile_sums
 
-#: With a wanted error the noise is looked at whenever the samples have grown by one part in this.
-CHECK_FRACTION = 8
 #: Between two states at least this long passes, and this many times what making a state costs.
 STATE_SECONDS = 0.5
 STATE_COST = 20
@@ -57,7 +59,9 @@ class Renderer:
     neighbouring pixels' errors differ for that many, and later ones begin anew (kernels/sampler). adaptive: whether
     tiles get samples by their error, from the pictures so far.
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
-    Raises SceneError, DeviceError, KernelError, UsageError.
+    checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the end; resume:
+    go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
+    Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
 
     def __init__(self, scene: Scene, *, device: str | int | None = None, size: tuple[int, int] | None = None,
@@ -65,7 +69,9 @@ class Renderer:
                  integrator: str | None = None, sampler: str | None = None, filter: str | None = None,
                  adaptive: bool | None = None, triangle: str = "watertight", box: str = "robust",
                  sphere: str = "robust", offset: str = "bound", builder: str | None = None, layout: str | None = None,
-                 lanes: int | None = None, on_phase: Callable[[str], None] = lambda phase: None) -> None:
+                 lanes: int | None = None, on_phase: Callable[[str], None] = lambda phase: None,
+                 checkpoint: str | Path | None = None, resume: bool = False,
+                 checkpoint_seconds: float = 30.0) -> None:
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
                                  "sampler": sampler, "filter": filter, "adaptive": adaptive}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
@@ -78,16 +84,23 @@ class Renderer:
         self.compiled = compile_scene(self.scene, choices, device=self.device)
         if not {"LIGHTS", "SKY"} & set(self.compiled.features):
             logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
+        self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene,
+                                                   self.compiled.choices, self.device.info.name)
         on_phase("compile")
         depth = settings.max_depth if settings.integrator == "path" else min(settings.max_depth, 2)
         if spp is not None and settings.adaptive:
             spp *= MOST_TIMES_PLANNED
-        self.session = Session(self.device, self.compiled, settings.size, depth, settings.seed, spp)
-        self._noise = NoiseEstimate(spp)
-        self.history: list[dict[str, Any]] = []
+        self._planned_spp = kept.planned_spp if kept else spp
+        self.session = Session(self.device, self.compiled, settings.size, depth, settings.seed, self._planned_spp)
+        self._noise = kept.noise if kept else NoiseEstimate(self._planned_spp)
+        self.history: list[dict[str, Any]] = kept.history if kept else []
         self.stop_reason: str | None = None
-        self.seconds = 0.0
+        self.seconds = kept.seconds if kept else 0.0
         self._clock = 0.0
+        self._interrupted = False
+        if kept:
+            self.session.restore(kept.film, kept.work)
+            self.state()
 
     @property
     def settings(self) -> RenderSettings:
@@ -103,25 +116,31 @@ class Renderer:
         """
         check_stops(spp, time, error)
         spp = planned_spp(self.settings, spp, time, error)
-        self.stop_reason = None
         self._clock = clock.perf_counter() - self.seconds
-        next_state, next_check = 0.0, 1
+        self.stop_reason = self._reached(spp, time, error)
+        if self.stop_reason is not None:
+            yield self.state(reference)
+        next_state = 0.0
         while self.stop_reason is None:
-            if spp is None or self.session.samples_done < spp:
-                self._run_pass(spp, time, next_check if error is not None else None)
-            if spp is not None and self.session.samples_done >= spp and self.stop_reason is None:
-                self.stop_reason = "spp"
+            self._run_pass(spp, time, error)
             now, done = clock.perf_counter(), self.session.samples_done
-            due = now >= next_state or done & (done - 1) == 0 or (error is not None and done >= next_check)
-            if self.stop_reason is None and not due and not self._adapts:
+            if self.stop_reason is None and spp is not None and done >= spp:
+                self.stop_reason = "spp"
+            looks = error is not None and self._is_check(done)
+            due = now >= next_state or done & (done - 1) == 0 or looks or self._adapts
+            if self.stop_reason is None and not due:
                 continue
-            next_check = done + 1 + done // CHECK_FRACTION
             state = self._record_state(reference)
-            if self.stop_reason is None and error is not None and state.noise is not None and state.noise <= error:
+            if self.stop_reason is None and looks and low_enough(state.noise, error):
                 self.stop_reason = "error"
             cost = clock.perf_counter() - now
             next_state = now + max(STATE_SECONDS, STATE_COST * cost)
+            self._keep(state.film, last=self.stop_reason is not None)
             yield state
+
+    def interrupt(self) -> None:
+        """Has `passes` end after the launches in flight, with a state and a checkpoint; for signal handlers, too."""
+        self._interrupted = True
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
@@ -135,18 +154,37 @@ class Renderer:
         self._last = State(self.session.samples_done, self.seconds, noise, relmse, film)
         return self._last
 
-    def _run_pass(self, spp: int | None, time: float | None, check: int | None) -> None:
-        """One pass, not past `check` samples; sets the stop reason where `time` is over, maybe inside the pass."""
-        for _ in self._adaptive_pass(spp) if self._adapts else self._even_pass(spp, check):
+    def _reached(self, spp: int | None, time: float | None, error: float | None) -> str | None:
+        """The stop reason where an earlier call, or the render it goes on with, came so far already."""
+        done = self.session.samples_done
+        if done and time is not None and self.seconds >= time:
+            return "time"
+        if done and spp is not None and done >= spp:
+            return "spp"
+        looks = done and error is not None and self._is_check(done) and not self.session.work.parts
+        return "error" if looks and low_enough(self.state().noise, error) else None
+
+    def _run_pass(self, spp: int | None, time: float | None, error: float | None) -> None:
+        """One pass; sets the stop reason where `time` is over or it is interrupted, maybe inside the pass."""
+        for _ in self._adaptive_pass(spp) if self._adapts else self._even_pass(spp, error):
             self.seconds = clock.perf_counter() - self._clock
+            if self._interrupted:
+                self.stop_reason, self._interrupted = "interrupted", False
+                return
             if time is not None and self.seconds >= time and self.session.samples_done:
                 self.stop_reason = "time"
                 return
+            if self.session.work.parts:
+                self._keep()
 
     @property
     def _adapts(self) -> bool:
         """Whether the next pass goes by the error of the tiles; the picture so far is `_last` then."""
         return self.settings.adaptive and self.session.samples_done >= FLOOR_SPP
+
+    def _is_check(self, done: int) -> bool:
+        """Whether a wanted error is compared with the noise of so many samples; never by time, so all runs agree."""
+        return self._adapts or done % check_step(done) == 0
 
     def _adaptive_pass(self, spp: int | None) -> Iterator[None]:
         """Doubles the samples of those tiles where that takes most error away; ends the render at `spp`."""
@@ -160,17 +198,27 @@ class Renderer:
             self.stop_reason = "spp"
         yield from session.double(tiles)
 
-    def _even_pass(self, spp: int | None, check: int | None) -> Iterator[None]:
-        ends = [end for end in (spp, check) if end is not None]
-        return self.session.render(self._pass_size(self.session.samples_done, min(ends, default=None)))
+    def _even_pass(self, spp: int | None, error: float | None) -> Iterator[None]:
+        done = self.session.samples_done
+        step = check_step(done)
+        ends = [end for end in (spp, None if error is None else done + step - done % step) if end is not None]
+        return self.session.render(self._pass_size(done, min(ends, default=None)))
 
     def _record_state(self, reference: NDArray[np.float32] | None) -> State:
+        """The state, and its entry in the history, unless it is of a pass that will be gone on with."""
         self.session.wait()
         self.seconds = clock.perf_counter() - self._clock
         state = self.state(reference)
-        entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
-        self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
+        if self.stop_reason != "interrupted" or not self.session.work.parts:
+            entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
+            self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
         return state
+
+    def _keep(self, film: Film | None = None, last: bool = False) -> None:
+        """Writes a checkpoint where one is due, or the last one; film: as it is now, if that is known."""
+        if self._checkpoints is not None and (last or self._checkpoints.due):
+            self._checkpoints.write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(),
+                                         self.session.work, self._noise))
 
     def _pass_size(self, done: int, spp: int | None) -> int:
         """Samples of the next pass: never past a power of two, so that history has them, nor past the end."""
@@ -186,15 +234,3 @@ def _check(choices: Choices) -> None:
         if (value := getattr(choices, name)) not in values:
             named = ", ".join(str(known_value) for known_value in values if known_value is not None)
             raise UsageError(f"{name} {value!r} is unknown; choose from {named}")
-
-
-def planned_spp(settings: RenderSettings, spp: int | None, time: float | None, error: float | None) -> int | None:
-    """How many samples a pixel `passes` takes with these stop conditions; None where only time or error ends it."""
-    return settings.spp if spp is None and time is None and error is None else spp
-
-
-def check_stops(spp: int | None, time: float | None, error: float | None) -> None:
-    """UsageError unless each stop condition that is given is above 0 and finite."""
-    for name, value in [("spp", spp), ("time", time), ("error", error)]:
-        if value is not None and not 0 < value < float("inf"):
-            raise UsageError(f"{name} is {value}; it must be above 0")

@@ -1,0 +1,84 @@
+"""What is kept of a render, and how it becomes arrays for a file and comes back."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .checkpoint_file import Arrays
+from .film import Film
+from .noise import NoiseEstimate
+from .records import PIXEL
+from .tiles import tiles_of
+from .work import Part, Work
+
+#: The columns of a history, NaN where an entry has none of it.
+HISTORY = ("spp", "seconds", "noise", "relmse")
+KINDS: dict[str, np.dtype[Any]] = {
+    "film": PIXEL, "samples": np.dtype(np.int64), "then": np.dtype(np.int64), "tiles": np.dtype(np.uint32),
+    "parts": np.dtype(np.int64), "noise_mean": np.dtype(np.float32), "noise_changes": np.dtype(np.float64),
+    "noise_level": np.dtype(np.int64), "history": np.dtype(np.float64)}
+MOST_SAMPLES = 1 << 32
+NO_SENSE = "is damaged: its parts do not fit each other"
+
+
+@dataclass(frozen=True)
+class Kept:
+    """A render between two launches. planned_spp: what its sampler was told (session.block_bits)."""
+
+    planned_spp: int | None
+    seconds: float
+    history: list[dict[str, Any]]
+    film: Film
+    work: Work
+    noise: NoiseEstimate
+
+
+def to_arrays(kept: Kept) -> Arrays:
+    """As KINDS says. parts: (k, 4); history: (n, 4), see HISTORY; the others as Work and NoiseEstimate say."""
+    work, (mean, changes, level) = kept.work, kept.noise.arrays()
+    rows = [[np.nan if entry.get(name) is None else entry[name] for name in HISTORY] for entry in kept.history]
+    arrays = {"film": kept.film.pixels, "samples": work.samples, "then": work.then, "tiles": work.tiles,
+              "parts": np.array(work.parts).reshape(-1, 4), "noise_mean": mean, "noise_changes": changes,
+              "noise_level": level, "history": np.array(rows).reshape(-1, 4)}
+    return {name: arrays[name].astype(kind, copy=False) for name, kind in KINDS.items()}
+
+
+def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -> Kept:
+    """What was kept of a picture of (width, height); ValueError where the parts do not fit each other."""
+    planned, seconds = header.get("planned_spp"), header.get("seconds")
+    if not (planned is None or type(planned) is int and planned > 0) or type(seconds) is not float or not (
+            0 <= seconds < np.inf and _work_fits(arrays, size) and _noise_fits(arrays, size)):
+        raise ValueError(NO_SENSE)
+    work, noise = Work(arrays["samples"]), NoiseEstimate(planned)
+    work.then, work.tiles = arrays["then"], arrays["tiles"]
+    work.parts = deque(Part(*part) for part in arrays["parts"].tolist())
+    noise.restore(arrays["noise_mean"], arrays["noise_changes"], arrays["noise_level"])
+    history = []
+    for spp, second, error, relmse in arrays["history"].tolist():
+        entry = {"spp": int(spp), "seconds": second, "noise": None if np.isnan(error) else error}
+        history.append(entry if np.isnan(relmse) else {**entry, "relmse": relmse})
+    return Kept(planned, seconds, history, Film(arrays["film"]), work, noise)
+
+
+def _work_fits(arrays: Arrays, size: tuple[int, int]) -> bool:
+    """Whether film and work are of this size, and no launch would reach beyond the film or 2³² samples."""
+    samples, then, tiles, parts = (arrays[name] for name in ("samples", "then", "tiles", "parts"))
+    return bool(arrays["film"].shape == size[::-1] and samples.shape == then.shape == tiles_of(size)
+                and np.all((0 <= samples) & (samples <= then) & (then <= MOST_SAMPLES))
+                and tiles.ndim == 1 and np.all(tiles < samples.size) and parts.shape[1:] == (4,)
+                and all(0 <= part.first < part.end <= len(tiles) and 0 <= part.samples < MOST_SAMPLES
+                        and 0 < part.more <= MOST_SAMPLES - part.samples for part in map(Part._make, parts.tolist())))
+
+
+def _noise_fits(arrays: Arrays, size: tuple[int, int]) -> bool:
+    """Whether estimate and history are of this size; there is no estimate before the first picture."""
+    mean, changes, level = (arrays[name] for name in ("noise_mean", "noise_changes", "noise_level"))
+    shapes = [(*size[::-1], 3), tiles_of(size)] if mean.size else [(0, 0, 3), (0, 0)]
+    history = arrays["history"]
+    return bool([mean.shape, level.shape] == shapes and changes.shape[1:] == level.shape and len(changes) <= 64
+                and np.all((-1 <= level) & (level <= len(changes)))
+                and history.shape[1:] == (4,) and np.all(np.isfinite(history[:, :2])))

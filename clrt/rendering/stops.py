@@ -1,0 +1,31 @@
+"""When a render ends: at so many samples, after a time, or at an error, whatever comes first."""
+
+from __future__ import annotations
+
+from ..errors import UsageError
+from ..scene.model import RenderSettings
+
+#: With a wanted error the noise is looked at so many times between two powers of two of the samples.
+CHECKS = 8
+
+
+def planned_spp(settings: RenderSettings, spp: int | None, time: float | None, error: float | None) -> int | None:
+    """How many samples a pixel `passes` takes with these stop conditions; None where only time or error ends it."""
+    return settings.spp if spp is None and time is None and error is None else spp
+
+
+def check_stops(spp: int | None, time: float | None, error: float | None) -> None:
+    """UsageError unless each stop condition that is given is above 0 and finite."""
+    for name, value in [("spp", spp), ("time", time), ("error", error)]:
+        if value is not None and not 0 < value < float("inf"):
+            raise UsageError(f"{name} is {value}; it must be above 0")
+
+
+def check_step(done: int) -> int:
+    """From `done` samples on a wanted error is looked at wherever they are a multiple of this."""
+    return max(1, (1 << done.bit_length()) // (2 * CHECKS))
+
+
+def low_enough(noise: float | None, error: float | None) -> bool:
+    """Whether the noise, if it is known, is at most the wanted error, if there is one."""
+    return noise is not None and error is not None and noise <= error
