@@ -7,16 +7,20 @@ import gc
 import logging
 import signal
 import sys
-import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import UsageError
-from . import STARTED
+from .interrupt import Interruptible
 from .options import Size, tracing_options
-from .progress import Goal, make_progress
+from .outputs import Outputs
+from .progress import Goal, Progress, make_progress
+
+if TYPE_CHECKING:
+    from ..output.denoise import Denoiser
+    from ..rendering.renderer import Renderer
 
 
 @click.command()
@@ -40,6 +44,11 @@ from .progress import Goal, make_progress
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
 @click.option("--denoise", is_flag=True,
               help="Denoise the picture; the raw one is kept beside it as <stem>.raw<suffix>.")
+@click.option("--checkpoint", type=click.Path(path_type=Path), metavar="FILE",
+              help="Keep there what --resume needs to go on; FILE~ is the one before.")
+@click.option("--checkpoint-every", type=click.FloatRange(min=0), default=30.0, show_default=True, metavar="SECONDS",
+              help="How often; less often where that would take more than 2 % of the time.")
+@click.option("--resume", is_flag=True, help="Go on from --checkpoint; without one yet, begin.")
 @click.option("--view", default="srgb", show_default=True, metavar="NAME", help="View transform of .png pictures.")
 @click.option("--exposure", default=0.0, metavar="EV", help="Exposure of .png pictures, in stops.")
 @click.option("--progress", "progress_kind", type=click.Choice(["bar", "plain", "json"]), help="Progress on stderr.")
@@ -49,81 +58,67 @@ from .progress import Goal, make_progress
 def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None, spp: int | None,
             seconds: float | None, error: float | None, depth: int | None, seed: int | None, devices: tuple[str, ...],
             integrator: str | None, sampler: str | None, pixel_filter: str | None, adaptive: bool | None,
-            reference: Path | None, report: Path | None, plot: Path | None, denoise: bool, view: str, exposure: float,
-            progress_kind: str | None, print_kernel: bool, quiet: bool, **tracing: Any) -> None:
+            reference: Path | None, report: Path | None, plot: Path | None, denoise: bool, checkpoint: Path | None,
+            checkpoint_every: float, resume: bool, view: str, exposure: float, progress_kind: str | None,
+            print_kernel: bool, quiet: bool, **tracing: Any) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
-    from ..output.denoise import Denoiser, denoised, raw_path
-    from ..output.image import Image
-    from ..rendering.aov import render_aovs
+    from ..output.denoise import Denoiser
     from ..rendering.renderer import Renderer
-    from ..rendering.report import render_report
     from ..rendering.stops import check_stops, planned_spp
     from ..scene.file import load
 
     atexit.register(gc.freeze)  # else Python, as it ends, searches all modules' objects for garbage, in 0.05 s
-    outputs = outputs or (Path(f"{scene.stem}.png"),)
     if len(devices) > 1:
         raise UsageError(f"--device is given {len(devices)} times; this version renders on one device, so name one")
-    raws = tuple(map(raw_path, outputs)) if denoise else ()
-    _check_outputs(outputs, raws, report, plot, view, reference)
+    if resume and checkpoint is None:
+        raise UsageError("--resume goes on from a checkpoint; name its file with --checkpoint")
+    results = Outputs(outputs or (Path(f"{scene.stem}.png"),), denoise, view, exposure, report, plot)
+    results.check(reference, checkpoint)
     check_stops(spp, seconds, error)
     denoiser = Denoiser() if denoise else None
     if quiet:
         logging.disable(logging.WARNING)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's end keeps the picture, too
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's end is Ctrl-C, too
     options: dict[str, Any] = {
         "size": size, "max_depth": depth, "seed": seed, "device": devices[0] if devices else None,
-        "integrator": integrator, "sampler": sampler, "filter": pixel_filter,
-        "adaptive": adaptive, **tracing}
+        "integrator": integrator, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
+        "checkpoint": None if print_kernel else checkpoint, "resume": resume and not print_kernel,
+        "checkpoint_seconds": checkpoint_every, **tracing}
     with make_progress(progress_kind, quiet) as progress:
         progress.phase("load")
         content = load(scene)
         expected = None if reference is None else _read_reference(reference, size or content.render.size)
-        renderer = Renderer(content, spp=planned_spp(content.render, spp, seconds, error), on_phase=progress.phase,
-                            **options)
+        planned = planned_spp(content.render, spp, seconds, error)
+        renderer = Renderer(content, spp=planned, on_phase=progress.phase, **options)
         if print_kernel:
             click.echo(renderer.compiled.source)
             return
-        aovs = render_aovs(renderer.session) if denoiser else {}
-        progress.phase("render")
-        goal = Goal(planned_spp(renderer.settings, spp, seconds, error), seconds, error)
-        try:
-            for state in renderer.passes(spp=spp, time=seconds, error=error, reference=expected):
-                progress.state(state, goal)
-        except KeyboardInterrupt:
-            state = renderer.state(expected)
-            renderer.stop_reason = "interrupted"
-        progress.phase("write")
-        image = Image(state.pixels, render_report(renderer, state))
-        _save(image, raws or outputs, view, exposure)
-        if denoiser is not None:
-            progress.phase("denoise")
-            image = denoised(image, denoiser, aovs, expected)
-            _save(image, outputs, view, exposure)
-        _write_measures(renderer, image, report, plot)
-    if renderer.stop_reason == "interrupted":
+        with Interruptible(renderer.interrupt) as interruptible:
+            _render(renderer, results, Goal(planned, seconds, error), expected, denoiser, progress)
+    if interruptible.asked:
         sys.exit(130)
 
 
-def _check_outputs(outputs: tuple[Path, ...], raws: tuple[Path, ...], report: Path | None, plot: Path | None,
-                   view: str, reference: Path | None) -> None:
-    """Finds out before the render whether its results can be written."""
-    from ..output.files import check_target
-    from ..output.images import check_writable
-    from ..output.plots import check_plot
-    from ..output.view import check_view
+def _render(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, denoiser: Denoiser | None,
+            progress: Progress) -> None:
+    """Renders to the goal, or until it is interrupted, and writes the results."""
+    from ..output.denoise import denoised
+    from ..output.image import Image
+    from ..rendering.aov import render_aovs
+    from ..rendering.report import render_report
 
-    check_view(view)
-    for output in [*outputs, *raws]:
-        check_writable(output)
-        if output in raws and output in outputs:
-            raise UsageError(f"{output}: is where the raw picture is kept; name another picture with -o")
-        if reference is not None and output.resolve() == reference.resolve():
-            raise UsageError(f"{output}: is the reference, and would be overwritten; name another picture with -o")
-    if report is not None:
-        check_target(report)
-    if plot is not None:
-        check_plot(plot)
+    aovs = render_aovs(renderer.session) if denoiser else {}
+    progress.phase("render")
+    for state in renderer.passes(spp=goal.spp, time=goal.seconds, error=goal.error, reference=expected):
+        progress.state(state, goal)
+    progress.phase("write")
+    image = Image(state.pixels, render_report(renderer, state))
+    results.save(image, raw=denoiser is not None)
+    if denoiser is not None:
+        progress.phase("denoise")
+        image = denoised(image, denoiser, aovs, expected)
+        results.save(image)
+    results.save_measures(renderer, image)
 
 
 def _read_reference(path: Path, size: tuple[int, int]) -> Any:
@@ -135,19 +130,3 @@ def _read_reference(path: Path, size: tuple[int, int]) -> Any:
         raise UsageError(f"{path}: the reference is {width}x{height}, the picture {size[0]}x{size[1]}; "
                          f"use --size {width}x{height}")
     return pixels
-
-
-def _save(image: Any, paths: tuple[Path, ...], view: str, exposure: float) -> None:
-    for path in paths:
-        click.echo(str(image.save(path, view=view, exposure=exposure)))
-
-
-def _write_measures(renderer: Any, image: Any, report: Path | None, plot: Path | None) -> None:
-    from ..output.plots import plot_history
-    from ..output.report import write_report
-
-    if report is not None:
-        write_report(report, {**image.report, "total_seconds": time.perf_counter() - STARTED})
-        click.echo(str(report))
-    if plot is not None:
-        click.echo(str(plot_history(plot, renderer.scene.name, renderer.history)))

@@ -13,12 +13,16 @@ import numpy as np
 from .files import check_target, replacing
 
 
-def write_report(path: Path, report: Mapping[str, Any]) -> None:
-    """Write `report` in one step (see `replacing`); NaN and Inf, which JSON lacks, become null. Raises OutputError."""
+def write_report(path: Path, report: Mapping[str, Any]) -> Path:
+    """Write `report` in one step (see `replacing`); NaN and Inf, which JSON lacks, become null. Returns `path`.
+
+    Raises OutputError.
+    """
     check_target(path)
     text = json.dumps(_plain(report), indent=1, ensure_ascii=False, allow_nan=False)
     with replacing(path) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
+    return path
 
 
 def _plain(value: Any) -> Any:

@@ -1,0 +1,86 @@
+"""What `clrt render` writes: pictures, a report and a plot, checked before the render."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ..errors import OutputError, UsageError
+from . import STARTED
+
+if TYPE_CHECKING:
+    from ..output.image import Image
+    from ..rendering.renderer import Renderer
+
+
+@dataclass
+class Outputs:
+    """pictures: of the end result; denoise: whether the raw ones are kept beside them; view, exposure: of .png
+    pictures. One that cannot be written keeps none of the others from being written."""
+
+    pictures: tuple[Path, ...]
+    denoise: bool
+    view: str
+    exposure: float
+    report: Path | None
+    plot: Path | None
+    _errors: list[OutputError] = field(default_factory=list)
+
+    @property
+    def raws(self) -> tuple[Path, ...]:
+        """Where the raw pictures go, if there are any."""
+        from ..output.denoise import raw_path
+
+        return tuple(map(raw_path, self.pictures)) if self.denoise else ()
+
+    def check(self, reference: Path | None, checkpoint: Path | None) -> None:
+        """Finds out before the render whether its results can be written, and over none of its inputs."""
+        from ..output.files import check_target
+        from ..output.images import check_writable
+        from ..output.plots import check_plot
+        from ..output.view import check_view
+
+        check_view(self.view)
+        for picture in [*self.pictures, *self.raws]:
+            check_writable(picture)
+            if picture in self.raws and picture in self.pictures:
+                raise UsageError(f"{picture}: is where the raw picture is kept; name another picture with -o")
+            if reference is not None and picture.resolve() == reference.resolve():
+                raise UsageError(f"{picture}: is the reference, and would be overwritten; name another picture with -o")
+        for other in (self.report, checkpoint):
+            if other is not None:
+                check_target(other)
+        if self.plot is not None:
+            check_plot(self.plot)
+        results = [*self.pictures, *self.raws, self.report, self.plot, reference]
+        if checkpoint is not None and checkpoint.resolve() in [path.resolve() for path in results if path]:
+            raise UsageError(f"{checkpoint}: is named for something else, too; name another --checkpoint")
+
+    def save(self, image: Image, raw: bool = False) -> None:
+        """Writes the pictures, or the raw ones."""
+        for path in self.raws if raw else self.pictures:
+            self._write(lambda: image.save(path, view=self.view, exposure=self.exposure))
+
+    def save_measures(self, renderer: Renderer, image: Image) -> None:
+        """Writes report and plot, and then raises OutputError where anything could not be written."""
+        from ..output.plots import plot_history
+        from ..output.report import write_report
+
+        if (report := self.report) is not None:
+            self._write(lambda: write_report(report, {**image.report, "total_seconds": time.perf_counter() - STARTED}))
+        if (plot := self.plot) is not None:
+            self._write(lambda: plot_history(plot, renderer.scene.name, renderer.history))
+        if self._errors:
+            raise OutputError("; ".join(map(str, self._errors)))
+
+    def _write(self, write: Callable[[], Path]) -> None:
+        """Prints where the file was written."""
+        try:
+            click.echo(str(write()))
+        except OutputError as error:
+            self._errors.append(error)
