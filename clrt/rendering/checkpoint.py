@@ -74,7 +74,8 @@ class Checkpoints:
             except FileNotFoundError:
                 continue
             except (OSError, ValueError) as error:
-                problems.append(f"{path} {error if isinstance(error, ValueError) else error.strerror}")
+                reason = f"cannot be read ({error.strerror})" if isinstance(error, OSError) else error
+                problems.append(f"{path} {reason}")
                 self._newest_is_whole = self._newest_is_whole and path != self.path
                 continue
             self._warn(path, header, problems)
