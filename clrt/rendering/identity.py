@@ -19,14 +19,15 @@ from ..scene.model import Scene
 from .compile import Choices
 
 PARTS = ("camera", "meshes", "spheres", "lights", "environment")
-#: Of those in RenderSettings.
-SETTINGS = ("size", "max_depth", "seed", "integrator", "sampler", "filter", "adaptive")
+#: Of those in RenderSettings, beside the size.
+SETTINGS = ("max_depth", "seed", "integrator", "sampler", "filter", "adaptive")
 
 
 def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:
     """Each setting as text, each part of the scene and the kernels as the SHA-256 of what they are."""
     settings = {name: getattr(scene.render, name) for name in SETTINGS} | asdict(choices.tests)
-    return {"version": version("clrt"), "kernels": kernel_digest(),
+    width, height = scene.render.size
+    return {"version": version("clrt"), "kernels": kernel_digest(), "size": f"{width}x{height}",
             **{name: str(value) for name, value in settings.items()}, "offset": choices.offset,
             **{part: _digest(getattr(scene, part)) for part in PARTS}}
 

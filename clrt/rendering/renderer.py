@@ -88,9 +88,8 @@ class Renderer:
                                                    self.compiled.choices, self.device.info.name)
         on_phase("compile")
         depth = settings.max_depth if settings.integrator == "path" else min(settings.max_depth, 2)
-        if spp is not None and settings.adaptive:
-            spp *= MOST_TIMES_PLANNED
-        self._planned_spp = kept.planned_spp if kept else spp
+        planned = None if spp is None else int(spp) * (MOST_TIMES_PLANNED if settings.adaptive else 1)
+        self._planned_spp = kept.planned_spp if kept else planned
         self.session = Session(self.device, self.compiled, settings.size, depth, settings.seed, self._planned_spp)
         self._noise = kept.noise if kept else NoiseEstimate(self._planned_spp)
         self.history: list[dict[str, Any]] = kept.history if kept else []

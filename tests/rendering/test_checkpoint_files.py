@@ -148,7 +148,7 @@ def _rewrite(path: Path, header: dict[str, Any], arrays: dict[str, Any]) -> None
 
 
 @pytest.mark.parametrize("other, named", [
-    ({"seed": 2}, "seed 1 instead of 2"), ({"size": (44, 61)}, "size (61, 44) instead of (44, 61)"),
+    ({"seed": 2}, "seed 1 instead of 2"), ({"size": (44, 61)}, "size 61x44 instead of 44x61"),
     ({"max_depth": 2}, "max_depth"), ({"integrator": "direct"}, "integrator"), ({"filter": "tent"}, "filter"),
     ({"sampler": "independent"}, "sampler"), ({"adaptive": True}, "adaptive False instead of True"),
     ({"triangle": "moller_trumbore"}, "triangle"), ({"offset": "ulp"}, "offset")], ids=lambda value: str(value)[:30])
