@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from datetime import datetime, timezone
 from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import IO, Any
 
+from ..device.child import end_child, last_line, start_child, told_end
 from ..device.discover import DeviceInfo
 from ..device.sources import kernel_digest
 from ..device.verdicts import Verdict
@@ -26,7 +23,7 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
     start, kernels = time.monotonic(), kernel_digest()
     part, failures, figures = "starting", list[str](), dict[str, float | str]()
     with tempfile.TemporaryFile() as errors:
-        child = _start(info, errors)
+        child = start_child(f"{__package__}.child", info.id, subprocess.PIPE, errors)
         try:
             for told in _told(child, start + limit):
                 if "begins" in told:
@@ -36,23 +33,13 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
                     failures += [f"{part}: {failure}" for failure in told["failures"]]
                     figures |= told["figures"]
             if child.wait(max(0.0, start + limit - time.monotonic())):
-                failures.append(f"{part}: {_end(child.returncode)}{_last_line(errors)}")
+                failures.append(f"{part}: {told_end(child.returncode)}{last_line(errors)}")
         except (Empty, subprocess.TimeoutExpired):
             failures.append(f"{part}: it did not finish in {limit:g} s")
         finally:
-            child.kill()
-            with suppress(subprocess.TimeoutExpired):
-                child.wait(1.0)
+            end_child(child)
     when = datetime.now(timezone.utc).isoformat(timespec="seconds")
     return Verdict(not failures, failures, when, round(time.monotonic() - start, 1), kernels, figures)
-
-
-def _start(info: DeviceInfo, errors: IO[bytes]) -> subprocess.Popen[str]:
-    """The process, which finds the same modules as this one wherever it is started."""
-    path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
-    return subprocess.Popen([sys.executable, "-P", "-m", f"{__package__}.child", info.id], stdin=subprocess.DEVNULL,
-                            stdout=subprocess.PIPE, stderr=errors, text=True, encoding="utf-8",
-                            env={**os.environ, "PYTHONPATH": path})
 
 
 def _told(child: subprocess.Popen[str], deadline: float) -> Iterator[dict[str, Any]]:
@@ -68,18 +55,3 @@ def _told(child: subprocess.Popen[str], deadline: float) -> Iterator[dict[str, A
     Thread(target=listen, args=(child.stdout,), daemon=True).start()
     while (line := lines.get(timeout=max(0.0, deadline - time.monotonic()))).endswith("\n"):
         yield json.loads(line)
-
-
-def _end(code: int) -> str:
-    """How a process ended that should have returned 0."""
-    if code < 0:
-        return f"the driver crashed with signal {-code} ({signal.strsignal(-code)})"
-    return f"the process ended with code {code}"
-
-
-def _last_line(errors: IO[bytes]) -> str:
-    """The last that was written, which says what was wrong if anything does."""
-    errors.seek(0)
-    lines = errors.read().decode(errors="replace").split("\n")
-    last = next((line.strip() for line in reversed(lines) if line.strip()), "")
-    return f"; it said: {last}" if last else ""
