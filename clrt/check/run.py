@@ -13,7 +13,7 @@ from threading import Thread
 from typing import IO, Any
 
 from ..device.child import end_child, last_line, start_child, told_end
-from ..device.discover import DeviceInfo
+from ..device.describe import DeviceInfo
 from ..device.sources import kernel_digest
 from ..device.verdicts import Verdict
 

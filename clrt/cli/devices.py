@@ -1,8 +1,9 @@
-"""`clrt devices`: the OpenCL devices of this machine, best first, and whether they compute right."""
+"""`clrt devices`: the OpenCL devices of this machine, best first, whether they compute right, and how fast."""
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -12,39 +13,58 @@ import click
 from ..errors import DeviceError
 
 if TYPE_CHECKING:
-    from ..device.discover import DeviceInfo
+    from ..device.describe import DeviceInfo
     from ..device.verdicts import Verdict
 
 
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON list.")
 @click.option("--check", is_flag=True, help="Check each against known answers, and keep what is found.")
+@click.option("--bench", is_flag=True, help="Measure how many rays a second each follows, and rank them by that.")
 @click.option("--device", "selectors", multiple=True, metavar="SEL", help="Only this one; may be repeated.")
 @click.option("--limit", type=click.FloatRange(1.0), default=300.0, show_default=True, metavar="SECONDS",
-              help="What a check may take.")
-def command(as_json: bool, check: bool, selectors: tuple[str, ...], limit: float) -> None:
+              help="What a check or measurement of a device may take.")
+def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...], limit: float) -> None:
     """List the OpenCL devices, best first; * marks the one used when none is named.
 
-    Checks take some seconds a device, of simulators minutes: these are checked only if they are named. A device that
-    fails its check is used only if it is named, until its driver or clrt changes or it passes.
+    Checks and measurements take some seconds a device, of simulators minutes: these are among them only if they are
+    named. A device that fails its check is used only if it is named, until its driver or clrt changes or it passes.
     """
-    from ..device.discover import as_dict, find_devices, select
+    from ..device.discover import NOTHING, as_dict, find_devices, select
 
+    before = [info for info, _ in find_devices(again=True)]
     wanted = [select(selector)[0].id for selector in selectors]
-    verdicts = {} if not check else {info.id: _checked(info, limit) for info, _ in find_devices()
-                                     if (info.id in wanted if wanted else info.usable and info.type != "simulator")}
+    tried = [info for info in before if (info.id in wanted if wanted else info.usable and info.type != "simulator")]
+    verdicts = {info.id: _checked(info, limit) for info in tried if check}
+    unmeasured = [problem for info in tried if bench and (problem := _measured(info, limit))]
     found = [replace(info, check=verdicts.get(info.id, info.check)) for info, _ in find_devices()
              if not wanted or info.id in wanted]
     if as_json:
         click.echo(json.dumps([as_dict(info) for info in found], indent=1))
-    elif found:
-        click.echo("\n".join(line for info in found for line in _lines(info)))
     else:
-        click.echo('no OpenCL device; `pip install "pyopencl[pocl]"` brings one that runs on the CPU')
-    if failed := [info for info in found if info.id in verdicts and info.failed]:
-        names = ", ".join(info.name for info in failed)
-        raise DeviceError(f"{names} failed the check: update the driver and run `clrt devices --check` again; until "
-                          "that passes, such a device is used only if it is named")
+        click.echo("\n".join(line for info in found for line in _lines(info)), nl=bool(found))
+    if not found:
+        click.echo(NOTHING, err=True)
+    if named := os.environ.get("CLRT_DEVICE"):
+        click.echo(f"CLRT_DEVICE={named}: {select(named)[0].index} is used where none is named", err=True)
+    problems = unmeasured + [f"{info.name} failed the check: update the driver and run `clrt devices --check` again; "
+                             "until that passes, it is used only if it is named"
+                             for info in found if info.id in verdicts and info.failed]
+    if problems:
+        raise DeviceError("; ".join(problems))
+
+
+def _measured(info: DeviceInfo, limit: float) -> str:
+    """Measures a device and keeps its speed; returns what went wrong."""
+    from ..device.speeds import keep_speed
+    from ..study.device_speed import measure_device
+
+    click.echo(f"{info.name}: measuring", err=True)
+    try:
+        speed = measure_device(info, limit)
+    except DeviceError as error:
+        return str(error)
+    return "" if keep_speed(info, speed) else f"{info.name}: its speed cannot be kept"
 
 
 def _checked(info: DeviceInfo, limit: float) -> Verdict:
@@ -60,9 +80,16 @@ def _checked(info: DeviceInfo, limit: float) -> Verdict:
 
 def _lines(info: DeviceInfo) -> Iterator[str]:
     yield f"{'*' if info.chosen else ' '} {info.index}  {info.id}  {info.type:11}  {info.name}"
-    yield (f"     {info.platform}, {info.platform_version}, driver {info.driver}; "
-           f"{info.compute_units} compute units, {info.global_bytes / 2**30:.1f} GiB")
+    if info.type != "none":
+        yield (f"     {info.platform}, {info.platform_version}, driver {info.driver}; "
+               f"{info.compute_units} compute units, {info.global_bytes / 2**30:.1f} GiB")
+    yield from (f"     {place}" for place in info.hardware)
     yield f"     {'usable' if info.usable else 'not usable'}: {info.why}"
+    if info.bench:
+        yield (f"     Mrays/s: {info.bench.mrays_primary:.3g} primary, {info.bench.mrays_bounce:.3g} bounce, "
+               f"{info.bench.mrays_shadow:.3g} shadow")
+    if not info.usable:
+        return
     if info.check is None:
         named = f" --device {info.index}" if info.type == "simulator" else ""
         yield f"     not checked: `clrt devices --check{named}`"

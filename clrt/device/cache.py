@@ -1,4 +1,4 @@
-"""Files kept between runs: program binaries, what checks of devices found (verdicts.py), and reference pictures.
+"""Files kept between runs: program binaries, what is known of devices and drivers, and reference pictures.
 
 Whatever is wrong with the folder (absent, read-only, damaged), a file is not there, and what it held is made anew.
 Files are put in place by a rename, so readers never see half of one; a binary follows its SHA-256.

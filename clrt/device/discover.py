@@ -1,78 +1,55 @@
 """Which OpenCL devices there are, which can be used, and which one is meant.
 
-The best comes first: GPUs, then other accelerators, CPUs and simulators, the larger before the smaller. A device
-that cannot run clrt is listed with the reason, last. One that failed its check (clrt.check) is used only if named.
+The best comes first: GPUs, then other accelerators, CPUs and simulators, the larger before the smaller; those whose
+speed was measured trade places by it. What cannot run clrt is listed with the reason, last. A device that failed its
+check (clrt.check) is used only if named.
 """
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import os
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import pyopencl as cl
 
 from ..errors import DeviceError
+from .describe import DeviceInfo, describe, describe_empty, describe_faulty, with_own_id
 from .fork import check_process
-from .verdicts import Verdict, kept_verdict
+from .loader import devices_of
+from .platforms import load_platforms
+from .speeds import kept_speed
+from .verdicts import kept_verdict
 
-MINIMUM_ALLOCATION = 16 << 20
+NOTHING = 'no OpenCL device: install one with `pip install "pyopencl[pocl]"` or a GPU driver'
+ORDER = ("gpu", "accelerator", "cpu", "simulator", "none")
+Found = list[tuple[DeviceInfo, cl.Device | None]]
 
 
-@dataclass(frozen=True)
-class DeviceInfo:
-    """One OpenCL device. `id` stays the same until the platform or driver changes; `why` says what `usable` means.
+def find_devices(again: bool = False) -> Found:
+    """Every device of every platform, best first, and what is there without one. `chosen` is the one that is used when
+    none is named: no simulator, unless there is nothing else, as they are a thousand times as slow.
 
-    check: what its last check found; None where it was not checked as it is now.
+    again: drivers that were faulty are tried once more, unless this process has loaded its drivers.
     """
-
-    index: int
-    id: str
-    name: str
-    platform: str
-    platform_version: str
-    driver: str
-    type: str
-    compute_units: int
-    global_bytes: int
-    max_alloc_bytes: int
-    usable: bool
-    why: str
-    chosen: bool
-    check: Verdict | None = None
-
-    @property
-    def failed(self) -> bool:
-        """Whether its check failed."""
-        return self.check is not None and not self.check.passed
-
-
-def find_devices() -> list[tuple[DeviceInfo, cl.Device]]:
-    """Every device of every platform, best first. `chosen` marks the one that is used when none is named.
-
-    That is no simulator, unless there is nothing else: they are a thousand times as slow.
-    """
-    found = sorted(_every_device(), key=_rank)
-    infos: list[DeviceInfo] = []
-    for device in found:
-        infos.append(_describe(device, infos))
-    usable = [info for info in infos if info.usable]
-    real = [info for info in usable if info.type != "simulator"]
-    chosen = next((info for info in real or usable if not info.failed), None)
-    return [(replace(info, chosen=info is chosen), device) for info, device in zip(infos, found)]
+    found = _by_speed(sorted(_everything(again), key=_capability))
+    found = [(replace(info, index=index), device) for index, (info, device) in enumerate(found)]
+    candidates = [info for info, _ in found if info.usable and not info.failed]
+    chosen = next((info for info in candidates if info.type != "simulator"), candidates[0] if candidates else None)
+    infos = [info for info, _ in found]
+    return [(replace(info, chosen=info is chosen, why=_why(info, infos, chosen)), device) for info, device in found]
 
 
 def devices() -> list[dict[str, Any]]:
     """What `clrt devices --json` prints: a dict for each device, best first."""
-    return [as_dict(info) for info, _ in find_devices()]
+    return [as_dict(info) for info, _ in find_devices(again=True)]
 
 
 def as_dict(info: DeviceInfo) -> dict[str, Any]:
-    """The fields of a device, and of its check if it was checked."""
-    return {name: value for name, value in asdict(info).items() if name != "check" or value}
+    """The fields of a device; of its check, speed and hardware where they are known."""
+    return {name: value for name, value in asdict(info).items()
+            if value or name not in ("check", "bench", "hardware")}
 
 
 def choose(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
@@ -90,79 +67,90 @@ def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
     """
     found = find_devices()
     if not found:
-        raise DeviceError('no OpenCL device: install one with `pip install "pyopencl[pocl]"` or a GPU driver')
+        raise DeviceError(NOTHING)
     if selector is None:
         selector = os.environ.get("CLRT_DEVICE") or None
     matches = [pair for pair in found if _matches(pair[0], selector)]
     if str(selector).lower() in ("cpu", "gpu", "none"):
         matches = sorted((pair for pair in matches if pair[0].usable), key=lambda pair: pair[0].failed)[:1]
-    listing = "\n".join(f"  {info.index}  {info.id}  {info.name} ({info.platform}){' failed its check' * info.failed}"
+    listing = "\n".join(f"  {info.index}  {info.id}  {info.name} ({info.platform}){_trouble(info)}"
                         for info, _ in found)
     if not matches and selector is None and any(info.failed for info, _ in found):
         raise DeviceError(f"no usable device passed its check; `clrt devices` says what failed. Update the driver and "
                           f"run `clrt devices --check` again, or name a device to use it all the same:\n{listing}")
+    if not matches and selector is None:
+        raise DeviceError(f"no device can be used; `clrt devices` says why and what to do:\n{listing}")
     if not matches:
         raise DeviceError(f"no usable device matches {selector!r}; there are:\n{listing}")
     if len(matches) > 1:
         raise DeviceError(f"{len(matches)} devices match {selector!r}; name one by number or id:\n{listing}")
-    if not matches[0][0].usable:
-        raise DeviceError(f"{matches[0][0].name} cannot be used: {matches[0][0].why}")
-    return matches[0]
+    info, device = matches[0]
+    if not info.usable or device is None:
+        raise DeviceError(f"{info.name} cannot be used: {info.why}")
+    return info, device
 
 
-def _every_device() -> Iterator[cl.Device]:
+def _everything(again: bool) -> Found:
+    """Devices with ids of their own, platforms without devices, and drivers that were left out."""
     check_process()
-    try:
-        platforms = cl.get_platforms()
-    except cl.Error:
-        return
+    platforms, faults = load_platforms(again)
+    found: Found = []
     for platform in platforms:
-        try:
-            yield from platform.get_devices()
-        except cl.Error:
-            continue  # a platform without devices must not hide the others
+        here: Found = [(describe(device), device) for device in devices_of(platform)]
+        for info, device in here or [(describe_empty(platform), None)]:
+            own = with_own_id(info, {other.id for other, _ in found})
+            found.append((replace(own, check=kept_verdict(own), bench=kept_speed(own)), device))
+    return found + [(describe_faulty(driver, fault), None) for driver, fault in faults.items()]
 
 
-def _rank(device: cl.Device) -> tuple[bool, int, int]:
-    order = {"gpu": 0, "accelerator": 1, "cpu": 2, "simulator": 3}
-    return bool(_unusable(device)), order[_type(device)], -device.max_compute_units * device.max_clock_frequency
+def _capability(pair: tuple[DeviceInfo, cl.Device | None]) -> tuple[bool, int, int, bool]:
+    info, device = pair
+    size = info.compute_units * device.max_clock_frequency if device else 0
+    return not info.usable, ORDER.index(info.type), -size, bool(info.translated)
 
 
-def _type(device: cl.Device) -> str:
-    if "Oclgrind" in device.platform.name:
-        return "simulator"
-    if device.type & cl.device_type.GPU:
-        return "gpu"
-    return "cpu" if device.type & cl.device_type.CPU else "accelerator"
+def _by_speed(found: Found) -> Found:
+    """Those that were measured in the order of their speeds, on the places that they had; the others stay on theirs."""
+    speeds = {place: info.bench.mrays for place, (info, _) in enumerate(found) if info.usable and info.bench}
+    ranked = dict(zip(speeds, sorted(speeds, key=lambda place: -speeds[place])))
+    return [found[ranked.get(place, place)] for place in range(len(found))]
 
 
-def _unusable(device: cl.Device) -> str:
-    """Why the device cannot run clrt; empty where it can."""
-    if not device.available:
-        return "the driver says that it is not available"
-    if not device.compiler_available:
-        return "its driver has no compiler"
-    if not device.endian_little:
-        return "it is big-endian"
-    if device.max_mem_alloc_size < MINIMUM_ALLOCATION:
-        return f"its largest buffer is {device.max_mem_alloc_size} bytes; {MINIMUM_ALLOCATION} are needed"
-    return ""
+def _why(info: DeviceInfo, infos: list[DeviceInfo], chosen: DeviceInfo | None) -> str:
+    """What is to be said of a device of `infos`: whether and why it was chosen, and what makes it odd."""
+    if not info.usable:
+        return info.why
+    speed = f"{info.bench.mrays:.3g} Mrays/s" if info.bench else "not measured"
+    notes = [f"{info.type}, {speed}"]
+    if info is chosen:
+        rivals = sum(other.usable and not other.failed and other.type != "simulator" for other in infos)
+        rank = "only one" if rivals <= 1 else "fastest measured" if info.bench else f"largest {info.type}"
+        notes = [f"chosen as the {rank}, {speed}"]
+    twin = next((other for other in infos[:info.index] if other.usable and _same_hardware(info, other)), None)
+    if twin:
+        notes.append(f"the same hardware as {twin.index} through another platform")
+    if info.translated:
+        notes.append(f"a translation of OpenCL to {info.translated}; a driver of the hardware's own is better")
+    if info.failed:
+        notes.append(f"but its check failed: {_failures(info)}")
+    return "; ".join(notes)
 
 
-def _describe(device: cl.Device, before: list[DeviceInfo]) -> DeviceInfo:
-    """The device after those of `before`. Of several that are alike the second and later get ids of their own."""
-    platform = device.platform
-    identity = "|".join([platform.name, platform.version, device.vendor, device.name, device.driver_version])
-    ids = (hashlib.sha256(f"{identity}{twin}".encode()).hexdigest()[:8] for twin in ["", *range(1, len(before) + 1)])
-    reason = _unusable(device)
-    info = DeviceInfo(
-        index=len(before), id=next(i for i in ids if i not in [other.id for other in before]), name=device.name.strip(),
-        platform=platform.name.strip(), platform_version=platform.version.strip(), driver=device.driver_version.strip(),
-        type=_type(device), compute_units=device.max_compute_units, global_bytes=device.global_mem_size,
-        max_alloc_bytes=device.max_mem_alloc_size, usable=not reason,
-        why=reason or f"a {_type(device)} with OpenCL C 1.2", chosen=False)
-    info = replace(info, check=kept_verdict(info))
-    return replace(info, why=f"{info.why}, but its check failed: {_failures(info)}") if info.failed else info
+def _same_hardware(one: DeviceInfo, other: DeviceInfo) -> bool:
+    """Whether two platforms offer the same: CPUs, as a machine has one kind, else by UUID, place, or at least name."""
+    if one.type != other.type or one.type == "simulator":
+        return False
+    if one.type == "cpu":
+        return True
+    if (one.platform, one.platform_version) == (other.platform, other.platform_version):
+        return False
+    if one.hardware and other.hardware:
+        return bool({*one.hardware} & {*other.hardware})
+    return one.name == other.name
+
+
+def _trouble(info: DeviceInfo) -> str:
+    return " failed its check" if info.failed else "" if info.usable else " cannot be used"
 
 
 def _failures(info: DeviceInfo) -> str:

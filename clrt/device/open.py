@@ -9,7 +9,8 @@ from pyopencl import CommandQueue, Context
 
 from ..errors import DeviceError
 from . import pocl
-from .discover import DeviceInfo, choose
+from .describe import DeviceInfo
+from .discover import choose
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from . import cache
 from .sources import kernel_digest
 
 if TYPE_CHECKING:
-    from .discover import DeviceInfo
+    from .describe import DeviceInfo
 
 #: How the names of their files end.
 KIND = "check.json"
@@ -40,7 +40,7 @@ class Verdict:
 
 def keep_verdict(info: DeviceInfo, verdict: Verdict) -> bool:
     """Stores the verdict on a device; False where that is not possible."""
-    text = json.dumps({"checked": _checked(info), "verdict": asdict(verdict)}, indent=1)
+    text = json.dumps({"checked": identity_of(info), "verdict": asdict(verdict)}, indent=1)
     return cache.write_file(f"{info.id}.{KIND}", text.encode())
 
 
@@ -52,7 +52,7 @@ def kept_verdict(info: DeviceInfo) -> Verdict | None:
     try:
         kept = json.loads(content)
         verdict = _verdict(kept["verdict"])
-        return verdict if kept["checked"] == _checked(info) and verdict.kernels == kernel_digest() else None
+        return verdict if kept["checked"] == identity_of(info) and verdict.kernels == kernel_digest() else None
     except (ValueError, TypeError, LookupError, OverflowError, RecursionError):
         return None
 
@@ -62,8 +62,8 @@ def forget_verdicts() -> int:
     return cache.clear(f"*.{KIND}")
 
 
-def _checked(info: DeviceInfo) -> dict[str, str]:
-    """All that a verdict depends on, but for the kernels."""
+def identity_of(info: DeviceInfo) -> dict[str, str]:
+    """All that what is found about a device depends on, but for the kernels."""
     try:
         own = version("clrt")
     except PackageNotFoundError:

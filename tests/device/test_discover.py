@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
-import pyopencl as cl
 import pytest
 
 from clrt.device import discover, pocl
-from clrt.device.discover import DeviceInfo, choose, devices, find_devices
+from clrt.device.describe import DeviceInfo
+from clrt.device.discover import choose, devices, find_devices
 from clrt.device.open import Device, open_device
 from clrt.errors import DeviceError
 
@@ -66,7 +66,7 @@ def test_no_device_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None
 def test_this_machines_devices() -> None:
     """Best first, one chosen, every field, as JSON; ids tell drivers apart."""
     listed = devices()
-    assert listed and all(list(device) == FIELDS for device in listed)
+    assert listed and all([name for name in device if name != "hardware"] == FIELDS for device in listed)
     assert [device["index"] for device in listed] == list(range(len(listed)))
     assert [device["chosen"] for device in listed] == [True] + [False] * (len(listed) - 1)
     usable = [device["usable"] for device in listed]
@@ -74,16 +74,6 @@ def test_this_machines_devices() -> None:
     identities = [(d["platform"], d["platform_version"], d["name"], d["driver"]) for d in listed]
     assert len({device["id"] for device in listed}) == len(set(identities))
     assert json.loads(json.dumps(listed)) == listed
-
-
-def test_a_platform_that_fails_does_not_hide_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Broken:
-        def get_devices(self) -> list[cl.Device]:
-            raise cl.RuntimeError("no devices")
-
-    own = cl.get_platforms()
-    monkeypatch.setattr(cl, "get_platforms", lambda: [Broken(), *own])
-    assert devices()
 
 
 def test_open_device_by_index() -> None:

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from clrt.device import cache, discover, verdicts
-from clrt.device.discover import DeviceInfo, as_dict, choose, find_devices
+from clrt.device.describe import DeviceInfo
+from clrt.device.discover import as_dict, choose, find_devices
 from clrt.device.sources import kernel_digest
 from clrt.device.verdicts import Verdict, forget_verdicts, keep_verdict, kept_verdict
 from clrt.errors import DeviceError
@@ -101,7 +102,8 @@ def test_a_device_that_failed_is_used_only_if_named(info: DeviceInfo, caplog: py
 def test_the_next_best_is_used(info: DeviceInfo, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of three devices, all alike, the first failed: the second is used, also where only the kind is said."""
     own = next(device for each, device in find_devices() if each.id == info.id)
-    monkeypatch.setattr(discover, "_every_device", lambda: 3 * [own])
+    monkeypatch.setattr(discover, "load_platforms", lambda again: ([None], {}))
+    monkeypatch.setattr(discover, "devices_of", lambda platform: 3 * [own])
     infos = [info for info, _ in find_devices()]
     assert len({info.id for info in infos}) == 3
     keep_verdict(infos[0], FAILED)

@@ -1,0 +1,118 @@
+"""What is told of a device, and the identity that it keeps."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import pyopencl as cl
+
+from .drivers import Driver
+from .hardware import hardware
+from .speeds import Speed
+from .verdicts import Verdict
+
+MINIMUM_ALLOCATION = 16 << 20
+#: What a platform's or device's name says where OpenCL is translated to something else, and to what.
+TRANSLATIONS = {"clvk": "Vulkan", "zink": "Vulkan", "openclon12": "Direct3D 12"}
+
+
+@dataclass(frozen=True)
+class DeviceInfo:
+    """One OpenCL device, or a driver that offers none: `usable` and `why` tell.
+
+    id: the same until the platform or driver changes. why: what is to be said of it, and what to do where it cannot be
+    used. check, bench: what its last check found and its speed; None where it was not checked or measured as it is now.
+    hardware: its UUID and place on the PCI bus, where its driver tells them.
+    """
+
+    index: int
+    id: str
+    name: str
+    platform: str
+    platform_version: str
+    driver: str
+    type: str
+    compute_units: int
+    global_bytes: int
+    max_alloc_bytes: int
+    usable: bool
+    why: str
+    chosen: bool
+    check: Verdict | None = None
+    bench: Speed | None = None
+    hardware: tuple[str, ...] = ()
+
+    @property
+    def failed(self) -> bool:
+        """Whether its check failed."""
+        return self.check is not None and not self.check.passed
+
+    @property
+    def translated(self) -> str:
+        """What its platform translates OpenCL to; empty where it does not."""
+        names = f"{self.platform} {self.name}".lower()
+        return next((target for word, target in TRANSLATIONS.items() if word in names), "")
+
+
+def describe(device: cl.Device, index: int = 0) -> DeviceInfo:
+    """The device, as its driver tells; `chosen`, `check` and `bench` are left out."""
+    platform, places = device.platform, hardware(device)
+    identity = "|".join([platform.name, platform.version, device.vendor, device.name, device.driver_version, *places])
+    reason = _unusable(device)
+    return DeviceInfo(
+        index=index, id=_digest(identity), name=device.name.strip(), platform=platform.name.strip(),
+        platform_version=platform.version.strip(), driver=device.driver_version.strip(), type=_type(device),
+        compute_units=device.max_compute_units, global_bytes=device.global_mem_size,
+        max_alloc_bytes=device.max_mem_alloc_size, usable=not reason, why=reason, chosen=False, hardware=places)
+
+
+def describe_empty(platform: cl.Platform) -> DeviceInfo:
+    """A platform without devices."""
+    return replace(_nothing(platform.name.strip(), platform.version, "it has no device: is its hardware there, may you "
+                            "use it (groups video and render), does the driver want a variable to be set? If you do "
+                            "not need it, remove it"), platform_version=platform.version.strip())
+
+
+def describe_faulty(driver: Driver, fault: str) -> DeviceInfo:
+    """A driver that was left out."""
+    return replace(_nothing(driver.library, driver.source, f"{fault}. It is left out. Update, reinstall or remove this "
+                            f"driver ({driver.source} names it), then run `clrt devices`"), driver=driver.source)
+
+
+def _nothing(name: str, source: str, why: str) -> DeviceInfo:
+    return DeviceInfo(index=0, id=_digest(f"{name}|{source}"), name=name, platform=name, platform_version="", driver="",
+                      type="none", compute_units=0, global_bytes=0, max_alloc_bytes=0, usable=False, why=why,
+                      chosen=False)
+
+
+def with_own_id(info: DeviceInfo, taken: Collection[str]) -> DeviceInfo:
+    """The device with an id that none has yet: twins that nothing else tells apart are told by their order."""
+    ids = (info.id if not twin else _digest(f"{info.id}{twin}") for twin in range(len(taken) + 1))
+    return replace(info, id=next(each for each in ids if each not in taken))
+
+
+def _digest(identity: str) -> str:
+    return hashlib.sha256(identity.encode()).hexdigest()[:8]
+
+
+def _type(device: cl.Device) -> str:
+    if "Oclgrind" in device.platform.name:
+        return "simulator"
+    if device.type & cl.device_type.GPU:
+        return "gpu"
+    return "cpu" if device.type & cl.device_type.CPU else "accelerator"
+
+
+def _unusable(device: cl.Device) -> str:
+    """Why the device cannot run clrt; empty where it can."""
+    if not device.available:
+        return "the driver says that it is not available"
+    if not device.compiler_available:
+        return "its driver has no compiler"
+    if not device.endian_little:
+        return "it is big-endian"
+    if device.max_mem_alloc_size < MINIMUM_ALLOCATION:
+        return f"its largest buffer is {device.max_mem_alloc_size} bytes; {MINIMUM_ALLOCATION} are needed"
+    return ""

@@ -1,0 +1,95 @@
+"""Where the drivers of OpenCL are: the libraries that its loader would load, and some that it would not find.
+
+The loader reads .icd files, each of which names a library, in the folder OCL_ICD_VENDORS (or OPENCL_VENDOR_PATH, or
+/etc/OpenCL/vendors); where that variable names a file, there is this one alone. pip's pyopencl has a loader that reads
+its own folder as well. OCL_ICD_FILENAMES adds libraries. Beyond that, this finds
+- what is installed in Python's environment, where pip leaves .icd files that name no place that exists (Intel's);
+- libraries of drivers without an .icd file, as in containers that got a GPU's driver from their host.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyopencl as cl
+
+VENDORS = "/etc/OpenCL/vendors"
+#: Libraries that are looked for whether an .icd file names them or not, unless a variable says where drivers are.
+UNLISTED = ("libnvidia-opencl.so.1", "libamdocl64.so", "intel-opencl/libigdrcl.so")
+FOLDERS = (f"/usr/lib/{os.uname().machine}-linux-gnu" if hasattr(os, "uname") else "", "/usr/lib64", "/usr/lib",
+           "/usr/local/lib", "/usr/local/nvidia/lib64", "/usr/lib/wsl/lib", "/opt/rocm/lib", "/opt/rocm/opencl/lib")
+
+
+@dataclass(frozen=True)
+class Driver:
+    """library: a path, or a name that only the dynamic linker may find; source: the file or variable that names it."""
+
+    library: str
+    source: str
+
+
+def installed_drivers() -> list[Driver]:
+    """Every driver once, in the order in which the loader would take them."""
+    named = os.environ.get("OCL_ICD_VENDORS") or os.environ.get("OPENCL_VENDOR_PATH")
+    if named and not os.path.isdir(named):
+        drivers = [_driver(named)]
+    else:
+        drivers = [*_listed(Path(named or VENDORS)), *_listed(Path(cl.__file__).parent / ".libs"),
+                   *(each for each in _listed(Path(sys.prefix) / "etc/OpenCL/vendors") if os.path.exists(each.library))]
+        drivers += [] if named else _unlisted()
+    drivers += [Driver(_located(name), "OCL_ICD_FILENAMES")
+                for name in os.environ.get("OCL_ICD_FILENAMES", "").split(os.pathsep) if name]
+    by_file = {os.path.realpath(driver.library): driver for driver in reversed(drivers)}
+    return list(reversed(by_file.values()))
+
+
+def _listed(folder: Path) -> Iterator[Driver]:
+    """Those that a folder's .icd files name."""
+    with suppress(OSError):
+        yield from (_driver(os.path.join(folder, name)) for name in sorted(os.listdir(folder)) if name.endswith(".icd"))
+
+
+def _driver(path: str) -> Driver:
+    """The driver of an .icd file, or of a library itself."""
+    if not path.endswith(".icd"):
+        return Driver(_located(path), "OCL_ICD_VENDORS")
+    if os.sep not in path:
+        path = os.path.join(VENDORS, path)
+    try:
+        name = Path(path).read_text(errors="replace").partition("\n")[0].strip()
+    except OSError:
+        name = ""
+    return Driver(_located(name, os.path.dirname(path)) if name else path, path)
+
+
+def _located(name: str, folder: str = "") -> str:
+    """The path of a library that an .icd file in `folder` names; the name itself where there is no such file.
+
+    That may be a bare name, and what pip or conda installed may have been meant for another place than where it is.
+    """
+    if os.path.exists(name) and os.sep in name:
+        return name
+    prefix = os.path.join(os.path.normpath(os.path.join(folder, *[os.pardir] * 3)), "lib")
+    own = [prefix] if os.sep in name else [folder]
+    places = (os.path.join(place, os.path.basename(name)) for place in (own if folder else []) + _linker_folders())
+    return next((place for place in places if os.path.exists(place)), name)
+
+
+def _unlisted() -> list[Driver]:
+    found = ((name, os.path.join(folder, name)) for name in UNLISTED for folder in _linker_folders())
+    first = {name: path for name, path in reversed([each for each in found if os.path.exists(each[1])])}
+    return [Driver(path, os.path.dirname(path)) for path in first.values()]
+
+
+def _linker_folders() -> list[str]:
+    """Where the dynamic linker looks, and where drivers are known to hide from it."""
+    folders = os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep)
+    with suppress(OSError):
+        for file in sorted(os.scandir("/etc/ld.so.conf.d"), key=lambda entry: entry.name):
+            folders += [line.strip() for line in Path(file).read_text(errors="replace").splitlines()]
+    return [folder for folder in [*folders, *FOLDERS] if folder.startswith("/")]

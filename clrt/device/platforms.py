@@ -1,0 +1,90 @@
+"""The platforms of all drivers that can be loaded, and what is wrong with the others.
+
+A driver is probed (probe.py) before this process loads it. What was found is kept on disk for its files as they are:
+that it is fine until one of them or the machine changes, and a fault for an hour.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import sys
+import time
+from typing import Any
+
+import pyopencl as cl
+
+from . import cache
+from .drivers import Driver, installed_drivers
+from .loader import load
+
+#: How the names of the files end that keep what probes found.
+KIND = "driver.json"
+#: Seconds for which a fault is believed.
+FAULTY = 3600.0
+
+Faults = dict[Driver, str]
+_loaded: tuple[list[cl.Platform], Faults] | None = None
+
+
+def load_platforms(again: bool = False) -> tuple[list[cl.Platform], Faults]:
+    """The platforms, and what is wrong with each driver that was left out. again: drivers with faults are probed anew.
+
+    A process loads its drivers once, so later calls return the same.
+    """
+    global _loaded
+    if _loaded is None:
+        if sys.platform == "linux":
+            faults = faults_of(installed_drivers(), again)
+            good = [driver.library for driver, fault in faults.items() if not fault]
+            _loaded = load(good), {driver: fault for driver, fault in faults.items() if fault}
+        else:
+            _loaded = load(None), {}
+    return _loaded
+
+
+def faults_of(drivers: list[Driver], again: bool = False) -> Faults:
+    """What is wrong with each driver, empty where nothing is; what is not known is probed."""
+    faults = {driver: _kept(driver, again) for driver in drivers}
+    unknown = [driver for driver, fault in faults.items() if fault is None]
+    if unknown:
+        from .probe import probe
+
+        for driver, fault in zip(unknown, probe([driver.library for driver in unknown])):
+            faults[driver] = fault
+            content = {"state": _state(driver), "fault": fault, "when": time.time()}
+            cache.write_file(_name(driver), json.dumps(content).encode())
+            if fault and not again:
+                logging.getLogger(__name__).warning("the OpenCL driver %s is left out: %s; `clrt devices` says more",
+                                                    driver.library, fault)
+    return {driver: fault or "" for driver, fault in faults.items()}
+
+
+def _kept(driver: Driver, again: bool) -> str | None:
+    """What an earlier probe found, or None where that does not count, or no more."""
+    content = cache.read_file(_name(driver))
+    try:
+        kept = json.loads(content or b"null")
+        fault = str(kept["fault"])
+        fresh = not again and 0 <= time.time() - float(kept["when"]) < FAULTY
+        return fault if kept["state"] == _state(driver) and (fresh or not fault) else None
+    except (ValueError, TypeError, LookupError, OverflowError, RecursionError):
+        return None
+
+
+def _name(driver: Driver) -> str:
+    return f"{hashlib.sha256(f'{driver.library}|{driver.source}'.encode()).hexdigest()[:16]}.{KIND}"
+
+
+def _state(driver: Driver) -> list[Any]:
+    """The files of a driver, and the machine that they are on, whose kernel has the other half of some drivers."""
+    files = []
+    for path in (driver.library, driver.source):
+        try:
+            status = os.stat(path)
+            files.append([os.path.realpath(path), status.st_mtime_ns, status.st_size])
+        except OSError:
+            files.append([path])
+    return [*files, *os.uname()[1:4]]

@@ -1,0 +1,80 @@
+"""Asks drivers whether they can be loaded, each in a process of its own, for one may crash or hang whoever loads it.
+
+`python -m clrt.device.probe LIBRARY` is that process. It does all that listing devices does, and writes what is wrong.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from typing import IO
+
+from .child import end_child, last_line, start_child, told_end
+from .describe import describe
+from .loader import devices_of, load
+
+#: Seconds that all probes together may take. A slow start of many GPUs is no hang.
+LIMIT = 7.0
+
+
+def probe(libraries: Sequence[str], limit: float = LIMIT) -> list[str]:
+    """What is wrong with each driver, empty where nothing is; they are asked all at once."""
+    deadline = time.monotonic() + limit
+    logs = [(tempfile.TemporaryFile(), tempfile.TemporaryFile()) for _ in libraries]
+    children = [start_child(__name__, library, *log) for library, log in zip(libraries, logs)]
+    try:
+        return [_fault(child, *log, deadline) for child, log in zip(children, logs)]
+    finally:
+        for child, log in zip(children, logs):
+            end_child(child)
+            for file in log:
+                file.close()
+
+
+def _fault(child: subprocess.Popen[str], output: IO[bytes], errors: IO[bytes], deadline: float) -> str:
+    try:
+        code = child.wait(max(0.0, deadline - time.monotonic()))
+    except subprocess.TimeoutExpired:
+        return f"it hangs: no answer in {LIMIT:g} s"
+    if code:
+        return told_end(code) + last_line(errors)
+    output.seek(0)
+    return output.read().decode(errors="replace").strip()
+
+
+def main() -> None:
+    """Loads the driver that the first argument names. What it prints itself goes to standard error."""
+    with os.fdopen(os.dup(1), "w", encoding="utf-8") as result:
+        os.dup2(2, 1)
+        _no_core_dump()
+        result.write(_what_is_wrong(sys.argv[1]))
+
+
+def _what_is_wrong(library: str) -> str:
+    platforms = load([library])
+    for platform in platforms:
+        for device in devices_of(platform):
+            describe(device)
+    if platforms:
+        return ""
+    try:
+        ctypes.CDLL(library)
+    except OSError as error:
+        return f"it cannot be loaded: {error}"
+    return "it offers no platform, as drivers do whose hardware is not there"
+
+
+def _no_core_dump() -> None:
+    if sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, resource.getrlimit(resource.RLIMIT_CORE)[1]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,54 @@
+"""How fast devices were when they were measured (study/device_speed.py), kept beside the compiled programs.
+
+A speed counts for one device with one driver, for the kernels and the version of clrt that were measured.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from math import isfinite
+from typing import TYPE_CHECKING
+
+from . import cache
+from .sources import kernel_digest
+from .verdicts import identity_of
+
+if TYPE_CHECKING:
+    from .describe import DeviceInfo
+
+#: How the names of their files end.
+KIND = "bench.json"
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Millions of rays a second, the kernels alone."""
+
+    mrays_primary: float
+    mrays_bounce: float
+    mrays_shadow: float
+
+    @property
+    def mrays(self) -> float:
+        """Of as many rays of each kind."""
+        return 3 / (1 / self.mrays_primary + 1 / self.mrays_bounce + 1 / self.mrays_shadow)
+
+
+def keep_speed(info: DeviceInfo, speed: Speed) -> bool:
+    """Stores the speed of a device; False where that is not possible."""
+    kept = {"measured": identity_of(info), "kernels": kernel_digest(), "bench": asdict(speed)}
+    return cache.write_file(f"{info.id}.{KIND}", json.dumps(kept, indent=1).encode())
+
+
+def kept_speed(info: DeviceInfo) -> Speed | None:
+    """The speed of a device as it is now, or None."""
+    content = cache.read_file(f"{info.id}.{KIND}")
+    try:
+        kept = json.loads(content or b"null")
+        speed = Speed(**{name: float(mrays) for name, mrays in kept["bench"].items()})
+        right = all(isfinite(mrays) and mrays > 0 for mrays in asdict(speed).values())
+        current = kept["measured"] == identity_of(info) and kept["kernels"] == kernel_digest()
+        return speed if right and current else None
+    except (ValueError, TypeError, LookupError, AttributeError, OverflowError, RecursionError):
+        return None

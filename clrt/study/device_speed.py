@@ -1,0 +1,79 @@
+"""How many rays a second a device follows: some seconds of primary, bounce and shadow rays, in a process of their own.
+
+`python -m clrt.study.device_speed ID` is that process. The scene is a bumpy ball of 49 152 triangles in a room; there
+are as many rays as keep the device busy for a while, however fast it is.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import asdict
+
+from ..device.child import end_child, last_line, start_child, told_end
+from ..device.describe import DeviceInfo
+from ..device.speeds import Speed
+from ..errors import DeviceError
+from ..query import RayQuery
+from .rays import Run
+from .workloads import Workload, bumpy_ball, closed_room, workloads
+
+KINDS = ("primary", "bounce", "shadow")
+SUBDIVISIONS = 6
+#: The picture whose rays are followed, in pixels a side: doubled until its primary rays take BUSY seconds.
+SMALLEST, LARGEST, BUSY = 64, 2048, 0.02
+#: Each kind of rays is followed for so many seconds, and the fastest time counts, as others may use the machine, too.
+MEASURED = 0.3
+
+
+def measure_device(info: DeviceInfo, limit: float) -> Speed:
+    """Its speed; DeviceError where it crashes or takes more than `limit` seconds."""
+    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
+        child = start_child(__name__, info.id, output, errors)
+        try:
+            code = child.wait(limit)
+        except subprocess.TimeoutExpired as error:
+            raise DeviceError(f"{info.name} cannot be measured: it did not finish in {limit:g} s") from error
+        finally:
+            end_child(child)
+        if code:
+            raise DeviceError(f"{info.name} cannot be measured: {told_end(code)}{last_line(errors)}")
+        output.seek(0)
+        return Speed(**json.loads(output.read()))
+
+
+def measure(device: str) -> Speed:
+    """The speed of a device, measured in this process."""
+    ball = bumpy_ball(SUBDIVISIONS)
+    room = closed_room(*ball)
+    query = RayQuery(*room, device=device)
+    side = SMALLEST
+    while side < LARGEST and _seconds(query, next(workloads(*room, ball[0], query.closest_hit, (side, side)))) < BUSY:
+        side *= 2
+    kinds = [kind for kind in workloads(*room, ball[0], query.closest_hit, (side, side)) if kind.name in KINDS]
+    return Speed(**{f"mrays_{kind.name}": len(kind.rays[2]) / _seconds(query, kind, MEASURED) / 1e6 for kind in kinds})
+
+
+def _seconds(query: RayQuery, kind: Workload, budget: float = 0.0) -> float:
+    """The shortest time that the kernel took for these rays in `budget` seconds, after a run to warm up."""
+    run = Run(query, query.any_hit if kind.any_hit else query.closest_hit, kind.rays)
+    end = time.perf_counter() + budget
+    shortest = run()[0]
+    while time.perf_counter() < end:
+        shortest = min(shortest, run()[0])
+    return shortest
+
+
+def main() -> None:
+    """Measures the device that the first argument names. What its driver prints goes to standard error."""
+    with os.fdopen(os.dup(1), "w", encoding="utf-8") as result:
+        os.dup2(2, 1)
+        json.dump(asdict(measure(sys.argv[1])), result)
+
+
+if __name__ == "__main__":
+    main()

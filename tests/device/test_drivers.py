@@ -1,0 +1,146 @@
+"""Drivers that crash, hang or are empty are told with a remedy and do not keep the good ones from their work."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import pyopencl as cl
+import pytest
+
+from clrt.device.drivers import Driver, installed_drivers
+from clrt.device.platforms import faults_of
+
+from .fake_drivers import FAULTS, environment, listed, loads, make_driver, run
+
+SCENE = "[render]\nsize = [4, 4]\nspp = 1\n[[sphere]]\n"
+
+
+@pytest.fixture
+def broken(tmp_path: Path) -> Path:
+    """A folder of drivers of which none is good, and two .icd files without one; pip's are good."""
+    for name, choices in FAULTS.items():
+        make_driver(tmp_path / "vendors", name, **choices)
+    (tmp_path / "vendors" / "missing.icd").write_text("/nowhere/libmissing.so\n")
+    (tmp_path / "vendors" / "nothing.icd").write_text("")
+    (tmp_path / "scene.toml").write_text(SCENE)
+    return tmp_path
+
+
+def test_each_fault_is_a_row_with_its_remedy(broken: Path) -> None:
+    """The sleeping one sleeps for longer than the test waits; the others are listed behind what can be used."""
+    rows = {Path(row["name"]).stem.removeprefix("lib"): row for row in listed(broken)}
+    words = {"aborts": "crashed with signal 6", "segfaults": "crashed with signal 11", "hangs": "no answer",
+             "empty": "no device", "missing": "cannot open shared object file", "nothing": "cannot be loaded"}
+    for name, word in words.items():
+        row = rows.pop(name)
+        assert not row["usable"] and not row["chosen"] and word in row["why"] and "remove" in row["why"]
+        assert name == "empty" or f"{name}.icd names it" in row["why"]
+        assert row["index"] >= sum(other["usable"] for other in rows.values())
+    assert sum(row["chosen"] for row in rows.values()) == 1
+
+
+def test_the_good_one_renders_meanwhile(broken: Path) -> None:
+    """Bad drivers are loaded by probes alone, and not again until they change or `clrt devices` asks."""
+    (broken / "vendors" / "hangs.icd").unlink()  # which would have every probe wait
+    first = run(broken, "-m", "clrt", "render", "scene.toml")
+    assert first.returncode == 0 and "libaborts.so is left out" in first.stderr, first.stderr
+    assert loads(broken) == ["aborts", "empty", "empty", "segfaults"]
+    again = run(broken, "-m", "clrt", "render", "scene.toml")
+    assert again.returncode == 0 and "left out" not in again.stderr and (broken / "scene.png").exists()
+    assert loads(broken) == ["empty"]
+    make_driver(broken / "vendors", "segfaults")
+    assert [row["name"] for row in listed(broken)][0] == "Fake GPU"
+    assert loads(broken) == ["aborts", "empty", "segfaults", "segfaults"]
+    named = run(broken, "-m", "clrt", "render", "scene.toml", "--device", "libaborts")
+    assert named.returncode == 4 and "cannot be used: the driver crashed with signal 6" in named.stderr
+
+
+def test_whatever_is_kept_of_a_probe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What cannot be read, or was kept of another file, is asked anew: a bad driver is never trusted for it."""
+    monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setenv("FAKE_LOG", str(tmp_path / "log"))
+    driver = Driver(str(make_driver(tmp_path / "vendors", "aborts", ON_LOAD="abort()")), "a test")
+    assert "signal 6" in faults_of([driver])[driver] and loads(tmp_path) == ["aborts"]
+    assert "signal 6" in faults_of([driver])[driver] and loads(tmp_path) == []
+    file, = (tmp_path / "cache").iterdir()
+    good = json.loads(file.read_bytes()) | {"fault": ""}
+    for content in (b"", b"[]", b'{"fault": ""}', b"[" * 100_000, json.dumps(good | {"when": "x"}).encode(),
+                    json.dumps(good | {"state": good["state"][1:]}).encode()):
+        file.write_bytes(content)
+        assert "signal 6" in faults_of([driver])[driver] and loads(tmp_path) == ["aborts"]
+
+
+def test_a_cache_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    make_driver(tmp_path / "vendors", "aborts", ON_LOAD="abort()")
+    assert "signal 6" in listed(tmp_path, CLRT_CACHE_DIR=str(tmp_path / "file"))[-1]["why"]
+
+
+def test_two_pocls(tmp_path: Path) -> None:
+    """Two platforms of one name, of which nothing tells the devices apart: each has an id of its own, and renders."""
+    packages, own = Path(cl.__file__).parents[1], tmp_path / "packages" / "pyopencl" / ".libs"
+    own.mkdir(parents=True)
+    (tmp_path / "packages" / "pocl_binary_distribution").symlink_to(packages / "pocl_binary_distribution")
+    shutil.copy(next((packages / "pyopencl" / ".libs").glob("libpocl-*")), own / "libother.so")
+    (tmp_path / "vendors").mkdir()
+    (tmp_path / "vendors" / "other.icd").write_text(str(own / "libother.so"))
+    (tmp_path / "scene.toml").write_text(SCENE)
+    pocls = [row for row in listed(tmp_path) if row["platform"] == "Portable Computing Language"]
+    assert len(pocls) == 2 and pocls[0]["chosen"] and not pocls[1]["chosen"] and pocls[0]["id"] != pocls[1]["id"]
+    assert "the same hardware as 0" in pocls[1]["why"]
+    for row in pocls:
+        rendering = run(tmp_path, "-m", "clrt", "render", "scene.toml", "--device", row["id"])
+        assert rendering.returncode == 0, rendering.stderr
+
+
+def test_no_driver_at_all(tmp_path: Path) -> None:
+    """Without pip's: an empty list, and what to install."""
+    (tmp_path / "vendors").mkdir()
+    bare = tmp_path / "packages" / "pyopencl"
+    shutil.copytree(Path(cl.__file__).parent, bare, ignore=shutil.ignore_patterns("*.icd", "libpocl*", "liboclgrind*"))
+    (tmp_path / "scene.toml").write_text(SCENE)
+    path = os.pathsep.join([str(bare.parent), *sys.path])
+    result = run(tmp_path, "-m", "clrt", "devices", "--json", PYTHONPATH=path)
+    assert result.returncode == 0 and result.stdout.strip() == "[]" and "pip install" in result.stderr
+    rendering = run(tmp_path, "-m", "clrt", "render", "scene.toml", PYTHONPATH=path)
+    assert rendering.returncode == 4 and "pip install" in rendering.stderr and "Traceback" not in rendering.stderr
+
+
+def test_where_drivers_are_found(tmp_path: Path) -> None:
+    """One that OCL_ICD_VENDORS names alone, one that OCL_ICD_FILENAMES adds; the environment is as before."""
+    library = make_driver(tmp_path / "vendors", "one")
+    make_driver(tmp_path / "others", "two")
+    for named in (library, library.with_name("one.icd")):
+        assert [row["platform"] for row in listed(tmp_path, OCL_ICD_VENDORS=str(named))] == ["one"]
+    added = {"OCL_ICD_VENDORS": str(library), "OCL_ICD_FILENAMES": str(tmp_path / "others" / "libtwo.so")}
+    assert {row["platform"] for row in listed(tmp_path, **added)} == {"one", "two"}
+    code = "import clrt, os; before = dict(os.environ); clrt.devices(); before['PYOPENCL_HOME'] = " \
+           "os.environ.get('PYOPENCL_HOME'); assert before == dict(os.environ)"
+    assert run(tmp_path, "-c", code, **added).returncode == 0
+
+
+def test_drivers_that_no_icd_file_finds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What pip moved, and a library alone as in containers; where a variable names a folder, that says what counts."""
+    for name, value in environment(tmp_path).items():
+        monkeypatch.setenv(name, value)
+    (tmp_path / "vendors").mkdir()
+    moved = tmp_path / "prefix" / "etc" / "OpenCL" / "vendors"
+    moved.mkdir(parents=True)
+    (moved / "intel.icd").write_text("/opt/placeholder/lib/libintelocl.so")
+    (moved / "absent.icd").write_text("/opt/placeholder/lib/libabsent.so")
+    linked = tmp_path / "prefix" / "lib"
+    linked.mkdir()
+    for name in ("libintelocl.so", "libnvidia-opencl.so.1"):
+        (linked / name).touch()
+    monkeypatch.setattr(sys, "prefix", str(tmp_path / "prefix"))
+    monkeypatch.setenv("LD_LIBRARY_PATH", str(linked))
+    found = {Path(driver.library) for driver in installed_drivers()}
+    assert linked / "libintelocl.so" in found and not any(path.name == "libabsent.so" for path in found)
+    assert linked / "libnvidia-opencl.so.1" not in found
+    monkeypatch.delenv("OCL_ICD_VENDORS")
+    monkeypatch.delenv("OPENCL_VENDOR_PATH", raising=False)
+    assert linked / "libnvidia-opencl.so.1" in {Path(driver.library) for driver in installed_drivers()}
