@@ -35,9 +35,9 @@ def find_devices(again: bool = False) -> Found:
     """
     found = _by_speed(sorted(_everything(again), key=_capability))
     found = [(replace(info, index=index), device) for index, (info, device) in enumerate(found)]
-    candidates = [info for info, _ in found if info.usable and not info.failed]
-    chosen = next((info for info in candidates if info.type != "simulator"), candidates[0] if candidates else None)
     infos = [info for info, _ in found]
+    usable = [info for info in infos if info.usable]
+    chosen = next((info for info in _real(usable) or usable if not info.failed), None)
     return [(replace(info, chosen=info is chosen, why=_why(info, infos, chosen)), device) for info, device in found]
 
 
@@ -123,7 +123,7 @@ def _why(info: DeviceInfo, infos: list[DeviceInfo], chosen: DeviceInfo | None) -
     speed = f"{info.bench.mrays:.3g} Mrays/s" if info.bench else "not measured"
     notes = [f"{info.type}, {speed}"]
     if info is chosen:
-        rivals = sum(other.usable and not other.failed and other.type != "simulator" for other in infos)
+        rivals = sum(other.usable and not other.failed for other in _real(infos))
         rank = "only one" if rivals <= 1 else "fastest measured" if info.bench else f"largest {info.type}"
         notes = [f"chosen as the {rank}, {speed}"]
     twin = next((other for other in infos[:info.index] if other.usable and _same_hardware(info, other)), None)
@@ -134,6 +134,10 @@ def _why(info: DeviceInfo, infos: list[DeviceInfo], chosen: DeviceInfo | None) -
     if info.failed:
         notes.append(f"but its check failed: {_failures(info)}")
     return "; ".join(notes)
+
+
+def _real(infos: list[DeviceInfo]) -> list[DeviceInfo]:
+    return [info for info in infos if info.type != "simulator"]
 
 
 def _same_hardware(one: DeviceInfo, other: DeviceInfo) -> bool:

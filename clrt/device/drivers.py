@@ -74,10 +74,12 @@ def _located(name: str, folder: str = "") -> str:
     """
     if os.path.exists(name) and os.sep in name:
         return name
-    prefix = os.path.join(os.path.normpath(os.path.join(folder, *[os.pardir] * 3)), "lib")
-    own = [prefix] if os.sep in name else [folder]
-    places = (os.path.join(place, os.path.basename(name)) for place in (own if folder else []) + _linker_folders())
-    return next((place for place in places if os.path.exists(place)), name)
+    if folder:
+        own = os.path.normpath(os.path.join(folder, *[os.pardir] * 3, "lib")) if os.sep in name else folder
+        if os.path.exists(path := os.path.join(own, os.path.basename(name))):
+            return path
+    paths = (os.path.join(place, os.path.basename(name)) for place in _linker_folders())
+    return next((path for path in paths if os.path.exists(path)), name)
 
 
 def _unlisted() -> list[Driver]:
