@@ -106,6 +106,8 @@ def _everything(again: bool) -> Found:
 def _capability(pair: tuple[DeviceInfo, cl.Device | None]) -> tuple[bool, int, int, bool]:
     info, device = pair
     size = info.compute_units * device.max_clock_frequency if device else 0
+    if device and info.type == "cpu":  # the same processor through several platforms, some of which lack its vectors
+        size *= device.native_vector_width_float
     return not info.usable, ORDER.index(info.type), -size, bool(info.translated)
 
 

@@ -37,13 +37,13 @@ def installed_drivers() -> list[Driver]:
     """Every driver once, in the order in which the loader would take them."""
     named = os.environ.get("OCL_ICD_VENDORS") or os.environ.get("OPENCL_VENDOR_PATH")
     if named and not os.path.isdir(named):
-        drivers = [_driver(named)]
+        drivers = [_driver(named, "OCL_ICD_VENDORS")]
     else:
         drivers = [*_listed(Path(named or VENDORS)), *_listed(Path(cl.__file__).parent / ".libs"),
                    *(each for each in _listed(Path(sys.prefix) / "etc/OpenCL/vendors") if os.path.exists(each.library))]
         drivers += [] if named else _unlisted()
-    drivers += [Driver(_located(name), "OCL_ICD_FILENAMES")
-                for name in os.environ.get("OCL_ICD_FILENAMES", "").split(os.pathsep) if name]
+    drivers += [_driver(path, "OCL_ICD_FILENAMES")
+                for path in os.environ.get("OCL_ICD_FILENAMES", "").split(os.pathsep) if path]
     by_file = {os.path.realpath(driver.library): driver for driver in reversed(drivers)}
     return list(reversed(by_file.values()))
 
@@ -51,13 +51,14 @@ def installed_drivers() -> list[Driver]:
 def _listed(folder: Path) -> Iterator[Driver]:
     """Those that a folder's .icd files name."""
     with suppress(OSError):
-        yield from (_driver(os.path.join(folder, name)) for name in sorted(os.listdir(folder)) if name.endswith(".icd"))
+        names = sorted(name for name in os.listdir(folder) if name.endswith(".icd"))
+        yield from (_driver(os.path.join(folder, name), "") for name in names)
 
 
-def _driver(path: str) -> Driver:
-    """The driver of an .icd file, or of a library itself."""
+def _driver(path: str, variable: str) -> Driver:
+    """The driver of an .icd file, or of a library that the variable names."""
     if not path.endswith(".icd"):
-        return Driver(_located(path), "OCL_ICD_VENDORS")
+        return Driver(_located(path), variable)
     if os.sep not in path:
         path = os.path.join(VENDORS, path)
     try:

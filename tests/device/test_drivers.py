@@ -118,6 +118,8 @@ def test_where_drivers_are_found(tmp_path: Path) -> None:
         assert [row["platform"] for row in listed(tmp_path, OCL_ICD_VENDORS=str(named))] == ["one"]
     added = {"OCL_ICD_VENDORS": str(library), "OCL_ICD_FILENAMES": str(tmp_path / "others" / "libtwo.so")}
     assert {row["platform"] for row in listed(tmp_path, **added)} == {"one", "two"}
+    added["OCL_ICD_FILENAMES"] = f"/nowhere/libthree.so:{tmp_path / 'others' / 'two.icd'}"
+    assert {row["platform"] for row in listed(tmp_path, **added)} == {"one", "two", "/nowhere/libthree.so"}
     code = "import clrt, os; before = dict(os.environ); clrt.devices(); before['PYOPENCL_HOME'] = " \
            "os.environ.get('PYOPENCL_HOME'); assert before == dict(os.environ)"
     assert run(tmp_path, "-c", code, **added).returncode == 0
