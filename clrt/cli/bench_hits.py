@@ -27,7 +27,7 @@ def hits_command(device: str | None, quick: bool, json_file: Path | None) -> Non
     if json_file is not None:
         check_target(json_file)
     only = None if device is None else choose(device)[0].index
-    found, results = [each for each in devices() if only in (None, each["index"])], []
+    found, results = [each for each in devices() if each["usable"] and only in (None, each["index"])], []
     for each in found:
         click.echo(f"device {each['index']}: {each['name']} ({each['platform']}, {each['driver']})")
     click.echo("Below each kind of rays: how many answers are not the first line's, bit by bit")

@@ -68,6 +68,12 @@ def describe(device: cl.Device, index: int = 0) -> DeviceInfo:
         max_alloc_bytes=device.max_mem_alloc_size, usable=not reason, why=reason, chosen=False, hardware=places)
 
 
+def size_of(device: cl.Device) -> int:
+    """What it may be able to do: compute units times clock, and on a CPU, as not every platform uses them, vectors."""
+    vectors = device.native_vector_width_float if _type(device) == "cpu" else 1
+    return int(device.max_compute_units * device.max_clock_frequency * vectors)
+
+
 def describe_empty(platform: cl.Platform) -> DeviceInfo:
     """A platform without devices."""
     return replace(_nothing(platform.name.strip(), platform.version, "it has no device: is its hardware there, may you "

@@ -15,7 +15,7 @@ from typing import Any
 import pyopencl as cl
 
 from ..errors import DeviceError
-from .describe import DeviceInfo, describe, describe_empty, describe_faulty, with_own_id
+from .describe import DeviceInfo, describe, describe_empty, describe_faulty, size_of, with_own_id
 from .fork import check_process
 from .loader import devices_of
 from .platforms import load_platforms
@@ -105,10 +105,7 @@ def _everything(again: bool) -> Found:
 
 def _capability(pair: tuple[DeviceInfo, cl.Device | None]) -> tuple[bool, int, int, bool]:
     info, device = pair
-    size = info.compute_units * device.max_clock_frequency if device else 0
-    if device and info.type == "cpu":  # the same processor through several platforms, some of which lack its vectors
-        size *= device.native_vector_width_float
-    return not info.usable, ORDER.index(info.type), -size, bool(info.translated)
+    return not info.usable, ORDER.index(info.type), -size_of(device) if device else 0, bool(info.translated)
 
 
 def _by_speed(found: Found) -> Found:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import IO
 
 from .child import end_child, last_line, start_child, told_end
-from .describe import describe
+from .describe import describe, size_of
 from .loader import devices_of, load
 
 #: Seconds that all probes together may take. A slow start of many GPUs is no hang.
@@ -53,13 +53,14 @@ def main() -> None:
         os.dup2(2, 1)
         _no_core_dump()
         result.write(_what_is_wrong(sys.argv[1]))
+    os._exit(0)  # some drivers crash as they are unloaded, when all work is done
 
 
 def _what_is_wrong(library: str) -> str:
     platforms = load([library])
     for platform in platforms:
         for device in devices_of(platform):
-            describe(device)
+            describe(device), size_of(device)
     if platforms:
         return ""
     try:

@@ -1,6 +1,6 @@
 /* A driver of OpenCL that shows devices and can do nothing else, as told when it is compiled:
    PLATFORM, NAME, UNITS (compute units of the first; each further one has one less), COUNT (devices), TYPE (4: GPU),
-   REVERSED (lists them from the last), UUIDS (with that extension), ON_LOAD, ON_DEVICES (statements).
+   REVERSED (lists them from the last), UUIDS (with that extension), REFUSED (a query), ON_LOAD, ON_UNLOAD, ON_DEVICES (statements).
    It has no headers to include: the numbers are those of the OpenCL specification. */
 #include <signal.h>
 #include <stdio.h>
@@ -50,12 +50,14 @@ static int device_ids(Object *of, unsigned long kind, unsigned room, Object **to
 static int device_info(Object *of, unsigned query, size_t room, void *to, size_t *told) {
     unsigned long type = TYPE, size = 1ul << 33;
     unsigned yes = 1, units = UNITS - of->number, mhz = 1000, place[4] = {0, 0x65 + of->number, 0, 0};
+    if (query == REFUSED) return -30;
     unsigned char uuid[16] = {0xAB, of->number};
     switch (query) {
     case 0x1000: return answer(&type, sizeof type, room, to, told);
     case 0x1002: return answer(&units, sizeof units, room, to, told);
     case 0x100C: return answer(&mhz, sizeof mhz, room, to, told);
     case 0x1010: case 0x101F: return answer(&size, sizeof size, room, to, told);
+    case 0x103A: return answer(&yes, sizeof yes, room, to, told);
     case 0x1026: case 0x1027: case 0x1028: return answer(&yes, sizeof yes, room, to, told);
     case 0x102B: return text(NAME, room, to, told);
     case 0x102F: return text("OpenCL 1.2 fake", room, to, told);
@@ -88,4 +90,8 @@ __attribute__((constructor)) static void load(void) {
     FILE *file = log ? fopen(log, "a") : NULL;
     if (file) { fprintf(file, "%s\n", PLATFORM); fclose(file); }
     ON_LOAD;
+}
+
+__attribute__((destructor)) static void unload(void) {
+    ON_UNLOAD;
 }

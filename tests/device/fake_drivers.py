@@ -11,9 +11,9 @@ from typing import Any
 
 SOURCE = Path(__file__).with_name("fake_driver.c")
 DEFAULTS = {"PLATFORM": '"Fake"', "NAME": '"Fake GPU"', "UNITS": "100", "COUNT": "1", "TYPE": "4", "REVERSED": "0",
-            "UUIDS": "0", "ON_LOAD": "", "ON_DEVICES": ""}
+            "UUIDS": "0", "REFUSED": "0", "ON_LOAD": "", "ON_UNLOAD": "", "ON_DEVICES": ""}
 FAULTS = {"aborts": {"ON_LOAD": "abort()"}, "hangs": {"ON_LOAD": "sleep(1000)"}, "empty": {"COUNT": "0"},
-          "segfaults": {"ON_DEVICES": "raise(SIGSEGV)"}}
+          "segfaults": {"ON_DEVICES": "raise(SIGSEGV)"}, "refuses": {"TYPE": "2", "REFUSED": "0x103A"}}
 
 
 def make_driver(vendors: Path, name: str, **choices: str) -> Path:

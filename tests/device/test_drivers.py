@@ -31,9 +31,10 @@ def broken(tmp_path: Path) -> Path:
 
 
 def test_each_fault_is_a_row_with_its_remedy(broken: Path) -> None:
-    """The sleeping one sleeps for longer than the test waits; the others are listed behind what can be used."""
+    """The sleeping one sleeps for longer than the test waits; all are listed behind what can be used."""
     rows = {Path(row["name"]).stem.removeprefix("lib"): row for row in listed(broken)}
     words = {"aborts": "crashed with signal 6", "segfaults": "crashed with signal 11", "hangs": "no answer",
+             "refuses": "clGetDeviceInfo failed",
              "empty": "no device", "missing": "cannot open shared object file", "nothing": "cannot be loaded"}
     for name, word in words.items():
         row = rows.pop(name)
@@ -48,13 +49,13 @@ def test_the_good_one_renders_meanwhile(broken: Path) -> None:
     (broken / "vendors" / "hangs.icd").unlink()  # which would have every probe wait
     first = run(broken, "-m", "clrt", "render", "scene.toml")
     assert first.returncode == 0 and "libaborts.so is left out" in first.stderr, first.stderr
-    assert loads(broken) == ["aborts", "empty", "empty", "segfaults"]
+    assert loads(broken) == ["aborts", "empty", "empty", "refuses", "segfaults"]
     again = run(broken, "-m", "clrt", "render", "scene.toml")
     assert again.returncode == 0 and "left out" not in again.stderr and (broken / "scene.png").exists()
     assert loads(broken) == ["empty"]
     make_driver(broken / "vendors", "segfaults")
     assert [row["name"] for row in listed(broken)][0] == "Fake GPU"
-    assert loads(broken) == ["aborts", "empty", "segfaults", "segfaults"]
+    assert loads(broken) == ["aborts", "empty", "refuses", "segfaults", "segfaults"]
     named = run(broken, "-m", "clrt", "render", "scene.toml", "--device", "libaborts")
     assert named.returncode == 4 and "cannot be used: the driver crashed with signal 6" in named.stderr
 
@@ -72,6 +73,12 @@ def test_whatever_is_kept_of_a_probe(tmp_path: Path, monkeypatch: pytest.MonkeyP
                     json.dumps(good | {"state": good["state"][1:]}).encode()):
         file.write_bytes(content)
         assert "signal 6" in faults_of([driver])[driver] and loads(tmp_path) == ["aborts"]
+
+
+def test_a_driver_that_crashes_when_all_is_done(tmp_path: Path) -> None:
+    """As it is unloaded: it can be used all the same."""
+    driver = Driver(str(make_driver(tmp_path / "vendors", "late", ON_UNLOAD="abort()")), "a test")
+    assert faults_of([driver]) == {driver: ""}
 
 
 def test_a_cache_that_cannot_be_written(tmp_path: Path) -> None:
