@@ -16,13 +16,13 @@ from .options import Size
 if TYPE_CHECKING:
     from ..study.converge import Effort
 
-#: Of contestants.py, there after "clrt, ".
-CHOICES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "lanes 8", "lanes 16", "unplanned"]
+#: Those of contestants.py, there after "clrt, ".
+NAMES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "lanes 8", "lanes 16", "unplanned"]
 
 
 @click.command("converge")
 @click.argument("scenes", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SCENE...")
-@click.option("--choice", "names", multiple=True, type=click.Choice(CHOICES),
+@click.option("--choice", "names", multiple=True, type=click.Choice(NAMES),
               help="Compare these alone, with the first; may be repeated. Default: up to bvh2.")
 @click.option("--peers", is_flag=True, help="Beside other renderers, where installed: Mitsuba, Cycles.")
 @click.option("--device", "selectors", multiple=True, metavar="SEL", help="See `clrt devices`; may be repeated.")

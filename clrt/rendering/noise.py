@@ -21,9 +21,8 @@ class NoiseEstimate:
     are alike, which is enough: with E_n the mean of the first n and V(n) its squared error, Cov(E_n, E_2n) = V(2n),
     hence the mean square of E_n − E_2n is V(n) − V(2n). If V falls by r with each doubling that is (r − 1)·V(2n). The
     last three such differences, over all tiles that have as many samples, tell how fast it fell, and as that always
-    slows down, towards 2 in the end, r is the geometric mean of both.
-    Blocks of 2^k samples, taken for independent of each other, give V between powers of two. It is never more than the
-    samples' variance gives (Film.noise).
+    slows down, towards 2 in the end, r is the geometric mean of both. Blocks of 2^k samples, taken for independent of
+    each other, give V between powers of two. It is never more than the samples' variance gives (Film.noise).
 
     planned_spp: where the sampler begins anew, r is 2 from there on.
     """

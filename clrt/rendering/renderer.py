@@ -190,7 +190,9 @@ class Renderer:
         session, film = self.session, self._last.film
         samples = session.tile_samples * tile_pixels(session.size)
         done = int(samples.sum())
-        most = GROWTH * done if spp is None else min(GROWTH * done, spp * film.pixels.size - done)
+        most = max(GROWTH * done, samples.max())    # of few tiles at least the dearest, else none may ever fit
+        if spp is not None:
+            most = min(most, spp * film.pixels.size - done)
         tiles = worth_doubling(self._noise.tile_errors(session.tile_samples), tile_sums(film.pixels["rays"]), samples,
                                most)
         if len(tiles) == 0:

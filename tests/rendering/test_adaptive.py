@@ -21,7 +21,7 @@ from .test_noise import outdoors, room
 SIZE = (61, 44)
 
 
-def renderer(device: Device, scene: Scene, seed: int = 1, spp: int | None = 64, adaptive: bool = True) -> Renderer:
+def renderer(device: Device, scene: Scene, seed: int = 1, spp: int = 64, adaptive: bool = True) -> Renderer:
     """At SIZE, for `spp` planned samples."""
     return Renderer(scene, device=device.info.index, size=SIZE, spp=spp, seed=seed, adaptive=adaptive)
 
@@ -109,11 +109,12 @@ def test_interrupted_and_cut_it_is_the_same_picture(device: Device, monkeypatch:
     assert stops > 20 and state.film.pixels.tobytes() == at_once.tobytes()
 
 
-def test_it_stops_at_an_error(device: Device) -> None:
-    """With no number of samples planned."""
-    running = renderer(device, outdoors(), spp=None)
-    state = end(running, error=0.03)
-    assert running.stop_reason == "error" and state.noise is not None and state.noise <= 0.03 and state.spp > FLOOR_SPP
+@pytest.mark.parametrize("size", [SIZE, (8, 8), (12, 5)], ids=str)
+def test_it_stops_at_an_error(device: Device, size: tuple[int, int]) -> None:
+    """With no number of samples planned; also where there are but one or two tiles, which are doubled whole."""
+    running = Renderer(outdoors(), device=device.info.index, size=size, seed=1, adaptive=True)
+    state = end(running, error=0.01)
+    assert running.stop_reason == "error" and state.noise is not None and state.noise <= 0.01 and state.spp > FLOOR_SPP
 
 
 def test_the_scene_file_may_ask_for_it(tmp_path: Path) -> None:

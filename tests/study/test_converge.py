@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from clrt.cli.bench_converge import CHOICES as NAMES
-from clrt.cli.bench_converge import converge_command
+from clrt.cli.bench_converge import NAMES, converge_command
 from clrt.device.cache import REFERENCES
 from clrt.device.open import Device
 from clrt.output.images import read_image
