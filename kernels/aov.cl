@@ -35,12 +35,14 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
         turn_towards(&surface, towards);
         Frame shading = frame_around(surface.ns);
         real3 wo = to_local(shading, towards);
+        Bsdf bsdf;
+        bsdf_at(scene, &surface, &bsdf);
         real middle = (real)(0.5f);
-        BsdfSample sample = bsdf_sample(scene, surface.material, surface.front, wo, (real2){middle, middle}, middle);
+        BsdfSample sample = bsdf_sample(&bsdf, wo, (real2){middle, middle}, middle);
         real3 wi = to_world(shading, sample.wi);
         ireal followed = hit & sample.specular & keeps_its_side(&sample, dot3(wi, surface.ng));
         ireal ends = hit & !followed;
-        seen.albedo = choose(ends, mul(tint, bsdf_albedo(scene, surface.material)), seen.albedo);
+        seen.albedo = choose(ends, mul(tint, bsdf_albedo(&bsdf)), seen.albedo);
         seen.normal = choose(ends, surface.ns, seen.normal);
         if (depth >= max_depth || !ANY(followed)) return seen;
         tint = choose(followed, mul(tint, sample.weight), tint);

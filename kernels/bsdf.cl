@@ -3,23 +3,38 @@
 #include "bsdf/interface.cl"
 #include MATERIAL_FILES
 
-static inline ireal material_index(ireal material, ireal is_type) { return is_type ? material >> 4 : (ireal)(0); }
+// What the lanes hit: each lane's material is of one type, and only that member means something for it.
+typedef struct {
+    ireal type;
+#define MEMBER(name, number) struct name name;
+    MATERIAL_TYPES(MEMBER)
+} Bsdf;
 
-static inline real3 bsdf_eval(const Scene *scene, ireal material, ireal front, real3 wo, real3 wi) {
+// A material's code is its type | its index among those of its type << 4.
+static inline void bsdf_at(const Scene *scene, const Surface *surface, Bsdf *bsdf) {
+    bsdf->type = surface->material & 15;
+#define READ(name, number) { \
+        ireal is_type = bsdf->type == number; \
+        if (ANY(is_type)) bsdf->name = name##_at(scene, is_type ? surface->material >> 4 : (ireal)(0), surface); \
+    }
+    MATERIAL_TYPES(READ)
+}
+
+static inline real3 bsdf_eval(const Bsdf *bsdf, real3 wo, real3 wi) {
     real3 value = splat(ZERO);
-#define EVAL(name, type) { \
-        ireal is_type = (material & 15) == type; \
-        if (ANY(is_type)) value = choose(is_type, name##_eval(scene, material_index(material, is_type), front, wo, wi), value); \
+#define EVAL(name, number) { \
+        ireal is_type = bsdf->type == number; \
+        if (ANY(is_type)) value = choose(is_type, name##_eval(&bsdf->name, wo, wi), value); \
     }
     MATERIAL_TYPES(EVAL)
     return value;
 }
 
-static inline real bsdf_pdf(const Scene *scene, ireal material, ireal front, real3 wo, real3 wi) {
+static inline real bsdf_pdf(const Bsdf *bsdf, real3 wo, real3 wi) {
     real pdf = ZERO;
-#define PDF(name, type) { \
-        ireal is_type = (material & 15) == type; \
-        if (ANY(is_type)) pdf = is_type ? name##_pdf(scene, material_index(material, is_type), front, wo, wi) : pdf; \
+#define PDF(name, number) { \
+        ireal is_type = bsdf->type == number; \
+        if (ANY(is_type)) pdf = is_type ? name##_pdf(&bsdf->name, wo, wi) : pdf; \
     }
     MATERIAL_TYPES(PDF)
     return pdf;
@@ -31,12 +46,12 @@ static inline real bsdf_pdf(const Scene *scene, ireal material, ireal front, rea
 #define SAMPLE_SPREAD(is_type)
 #endif
 
-static inline BsdfSample bsdf_sample(const Scene *scene, ireal material, ireal front, real3 wo, real2 u, real lobe) {
+static inline BsdfSample bsdf_sample(const Bsdf *bsdf, real3 wo, real2 u, real lobe) {
     BsdfSample sample = no_sample();
-#define SAMPLE(name, type) { \
-        ireal is_type = (material & 15) == type; \
+#define SAMPLE(name, number) { \
+        ireal is_type = bsdf->type == number; \
         if (ANY(is_type)) { \
-            BsdfSample s = name##_sample(scene, material_index(material, is_type), front, wo, u, lobe); \
+            BsdfSample s = name##_sample(&bsdf->name, wo, u, lobe); \
             sample.weight = choose(is_type, s.weight, sample.weight); \
             sample.wi = choose(is_type, s.wi, sample.wi); \
             sample.pdf = is_type ? s.pdf : sample.pdf; \
@@ -48,11 +63,11 @@ static inline BsdfSample bsdf_sample(const Scene *scene, ireal material, ireal f
     return sample;
 }
 
-static inline real3 bsdf_albedo(const Scene *scene, ireal material) {
+static inline real3 bsdf_albedo(const Bsdf *bsdf) {
     real3 albedo = splat(ZERO);
-#define ALBEDO(name, type) { \
-        ireal is_type = (material & 15) == type; \
-        if (ANY(is_type)) albedo = choose(is_type, name##_albedo(scene, material_index(material, is_type)), albedo); \
+#define ALBEDO(name, number) { \
+        ireal is_type = bsdf->type == number; \
+        if (ANY(is_type)) albedo = choose(is_type, name##_albedo(&bsdf->name), albedo); \
     }
     MATERIAL_TYPES(ALBEDO)
     return albedo;

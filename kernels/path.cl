@@ -49,12 +49,12 @@ static inline real3 found_light(const Scene *scene, const Step *step, const Surf
 
 #if LIGHTS
 // 2. Light that arrives by a shadow ray towards a sampled point of a light.
-static inline real3 sampled_light(const Scene *scene, const Surface *surface, Frame shading, real3 wo, ireal active,
-                                  Sampler *sampler, ureal *rays) {
+static inline real3 sampled_light(const Scene *scene, const Surface *surface, const Bsdf *bsdf, Frame shading, real3 wo,
+                                  ireal active, Sampler *sampler, ureal *rays) {
     LightSample light = light_sample(scene, surface->p, surface->ns, sampler);
     real3 wi = to_local(shading, light.wi);
     ireal above = dot3(light.wi, surface->ng) > 0.0f;
-    real3 f = bsdf_eval(scene, surface->material, surface->front, wo, wi);
+    real3 f = bsdf_eval(bsdf, wo, wi);
     real3 contribution = mul(f, light.radiance);
     ireal useful = active & above & (light.pdf > 0.0f) & is_positive3(contribution);
     if (!ANY(useful)) return splat(ZERO);
@@ -63,7 +63,7 @@ static inline real3 sampled_light(const Scene *scene, const Surface *surface, Fr
     real t_max = light.infinite ? (real)(INFINITY) : ONE;
     *rays += useful ? (ureal)(1) : (ureal)(0);
     ireal blocked = any_hit(scene, origin, direction, t_max, useful);
-    real pdf = bsdf_pdf(scene, surface->material, surface->front, wo, wi);
+    real pdf = bsdf_pdf(bsdf, wo, wi);
     real weight = (light.delta ? ONE : power_heuristic(light.pdf, pdf)) / light.pdf;
     return choose(useful & !blocked, scale(contribution, weight), splat(ZERO));
 }
@@ -98,13 +98,15 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
         turn_towards(&surface, towards);
         Frame shading = frame_around(surface.ns);
         real3 wo = to_local(shading, towards);
+        Bsdf bsdf;
+        bsdf_at(scene, &surface, &bsdf);
 #if LIGHTS
-        real3 direct = sampled_light(scene, &surface, shading, wo, active, sampler, rays);
+        real3 direct = sampled_light(scene, &surface, &bsdf, shading, wo, active, sampler, rays);
         L = add(L, mul(beta, AT_EYE(direct)));
 #endif
         // 3. Go on in a direction drawn from the material.
         real2 u = next_2d(sampler), choice = next_2d(sampler);
-        BsdfSample sample = bsdf_sample(scene, surface.material, surface.front, wo, u, choice.x);
+        BsdfSample sample = bsdf_sample(&bsdf, wo, u, choice.x);
         step.p = surface.p;
         step.n = surface.ns;
         step.wi = to_world(shading, sample.wi);

@@ -12,24 +12,26 @@ static inline real fresnel_dielectric(real cos_o, real eta, real *cos_t) {
     return cos2_t > 0.0f ? reflected : ONE;
 }
 
-static inline real3 dielectric_eval(const Scene *scene, ireal index, ireal front, real3 wo, real3 wi) {
-    return splat(ZERO);
+struct dielectric { real3 color; real eta; };   // eta: index of refraction beyond the surface over that on wo's side
+
+static inline struct dielectric dielectric_at(const Scene *scene, ireal index, const Surface *surface) {
+    real ior = PARAMETER(dielectric, ior);
+    return (struct dielectric){PARAMETER3(dielectric, color), surface->front ? ior : 1.0f / ior};
 }
 
-static inline real dielectric_pdf(const Scene *scene, ireal index, ireal front, real3 wo, real3 wi) { return ZERO; }
+static inline real3 dielectric_eval(const struct dielectric *m, real3 wo, real3 wi) { return splat(ZERO); }
 
-static inline real3 dielectric_albedo(const Scene *scene, ireal index) {
-    return GATHER3(scene->dielectric, index, .color);
-}
+static inline real dielectric_pdf(const struct dielectric *m, real3 wo, real3 wi) { return ZERO; }
 
-static inline BsdfSample dielectric_sample(const Scene *scene, ireal index, ireal front, real3 wo, real2 u, real lobe) {
-    real ior = GATHER(real, scene->dielectric, index, .ior);
-    real eta = front ? ior : 1.0f / ior, cos_t;
-    ireal reflected = lobe < fresnel_dielectric(wo.z, eta, &cos_t);
-    real to_inside = 1.0f / eta;
+static inline real3 dielectric_albedo(const struct dielectric *m) { return m->color; }
+
+static inline BsdfSample dielectric_sample(const struct dielectric *m, real3 wo, real2 u, real lobe) {
+    real cos_t;
+    ireal reflected = lobe < fresnel_dielectric(wo.z, m->eta, &cos_t);
+    real to_inside = 1.0f / m->eta;
     BsdfSample sample = no_sample();
     sample.wi = choose(reflected, vector(-wo.x, -wo.y, wo.z), vector(-wo.x * to_inside, -wo.y * to_inside, -cos_t));
-    sample.weight = choose(reflected, splat(ONE), GATHER3(scene->dielectric, index, .color));
+    sample.weight = choose(reflected, splat(ONE), m->color);
     sample.pdf = ONE;
     sample.spread = reflected ? ONE : to_inside * to_inside;
     sample.specular = ALL_LANES;

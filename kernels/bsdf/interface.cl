@@ -1,14 +1,20 @@
 // What every material's file provides, by its name:
 //
-//   NAME_eval(scene, index, front, wo, wi)           f·|cos wi|
-//   NAME_pdf(scene, index, front, wo, wi)            density per solid angle with which NAME_sample chooses wi
-//   NAME_sample(scene, index, front, wo, u, lobe)    a direction with its weight f·|cos|/pdf; u in [0,1)², lobe in [0,1)
-//   NAME_albedo(scene, index)                        what part of white light from straight above it reflects or lets
-//                                                    through, in [0, 1]
+//   struct NAME                              its parameters where it was hit, of every lane
+//   NAME_at(scene, index, surface)           reads them: PARAMETER(NAME, x) and PARAMETER3(NAME, x) for its dataclass's x
+//   NAME_eval(m, wo, wi)                     f·|cos wi|
+//   NAME_pdf(m, wo, wi)                      density per solid angle with which NAME_sample chooses wi
+//   NAME_sample(m, wo, u, lobe)              a direction with its weight f·|cos|/pdf; u in [0,1)², lobe in [0,1)
+//   NAME_albedo(m)                           what part of white light from straight above it reflects or lets through,
+//                                            in [0, 1]
 //
-// wo, wi: unit, local frame, both pointing away from the surface, +z the shading normal on the side of wo; front:
-// whether that is the surface's outside. wi.z < 0 goes through it: then the material is among TRANSMISSION's.
-#include "vector.cl"
+// m: const struct NAME *. wo, wi: unit, local frame, both pointing away from the surface, +z the shading normal on the
+// side of wo; surface->front: whether that is the outside. wi.z < 0 goes through it: then the material is among
+// TRANSMISSION's.
+#include "surface.cl"
+
+#define PARAMETER(kind, name) GATHER(real, scene->kind, index, .name)
+#define PARAMETER3(kind, name) GATHER3(scene->kind, index, .name)
 
 typedef struct {
     real3 weight, wi;

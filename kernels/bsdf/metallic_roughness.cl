@@ -17,7 +17,7 @@
 
 #define LOSS_COEFFICIENTS ((int)(sizeof(((MetallicRoughness *)0)->loss) / sizeof(float)))
 
-typedef struct {
+struct metallic_roughness {
     real3 albedo, f0;
     real alpha;
     ireal smith;
@@ -26,27 +26,27 @@ typedef struct {
     real mean_loss, width, spread;
     real loss[LOSS_COEFFICIENTS];
 #endif
-} MetallicRoughnessLobes;
+};
 
-static inline MetallicRoughnessLobes metallic_roughness_lobes(const Scene *scene, ireal index) {
-    MetallicRoughnessLobes m;
-    m.albedo = GATHER3(scene->metallic_roughness, index, .albedo);
-    m.f0 = GATHER3(scene->metallic_roughness, index, .f0);
-    m.alpha = GATHER(real, scene->metallic_roughness, index, .alpha);
-    m.smith = TO_INT(GATHER(real, scene->metallic_roughness, index, .smith));
+static inline struct metallic_roughness metallic_roughness_at(const Scene *scene, ireal index, const Surface *surface) {
+    struct metallic_roughness m;
+    m.albedo = PARAMETER3(metallic_roughness, albedo);
+    m.f0 = PARAMETER3(metallic_roughness, f0);
+    m.alpha = PARAMETER(metallic_roughness, alpha);
+    m.smith = TO_INT(PARAMETER(metallic_roughness, smith));
 #if MULTIPLE_SCATTERING
-    m.multiple = GATHER3(scene->metallic_roughness, index, .multiple);
-    m.mean_loss = GATHER(real, scene->metallic_roughness, index, .mean_loss);
-    m.width = GATHER(real, scene->metallic_roughness, index, .width);
-    m.spread = GATHER(real, scene->metallic_roughness, index, .spread);
-    for (int k = 0; k < LOSS_COEFFICIENTS; ++k) m.loss[k] = GATHER(real, scene->metallic_roughness, index, .loss[k]);
+    m.multiple = PARAMETER3(metallic_roughness, multiple);
+    m.mean_loss = PARAMETER(metallic_roughness, mean_loss);
+    m.width = PARAMETER(metallic_roughness, width);
+    m.spread = PARAMETER(metallic_roughness, spread);
+    for (int k = 0; k < LOSS_COEFFICIENTS; ++k) m.loss[k] = PARAMETER(metallic_roughness, loss[k]);
 #endif
     return m;
 }
 
 #if MULTIPLE_SCATTERING
 // What a single bounce with F = 1 loses of light from an angle: a polynomial in a stretched cosine.
-static inline real microfacet_loss(const MetallicRoughnessLobes *m, real cos_theta) {
+static inline real microfacet_loss(const struct metallic_roughness *m, real cos_theta) {
     real q = cos_theta / (cos_theta + m->width);
     real x = 2.0f * sqrt(q * (1.0f + m->width)) - 1.0f;
     real sum = ZERO;
@@ -55,12 +55,12 @@ static inline real microfacet_loss(const MetallicRoughnessLobes *m, real cos_the
 }
 
 // Around +z with a density of cos² + alpha² in cos²: pdf = cos/(pi·spread·(cos² + alpha²)), spread = log(1 + 1/alpha²).
-static inline real3 sample_multiple(const MetallicRoughnessLobes *m, real2 u) {
+static inline real3 sample_multiple(const struct metallic_roughness *m, real2 u) {
     real s, c, z2 = minimum(m->alpha * m->alpha * (exp(u.x * m->spread) - 1.0f), ONE), r = sqrt(1.0f - z2);
     sincos_turns(u.y, &s, &c);
     return vector(r * c, r * s, sqrt(z2));
 }
-static inline real multiple_pdf(const MetallicRoughnessLobes *m, real cos_theta) {
+static inline real multiple_pdf(const struct metallic_roughness *m, real cos_theta) {
     return cos_theta / (PI * m->spread * (cos_theta * cos_theta + m->alpha * m->alpha));
 }
 #endif
@@ -89,7 +89,7 @@ static inline real ggx_lambda(real3 w, real alpha) {
 }
 
 // G2 by the forms that the scene's materials use.
-static inline real shadowing(const MetallicRoughnessLobes *m, real3 wo, real3 wi) {
+static inline real shadowing(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real g = ZERO;
     real lambda_o = ggx_lambda(wo, m->alpha), lambda_i = ggx_lambda(wi, m->alpha);
 #if SMITH_HEIGHT_CORRELATED
@@ -110,7 +110,7 @@ static inline real shadowing(const MetallicRoughnessLobes *m, real3 wo, real3 wi
 // The lobes' probabilities: their shares of the reflected light, judged by the Fresnel term at wo.
 typedef struct { real specular, multiple, diffuse; } LobeShares;
 
-static inline LobeShares lobe_shares(const MetallicRoughnessLobes *m, real3 wo) {
+static inline LobeShares lobe_shares(const struct metallic_roughness *m, real3 wo) {
     real3 f = fresnel_schlick(m->f0, wo.z);
     LobeShares share = {luminance(f), ZERO, luminance(mul(sub(splat(ONE), f), m->albedo))};
 #if MULTIPLE_SCATTERING
@@ -122,7 +122,7 @@ static inline LobeShares lobe_shares(const MetallicRoughnessLobes *m, real3 wo) 
                         some ? share.diffuse / sum : ZERO};
 }
 
-static inline real3 metallic_roughness_value(const MetallicRoughnessLobes *m, real3 wo, real3 wi) {
+static inline real3 metallic_roughness_eval(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 sum = add(wo, wi);
     real length = length3(sum);
     real3 h = scale(sum, 1.0f / length);
@@ -137,7 +137,7 @@ static inline real3 metallic_roughness_value(const MetallicRoughnessLobes *m, re
     return choose((wo.z > 0.0f) & (wi.z > 0.0f), mad3(f, specular, diffuse), splat(ZERO));
 }
 
-static inline real metallic_roughness_density(const MetallicRoughnessLobes *m, real3 wo, real3 wi) {
+static inline real metallic_roughness_pdf(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 h = normalize3(add(wo, wi));
     real visible = ggx_d(h, m->alpha) / (4.0f * wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
     LobeShares share = lobe_shares(m, wo);
@@ -148,22 +148,11 @@ static inline real metallic_roughness_density(const MetallicRoughnessLobes *m, r
     return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
 }
 
-static inline real3 metallic_roughness_eval(const Scene *scene, ireal index, ireal front, real3 wo, real3 wi) {
-    MetallicRoughnessLobes m = metallic_roughness_lobes(scene, index);
-    return metallic_roughness_value(&m, wo, wi);
-}
-
-static inline real metallic_roughness_pdf(const Scene *scene, ireal index, ireal front, real3 wo, real3 wi) {
-    MetallicRoughnessLobes m = metallic_roughness_lobes(scene, index);
-    return metallic_roughness_density(&m, wo, wi);
-}
-
 // As if no light were lost between microfacets: f0, and what goes through the surface twice: (1 − f0) of it straight in,
 // and (1 − f0)·20/21, the cosine-weighted mean of 1 − F, out again.
-static inline real3 metallic_roughness_albedo(const Scene *scene, ireal index) {
-    real3 f0 = GATHER3(scene->metallic_roughness, index, .f0), in = sub(splat(ONE), f0);
-    real3 body = mul(mul(in, in), GATHER3(scene->metallic_roughness, index, .albedo));
-    return mad3(body, (real)(20.0f / 21.0f), f0);
+static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m) {
+    real3 in = sub(splat(ONE), m->f0);
+    return mad3(mul(mul(in, in), m->albedo), (real)(20.0f / 21.0f), m->f0);
 }
 
 // A normal visible from wo: stretch, draw a point of the cap of directions, unstretch.
@@ -177,18 +166,17 @@ static inline real3 sample_visible_normal(real3 wo, real alpha, real2 u) {
     return normalize3(vector(h.x * alpha, h.y * alpha, maximum(h.z, (real)(1e-30f))));
 }
 
-static inline BsdfSample metallic_roughness_sample(const Scene *scene, ireal index, ireal front, real3 wo, real2 u, real lobe) {
-    MetallicRoughnessLobes m = metallic_roughness_lobes(scene, index);
-    real3 h = sample_visible_normal(wo, m.alpha, u);
+static inline BsdfSample metallic_roughness_sample(const struct metallic_roughness *m, real3 wo, real2 u, real lobe) {
+    real3 h = sample_visible_normal(wo, m->alpha, u);
     real3 reflected = sub(scale(h, 2.0f * dot3(wo, h)), wo);
     BsdfSample sample = no_sample();
-    LobeShares share = lobe_shares(&m, wo);
+    LobeShares share = lobe_shares(m, wo);
     sample.wi = choose(lobe < share.specular, reflected, sample_cosine(u));
 #if MULTIPLE_SCATTERING
-    sample.wi = choose(lobe >= 1.0f - share.multiple, sample_multiple(&m, u), sample.wi);
+    sample.wi = choose(lobe >= 1.0f - share.multiple, sample_multiple(m, u), sample.wi);
 #endif
-    sample.pdf = metallic_roughness_density(&m, wo, sample.wi);
+    sample.pdf = metallic_roughness_pdf(m, wo, sample.wi);
     real inverse = sample.pdf > 0.0f ? 1.0f / sample.pdf : ZERO;
-    sample.weight = scale(metallic_roughness_value(&m, wo, sample.wi), inverse);
+    sample.weight = scale(metallic_roughness_eval(m, wo, sample.wi), inverse);
     return sample;
 }

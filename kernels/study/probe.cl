@@ -74,11 +74,22 @@ kernel void probe_accumulate(SCENE_PARAMETERS, uint n, global const float *in, g
     put(out, n, 13, TO_REAL(a.dropped));
 }
 
+// A material, by its code, somewhere on a surface.
+static Bsdf material_at(const Scene *scene, real code, ireal front) {
+    Surface surface;
+    surface.material = TO_INT(code);
+    surface.front = front;
+    Bsdf bsdf;
+    bsdf_at(scene, &surface, &bsdf);
+    return bsdf;
+}
+
 // in: material, wo (3), u (2), lobe -> out: wi (3), weight (3), pdf, specular; seen from the front if `front`
 kernel void probe_bsdf_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint front) {
     ELEMENTS
     real2 u = {ROW(in, 4), ROW(in, 5)};
-    BsdfSample sample = bsdf_sample(&scene, TO_INT(ROW(in, 0)), front ? ALL_LANES : NO_LANES, ROW3(in, 1), u, ROW(in, 6));
+    Bsdf bsdf = material_at(&scene, ROW(in, 0), front ? ALL_LANES : NO_LANES);
+    BsdfSample sample = bsdf_sample(&bsdf, ROW3(in, 1), u, ROW(in, 6));
     put3(out, n, 0, sample.wi);
     put3(out, n, 3, sample.weight);
     put(out, n, 6, sample.pdf);
@@ -88,9 +99,9 @@ kernel void probe_bsdf_sample(SCENE_PARAMETERS, uint n, global const float *in, 
 // in: material, wo (3), wi (3) -> out: f·|cos| (3), pdf
 kernel void probe_bsdf_value(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
-    ireal material = TO_INT(ROW(in, 0));
-    put3(out, n, 0, bsdf_eval(&scene, material, ALL_LANES, ROW3(in, 1), ROW3(in, 4)));
-    put(out, n, 3, bsdf_pdf(&scene, material, ALL_LANES, ROW3(in, 1), ROW3(in, 4)));
+    Bsdf bsdf = material_at(&scene, ROW(in, 0), ALL_LANES);
+    put3(out, n, 0, bsdf_eval(&bsdf, ROW3(in, 1), ROW3(in, 4)));
+    put(out, n, 3, bsdf_pdf(&bsdf, ROW3(in, 1), ROW3(in, 4)));
 }
 
 #if MATERIAL_METALLIC_ROUGHNESS

@@ -30,7 +30,7 @@ SABOTAGES = {
     "cracks between triangles": ("rays", r"e->u1 >= e->u2\)(.*)e->u1 <= e->u2\)", r"e->u1 > e->u2)\1e->u1 < e->u2)"),
     "the far child forgotten": ("binary tree", r"distance\[top\+\+\] = far;", ""),
     "boxes too small": ("tree builder", r"box_union\(Box a, Box b\) \{", r"\g<0>\n    b = a;"),
-    "paint that swallows light": ("furnace", r"sample.weight = (GATHER3\(scene->diffuse.*\));",
+    "paint that swallows light": ("furnace", r"sample.weight = (m->color);",
                                   r"sample.weight = scale(\1, (real)(0.999999f));"),
     "light that does not fade": ("lamp", r"inverse \* inverse", "inverse"),
     "weights that sum to two": ("room", r"return 1.0f / \(1.0f \+ ratio \* ratio\);", "return ONE;"),
