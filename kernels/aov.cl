@@ -32,6 +32,9 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
 #if PRIMITIVES
         Surface surface = surface_at(scene, origin, direction, &hits);
         real3 towards = negate(direction);
+#if NORMAL_MAPS
+        bend_normal(scene, &surface);
+#endif
         turn_towards(&surface, towards);
         Frame shading = frame_around(surface.ns);
         real3 wo = to_local(shading, towards);

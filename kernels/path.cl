@@ -95,6 +95,9 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
 
 #if PRIMITIVES
         real3 towards = negate(step.wi);
+#if NORMAL_MAPS
+        bend_normal(scene, &surface);
+#endif
         turn_towards(&surface, towards);
         Frame shading = frame_around(surface.ns);
         real3 wo = to_local(shading, towards);

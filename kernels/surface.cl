@@ -4,6 +4,7 @@
 // roundings of the primitive's own coordinates, however far the ray came (pbrt, 4th ed., 6.8). Where new rays start is
 // said in offset/.
 #include "traverse/trace.cl"
+#include TEXTURE_FILES
 
 typedef struct {
     real3 p, p_error;     // |p − exact| <= p_error by component
@@ -11,6 +12,16 @@ typedef struct {
     ireal material;       // type | index << 4
     ireal light;          // entry of the light table, or -1
     ireal front;          // whether it is seen from its front side, once it is turned (turn_towards)
+#if TEXTURES
+    Coordinates at;
+#endif
+#if VERTEX_COLORS
+    real3 tint;
+#endif
+#if NORMAL_MAPS
+    real3 tangent;        // not of unit length
+    real handedness;      // of the bitangent; 0 where there are no tangents
+#endif
 } Surface;
 
 #if TRIANGLES
@@ -49,6 +60,18 @@ static inline void triangle_surface(const Scene *scene, const Hits *hits, ireal 
         surface->ns = choose(smooth & (norm2 > 0.0f), scale(ns, rsqrt(norm2)), surface->ns);
     }
 #endif
+#if TEXTURES
+    surface->at = triangle_coordinates(scene, primitive, b0, b1, b2);
+#endif
+#if VERTEX_COLORS
+    surface->tint = mad3(GATHER3(scene->colors, primitive, .c0), b0,
+                    mad3(GATHER3(scene->colors, primitive, .c1), b1, scale(GATHER3(scene->colors, primitive, .c2), b2)));
+#endif
+#if NORMAL_MAPS
+    surface->tangent = mad3(GATHER3(scene->tangents, primitive, .t0), b0,
+                       mad3(GATHER3(scene->tangents, primitive, .t1), b1, scale(GATHER3(scene->tangents, primitive, .t2), b2)));
+    surface->handedness = GATHER(real, scene->tangents, primitive, .sign);
+#endif
 }
 #endif
 
@@ -68,6 +91,16 @@ static inline void sphere_surface(const Scene *scene, real3 origin, real3 direct
     surface->p = choose(nearby, met, surface->p);
     surface->p_error = choose(nearby, met_error, surface->p_error);
     surface->ng = surface->ns = n;
+#if TEXTURES
+    surface->at = sphere_coordinates(n);
+#endif
+#if VERTEX_COLORS
+    surface->tint = splat(ONE);
+#endif
+#if NORMAL_MAPS
+    surface->tangent = vector(n.z, ZERO, -n.x);
+    surface->handedness = ONE;
+#endif
     surface->material = GATHER(ireal, scene->spheres, sphere, .material);
     surface->light = GATHER(ireal, scene->spheres, sphere, .light);
 }
@@ -89,6 +122,19 @@ static inline Surface surface_at(const Scene *scene, real3 origin, real3 directi
         surface.ns = choose(is_sphere, other.ns, surface.ns);
         surface.material = is_sphere ? other.material : surface.material;
         surface.light = is_sphere ? other.light : surface.light;
+#if TEXTURES
+        for (int i = 0; i < UV_SETS; ++i) {
+            surface.at.set[i].x = is_sphere ? other.at.set[i].x : surface.at.set[i].x;
+            surface.at.set[i].y = is_sphere ? other.at.set[i].y : surface.at.set[i].y;
+        }
+#endif
+#if VERTEX_COLORS
+        surface.tint = choose(is_sphere, other.tint, surface.tint);
+#endif
+#if NORMAL_MAPS
+        surface.tangent = choose(is_sphere, other.tangent, surface.tangent);
+        surface.handedness = is_sphere ? other.handedness : surface.handedness;
+#endif
     }
 #elif TRIANGLES
     triangle_surface(scene, hits, primitive, &surface);

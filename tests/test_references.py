@@ -76,9 +76,10 @@ def test_metals_and_ggx_mean_what_the_renderer_of_the_pictures_meant(tmp_path: P
     """F0 is the colour, nothing is diffuse, and alpha is roughness² or as stored."""
     scene, _ = load_reference(stored(tmp_path))
     for index, f0, alpha in [(1, (0.9, 0.65, 0.35), 0.25), (2, (1, 1, 1), 0.36)]:
-        parameters = scene.spheres[index].material.parameters()
-        assert parameters["f0"] == pytest.approx(f0) and parameters["albedo"] == pytest.approx((0, 0, 0), abs=0)
-        assert parameters["alpha"] == pytest.approx(alpha, rel=1e-12)
+        material = scene.spheres[index].material
+        assert isinstance(material, MetallicRoughness)
+        assert material.lobes.f0 == pytest.approx(f0) and material.lobes.albedo == pytest.approx((0, 0, 0), abs=0)
+        assert material.lobes.alpha == pytest.approx(alpha, rel=1e-12)
 
 
 def test_constant_light_is_the_environments_color(tmp_path: Path) -> None:

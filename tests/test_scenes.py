@@ -104,7 +104,7 @@ def test_furnace(device: Device) -> None:
             assert np.abs(mean[disc] - 1).max() < 1e-5
             continue
         nodes = np.linspace(0, 0.95, 24)
-        curve = [albedo(sphere.material.roughness**2, float(np.sqrt(1 - node**2)), "height_correlated", 200)
+        curve = [albedo(sphere.material.lobes.alpha, float(np.sqrt(1 - node**2)), "height_correlated", 200)
                  for node in nodes]
         expected = np.interp(radii, nodes, curve).mean(axis=(1, 3))[disc].mean()
         error = np.sqrt(variance[disc][:, 0].mean() / disc.sum())
@@ -162,7 +162,7 @@ def test_the_manual_has_the_presets_and_the_words_to_come() -> None:
     assert {name: (_value(f0), float(metal == "metal")) for name, (f0, metal) in rows.items()} == F0_PRESETS
     not_yet = MANUAL.split("## Not drawn yet")[1].split("##")[0]
     assert set(re.findall(r"`(\w+)`", not_yet)) == LATER
-    assert replace(MetallicRoughness(), preset="gold").parameters()["f0"] == F0_PRESETS["gold"][0]
+    assert replace(MetallicRoughness(), preset="gold").lobes.f0 == F0_PRESETS["gold"][0]
 
 
 def _rows(heading: str, first: str = "key") -> dict[str, tuple[str, str]]:

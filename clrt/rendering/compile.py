@@ -19,12 +19,16 @@ from ..device.preamble import Buffers, defines, scene_struct, type_list, typedef
 from ..device.program import compose, files_of
 from ..scene.materials import MATERIALS, Material
 from ..scene.model import Camera, Scene
+from ..scene.textures import Texture
 from ..scene.scaling import Frame, frame_of, in_frame
 from ..scene.validate import validate
+from .corners import pack_corners
 from .emitters import SURFACES, TYPES, Emitters, pack_emitters
 from .environment import Sky, pack_sky
 from .filters import filter_quantiles
-from .records import AOV, COUNTS, LAUNCH, NORMALS, PIXEL, SPHERE, TRIANGLE, material_record
+from .materials import Materials, pack_materials
+from .records import AOV, COUNTS, LAUNCH, NORMALS, PIXEL, SPHERE, TRIANGLE
+from .textures import Textures
 from .tiles import TILE
 
 
@@ -104,9 +108,11 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
         packing = beside.submit(pack_sky, scene.environment)
         tree = build_tree(device, layout, choices.builder, triangles, in_tree, choices.tests.triangle)
         sky = packing.result()
-    emitters = pack_emitters(scene, triangles, sky)
+    textures = Textures()
+    emitters = pack_emitters(scene, triangles, sky, textures)
     users = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
-    codes, material_buffers = _materials(users)
+    materials = pack_materials(users, textures)
+    codes = materials.codes
 
     buffers = tree_buffers(tree)
     if lone:
@@ -119,7 +125,8 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
         buffers["normals"] = ("Normals", _normal_records(normals))
     if len(spheres):
         buffers["spheres"] = ("Sphere", _sphere_records(spheres, codes[len(scene.meshes):], emitters.sphere))
-    buffers |= material_buffers | emitters.buffers | sky.buffers
+    buffers |= pack_corners(scene.meshes, textures.uv_sets, bool(materials.mapped("normal_map")))
+    buffers |= materials.buffers | textures.buffers() | emitters.buffers | sky.buffers
     if scene.render.filter != "box":
         buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))
     counts = np.zeros(1, COUNTS)
@@ -127,10 +134,10 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
     for kind, count in emitters.counts.items():
         counts[f"{kind}_lights"] = count
 
-    used = [m for m in MATERIALS if m.kernel in material_buffers]
-    features = _features(scene, used, users, emitters, sky, lone)
-    preamble = _preamble(buffers, features, used, emitters, choices, tree, frame.unit)
-    files = {**_files(used, emitters, sky, choices, tree.name, bool(len(triangles)), bool(len(spheres)), lone),
+    features = _features(scene, materials, textures.uv_sets, users, emitters, sky, lone)
+    preamble = _preamble(buffers, features, materials, textures.uv_sets, emitters, choices, tree, frame.unit)
+    files = {**_files(materials.used, emitters, sky, choices, tree.name, len(triangles) > 0, len(spheres) > 0, lone),
+             "TEXTURE_FILES": ["texture.cl"] if textures.uv_sets else [],
              "SAMPLER": [f"sampler/{scene.render.sampler}.cl"],
              "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"]}
     return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame)
@@ -145,24 +152,6 @@ def _geometry(scene: Scene) -> tuple[NDArray[np.float32], dict[int, NDArray[np.f
             normals[first] = np.take(mesh.normals, mesh.faces, axis=0)
         first += len(mesh.faces)
     return np.concatenate(corners), normals
-
-
-def _materials(users: list[Material]) -> tuple[NDArray[np.int32], dict[str, tuple[str, NDArray[Any]]]]:
-    """Each user's material code (type | index << 4), and a buffer of records for every type in use."""
-    distinct: dict[type[Material], dict[Material, int]] = {}
-    codes = []
-    for material in users:
-        indices = distinct.setdefault(type(material), {})
-        codes.append(MATERIALS.index(type(material)) | indices.setdefault(material, len(indices)) << 4)
-    buffers: dict[str, tuple[str, NDArray[Any]]] = {}
-    for kind in MATERIALS:
-        if kind in distinct:
-            records = np.zeros(len(distinct[kind]), material_record(distinct[kind]))
-            for material, index in distinct[kind].items():
-                for name, value in material.parameters().items():
-                    records[name][index] = value
-            buffers[kind.kernel] = (kind.__name__, records)
-    return np.array(codes, np.int32), buffers
 
 
 def _triangle_records(triangles: NDArray[np.float32], materials: NDArray[np.int32], lights: NDArray[np.int32],
@@ -192,20 +181,24 @@ def _sphere_records(spheres: NDArray[np.float32], materials: NDArray[np.int32],
     return records
 
 
-def _features(scene: Scene, used: Iterable[type[Material]], users: Iterable[Material], emitters: Emitters, sky: Sky,
+def _features(scene: Scene, materials: Materials, uv_sets: int, users: list[Material], emitters: Emitters, sky: Sky,
               lone: bool) -> set[str]:
     """The names that are defined while compiling: what the scene has, and the parts of materials that it uses."""
-    features = {f"MATERIAL_{kind.kernel.upper()}" for kind in used} | {f"LIGHT_{t.upper()}" for t in emitters.types}
+    features = {f"MATERIAL_{kind.kernel.upper()}" for kind in materials.used}
+    features |= {f"LIGHT_{kind.upper()}" for kind in emitters.types}
     features |= set().union(*(material.features() for material in users))
     has = {**tree_features(bool(scene.meshes), bool(scene.spheres), lone), "SPHERES": bool(scene.spheres),
            "SKY": sky.kernel is not None, "LIGHTS": emitters.count > 0, "LIGHT_TREE": emitters.choice.tree,
            "EMITTERS": any(t in SURFACES for t in emitters.types),
+           "TEXTURES": uv_sets > 0, "EMISSION_TEXTURES": any(isinstance(user.emission, Texture) for user in users),
+           "NORMAL_MAPS": bool(materials.mapped("normal_map")),
+           "VERTEX_COLORS": any(mesh.colors is not None for mesh in scene.meshes),
            "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes)}
     return features | {name for name, present in has.items() if present}
 
 
-def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], emitters: Emitters, choices: Choices,
-              tree: Layout, unit: float) -> str:
+def _preamble(buffers: Buffers, features: set[str], materials: Materials, uv_sets: int, emitters: Emitters,
+              choices: Choices, tree: Layout, unit: float) -> str:
     # Only offsets that are lengths of the scene's know its unit: others share programs whatever it is.
     lengths = {} if choices.offset == "bound" else {"SCENE_UNIT": min(unit, LARGEST_UNIT)}
     surfaces = [t for t in emitters.types if t in SURFACES]
@@ -215,9 +208,16 @@ def _preamble(buffers: Buffers, features: set[str], used: list[type[Material]], 
         defines({feature: 1 for feature in sorted(features)}),
         typedefs({"Counts": COUNTS, "Pixel": PIXEL, "Aov": AOV, "Launch": LAUNCH}),
         scene_struct(buffers),
-        type_list("MATERIAL_TYPES", [(kind.kernel, MATERIALS.index(kind)) for kind in used]),
+        type_list("MATERIAL_TYPES", _numbered(materials.used)),
+        type_list("NORMAL_MAPPED_TYPES", _numbered(materials.mapped("normal_map"))),
+        defines({"UV_SETS": uv_sets}),
+        *(f"#define READ_{name} {'TEXTURED' if reads else 'CONSTANT'}" for name, reads in materials.reads.items()),
         type_list("LIGHT_TYPES", [(t, TYPES.index(t)) for t in emitters.types]),
         type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces])])
+
+
+def _numbered(kinds: Iterable[type[Material]]) -> list[tuple[str, int]]:
+    return [(kind.kernel, MATERIALS.index(kind)) for kind in kinds]
 
 
 def _files(used: list[type[Material]], emitters: Emitters, sky: Sky, choices: Choices, layout: str,

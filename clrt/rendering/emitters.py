@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from ..scene.lights import DirectionalLight, PointLight
 from ..scene.model import Scene
+from ..scene.textures import Texture
 from .environment import LUMINANCE, Sky
 from .light_choice import LightChoice, pack_choice
 from .light_groups import Doubles, joined, round_lights
 from .records import DIRECTIONAL_LIGHT, POINT_LIGHT, SPHERE_LIGHT
+from .textures import Textures
 from .triangle_lights import pack_triangle_lights
 
 #: The types in the order of their lights' numbers, infinite ones last; the kernel file is light/<name>.cl, the sky's is
@@ -43,12 +45,12 @@ class Emitters:
         return sum(self.counts.values())
 
 
-def pack_emitters(scene: Scene, triangles: NDArray[np.float32], sky: Sky) -> Emitters:
+def pack_emitters(scene: Scene, triangles: NDArray[np.float32], sky: Sky, textures: Textures) -> Emitters:
     """All lights of the scene that are not black. triangles: (m, 3, 3) float32, the meshes' in order."""
-    flat = pack_triangle_lights(scene.meshes, triangles)
-    shines = np.array([any(sphere.material.emission) for sphere in scene.spheres], bool)
+    flat = pack_triangle_lights(scene.meshes, triangles, textures)
+    shines = np.array([any(sphere.material.radiance) for sphere in scene.spheres], bool)
     of_sphere = np.where(shines, len(flat.records) + np.cumsum(shines) - 1, -1).astype(np.int32)
-    balls, points, beams = _sphere_lights(scene), _point_lights(scene), _directional_lights(scene)
+    balls, points, beams = _sphere_lights(scene, textures), _point_lights(scene), _directional_lights(scene)
     records = {"triangle": flat.records, "sphere": balls, "point": points, "directional": beams}
     counts = {kind: len(array) for kind, array in records.items() if len(array)}
     infinite = _doubles(beams, "towards") * _luminance(beams, "irradiance")[:, None]
@@ -65,11 +67,13 @@ def pack_emitters(scene: Scene, triangles: NDArray[np.float32], sky: Sky) -> Emi
     return Emitters(buffers | choice.buffers, counts, flat.light, of_sphere, choice)
 
 
-def _sphere_lights(scene: Scene) -> NDArray[Any]:
-    lamps = [sphere for sphere in scene.spheres if any(sphere.material.emission)]
+def _sphere_lights(scene: Scene, textures: Textures) -> NDArray[Any]:
+    lamps = [sphere for sphere in scene.spheres if any(sphere.material.radiance)]
     records = np.zeros(len(lamps), SPHERE_LIGHT)
     for record, lamp in zip(records, lamps):
-        record["center"], record["radius"], record["radiance"] = lamp.center, lamp.radius, lamp.material.emission
+        record["center"], record["radius"], record["radiance"] = lamp.center, lamp.radius, lamp.material.radiance
+        emission = lamp.material.emission
+        record["texture"] = textures.number(emission) if isinstance(emission, Texture) else -1
     return records
 
 

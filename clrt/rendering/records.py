@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from ..device.records import record
-from ..scene.materials import Material
 
 TRIANGLE = record(p0="3f4", material="i4", p1="3f4", light="i4", p2="3f4", normals="i4")
 NORMALS = record(n0="3f4", pad0="i4", n1="3f4", pad1="i4", n2="3f4", pad2="i4")
+TEXCOORDS = record(uv0="2f4", uv1="2f4", uv2="2f4", pad="2f4")
+COLORS = record(c0="4f4", c1="4f4", c2="4f4")
+#: sign: of the bitangent, or 0 where there is no tangent.
+TANGENTS = record(t0="3f4", sign="f4", t1="3f4", pad1="f4", t2="3f4", pad2="f4")
 SPHERE = record(center="3f4", radius="f4", material="i4", light="i4", pad="2i4")
 
 #: A light, lights together, or an infinite light (kernels/light/choice.cl, tree.cl).
 LIGHT_GROUP = record(center="3f4", radius="f4", axis="3f4", cos_cone="f4", intensity="f4", below="i4", above="i4",
                      pad="i4")
 LIGHT_PLACE = np.dtype([("group", "i4")])
-TRIANGLE_LIGHT = record(p0="3f4", area="f4", e1="3f4", parallelogram="i4", e2="3f4", pad0="i4", normal="3f4", pad1="i4",
-                        radiance="3f4", pad2="i4")
-SPHERE_LIGHT = record(center="3f4", radius="f4", radiance="3f4", pad="i4")
+#: texture: of its radiance, or −1; primitive: the triangle whose texture coordinates that has.
+TRIANGLE_LIGHT = record(p0="3f4", area="f4", e1="3f4", parallelogram="i4", e2="3f4", texture="i4", normal="3f4",
+                        primitive="i4", radiance="3f4", pad="i4")
+SPHERE_LIGHT = record(center="3f4", radius="f4", radiance="3f4", texture="i4")
 POINT_LIGHT = record(position="3f4", pad0="i4", intensity="3f4", pad1="i4")
 DIRECTIONAL_LIGHT = record(towards="3f4", pad0="i4", irradiance="3f4", pad1="i4")
 
@@ -36,28 +40,38 @@ PIXEL = record(sum="3f4", count="u4", sum_error="3f4", dropped="u4", square="3f4
 LAUNCH = record(position="3f4", width="u4", right="3f4", height="u4", up="3f4", max_depth="i4", forward="3f4",
                 seed="u4", first_pixel="u4", pixel_count="u4", first_sample="u4", sample_count="u4",
                 block_bits="u4", pad="3u4")
+#: u_row, v_row: what of (u, v, 1) makes the picture's coordinates. first: of its texels.
+TEXTURE = record(u_row="3f4", width="i4", v_row="3f4", height="i4", first="i4", wrap_u="i4", wrap_v="i4", nearest="i4",
+                 uv_set="i4", shift="u4", pad="2i4")
+TEXEL = np.dtype([("rgba", "u4")])
+#: Of a byte that is encoded by sRGB's curve.
+LINEAR = np.dtype([("linear", "f4")])
 #: Of a pixel's AOVs (kernels/aov.cl); what is not named pad is a picture of its own.
 AOV = record(albedo="3f4", pad0="i4", normal="3f4", pad1="i4")
 #: A filter's quantile, in pixels from a pixel's edge.
 FILTER = np.dtype([("quantile", "f4")])
 
 
-def material_record(materials: Iterable[Material]) -> np.dtype[Any]:
-    """The record of materials of one type: all parameters that one of them has.
+def material_record(values: Iterable[Mapping[str, Any]]) -> np.dtype[Any]:
+    """The record of materials of one type, which have these values by name: all that one of them has.
 
-    Rows of a multiple of four first, then triples, each followed by a scalar or padding, then the other scalars.
+    Rows of a multiple of four first, then triples, each followed by a scalar or padding, then the other scalars; whole
+    numbers are int32.
     """
     sizes: dict[str, int] = {}
-    for material in materials:
-        sizes |= {name: len(value) if isinstance(value, tuple) else 1 for name, value in material.parameters().items()}
+    scalar: dict[str, str] = {}
+    for named in values:
+        sizes |= {name: len(value) if isinstance(value, tuple) else 1 for name, value in named.items()}
+        scalar |= {name: "i4" if name.endswith("_texture") else "f4" for name in named}
     triples = [name for name, size in sizes.items() if size == 3]
     scalars = [name for name, size in sizes.items() if size == 1]
     fields = {name: f"{size}f4" for name, size in sizes.items() if size > 3}
     for i, triple in enumerate(triples):
         fields[triple] = "3f4"
-        fields[scalars.pop(0) if scalars else f"pad{i}"] = "f4"
-    for scalar in scalars:
-        fields[scalar] = "f4"
+        name = scalars.pop(0) if scalars else f"pad{i}"
+        fields[name] = scalar.get(name, "f4")
+    for name in scalars:
+        fields[name] = scalar[name]
     for i in range(-len(scalars) % 4):
         fields[f"rest{i}"] = "f4"
     return record(**fields)

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.model import Mesh
+from ..scene.textures import Texture
+from .emission import mean_emission
 from .environment import LUMINANCE
 from .light_groups import Doubles, LightGroups, flat_lights
 from .records import TRIANGLE_LIGHT
+from .textures import Textures
 
 #: By how many roundings of their largest coordinate four corners may miss a parallelogram.
 ROUNDINGS = 4
@@ -26,22 +29,36 @@ class TriangleLights(NamedTuple):
     light: NDArray[np.int32]
 
 
-def pack_triangle_lights(meshes: list[Mesh], triangles: NDArray[np.float32]) -> TriangleLights:
-    """triangles: (m, 3, 3) float32, the meshes' in order. What is black, or has no area in float32, is no light."""
+def pack_triangle_lights(meshes: list[Mesh], triangles: NDArray[np.float32], textures: Textures) -> TriangleLights:
+    """triangles: (m, 3, 3) float32, the meshes' in order. What is black, or has no area in float32, is no light.
+
+    Those with a texture are never joined, and are chosen by what it holds around them.
+    """
     mesh = np.repeat(np.arange(len(meshes)), [len(each.faces) for each in meshes])
-    emission = np.array([each.material.emission for each in meshes], np.float64).reshape(-1, 3)
-    lamps = np.flatnonzero(emission[mesh].any(axis=1))
+    emission = np.array([each.material.radiance for each in meshes], np.float64).reshape(-1, 3)
+    painted = np.array([isinstance(each.material.emission, Texture) for each in meshes], bool)
+    texture = np.array([textures.number(each.material.emission) if isinstance(each.material.emission, Texture) else -1
+                        for each in meshes], np.int32)
+    around = np.concatenate([np.ones((0, 3)), *map(mean_emission, meshes)])
+    lamps = np.flatnonzero((emission[mesh] * around).any(axis=1))
     lamps = lamps[(_normals(triangles[lamps].astype(np.float64))[1] / 2).astype(np.float32) > 0]
-    corners, whole = _joined(triangles[lamps].astype(np.float64), mesh[lamps], lamps)
+    corners, whole = _joined(triangles[lamps].astype(np.float64), mesh[lamps], lamps, ~painted[mesh[lamps]])
     begins = np.ones(len(lamps), bool)
     begins[1:] = ~whole[:-1]
     light = np.full(len(triangles), -1, np.int32)
     light[lamps] = np.cumsum(begins) - 1
-    return TriangleLights(*_packed(corners[begins], whole[begins], emission[mesh[lamps[begins]]]), light)
+    own = lamps[begins]
+    records, groups = _packed(corners[begins], whole[begins], emission[mesh[own]], around[own])
+    records["texture"], records["primitive"] = texture[mesh[own]], own
+    return TriangleLights(records, groups, light)
 
 
-def _packed(corners: Doubles, whole: NDArray[np.bool_], radiance: Doubles) -> tuple[NDArray[Any], LightGroups]:
-    """Of triangles with corners (n, 3, 3) or, where `whole` (n,), the parallelograms that have these three."""
+def _packed(corners: Doubles, whole: NDArray[np.bool_], radiance: Doubles,
+            share: Doubles) -> tuple[NDArray[Any], LightGroups]:
+    """Of triangles with corners (n, 3, 3) or, where `whole` (n,), the parallelograms that have these three.
+
+    share: (n, 3), what part of the radiance leaves them on average.
+    """
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal, area = _normals(corners)
     area = np.where(whole, area, area / 2)
@@ -51,7 +68,7 @@ def _packed(corners: Doubles, whole: NDArray[np.bool_], radiance: Doubles) -> tu
     records["parallelogram"] = whole
     fourth = corners[:, 1] + np.where(whole[:, None], e2, 0)
     outline = np.concatenate([corners, fourth[:, None]], axis=1)
-    return records, flat_lights(outline, normal, area * (radiance @ LUMINANCE))
+    return records, flat_lights(outline, normal, area * (radiance * share @ LUMINANCE))
 
 
 def _normals(corners: Doubles) -> tuple[Doubles, Doubles]:
@@ -61,10 +78,12 @@ def _normals(corners: Doubles) -> tuple[Doubles, Doubles]:
     return cross / np.where(norm > 0, norm, 1)[:, None], norm
 
 
-def _joined(corners: Doubles, mesh: Integers, face: Integers) -> tuple[Doubles, NDArray[np.bool_]]:
+def _joined(corners: Doubles, mesh: Integers, face: Integers,
+            plain: NDArray[np.bool_]) -> tuple[Doubles, NDArray[np.bool_]]:
     """Which of k triangles make a parallelogram with the next one, (k,), none of them with two.
 
-    Their corners, (k, 3, 3), are turned so that they begin with the one that is not the other's. mesh, face: (k,).
+    Their corners, (k, 3, 3), are turned so that they begin with the one that is not the other's. mesh, face: (k,);
+    plain: (k,), which may be joined.
     """
     following = np.roll(corners, -1, axis=0)
     error = ROUNDINGS * 2.0**-24 * np.abs(corners).max(axis=(1, 2), initial=0)
@@ -76,7 +95,7 @@ def _joined(corners: Doubles, mesh: Integers, face: Integers) -> tuple[Doubles, 
             shared = np.all((a[:, 1] == b[:, 2]) & (a[:, 2] == b[:, 1]), axis=1)
             missed = np.abs(a[:, 0] + b[:, 0] - a[:, 1] - a[:, 2]).max(axis=1, initial=0)
             apex[shared & (missed <= error)] = i
-    joined = (apex >= 0) & (np.roll(face, -1) == face + 1) & (np.roll(mesh, -1) == mesh)
+    joined = (apex >= 0) & plain & (np.roll(face, -1) == face + 1) & (np.roll(mesh, -1) == mesh)
     # Where each of several in a row could be joined with the next, every other one is.
     here = np.arange(len(joined))
     since = here - np.maximum.accumulate(np.where(joined, -1, here))

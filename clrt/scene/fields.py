@@ -10,14 +10,16 @@ import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields
 from functools import lru_cache
-from types import NoneType
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 
+from .textures import Texture
+
 #: Fields whose values are no plain data; whoever holds them checks them.
-ELSEWHERE = frozenset({"image", "material"})
+ELSEWHERE = frozenset({"image", "material", "picture"})
 #: Words of the scene format that this version knows but cannot draw yet.
 LATER = frozenset({"aperture_radius", "focus_distance", "projection", "instance", "phong", "blinn_phong", "local",
                    "raster"})
@@ -91,6 +93,14 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
         yield from _problems(parts[0], value, path) if _fault(parts[0], value) else _outside(parts[1:], value, path)
     elif NoneType in parts:
         yield from () if value is None else _problems(parts[0], value, path)
+    elif origin in (Union, UnionType):
+        yield from _problems(_meant(parts, value), value, path)
+        if isinstance(value, Texture):
+            yield from _problems(_factor(parts[0], value), value.factor, f"{path}.factor")
+    elif hint is Texture and not isinstance(value, Texture):
+        yield f'{path}: {show(value)} is no texture; write {{ image = "FILE" }}'
+    elif hint is Texture:
+        yield from field_problems(Texture, {field.name: getattr(value, field.name) for field in fields(Texture)}, path)
     elif origin is Literal:
         if not (isinstance(value, str) and value in parts):
             yield f"{path}: {show(value)} {unknown(value, parts)}"
@@ -103,6 +113,18 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
             yield f"{path}: {show(value)} has {len(value)} entries; write {len(kinds)}"
     elif hint is not Any and (fault := _fault(origin or hint, value)):
         yield f"{path}: {show(value)} {fault}"
+
+
+def _meant(parts: tuple[Any, ...], value: Any) -> Any:
+    """Which of a union's types a value is judged by: the one that it is of, or else the first."""
+    kinds = [(get_origin(part) or part, part) for part in parts]
+    return next((part for kind, part in kinds if isinstance(kind, type) and isinstance(value, kind)), parts[0])
+
+
+def _factor(plain: Any, texture: Texture) -> Any:
+    """What a texture's factor is judged by, where a plain value is by `plain`: of colours one number will do."""
+    one = get_origin(plain) is tuple and not isinstance(texture.factor, tuple)
+    return get_args(plain)[0] if one else plain
 
 
 def _outside(limits: Iterable[Any], value: float, path: str) -> Iterator[str]:
@@ -118,8 +140,6 @@ def _fault(kind: Any, value: Any) -> str:
     if isinstance(value, _ACCEPTED[kind]) and isinstance(value, bool) == (kind is bool):
         finite = not isinstance(value, float) or math.isfinite(value)
         return "" if finite else "is not a finite number; write one"
-    if kind is tuple and isinstance(value, dict) and "image" in value:
-        return "is a texture, which is not supported yet; write [red, green, blue]"
     if kind is tuple and isinstance(value, (list, np.ndarray)):
         return f"is a {type(value).__name__}; write a tuple"
     return _REMEDIES[kind]

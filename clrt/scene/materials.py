@@ -7,19 +7,19 @@ the packing and the tests of every BSDF find it in that list. Field types carry 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from math import log1p
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args
 
 from annotated_types import Ge, Le
 
 from .microfacets import fitted_loss, multiple_scattering
+from .textures import NonNegative, Texture
 
 Unit = Annotated[float, Ge(0), Le(1)]
 Albedo = tuple[Unit, Unit, Unit]
-NonNegative = Annotated[float, Ge(0)]
 Radiance = tuple[NonNegative, NonNegative, NonNegative]
-Parameter = float | tuple[float, ...]
+Parameter = float | tuple[float, ...] | Texture
 
 #: Specular reflectance at normal incidence, linear: (F0, metallic). Suchiński 2022, table 6.1.
 F0_PRESETS: dict[str, tuple[tuple[float, float, float], float]] = {
@@ -40,7 +40,7 @@ Preset = Literal["water", "plastic_low", "plastic_high", "glass_low", "glass_hig
                  "iron", "copper", "gold", "aluminium", "silver"]
 Smith = Literal["height_correlated", "separable", "schlick", "schlick_ibl"]
 
-#: GGX below this alpha is beyond float32 (D ~ 1/(pi alpha²)); use `Mirror` for a perfect one.
+#: GGX below this alpha is beyond float32 (D ~ 1/(pi alpha²)), in the kernel too; use `Mirror` for a perfect one.
 ALPHA_MIN = 1e-4
 
 
@@ -56,24 +56,52 @@ def tuples_for_lists(record: Any) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """What every material has. `emission`: radiance in W·sr⁻¹·m⁻² that its front side sends out."""
+    """What every material has.
+
+    emission: radiance in W·sr⁻¹·m⁻² that its front side sends out. normal_map: bends the shading normal (glTF's
+    convention: linear, x to the right and y up in the picture); its factor scales how far.
+    """
 
     kernel: ClassVar[str]
-    emission: Radiance = (0.0, 0.0, 0.0)
+    emission: Radiance | Texture = (0.0, 0.0, 0.0)
+    normal_map: Texture | None = None
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)
 
     def parameters(self) -> dict[str, Parameter]:
-        """The values its kernel reads: numbers, triples, rows of a multiple of four.
+        """The values its kernel reads: numbers, triples, rows of a multiple of four, or a texture for a field of these.
 
         What only some materials of a type have is 0 for the others.
         """
-        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "emission"}
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in SHARED}
+
+    @property
+    def radiance(self) -> Radiance:
+        """What it sends out, at most where that is a texture."""
+        return as_color(self.emission.factor) if isinstance(self.emission, Texture) else self.emission
+
+    def conflicts(self) -> list[str]:
+        """What is wrong with its fields together: "FIELD: fault; remedy"."""
+        return []
+
+    def textures(self) -> list[Texture]:
+        """All that it reads."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return [value for value in values if isinstance(value, Texture)]
 
     def features(self) -> frozenset[str]:
         """Names to define while compiling, for parts of the kernel that only some materials of this type need."""
         return frozenset()
+
+
+#: The fields that do not belong to a material's own kernel file.
+SHARED = frozenset(field.name for field in fields(Material))
+
+
+def as_color(factor: float | Radiance) -> Radiance:
+    """One number for all channels, or three."""
+    return factor if isinstance(factor, tuple) else (factor, factor, factor)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +109,15 @@ class Diffuse(Material):
     """Lambert: f = color/π."""
 
     kernel: ClassVar[str] = "diffuse"
-    color: Albedo = (0.8, 0.8, 0.8)
+    color: Albedo | Texture = (0.8, 0.8, 0.8)
+
+
+class Lobes(NamedTuple):
+    """f0: specular reflectance at normal incidence; albedo: of the diffuse body, unattenuated; alpha: roughness²."""
+
+    f0: tuple[float, ...]
+    albedo: tuple[float, ...]
+    alpha: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,9 +131,9 @@ class MetallicRoughness(Material):
     """
 
     kernel: ClassVar[str] = "metallic_roughness"
-    color: Albedo = (0.8, 0.8, 0.8)
-    metallic: Unit = 0.0
-    roughness: Unit = 0.5
+    color: Albedo | Texture = (0.8, 0.8, 0.8)
+    metallic: Unit | Texture = 0.0
+    roughness: Unit | Texture = 0.5
     preset: Preset | None = None
     smith: Smith = "height_correlated"
     multiple_scattering: bool = False
@@ -107,17 +143,30 @@ class MetallicRoughness(Material):
         if self.preset is not None:
             specular, metallic = F0_PRESETS[self.preset]
             color = specular if metallic else color
-        f0 = tuple(s + metallic * (c - s) for s, c in zip(specular, color))
-        albedo = tuple((1 - metallic) * c for c in color)
-        alpha = max(self.roughness**2, ALPHA_MIN)
-        forms = ("height_correlated", "separable", "schlick", "schlick_ibl")
-        single: dict[str, Parameter] = {
-            "albedo": albedo, "alpha": alpha, "f0": f0, "smith": float(forms.index(self.smith))}
+        single: dict[str, Parameter] = {"color": color, "metallic": metallic, "roughness": self.roughness,
+                                        "specular": specular, "smith": float(get_args(Smith).index(self.smith))}
         if not self.multiple_scattering:
             return single
+        f0, alpha = self.lobes.f0, self.lobes.alpha
         loss = fitted_loss(alpha, self.smith)
         return {**single, "multiple": multiple_scattering(f0, loss.mean), "mean_loss": loss.mean, "width": loss.width,
                 "spread": log1p(alpha**-2), "loss": loss.coefficients}
+
+    def conflicts(self) -> list[str]:
+        painted = any(isinstance(value, Texture) for value in (self.color, self.metallic, self.roughness))
+        fault = "multiple_scattering: is not known for textures; leave it out, or write numbers for color and the like"
+        return [fault] if self.multiple_scattering and painted else []
+
+    @property
+    def lobes(self) -> Lobes:
+        """What its parameters come to; TypeError if one of them is a texture."""
+        single = replace(self, multiple_scattering=False).parameters()
+        color, specular, metallic, roughness = (single[name] for name in ("color", "specular", "metallic", "roughness"))
+        if not (isinstance(color, tuple) and isinstance(specular, tuple) and isinstance(metallic, float | int)
+                and isinstance(roughness, float | int)):
+            raise TypeError("a texture has no lobes of its own")
+        f0 = tuple(s + metallic * (c - s) for s, c in zip(specular, color))
+        return Lobes(f0, tuple((1 - metallic) * c for c in color), max(roughness**2, ALPHA_MIN))
 
     def features(self) -> frozenset[str]:
         multiple = {"MULTIPLE_SCATTERING"} if self.multiple_scattering else set()
@@ -129,7 +178,7 @@ class Mirror(Material):
     """A perfect mirror that reflects `color` of the light at every angle."""
 
     kernel: ClassVar[str] = "mirror"
-    color: Albedo = (1.0, 1.0, 1.0)
+    color: Albedo | Texture = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +189,7 @@ class Dielectric(Material):
     """
 
     kernel: ClassVar[str] = "dielectric"
-    color: Albedo = (1.0, 1.0, 1.0)
+    color: Albedo | Texture = (1.0, 1.0, 1.0)
     ior: Annotated[float, Ge(0.25), Le(4)] = 1.5
 
     def features(self) -> frozenset[str]:

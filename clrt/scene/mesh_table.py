@@ -31,6 +31,7 @@ class MeshTable:
     file: str | None = None
     vertices: tuple[Vector, ...] | None = None
     faces: tuple[tuple[Vertex, Vertex, Vertex], ...] | None = None
+    uv: tuple[tuple[float, float], ...] | None = None
     material: str | None = None
     normals: Normals = "file"
     translate: Vector = (0.0, 0.0, 0.0)
@@ -54,9 +55,9 @@ class MeshTable:
 
         Raises SceneError for a file that cannot be read, indices out of range, and no geometry or two.
         """
-        inline = self.vertices is not None or self.faces is not None
+        inline = self.vertices is not None or self.faces is not None or self.uv is not None
         if self.file is not None and inline:
-            raise SceneError(f"{where}: has a file and vertices or faces; keep one of them")
+            raise SceneError(f"{where}: has a file and vertices, faces or uv; keep one of them")
         if self.file is not None:
             return self._from_file(self.file, folder, where)
         if self.vertices is None or self.faces is None:
@@ -65,7 +66,8 @@ class MeshTable:
         with np.errstate(over="ignore"):
             vertices = np.array(self.vertices, np.float32).reshape(-1, 3)
         faces = np.array(self.faces, np.int32).reshape(-1, 3)
-        mesh = Mesh(vertices, faces, Diffuse(), name=self.name or "mesh")
+        uv = None if self.uv is None else np.array(self.uv, np.float32).reshape(-1, 2)
+        mesh = Mesh(vertices, faces, Diffuse(), name=self.name or "mesh", uv=uv)
         problems = mesh_problems(mesh, where)
         if problems:
             raise SceneError(problems)

@@ -11,7 +11,8 @@ from annotated_types import Ge, Gt, Le, Lt
 from numpy.typing import NDArray
 
 from .lights import Light
-from .materials import Diffuse, Material, NonNegative, tuples_for_lists
+from .materials import Diffuse, Material, tuples_for_lists
+from .textures import NonNegative
 
 Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]
@@ -40,7 +41,9 @@ class Mesh:
     """Triangles of one material.
 
     vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front; normals: (n, 3) float32,
-    interpolated over each face, or None for flat shading.
+    interpolated over each face, or None for flat shading. uv, uv1: (n, 2) float32, the two sets of texture coordinates
+    (scene.textures). colors: (n, 3) or (n, 4) float32, linear, which multiply the material's color. tangents: (n, 4)
+    float32, for normal maps, w the sign of the bitangent as in glTF; computed where they are missing.
     """
 
     vertices: FloatArray
@@ -48,6 +51,10 @@ class Mesh:
     material: Material = field(default_factory=Diffuse)
     normals: FloatArray | None = None
     name: str = "mesh"
+    uv: FloatArray | None = None
+    uv1: FloatArray | None = None
+    colors: FloatArray | None = None
+    tangents: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Lists become arrays; what is wrong with an array is for `validate` to say."""

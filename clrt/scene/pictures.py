@@ -18,6 +18,34 @@ def read_picture(path: Path) -> NDArray[np.float32]:
     One channel is grey; alpha is left out. Raises SceneError naming the file if it is missing, empty, damaged, cropped
     (a data window that differs from the display window), or has no colour channels.
     """
+    buffer, pixels = _decoded(path, "float")
+    spec = buffer.spec()
+    if buffer.roi != buffer.roi_full:
+        raise SceneError(f"{path}: the file holds {spec.width}x{spec.height} pixels of a "
+                         f"{spec.full_width}x{spec.full_height} picture; save it uncropped")
+    colours: NDArray[np.float32] = pixels[..., _colour_channels(path, spec.channelnames)]
+    return colours if _holds_floats(buffer) else linear_from_srgb(colours)
+
+
+def read_texels(path: Path) -> NDArray[np.uint8]:
+    """The texels of a picture of at most 16 bits a channel: (h, w, 4) uint8 as stored, row 0 on top, alpha apart.
+
+    Raises SceneError as `read_picture`, and for pictures of floats, which would lose most of what they hold.
+    """
+    buffer, pixels = _decoded(path, "uint8")
+    if _holds_floats(buffer):
+        raise SceneError(f"{path}: holds floats, but textures have 8 bits a channel; convert it to PNG")
+    names = buffer.spec().channelnames
+    texels: NDArray[np.uint8] = np.full((*pixels.shape[:2], 4), 255, np.uint8)
+    texels[..., :3] = pixels[..., _colour_channels(path, names)]
+    for channel, name in enumerate(names):
+        if name.upper() == "A":
+            texels[..., 3] = pixels[..., channel]
+    return texels
+
+
+def _decoded(path: Path, dtype: str) -> tuple[Any, NDArray[Any]]:
+    """OpenImageIO's buffer of a file, and its (h, w, channels) of `dtype`."""
     import OpenImageIO as oiio
 
     if not path.is_file():
@@ -27,16 +55,17 @@ def read_picture(path: Path) -> NDArray[np.float32]:
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     buffer = oiio.ImageBuf(str(path), 0, 0, config)
-    pixels = buffer.get_pixels(oiio.FLOAT) if buffer.read(0, 0, True, oiio.FLOAT) else None
+    kind = oiio.TypeDesc(dtype)
+    pixels = buffer.get_pixels(kind) if buffer.read(0, 0, True, kind) else None
     if pixels is None:
         raise SceneError(f"{path}: cannot be decoded as a picture: {_complaint(buffer)}")
-    spec = buffer.spec()
-    if buffer.roi != buffer.roi_full:
-        raise SceneError(f"{path}: the file holds {spec.width}x{spec.height} pixels of a "
-                         f"{spec.full_width}x{spec.full_height} picture; save it uncropped")
-    colours: NDArray[np.float32] = pixels[..., _colour_channels(path, spec.channelnames)]
-    is_linear = buffer.nativespec().format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
-    return colours if is_linear else linear_from_srgb(colours)
+    return buffer, pixels
+
+
+def _holds_floats(buffer: Any) -> bool:
+    import OpenImageIO as oiio
+
+    return buffer.nativespec().format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
 
 
 def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -15,6 +15,8 @@ from .mesh_table import MeshTable
 from .model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from .pictures import read_picture
 from .sky import SUN
+from .texture_table import TextureReader
+from .textures import WHITE, Texture
 from .transform import transform_mesh
 
 Kind = TypeVar("Kind")
@@ -30,6 +32,7 @@ class SceneReader:
         self._path = path
         self._document: Table = _frozen(document)
         self._materials: dict[str, Material] = {}
+        self._textures = TextureReader(path.parent)
         self.problems = [f'key "{key}" {unknown(key, SECTIONS)}' for key in document if key not in SECTIONS]
 
     def scene(self) -> Scene:
@@ -86,8 +89,14 @@ class SceneReader:
             self.problems.append(f"{where}.type: {show(values['type'])} {unknown(values['type'], known)}")
         else:
             rest = {key: value for key, value in values.items() if key != "type"}
+            rest = {key: self._texture(value, f"{where}.{key}") if isinstance(value, dict) else value
+                    for key, value in rest.items()}
             return self._build(known[str(values["type"])], rest, where)
         return None
+
+    def _texture(self, values: Table, where: str) -> Texture:
+        """The texture that a table describes, or a white one if it is wrong."""
+        return self._tried(self._textures.read, values, where) or Texture(picture=WHITE)
 
     def _environment(self, values: Table) -> Environment | None:
         image = None

@@ -67,8 +67,12 @@ def transform_mesh(mesh: Mesh, matrix: Matrix) -> Mesh:
     if normals is not None:
         cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]) * (-1 if mirrored else 1)
         normals = unit(normals @ cofactors.T).astype(np.float32)
+    tangents = mesh.tangents
+    if tangents is not None:
+        turned = unit(tangents[:, :3] @ linear.T)
+        tangents = np.column_stack([turned, -tangents[:, 3] if mirrored else tangents[:, 3]]).astype(np.float32)
     faces = np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrored else mesh.faces
-    return replace(mesh, vertices=vertices, faces=faces, normals=normals)
+    return replace(mesh, vertices=vertices, faces=faces, normals=normals, tangents=tangents)
 
 
 def unit(vectors: NDArray[np.floating]) -> NDArray[np.float64]:

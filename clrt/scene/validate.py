@@ -13,6 +13,9 @@ from .lights import LIGHTS, DirectionalLight
 from .materials import Diffuse, Material
 from .model import Camera, Environment, FloatArray, Mesh, RenderSettings, Scene, Sphere
 
+#: What a mesh may have for each vertex, and of how many numbers.
+CORNERS = {"normals": (3,), "uv": (2,), "uv1": (2,), "colors": (3, 4), "tangents": (4,)}
+
 
 def validate(scene: Scene) -> None:
     """Raise one SceneError with all problems of the scene; does nothing if there are none.
@@ -31,7 +34,7 @@ def scene_problems(scene: Scene) -> list[str]:
     problems += _object_problems(scene.render, RenderSettings, "render")
     users: list[tuple[str, Mesh | Sphere]] = []
     for i, mesh in enumerate(scene.meshes):
-        problems += mesh_problems(mesh, f"mesh[{i}]")
+        problems += mesh_problems(mesh, f"mesh[{i}]") or texture_problems(mesh, f"mesh[{i}]")
         users.append((f"mesh[{i}].material", mesh))
     for i, sphere in enumerate(scene.spheres):
         problems += _object_problems(sphere, Sphere, f"sphere[{i}]")
@@ -45,28 +48,42 @@ def scene_problems(scene: Scene) -> list[str]:
 def mesh_problems(mesh: object, where: str) -> list[str]:
     """What is wrong with a mesh's arrays.
 
-    Refused: other shapes or dtypes than `Mesh` names, no triangles, vertices or normals that are not finite (used by a
-    face or not), indices outside the vertices, and normals of length zero, which point nowhere.
+    Refused: other shapes or dtypes than `Mesh` names, no triangles, values that are not finite (used by a face or not),
+    indices outside the vertices, normals of length zero, which point nowhere, and negative colours.
     """
     if not isinstance(mesh, Mesh):
         return [f"{where}: {show(mesh)} is no Mesh; write a clrt.Mesh"]
     where += f" {show(mesh.name)}"
     n = len(mesh.vertices) if isinstance(mesh.vertices, np.ndarray) else 0
-    arrays = [("vertices", mesh.vertices, np.float32, "n"), ("faces", mesh.faces, np.int32, "m")]
-    if mesh.normals is not None:
-        arrays.append(("normals", mesh.normals, np.float32, str(n)))
-    problems = [problem for name, array, dtype, rows in arrays
-                if (problem := _array_problem(array, dtype, rows, f"{where}: {name}"))]
+    arrays: list[tuple[str, object, type, str, tuple[int, ...]]] = [
+        ("vertices", mesh.vertices, np.float32, "n", (3,)), ("faces", mesh.faces, np.int32, "m", (3,))]
+    corners = {name: array for name in CORNERS if (array := getattr(mesh, name)) is not None}
+    arrays += [(name, array, np.float32, str(n), CORNERS[name]) for name, array in corners.items()]
+    problems = [problem for name, array, dtype, rows, columns in arrays
+                if (problem := _array_problem(array, dtype, rows, columns, f"{where}: {name}"))]
     if problems:
         return problems
     if len(mesh.faces) == 0:
         problems.append(f"{where}: has no triangles; add some or leave the mesh out")
     problems += index_problems(mesh.faces, n, where)
     problems += _row_problems(_not_finite(mesh.vertices), mesh.vertices, f"{where}: vertices", "is not finite")
-    if mesh.normals is not None:
-        nowhere = _not_finite(mesh.normals) | ~np.any(mesh.normals, axis=1)
-        problems += _row_problems(nowhere, mesh.normals, f"{where}: normals", "points nowhere")
+    for name, array in corners.items():
+        problems += _row_problems(_not_finite(array), array, f"{where}: {name}", "is not finite")
+    if mesh.normals is not None and not problems:
+        problems += _row_problems(~np.any(mesh.normals, axis=1), mesh.normals, f"{where}: normals", "points nowhere")
+    if mesh.colors is not None and not problems:
+        negative = np.asarray((mesh.colors < 0).any(axis=1))
+        problems += _row_problems(negative, mesh.colors, f"{where}: colors", "is negative")
     return problems
+
+
+def texture_problems(mesh: Mesh, where: str) -> list[str]:
+    """Textures of a mesh that has no texture coordinates for them."""
+    material: object = mesh.material
+    textures = material.textures() if isinstance(material, Material) else []
+    return [f'{where} {show(mesh.name)}: its material reads the texture {show(texture.picture.name)} by uv'
+            f'{texture.uv_set or ""}, but the mesh has none; give it texture coordinates, or another material'
+            for texture in textures if (mesh.uv1 if texture.uv_set else mesh.uv) is None]
 
 
 def index_problems(faces: NDArray[np.integer], n: int, where: str) -> list[str]:
@@ -80,15 +97,15 @@ def index_problems(faces: NDArray[np.integer], n: int, where: str) -> list[str]:
     return [f"{where}: faces[{face}] uses vertex {vertex}, but {valid}{_others(bad)}; repair the mesh"]
 
 
-def _array_problem(array: object, dtype: type, rows: str, where: str) -> str | None:
-    """Whether `array` is no (rows, 3) array of `dtype`."""
-    name = np.dtype(dtype).name
+def _array_problem(array: object, dtype: type, rows: str, columns: tuple[int, ...], where: str) -> str | None:
+    """Whether `array` is no (rows, k) array of `dtype`, k one of `columns`."""
+    name, shape = np.dtype(dtype).name, " or ".join(f"({rows}, {k})" for k in columns)
     if not isinstance(array, np.ndarray):
-        return f"{where} is a {type(array).__name__}; write a numpy array of {name}, shape ({rows}, 3)"
+        return f"{where} is a {type(array).__name__}; write a numpy array of {name}, shape {shape}"
     if array.dtype != dtype:
         return f"{where} has dtype {array.dtype}; convert it with .astype(np.{name})"
-    if array.ndim != 2 or array.shape[1] != 3 or (rows.isdigit() and len(array) != int(rows)):
-        return f"{where} has shape {array.shape}; it must be ({rows}, 3)"
+    if array.ndim != 2 or array.shape[1] not in columns or (rows.isdigit() and len(array) != int(rows)):
+        return f"{where} has shape {array.shape}; it must be {shape}"
     return None
 
 
@@ -101,8 +118,10 @@ def _row_problems(bad: NDArray[np.bool_], array: FloatArray, where: str, fault: 
 
 
 def _not_finite(rows: FloatArray) -> NDArray[np.bool_]:
-    x, y, z = np.isfinite(rows).T  # all(axis=1) takes seven times as long
-    return np.asarray(~(x & y & z))
+    finite = np.ones(len(rows), np.bool_)
+    for column in np.isfinite(rows).T:  # all(axis=1) takes seven times as long
+        finite &= column
+    return ~finite
 
 
 def _row(values: FloatArray) -> str:
@@ -128,7 +147,13 @@ def _material_problems(users: list[tuple[str, Mesh | Sphere]]) -> list[str]:
     for where, user in users:
         material = getattr(user, "material", Diffuse())
         first.setdefault(id(material), (where, material))
-    return [problem for where, material in first.values() for problem in _object_problems(material, Material, where)]
+    problems: list[str] = []
+    for where, material in first.values():
+        found = _object_problems(material, Material, where)
+        if isinstance(material, Material) and not found:
+            found = [f"{where}.{conflict}" for conflict in material.conflicts()]
+        problems += found
+    return problems
 
 
 def _camera_problems(camera: Camera) -> list[str]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..device.open import Device
-from ..scene.materials import ALPHA_MIN, MATERIALS, Material
+from ..scene.materials import ALPHA_MIN, MATERIALS, SHARED, Material
 from ..scene.model import Scene, Sphere
 from .probe import Doubles, Probe
 
@@ -99,7 +99,7 @@ def bsdfs(device: Device, materials: list[Material] | None = None, changes: Mapp
 def _values(kind: type[Material]) -> tuple[dict[str, tuple[Any, ...]], ...]:
     """What is tried of the fields that are numbers, of those that are flags, and of those that are words."""
     hints = get_type_hints(kind)
-    names = [field.name for field in fields(kind) if field.name != "emission"]
+    names = [field.name for field in fields(kind) if field.name not in SHARED]
     words = {name: tuple(found) for name in names if (found := _words(hints[name]))}
     flags = {name: (False, True) for name in names if hints[name] is bool}
     numbers = {name: NUMBERS.get(name) or _numbers(kind, name) for name in names if name not in words | flags}
@@ -115,7 +115,8 @@ def _numbers(kind: type[Material], name: str) -> tuple[Any, ...]:
     hint, default = get_type_hints(kind, include_extras=True)[name], getattr(kind(), name)
     if isinstance(default, tuple):
         return (COLOR,)
-    limits = [getattr(limit, end) for limit in get_args(hint)[1:] for end in ("ge", "gt", "le", "lt")
+    plain = next((part for part in get_args(hint) if get_origin(part) is Annotated), hint)   # of a number or a texture
+    limits = [getattr(limit, end) for limit in get_args(plain)[1:] for end in ("ge", "gt", "le", "lt")
               if hasattr(limit, end)]
     return (min(limits), sum(limits) / 2, max(limits)) if len(limits) == 2 else (default,)
 

@@ -18,6 +18,7 @@ from ..output.images import write_image
 from ..scene.lights import Light, PointLight
 from ..scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
+from ..scene.textures import untextured
 from .shapes import icosphere
 
 #: How near and far the camera sees, of the distance to where it looks.
@@ -92,25 +93,24 @@ class Nodes:
 
 
 def _diffuse(nodes: Nodes, material: Diffuse) -> Any:
-    return nodes("BsdfDiffuse", {"Color": (*material.color, 1), "Roughness": 0.0})
+    return nodes("BsdfDiffuse", {"Color": (*untextured(material.color), 1), "Roughness": 0.0})
 
 
 def _mirror(nodes: Nodes, material: Mirror) -> Any:
-    return nodes("BsdfAnisotropic", {"Color": (*material.color, 1), "Roughness": 0.0})
+    return nodes("BsdfAnisotropic", {"Color": (*untextured(material.color), 1), "Roughness": 0.0})
 
 
 def _metal(nodes: Nodes, material: MetallicRoughness) -> Any:
     """The F82 model is Schlick's where its tint is white; roughness is squared there, too."""
-    f0 = material.parameters()["f0"]
-    assert isinstance(f0, tuple)
-    return nodes("BsdfMetallic", {"Base Color": (*f0, 1), "Edge Tint": (1, 1, 1, 1), "Roughness": material.roughness},
-                 fresnel_type="F82", distribution="GGX")
+    return nodes("BsdfMetallic", {"Base Color": (*material.lobes.f0, 1), "Edge Tint": (1, 1, 1, 1),
+                                  "Roughness": material.roughness}, fresnel_type="F82", distribution="GGX")
 
 
 def _dielectric(nodes: Nodes, material: Dielectric) -> Any:
     """Of Blender's glass the colour would also be the reflection's."""
     reflection = nodes("BsdfAnisotropic", {"Color": (1, 1, 1, 1), "Roughness": 0.0})
-    refraction = nodes("BsdfRefraction", {"Color": (*material.color, 1), "Roughness": 0.0, "IOR": material.ior})
+    color = (*untextured(material.color), 1)
+    refraction = nodes("BsdfRefraction", {"Color": color, "Roughness": 0.0, "IOR": material.ior})
     part = nodes("Fresnel", {"IOR": material.ior}).outputs[0]
     return nodes("MixShader", {0: part, 1: refraction.outputs[0], 2: reflection.outputs[0]})
 
@@ -120,7 +120,7 @@ BSDFS: dict[type[Material], Callable[[Nodes, Any], Any]] = {
 
 
 def _is_metal(material: MetallicRoughness) -> bool:
-    return (not np.any(material.parameters()["albedo"]) and material.smith == "height_correlated"
+    return (not np.any(material.lobes.albedo) and material.smith == "height_correlated"
             and not material.multiple_scattering)
 
 
@@ -129,10 +129,10 @@ def _material(data: Any, material: Material) -> Any:
     made = data.materials.new(material.kernel)
     nodes = Nodes(made)
     shader = BSDFS[type(material)](nodes, material).outputs[0]
-    if any(material.emission):
+    if any(material.radiance):
         back = nodes("NewGeometry").outputs["Backfacing"]
         front = nodes("Math", {0: 1.0, 1: back}, operation="SUBTRACT").outputs[0]
-        emission = nodes("Emission", {"Color": (*material.emission, 1), "Strength": front}).outputs[0]
+        emission = nodes("Emission", {"Color": (*untextured(material.emission), 1), "Strength": front}).outputs[0]
         shader = nodes("AddShader", {0: shader, 1: emission}).outputs[0]
         made.cycles.emission_sampling = "FRONT"
     nodes("OutputMaterial", {"Surface": shader})

@@ -8,7 +8,7 @@ from typing import NamedTuple, get_args
 import numpy as np
 
 from ..device.open import Device
-from ..scene.materials import ALPHA_MIN, Diffuse, MetallicRoughness, Mirror, Smith
+from ..scene.materials import Diffuse, MetallicRoughness, Mirror, Smith
 from ..scene.microfacets import albedo
 from .bsdfs import Bsdfs, bsdfs
 from .probe import Doubles
@@ -35,7 +35,7 @@ def measure_metals(device: Device, samples: int, smiths: Iterable[Smith] = SMITH
               for smith in smiths for multiple in (False, True) for roughness in ROUGHNESSES]
     subject, numbers = bsdfs(device, [*metals]), evenly(samples)
     for which, metal in enumerate(metals):
-        single = albedo(np.array(COSINES), max(metal.roughness**2, ALPHA_MIN), metal.smith)
+        single = albedo(np.array(COSINES), metal.lobes.alpha, metal.smith)
         for cosine, once in zip(COSINES, single):
             found = float(_weights(subject, which, cosine, numbers)[:, 0].mean())
             yield Reflected(metal, cosine, found, 1.0 if metal.multiple_scattering else float(once))

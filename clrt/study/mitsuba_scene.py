@@ -18,6 +18,7 @@ from ..errors import UsageError
 from ..scene.lights import Light, PointLight
 from ..scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
+from ..scene.textures import untextured
 
 Plugin = dict[str, Any]
 
@@ -73,34 +74,34 @@ def _surface(shape: Plugin, owner: Mesh | Sphere) -> Plugin:
         shape["bsdf"] = BSDFS[kind](owner.material)
     except ValueError as error:
         raise UsageError(f"{owner.name}: Mitsuba cannot draw {error}") from None
-    if any(owner.material.emission):
-        shape["emitter"] = {"type": "area", "radiance": _rgb(owner.material.emission)}
+    if any(owner.material.radiance):
+        shape["emitter"] = {"type": "area", "radiance": _rgb(untextured(owner.material.emission))}
     return shape
 
 
 def _diffuse(material: Diffuse) -> Plugin:
-    return _two_sided({"type": "diffuse", "reflectance": _rgb(material.color)})
+    return _two_sided({"type": "diffuse", "reflectance": _rgb(untextured(material.color))})
 
 
 def _mirror(material: Mirror) -> Plugin:
-    return _two_sided({"type": "conductor", "material": "none", "specular_reflectance": _rgb(material.color)})
+    color = _rgb(untextured(material.color))
+    return _two_sided({"type": "conductor", "material": "none", "specular_reflectance": color})
 
 
 def _metal(material: MetallicRoughness) -> Plugin:
     """`principled` is GGX under Schlick's Fresnel term with the separable Smith term, if metallic is 1, exactly."""
-    parameters = material.parameters()
-    if np.any(parameters["albedo"]):
+    lobes = material.lobes
+    if np.any(lobes.albedo):
         raise ValueError("metallic_roughness that is not all metal: its own has another diffuse part")
     if material.smith != "separable" or material.multiple_scattering:
         raise ValueError('metals but with smith = "separable" and single scattering')
-    f0, alpha = parameters["f0"], parameters["alpha"]
-    assert isinstance(f0, tuple) and isinstance(alpha, float)
-    return _two_sided({"type": "principled", "metallic": 1.0, "roughness": sqrt(alpha), "base_color": _rgb(f0)})
+    return _two_sided({"type": "principled", "metallic": 1.0, "roughness": sqrt(lobes.alpha),
+                       "base_color": _rgb(lobes.f0)})
 
 
 def _dielectric(material: Dielectric) -> Plugin:
     return {"type": "dielectric", "int_ior": material.ior, "ext_ior": 1.0,
-            "specular_transmittance": _rgb(material.color)}
+            "specular_transmittance": _rgb(untextured(material.color))}
 
 
 BSDFS: dict[type[Material], Callable[[Any], Plugin]] = {

@@ -57,7 +57,7 @@ def lit_points() -> Iterator[tuple[str, str, Scene, float]]:
         yield "L9" if radius > 0.1 else "L3", name, scene, ALBEDO * 2 * radius**2 * 2 / d2**1.5
     centers = [(x, 2.0, z) for x in np.linspace(-5, 5, 32) for z in np.linspace(-5, 5, 31)]
     lamps = [_lamp(center, 0.02, 10.0 * (1 + i % 7)) for i, center in enumerate(centers)]
-    total = sum(ALBEDO * ball.material.emission[0] * 0.02**2 * 2 / (4 + ball.center[0]**2 + ball.center[2]**2)**1.5
+    total = sum(ALBEDO * ball.material.radiance[0] * 0.02**2 * 2 / (4 + ball.center[0]**2 + ball.center[2]**2)**1.5
                 for ball in lamps)
     yield "L3", f"{len(lamps)} lamps", Scene(meshes=[FLOOR], spheres=lamps), total
     sky = np.full((256, 512, 3), 0.5, np.float32)

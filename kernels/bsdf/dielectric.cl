@@ -16,7 +16,7 @@ struct dielectric { real3 color; real eta; };   // eta: index of refraction beyo
 
 static inline struct dielectric dielectric_at(const Scene *scene, ireal index, const Surface *surface) {
     real ior = PARAMETER(dielectric, ior);
-    return (struct dielectric){PARAMETER3(dielectric, color), surface->front ? ior : 1.0f / ior};
+    return (struct dielectric){COLOR(dielectric), surface->front ? ior : 1.0f / ior};
 }
 
 static inline real3 dielectric_eval(const struct dielectric *m, real3 wo, real3 wi) { return splat(ZERO); }

@@ -5,7 +5,7 @@
 struct diffuse { real3 color; };
 
 static inline struct diffuse diffuse_at(const Scene *scene, ireal index, const Surface *surface) {
-    return (struct diffuse){PARAMETER3(diffuse, color)};
+    return (struct diffuse){COLOR(diffuse)};
 }
 
 static inline real3 diffuse_eval(const struct diffuse *m, real3 wo, real3 wi) {

@@ -1,7 +1,8 @@
 // What every material's file provides, by its name:
 //
 //   struct NAME                              its parameters where it was hit, of every lane
-//   NAME_at(scene, index, surface)           reads them: PARAMETER(NAME, x) and PARAMETER3(NAME, x) for its dataclass's x
+//   NAME_at(scene, index, surface)           reads them: PARAMETER(NAME, x), PARAMETER3(NAME, x) for its
+//                                            dataclass's x, and COLOR(NAME) for its color
 //   NAME_eval(m, wo, wi)                     f·|cos wi|
 //   NAME_pdf(m, wo, wi)                      density per solid angle with which NAME_sample chooses wi
 //   NAME_sample(m, wo, u, lobe)              a direction with its weight f·|cos|/pdf; u in [0,1)², lobe in [0,1)
@@ -13,8 +14,21 @@
 // TRANSMISSION's.
 #include "surface.cl"
 
-#define PARAMETER(kind, name) GATHER(real, scene->kind, index, .name)
-#define PARAMETER3(kind, name) GATHER3(scene->kind, index, .name)
+// The preamble says of each parameter whether some material of its type reads it from a texture: READ_kind_name is
+// CONSTANT or TEXTURED.
+#define PARAMETER(kind, name) PASTE(READ_##kind##_##name, 1)(kind, name)
+#define PARAMETER3(kind, name) PASTE(READ_##kind##_##name, 3)(kind, name)
+#define CONSTANT1(kind, name) GATHER(real, scene->kind, index, .name)
+#define CONSTANT3(kind, name) GATHER3(scene->kind, index, .name)
+#define TEXTURED1(kind, name) \
+    textured(scene, GATHER(ireal, scene->kind, index, .name##_texture), CONSTANT1(kind, name), &surface->at)
+#define TEXTURED3(kind, name) \
+    textured3(scene, GATHER(ireal, scene->kind, index, .name##_texture), CONSTANT3(kind, name), &surface->at)
+#if VERTEX_COLORS
+#define COLOR(kind) mul(PARAMETER3(kind, color), surface->tint)
+#else
+#define COLOR(kind) PARAMETER3(kind, color)
+#endif
 
 typedef struct {
     real3 weight, wi;

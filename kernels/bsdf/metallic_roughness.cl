@@ -15,6 +15,7 @@
 #include "sampling.cl"
 #include "bsdf/interface.cl"
 
+#define ALPHA_MIN 1e-4f   // below, D(h) leaves float32's range
 #define LOSS_COEFFICIENTS ((int)(sizeof(((MetallicRoughness *)0)->loss) / sizeof(float)))
 
 struct metallic_roughness {
@@ -30,16 +31,18 @@ struct metallic_roughness {
 
 static inline struct metallic_roughness metallic_roughness_at(const Scene *scene, ireal index, const Surface *surface) {
     struct metallic_roughness m;
-    m.albedo = PARAMETER3(metallic_roughness, albedo);
-    m.f0 = PARAMETER3(metallic_roughness, f0);
-    m.alpha = PARAMETER(metallic_roughness, alpha);
+    real3 color = COLOR(metallic_roughness), specular = PARAMETER3(metallic_roughness, specular);
+    real metallic = PARAMETER(metallic_roughness, metallic), roughness = PARAMETER(metallic_roughness, roughness);
+    m.f0 = mad3(sub(color, specular), metallic, specular);
+    m.albedo = scale(color, 1.0f - metallic);
+    m.alpha = maximum(roughness * roughness, (real)(ALPHA_MIN));
     m.smith = TO_INT(PARAMETER(metallic_roughness, smith));
 #if MULTIPLE_SCATTERING
     m.multiple = PARAMETER3(metallic_roughness, multiple);
     m.mean_loss = PARAMETER(metallic_roughness, mean_loss);
     m.width = PARAMETER(metallic_roughness, width);
     m.spread = PARAMETER(metallic_roughness, spread);
-    for (int k = 0; k < LOSS_COEFFICIENTS; ++k) m.loss[k] = PARAMETER(metallic_roughness, loss[k]);
+    for (int k = 0; k < LOSS_COEFFICIENTS; ++k) m.loss[k] = GATHER(real, scene->metallic_roughness, index, .loss[k]);
 #endif
     return m;
 }

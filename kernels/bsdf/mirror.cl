@@ -4,7 +4,7 @@
 struct mirror { real3 color; };
 
 static inline struct mirror mirror_at(const Scene *scene, ireal index, const Surface *surface) {
-    return (struct mirror){PARAMETER3(mirror, color)};
+    return (struct mirror){COLOR(mirror)};
 }
 
 static inline real3 mirror_eval(const struct mirror *m, real3 wo, real3 wi) { return splat(ZERO); }

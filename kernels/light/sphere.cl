@@ -17,12 +17,17 @@ static inline LightSample sphere_light_sample(const Scene *scene, ireal index, r
     LightSample s;
     real3 around = sample_cone(u, height);
     s.wi = to_world(frame_around(scale(to_center, 1.0f / distance)), around);
-    s.radiance = choose(outside, GATHER3(scene->sphere_lights, index, .radiance), splat(ZERO));
     s.pdf = outside ? cone_pdf(height) : ONE;
     real sin2 = around.x * around.x + around.y * around.y;
     real near = distance * around.z - safe_sqrt(radius * radius - distance * distance * sin2);
     real3 n = normalize3(sub(mad3(s.wi, near, p), center));
     s.target = shadow_target(p, mad3(n, radius, center), n);
+    real3 radiance = GATHER3(scene->sphere_lights, index, .radiance);
+#if EMISSION_TEXTURES
+    Coordinates at = sphere_coordinates(n);
+    radiance = textured3(scene, GATHER(ireal, scene->sphere_lights, index, .texture), radiance, &at);
+#endif
+    s.radiance = choose(outside, radiance, splat(ZERO));
     s.infinite = s.delta = NO_LANES;
     return s;
 }
@@ -33,5 +38,9 @@ static inline real sphere_light_pdf(const Scene *scene, ireal index, real3 p, re
 }
 
 static inline real3 sphere_light_radiance(const Scene *scene, ireal index, real3 wi, const Surface *surface) {
-    return choose(dot3(wi, surface->ng) < 0.0f, GATHER3(scene->sphere_lights, index, .radiance), splat(ZERO));
+    real3 radiance = GATHER3(scene->sphere_lights, index, .radiance);
+#if EMISSION_TEXTURES
+    radiance = textured3(scene, GATHER(ireal, scene->sphere_lights, index, .texture), radiance, &surface->at);
+#endif
+    return choose(dot3(wi, surface->ng) < 0.0f, radiance, splat(ZERO));
 }

@@ -14,7 +14,12 @@ static inline LightSample triangle_light_sample(const Scene *scene, ireal index,
     s.wi = scale(d, rsqrt(d2));
     real cosine = -dot3(s.wi, n);
     ireal front = (cosine > 0.0f) & (d2 > 0.0f);
-    s.radiance = choose(front, GATHER3(scene->triangle_lights, index, .radiance), splat(ZERO));
+    real3 radiance = GATHER3(scene->triangle_lights, index, .radiance);
+#if EMISSION_TEXTURES
+    Coordinates at = triangle_coordinates(scene, GATHER(ireal, scene->triangle_lights, index, .primitive), 1.0f - b.x - b.y, b.x, b.y);
+    radiance = textured3(scene, GATHER(ireal, scene->triangle_lights, index, .texture), radiance, &at);
+#endif
+    s.radiance = choose(front, radiance, splat(ZERO));
     s.pdf = front ? d2 / (cosine * GATHER(real, scene->triangle_lights, index, .area)) : ONE;
     s.target = shadow_target(p, q, n);
     s.infinite = s.delta = NO_LANES;
@@ -26,5 +31,9 @@ static inline real triangle_light_pdf(const Scene *scene, ireal index, real3 p, 
 }
 
 static inline real3 triangle_light_radiance(const Scene *scene, ireal index, real3 wi, const Surface *surface) {
-    return choose(dot3(wi, surface->ng) < 0.0f, GATHER3(scene->triangle_lights, index, .radiance), splat(ZERO));
+    real3 radiance = GATHER3(scene->triangle_lights, index, .radiance);
+#if EMISSION_TEXTURES
+    radiance = textured3(scene, GATHER(ireal, scene->triangle_lights, index, .texture), radiance, &surface->at);
+#endif
+    return choose(dot3(wi, surface->ng) < 0.0f, radiance, splat(ZERO));
 }

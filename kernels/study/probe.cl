@@ -149,6 +149,18 @@ kernel void probe_leave(SCENE_PARAMETERS, uint n, global const float *in, global
 }
 #endif
 
+#if TEXTURES
+// in: texture, coordinates u, v -> out: its color (3) and number, with a factor of 1
+kernel void probe_texture(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    Coordinates at;
+    for (int i = 0; i < UV_SETS; ++i) at.set[i] = (real2){ROW(in, 1), ROW(in, 2)};
+    ireal texture = TO_INT(ROW(in, 0));
+    put3(out, n, 0, textured3(&scene, texture, splat(ONE), &at));
+    put(out, n, 3, textured(&scene, texture, ONE, &at));
+}
+#endif
+
 #if LIGHTS
 // in: p (3), n (3) -> out: the light that the numbers of pixel i choose, the probability of that, and what u becomes
 kernel void probe_pick_light(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed) {

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.scene.materials import F0_PRESETS, MetallicRoughness
+from clrt.scene.textures import untextured
 
 Doubles = NDArray[np.float64]
 
@@ -15,13 +16,14 @@ def cook_torrance(material: MetallicRoughness, wo: Doubles, wi: Doubles) -> Doub
 
     F of Schlick, D of Walter 2007 (eq. 33).
     """
-    color, f0, metallic = np.array(material.color), np.full(3, 0.04), material.metallic
+    color, f0 = np.array(untextured(material.color)), np.full(3, 0.04)
+    metallic, roughness = untextured(material.metallic), untextured(material.roughness)
     if material.preset is not None:
         f0, metallic = np.array(F0_PRESETS[material.preset][0]), F0_PRESETS[material.preset][1]
         color = f0 if metallic else color
     f0 = (1 - metallic) * f0 + metallic * color
     h = (wo + wi) / np.linalg.norm(wo + wi, axis=1, keepdims=True)
-    alpha, cos_h = material.roughness**2, h[:, 2]
+    alpha, cos_h = roughness**2, h[:, 2]
     tan2_h = (1 - cos_h**2) / cos_h**2
     d = alpha**2 / (np.pi * cos_h**4 * (alpha**2 + tan2_h)**2)
     g = masking(material.smith, alpha, wo[:, 2], wi[:, 2])

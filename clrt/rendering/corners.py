@@ -1,0 +1,51 @@
+"""Packs what triangles have at their corners beside positions and normals: for what reads it, of all triangles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scene.model import Mesh
+from ..scene.tangents import corner_tangents
+from .records import COLORS, TANGENTS, TEXCOORDS
+
+
+def pack_corners(meshes: Sequence[Mesh], uv_sets: int, normal_maps: bool) -> dict[str, tuple[str, NDArray[Any]]]:
+    """The buffers texcoords (a record a triangle and set), colors and tangents, as far as they are needed.
+
+    What a mesh lacks is 0, or white.
+    """
+    count = sum(len(mesh.faces) for mesh in meshes)
+    texcoords = np.zeros((count, uv_sets), TEXCOORDS)
+    colors = np.ones((count if any(mesh.colors is not None for mesh in meshes) else 0, 3, 4), np.float32)
+    tangents = np.zeros(count if normal_maps else 0, TANGENTS)
+    first = 0
+    for mesh in meshes:
+        own = slice(first, first + len(mesh.faces))
+        for i, uv in enumerate([mesh.uv, mesh.uv1][:uv_sets]):
+            if uv is not None:
+                _put(texcoords[own, i], "uv", uv[mesh.faces])
+        if mesh.colors is not None:
+            colors[own, :, :mesh.colors.shape[1]] = mesh.colors[mesh.faces]
+        if mesh.material.normal_map is not None and normal_maps:
+            tangent, sign = corner_tangents(mesh, mesh.material.normal_map.uv_set)
+            _put(tangents[own], "t", tangent)
+            tangents["sign"][own] = sign
+        first += len(mesh.faces)
+    buffers: dict[str, tuple[str, NDArray[Any]]] = {}
+    if texcoords.size:
+        buffers["texcoords"] = ("Texcoords", texcoords.ravel())
+    if len(colors):
+        buffers["colors"] = ("Colors", colors.reshape(-1, 12).view(COLORS).ravel())
+    if len(tangents):
+        buffers["tangents"] = ("Tangents", tangents)
+    return buffers
+
+
+def _put(records: NDArray[np.void], name: str, corners: NDArray[np.floating]) -> None:
+    """corners (m, 3, k) into the fields name0 … name2."""
+    for i in range(3):
+        records[f"{name}{i}"] = corners[:, i]

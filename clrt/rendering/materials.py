@@ -1,0 +1,76 @@
+"""Packs the materials: an array of records for each type in use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scene.materials import MATERIALS, Material, as_color
+from ..scene.textures import Texture
+from .records import material_record
+from .textures import Textures
+
+Number = float | tuple[float, ...] | int
+
+
+@dataclass(frozen=True)
+class Materials:
+    """codes: (users,) int32, each user's type | index << 4. buffers: the records of each type in use, by its kernel.
+
+    reads: by `kernel_parameter`, whether some material of the type reads that from a texture.
+    """
+
+    codes: NDArray[np.int32]
+    buffers: dict[str, tuple[str, NDArray[Any]]]
+    reads: dict[str, bool]
+    used: list[type[Material]]
+
+    def mapped(self, parameter: str) -> list[type[Material]]:
+        """The types in use that read the parameter from a texture."""
+        return [kind for kind in self.used if self.reads.get(f"{kind.kernel}_{parameter}")]
+
+
+def pack_materials(users: Iterable[Material], textures: Textures) -> Materials:
+    """The materials of these users, equal ones packed once, with their textures added to `textures`."""
+    distinct: dict[type[Material], dict[Material, int]] = {}
+    codes = []
+    for material in users:
+        indices = distinct.setdefault(type(material), {})
+        codes.append(MATERIALS.index(type(material)) | indices.setdefault(material, len(indices)) << 4)
+    used = [kind for kind in MATERIALS if kind in distinct]
+    buffers: dict[str, tuple[str, NDArray[Any]]] = {}
+    reads: dict[str, bool] = {}
+    for kind in used:
+        values = [_values(material, textures) for material in distinct[kind]]
+        records = np.zeros(len(values), material_record(values))
+        for name in records.dtype.names or ():
+            if name.endswith("_texture"):
+                records[name] = -1
+        for i, named in enumerate(values):
+            for name, value in named.items():
+                records[name][i] = value
+        buffers[kind.kernel] = (kind.__name__, records)
+        names = {name for named in values for name in named}
+        reads |= {f"{kind.kernel}_{name}": f"{name}_texture" in names for name in sorted(names)
+                  if not name.endswith("_texture")}
+    return Materials(np.array(codes, np.int32), buffers, reads, used)
+
+
+def _values(material: Material, textures: Textures) -> dict[str, Number]:
+    """What its record holds: of a texture its factor, and its number as NAME_texture."""
+    parameters = material.parameters()
+    if material.normal_map is not None:
+        parameters["normal_map"] = material.normal_map
+    colors = {field.name for field in fields(material) if isinstance(field.default, tuple)}
+    values: dict[str, Number] = {}
+    for name, value in parameters.items():
+        if isinstance(value, Texture):
+            values[name] = as_color(value.factor) if name in colors else value.factor
+            values[f"{name}_texture"] = textures.number(value)
+        else:
+            values[name] = value
+    return values

@@ -1,0 +1,55 @@
+"""Textures as the scene file writes them: `color = { image = "wood.png", scale = [2, 2] }`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import SceneError
+from .fields import field_problems
+from .pictures import read_texels
+from .textures import Channel, NonNegative, Pair, Picture, Texture, Wrap
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextureTable:
+    """The keys of such a table, as in Texture; `wrap` may be one word for both directions, `scale` one number."""
+
+    image: str
+    factor: NonNegative | tuple[NonNegative, NonNegative, NonNegative] = 1.0
+    channel: Channel = "red"
+    uv_set: int = 0
+    offset: Pair = (0.0, 0.0)
+    scale: Pair = (1.0, 1.0)
+    rotation_degrees: float = 0.0
+    wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
+    filter: str = "linear"
+
+
+class TextureReader:
+    """Reads the textures of one scene file, each picture once."""
+
+    def __init__(self, folder: Path) -> None:
+        """`folder`: what the tables' files are relative to."""
+        self._folder = folder
+        self._pictures: dict[str, Picture] = {}
+
+    def read(self, values: Mapping[str, Any], where: str) -> Texture:
+        """Raises SceneError with all that is wrong with the table or its picture."""
+        values = dict(values)
+        if isinstance(wrap := values.get("wrap"), str):
+            values["wrap"] = (wrap, wrap)
+        if isinstance(scale := values.get("scale"), int | float):
+            values["scale"] = (scale, scale)
+        problems = field_problems(TextureTable, values, where)
+        if problems:
+            raise SceneError(problems)
+        name = values.pop("image")
+        if name not in self._pictures:
+            try:
+                self._pictures[name] = Picture(read_texels(self._folder / name), name)
+            except SceneError as error:
+                raise SceneError([f"{where}.image: {problem}" for problem in error.problems]) from None
+        return Texture(picture=self._pictures[name], **values)

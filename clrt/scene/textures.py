@@ -1,0 +1,65 @@
+"""Textures: pictures that a material's parameter is read from, where a surface has texture coordinates.
+
+Coordinates are glTF's: (0, 0) is the upper left corner of the picture, (1, 1) the lower right one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal, TypeVar
+
+import numpy as np
+from annotated_types import Ge, Lt
+from numpy.typing import NDArray
+
+Channel = Literal["red", "green", "blue", "alpha"]
+Wrap = Literal["repeat", "mirror", "clamp"]
+NonNegative = Annotated[float, Ge(0)]
+Pair = tuple[float, float]
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """texels: (h, w, 4) uint8, row 0 on top, alpha not multiplied in. Textures may share one."""
+
+    texels: NDArray[np.uint8]
+    name: str = "picture"
+
+
+WHITE = Picture(np.full((1, 1, 4), 255, np.uint8), "white")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Texture:
+    """A picture, and how it lies on a surface.
+
+    Colours are taken for sRGB, numbers for linear, read from one `channel`; `factor`, one number or three, multiplies
+    them. The coordinates of `uv_set` are scaled, turned by `rotation_degrees` (counter-clockwise for who sees the
+    picture upright), and moved by `offset`, as KHR_texture_transform says. filter: bilinear, or the nearest texel.
+    """
+
+    picture: Picture
+    factor: NonNegative | tuple[NonNegative, NonNegative, NonNegative] = 1.0
+    channel: Channel = "red"
+    uv_set: Annotated[int, Ge(0), Lt(2)] = 0
+    offset: Pair = (0.0, 0.0)
+    scale: Pair = (1.0, 1.0)
+    rotation_degrees: float = 0.0
+    wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
+    filter: Literal["linear", "nearest"] = "linear"
+
+    @property
+    def to_picture(self) -> NDArray[np.float64]:
+        """(2, 3): what of (u, v, 1) makes the picture's coordinates, both from 0 to 1."""
+        angle = np.radians(self.rotation_degrees)
+        c, s = np.cos(angle), np.sin(angle)
+        turned = np.array([[c, s], [-s, c]]) @ np.diag(self.scale)
+        return np.column_stack([turned, self.offset])
+
+
+def untextured(value: Value | Texture) -> Value:
+    """A parameter of a material that is no texture; ValueError if it is one."""
+    if isinstance(value, Texture):
+        raise ValueError(f"the texture {value.picture.name}")
+    return value

@@ -1,0 +1,198 @@
+"""Textures: what kernels read against scipy's interpolation, and pictures whose light follows from what is on them."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any, Literal, get_args
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from clrt.device.open import Device
+from clrt.rendering.renderer import Renderer
+from clrt.scene.lights import DirectionalLight
+from clrt.scene.materials import Diffuse, Material, MetallicRoughness
+from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.textures import Channel, Picture, Texture, Wrap
+from clrt.study.probe import Probe
+
+Doubles = NDArray[np.float64]
+FILTERS: tuple[Literal["linear", "nearest"], ...] = ("linear", "nearest")
+MODES = {"repeat": "grid-wrap", "mirror": "reflect", "clamp": "nearest"}
+QUAD = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
+FACES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+BLACK = (0.0, 0.0, 0.0)
+UV = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
+
+
+def picture(seed: int, height: int, width: int) -> Picture:
+    """Noise."""
+    return Picture(np.random.default_rng(seed).integers(0, 256, (height, width, 4), np.uint8))
+
+
+def plain(red: int, green: int, blue: int) -> Picture:
+    """One color, as stored."""
+    return Picture(np.full((2, 2, 4), (red, green, blue, 255), np.uint8))
+
+
+def decoded(encoded: NDArray[np.uint8]) -> Doubles:
+    """sRGB's curve as IEC 61966-2-1 has it."""
+    values = encoded / 255
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055)**2.4)
+
+
+def quad(material: Material, **corners: Any) -> Mesh:
+    """[-1, 1]² at z = 0, its front towards +z, a picture upright on it."""
+    return Mesh(QUAD, FACES, material, **{"uv": UV, **corners})
+
+
+def seen(device: Device, scene: Scene, size: int = 32, spp: int = 16, **settings: Any) -> Doubles:
+    """The picture (size, size, 3) of [-1, 1]² at z = 0, from far above."""
+    scene = replace(scene, camera=Camera(position=(0, 0, 1000), look_at=(0, 0, 0),
+                                         fov_degrees=float(np.degrees(2 * np.arctan(1 / 1000)))),
+                    render=RenderSettings(size=(size, size), **settings))
+    for state in Renderer(scene, spp=spp, device=device.info.index).passes(spp=spp):
+        pass
+    return state.film.mean
+
+
+@pytest.mark.parametrize("kind", get_args(Wrap))
+def test_texels_are_read_as_scipy_reads_them(device: Device, kind: Wrap) -> None:
+    """Bilinear and nearest, every channel, over the edges, several pictures in one scene."""
+    pictures = [picture(1, 5, 7), picture(2, 1, 1), picture(3, 16, 2)]
+    textures = [Texture(picture=p, wrap=(kind, kind), filter=f, channel=c)
+                for p, f, c in itertools.product(pictures, FILTERS, get_args(Channel))]
+    users = [MetallicRoughness(color=texture, roughness=texture) for texture in textures]
+    probe = Probe(device, Scene(spheres=[Sphere(material=user) for user in users]))
+    records = probe.compiled.buffers["textures"][1]
+    assert len(records) == len(textures)
+    uv = np.random.default_rng(4).uniform(-2.5, 2.5, (2000, 2)).astype(np.float32).astype(np.float64)
+    for number, texture in enumerate(textures):
+        found = probe("texture", 4, np.full(len(uv), number), uv)
+        texels = texture.picture.texels
+        place = (uv * texels.shape[1::-1] - 0.5).T[::-1]
+        if texture.filter == "nearest":
+            clear = np.abs(place - np.floor(place) - 0.5).min(axis=0) > 1e-4
+            place = np.floor(place + 0.5)
+        else:
+            clear = np.ones(len(uv), bool)
+        channels = [*np.moveaxis(decoded(texels[..., :3]), 2, 0),
+                    texels[..., get_args(Channel).index(texture.channel)] / 255]
+        expected = np.stack([map_coordinates(c, place, order=1, mode=MODES[kind]) for c in channels], axis=1)
+        assert np.abs(found - expected)[clear].max() < 1e-5
+
+
+def test_a_picture_lies_upright_and_each_texel_fills_its_square(device: Device) -> None:
+    """White light from everywhere shows a diffuse surface in its own colors, whatever the samples."""
+    texels = picture(7, 8, 8)
+    scene = Scene(meshes=[quad(Diffuse(color=Texture(picture=texels, filter="nearest", factor=(1, 0.5, 0.25))))],
+                  environment=Environment(color=(1, 1, 1)))
+    expected = np.kron(decoded(texels.texels[..., :3]) * (1, 0.5, 0.25), np.ones((4, 4, 1)))
+    assert np.abs(seen(device, scene) - expected).max() < 1e-5
+
+
+@pytest.mark.parametrize("degrees, order", [(0, "abcd"), (90, "cadb"), (180, "dcba"), (270, "bdac")])
+def test_pictures_are_moved_scaled_and_turned(device: Device, degrees: float, order: str) -> None:
+    """Coordinates turned counter-clockwise turn the picture clockwise (KHR_texture_transform): a b over c d."""
+    colors = {"a": 0, "b": 80, "c": 160, "d": 240}
+    texels = np.full((2, 2, 4), 255, np.uint8)
+    texels[..., 0] = np.reshape([colors[name] for name in "abcd"], (2, 2))
+    # Half a turn about the coordinates' origin, (0, 0), ends at −u: repeated, that is the same square.
+    texture = Texture(picture=Picture(texels), rotation_degrees=degrees, scale=(2, 2), offset=(3, -4), filter="nearest")
+    scene = Scene(meshes=[quad(Diffuse(color=texture))], environment=Environment(color=(1, 1, 1)))
+    found = seen(device, scene, spp=4)[..., 0]
+    expected = np.kron(np.tile(decoded(np.reshape([colors[n] for n in order], (2, 2)).astype(np.uint8)), (2, 2)),
+                       np.ones((8, 8)))
+    assert np.abs(found - expected).max() < 1e-5
+
+
+def test_second_set_of_coordinates_and_numbers(device: Device) -> None:
+    """One material with a color by the first set, and a roughness by the second that makes it white metal or not."""
+    color, metal = picture(8, 4, 4), Picture(np.zeros((1, 2, 4), np.uint8))
+    metal.texels[0, 1, 2] = 255
+    material = MetallicRoughness(color=Texture(picture=color, filter="nearest"), roughness=1.0, preset=None,
+                                 metallic=Texture(picture=metal, channel="blue", uv_set=1, filter="nearest"))
+    scene = Scene(meshes=[quad(material, uv1=UV[:, ::-1])], environment=Environment(color=(1, 1, 1)))
+    plain_ones = [Scene(meshes=[quad(replace(material, metallic=m))], environment=Environment(color=(1, 1, 1)))
+                  for m in (0.0, 1.0)]
+    found, body, metallic = (seen(device, each) for each in (scene, *plain_ones))
+    assert np.abs(body - metallic).mean() > 0.02
+    assert np.array_equal(found[:16], body[:16]) and np.array_equal(found[16:], metallic[16:])
+
+
+def test_vertex_colors_multiply(device: Device) -> None:
+    """Linear over each triangle, so that the mean over a pixel is the value at its middle."""
+    colors = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+    scene = Scene(meshes=[quad(Diffuse(color=(0.5, 0.25, 1)), colors=colors), quad(Diffuse())],
+                  environment=Environment(color=(1, 1, 1)))
+    scene.meshes[1].vertices = (QUAD - (0, 0, 1)).astype(np.float32)
+    middle = (np.arange(32) + 0.5) / 32
+    found = seen(device, scene, spp=64)
+    assert np.abs(found[..., 0] - 0.5 * middle).max() < 2e-3
+    assert np.abs(found[..., 1] - 0.25 * middle[::-1, None]).max() < 2e-3
+    assert not found[..., 2].any()
+
+
+@pytest.mark.parametrize("turn", [0.0, 40.0, 90.0, 200.0])
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("shape", ["flat", "smooth", "own tangents"])
+def test_normal_maps_tilt_along_the_picture(device: Device, turn: float, mirrored: bool, shape: str) -> None:
+    """Red tilts the normal to the picture's right and green to its top, wherever these lie on the surface: light that
+    comes from there falls on it with the cosine of that."""
+    angle = np.radians(turn)
+    right, top = np.array([np.cos(angle), np.sin(angle), 0]), np.array([-np.sin(angle), np.cos(angle), 0])
+    right = -right if mirrored else right
+    uv = np.stack([QUAD @ right, -QUAD @ top], axis=1).astype(np.float32)
+    texel = np.array([200, 60, 210])
+    tilt = texel / 255 * 2 - 1
+    strength = 0.5
+    bent = strength * tilt[0] * right + strength * tilt[1] * top + [0, 0, tilt[2]]
+    towards = np.array([0.3, -0.2, 0.9])
+    cosine = bent @ towards / np.linalg.norm(bent) / np.linalg.norm(towards)
+    normals = np.tile(np.array([0, 0, 1], np.float32), (4, 1)) if shape != "flat" else None
+    own = np.tile(np.array([*right, -1 if mirrored else 1], np.float32), (4, 1)) if shape == "own tangents" else None
+    material = Diffuse(color=(0.8, 0.8, 0.8), normal_map=Texture(picture=plain(200, 60, 210), factor=strength))
+    scene = Scene(meshes=[quad(material, uv=uv, normals=normals, tangents=own)],
+                  lights=[DirectionalLight(direction=tuple(-towards), irradiance=(1, 1, 1))])
+    found = seen(device, scene, size=8, spp=4, max_depth=2)
+    assert found.mean() == pytest.approx(0.8 / np.pi * cosine, rel=1e-4)
+    assert found.std() < 1e-5
+
+
+def test_normal_maps_on_spheres(device: Device) -> None:
+    """A map that bends nothing leaves the picture as it is."""
+    flat = Texture(picture=plain(128, 128, 255), factor=0.0)
+    ball = Sphere(material=Diffuse(color=(0.7, 0.5, 0.3)))
+    scene = Scene(spheres=[ball], lights=[DirectionalLight(direction=(1, -1, -1), irradiance=(3, 3, 3))])
+    bent = replace(scene, spheres=[replace(ball, material=replace(ball.material, normal_map=flat))])
+    a, b = (seen(device, each, max_depth=2) for each in (scene, bent))
+    assert a.max() > 0.3 and np.abs(a - b).max() < 1e-5
+
+
+@pytest.mark.parametrize("lanes", [1, 8])
+def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: int) -> None:
+    """A picture that is half black: the light below is that of the other half alone, by light samples and without."""
+    half = Picture(np.full((1, 2, 4), 255, np.uint8))
+    half.texels[0, 0, :3] = 0
+    above = (QUAD * (1, 1, 0) + (0, 1, 1))[:, [0, 2, 1]]
+    ground = Mesh((QUAD * 9)[:, [0, 2, 1]].astype(np.float32), FACES[:, ::-1].copy(), Diffuse(color=(0.8, 0.8, 0.8)))
+    emission = Texture(picture=half, factor=5.0, filter="nearest")
+    painted = Mesh(above.astype(np.float32), FACES, Diffuse(color=BLACK, emission=emission), uv=UV)
+    right = np.where(UV[:, :1] == 0, above * (0, 1, 1), above)
+    small = Mesh(right.astype(np.float32), FACES, Diffuse(color=BLACK, emission=(5.0, 5.0, 5.0)))
+    pictures = []
+    for lamp in (painted, small):
+        scene = Scene(meshes=[ground, lamp], camera=Camera(position=(0, 0.5, 8), look_at=(0, 0.5, 0)),
+                      render=RenderSettings(size=(24, 24), max_depth=3))
+        renderer = Renderer(scene, spp=256, device=device.info.index, lanes=lanes)
+        for state in renderer.passes(spp=256):
+            pass
+        pictures.append(state.film)
+    found, expected = (film.mean for film in pictures)
+    error = np.sqrt(sum(film.variance for film in pictures))
+    z = (found - expected)[error > 0] / error[error > 0]
+    assert found.max() > 0.3 and abs(float(np.mean(found) / np.mean(expected)) - 1) < 5e-3
+    assert np.abs(z).max() < 6
