@@ -68,12 +68,12 @@ def mesh_problems(mesh: object, where: str) -> list[str]:
     problems += index_problems(mesh.faces, n, where)
     problems += _row_problems(_not_finite(mesh.vertices), mesh.vertices, f"{where}: vertices", "is not finite")
     for name, array in corners.items():
-        problems += _row_problems(_not_finite(array), array, f"{where}: {name}", "is not finite")
-    if mesh.normals is not None and not problems:
-        problems += _row_problems(~np.any(mesh.normals, axis=1), mesh.normals, f"{where}: normals", "points nowhere")
-    if mesh.colors is not None and not problems:
-        negative = np.asarray((mesh.colors < 0).any(axis=1))
-        problems += _row_problems(negative, mesh.colors, f"{where}: colors", "is negative")
+        bad, fault = _not_finite(array), "is not finite"
+        if name == "normals":
+            bad, fault = bad | ~np.any(array, axis=1), "points nowhere"
+        elif name == "colors":
+            bad, fault = bad | np.any(array < 0, axis=1), "is no colour"
+        problems += _row_problems(bad, array, f"{where}: {name}", fault)
     return problems
 
 
