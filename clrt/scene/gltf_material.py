@@ -11,10 +11,11 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import SceneError
 from . import gltf_document as gltf
 from .gltf_data import GltfData
 from .materials import Material, MetallicRoughness
-from .pictures import linear_from_srgb
+from .pictures import linear_from_srgb, read_texture
 
 log = logging.getLogger(__name__)
 
@@ -76,13 +77,12 @@ class Materials:
         if index not in self._pictures:
             image = gltf.entry(self._data.document.images, index, "image", user)
             try:
-                import imageio.v3 as imageio
-                if image.bufferView is not None:
-                    content = self._data.view(image.bufferView, f"image {index}").tobytes()
-                else:
-                    content = self._data.resource(image.uri or "", f"image {index}")
-                self._pictures[index] = np.asarray(imageio.imread(content, plugin="pillow", mode="RGB"), np.uint8)
-            except Exception as error:  # decoders raise whatever the damage leads to
+                content = (self._data.resource(image.uri or "", user) if image.bufferView is None
+                           else self._data.view(image.bufferView, user).tobytes())
+                pixels = read_texture(content, f"image {index}")
+                self._pictures[index] = np.broadcast_to(pixels[..., :3 if pixels.shape[2] > 2 else 1],
+                                                        (*pixels.shape[:2], 3))
+            except SceneError as error:
                 log.warning("%s: a texture is left out: %s", self._data.path, error)
                 self._pictures[index] = None
         return self._pictures[index]

@@ -1,4 +1,4 @@
-"""Read a picture file as linear Rec. 709: environment maps, and pictures to compare."""
+"""Read a picture file: environment maps and pictures to compare as linear Rec. 709, textures as they are stored."""
 
 from __future__ import annotations
 
@@ -9,6 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from .decoder import decode
+from .radiance import read_radiance
+
+#: How a glTF picture's bytes begin, and the ending of a file of that kind.
+EMBEDDED = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg", b"RIFF": ".webp"}
 
 
 def read_picture(path: Path) -> NDArray[np.float32]:
@@ -18,54 +23,57 @@ def read_picture(path: Path) -> NDArray[np.float32]:
     One channel is grey; alpha is left out. Raises SceneError naming the file if it is missing, empty, damaged, cropped
     (a data window that differs from the display window), or has no colour channels.
     """
-    buffer, pixels = _decoded(path, "float")
-    spec = buffer.spec()
-    if buffer.roi != buffer.roi_full:
-        raise SceneError(f"{path}: the file holds {spec.width}x{spec.height} pixels of a "
-                         f"{spec.full_width}x{spec.full_height} picture; save it uncropped")
-    colours: NDArray[np.float32] = pixels[..., _colour_channels(path, spec.channelnames)]
-    return colours if _holds_floats(buffer) else linear_from_srgb(colours)
+    _check_file(path)
+    if (radiance := read_radiance(path)) is not None:
+        return radiance
+    pixels, names = _stored(path, str(path))
+    colours = pixels[..., _colour_channels(path, names)]
+    if colours.dtype == np.float32:
+        return colours
+    return linear_from_srgb(np.asarray(colours / np.float32(np.iinfo(colours.dtype).max), np.float32))
 
 
-def read_texels(path: Path) -> NDArray[np.uint8]:
-    """The texels of a picture of at most 16 bits a channel: (h, w, 4) uint8 as stored, row 0 on top, alpha apart.
+def read_texture(source: Path | bytes, name: str) -> NDArray[np.uint8]:
+    """The pixels of a picture file, or of the bytes of one (PNG, JPEG, WebP): (h, w, c) as stored, row 0 on top.
 
-    Raises SceneError as `read_picture`, and for pictures of floats, which would lose most of what they hold.
+    c: 1 grey, 2 grey and alpha, 3 colours, 4 colours and alpha. Raises SceneError naming the picture by `name`.
     """
-    buffer, pixels = _decoded(path, "uint8")
-    if _holds_floats(buffer):
-        raise SceneError(f"{path}: holds floats, but textures have 8 bits a channel; convert it to PNG")
-    names = buffer.spec().channelnames
-    texels: NDArray[np.uint8] = np.full((*pixels.shape[:2], 4), 255, np.uint8)
-    texels[..., :3] = pixels[..., _colour_channels(path, names)]
-    for channel, name in enumerate(names):
-        if name.upper() == "A":
-            texels[..., 3] = pixels[..., channel]
-    return texels
+    if isinstance(source, Path):
+        _check_file(source)
+    pixels, _ = _stored(source, name)
+    pixels = pixels[..., :4]
+    if pixels.dtype == np.uint8:
+        return pixels
+    if pixels.dtype == np.float32:
+        raise SceneError(f"{name}: has floating-point pixels; save it as a PNG or JPEG picture")
+    return np.asarray((pixels.astype(np.uint32) + 128) // 257, np.uint8)
 
 
-def _decoded(path: Path, dtype: str) -> tuple[Any, NDArray[Any]]:
-    """OpenImageIO's buffer of a file, and its (h, w, channels) of `dtype`."""
-    import OpenImageIO as oiio
-
+def _check_file(path: Path) -> None:
     if not path.is_file():
         raise SceneError(f"{path}: {'is a folder, not a picture' if path.is_dir() else 'no such picture file'}")
     if path.stat().st_size == 0:
         raise SceneError(f"{path}: the picture file is empty; write it again")
-    config = oiio.ImageSpec()
-    config.attribute("oiio:UnassociatedAlpha", 1)
-    buffer = oiio.ImageBuf(str(path), 0, 0, config)
-    kind = oiio.TypeDesc(dtype)
-    pixels = buffer.get_pixels(kind) if buffer.read(0, 0, True, kind) else None
-    if pixels is None:
-        raise SceneError(f"{path}: cannot be decoded as a picture: {_complaint(buffer)}")
-    return buffer, pixels
 
 
-def _holds_floats(buffer: Any) -> bool:
-    import OpenImageIO as oiio
-
-    return buffer.nativespec().format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
+def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], list[str]]:
+    """The pixels as they are stored, and the names of the channels."""
+    suffix = ""
+    if isinstance(source, bytes):
+        suffix = next((ending for start, ending in EMBEDDED.items() if source.startswith(start)), "")
+        if not suffix:
+            raise SceneError(f"{name}: is neither PNG, JPEG nor WebP; convert it")
+    try:
+        arrays, facts = decode("picture", source, suffix)
+    except SceneError as error:
+        raise SceneError(f"{name}: cannot be decoded as a picture: {error}") from None
+    pixels = arrays["pixels"]
+    if facts["cropped"]:
+        height, width = pixels.shape[:2]
+        full_width, full_height = facts["whole"]
+        raise SceneError(f"{name}: the file holds {width}x{height} pixels of a {full_width}x{full_height} picture; "
+                         "save it uncropped")
+    return pixels, facts["channels"]
 
 
 def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -74,7 +82,7 @@ def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(encoded <= 0.04045, encoded / 12.92, power).astype(np.float32)
 
 
-def _colour_channels(path: Path, names: tuple[str, ...]) -> list[int]:
+def _colour_channels(path: Path, names: list[str]) -> list[int]:
     """Where red, green and blue are among a file's channels."""
     upper = [name.upper() for name in names]
     if len(names) <= 2:  # grey, or grey and alpha
@@ -82,11 +90,3 @@ def _colour_channels(path: Path, names: tuple[str, ...]) -> list[int]:
     if not {"R", "G", "B"} <= set(upper):
         raise SceneError(f"{path}: no channels R, G, B, but {', '.join(names)}; save its colour layer alone")
     return [upper.index(channel) for channel in "RGB"]
-
-
-def _complaint(buffer: Any) -> str:
-    """OpenImageIO's message about a file; it quotes raw bytes of damaged headers, which are not always text."""
-    try:
-        return str(buffer.geterror()).splitlines()[0]
-    except (UnicodeDecodeError, IndexError):
-        return "its header is damaged"

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import struct
+import time
+import zlib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import imageio.v3 as imageio
@@ -11,8 +17,10 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.errors import SceneError
-from clrt.output.images import write_image
-from clrt.scene.pictures import read_picture
+from clrt.output.images import rgbe_rounded, write_image
+from clrt.scene import decoder
+from clrt.scene.pictures import read_picture, read_texture
+from clrt.scene.radiance import read_radiance
 
 FloatArray = NDArray[np.float32]
 
@@ -87,3 +95,73 @@ def test_a_cropped_picture_is_refused(tmp_path: Path) -> None:
 def test_a_folder_is_no_picture(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="is a folder"):
         read_picture(tmp_path)
+
+
+def test_a_sky_is_read_as_its_library_reads_it(tmp_path: Path) -> None:
+    """Run-length coded .hdr files are read without the library: runs, literals, zeros and all exponents."""
+    rng = np.random.default_rng(1)
+    pixels = np.ldexp(rng.random((9, 300, 3), np.float32), rng.integers(-100, 100, (9, 300, 1)))
+    pixels[:, 20:200] = pixels[:, 20:21]
+    pixels[3, 250:] = 0
+    path = tmp_path / "sky.hdr"
+    write_image(path, pixels)
+    buffer = oiio.ImageBuf(str(path))
+    found, expected = read_radiance(path), buffer.get_pixels(oiio.FLOAT)
+    assert found is not None and expected is not None
+    np.testing.assert_array_equal(found, rgbe_rounded(pixels))
+    np.testing.assert_allclose(found, expected, rtol=2e-7)  # which takes powers in float32
+    whole = path.read_bytes()
+    for wrong in (whole[:-1], whole.replace(b"+X 300", b"+X 301"), whole.replace(b"#?RAD", b"#?RAX"),
+                  whole.replace(b"FORMAT", b"EXPOSURE=2\nFORMAT"), whole.replace(b"\x02\x02\x01", b"\x02\x03\x01", 1)):
+        path.write_bytes(wrong)
+        assert read_radiance(path) is None
+
+
+@pytest.mark.parametrize("mode, dtype", [("L", "u1"), ("LA", "u1"), ("RGB", "u1"), ("RGBA", "u1"), ("RGB", "u2")])
+def test_textures_are_read_as_stored(mode: str, dtype: str, tmp_path: Path) -> None:
+    """From files and bytes alike; alpha is kept beside the colours and not multiplied in; 16 bits are rounded to 8."""
+    path = tmp_path / "a.png"
+    stored_pixels = np.random.default_rng(2).integers(0, 256, (5, 7, len(mode))).astype(np.uint8)
+    output = oiio.ImageOutput.create(str(path))
+    spec = oiio.ImageSpec(7, 5, len(mode), "uint8" if dtype == "u1" else "uint16")
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    assert output is not None and output.open(str(path), spec)
+    output.write_image(stored_pixels if dtype == "u1" else stored_pixels.astype(np.uint16) * 257)
+    output.close()
+    np.testing.assert_array_equal(read_texture(path, "a"), stored_pixels)
+    np.testing.assert_array_equal(read_texture(path.read_bytes(), "a"), stored_pixels)
+    with pytest.raises(SceneError, match="image 3: is neither PNG, JPEG nor WebP"):
+        read_texture(b"GIF89a" + bytes(20), "image 3")
+
+
+def test_a_small_file_may_not_claim_a_huge_picture(tmp_path: Path) -> None:
+    """A PNG of 60 000 by 60 000 pixels, all of whose data are a few bytes, costs neither memory nor time."""
+    header = struct.pack(">IIBBBBB", 60000, 60000, 8, 2, 0, 0, 0)
+    chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(bytes(1000))), (b"IEND", b"")]
+    content = b"\x89PNG\r\n\x1a\n" + b"".join(struct.pack(">I", len(data)) + kind + data + struct.pack(
+        ">I", zlib.crc32(kind + data)) for kind, data in chunks)
+    (tmp_path / "a.png").write_bytes(content)
+    with pytest.raises(SceneError, match="cannot be decoded as a picture"):
+        read_picture(tmp_path / "a.png")
+
+
+def test_a_decoder_that_hangs_or_crashes_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pipe that nobody writes to keeps the decoder waiting; one that was killed is replaced by another."""
+    write_image(tmp_path / "a.png", noise(3, 4, 3))
+    expected = read_picture(tmp_path / "a.png")
+    os.mkfifo(tmp_path / "pipe.png")
+    assert decoder._running is not None
+    decoder._running._popen.kill()
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.png"), expected)
+    with monkeypatch.context() as patch:
+        patch.setattr(decoder, "LIMIT", 0.5)
+        with pytest.raises(SceneError, match="the decoder took more than 0.5 s; the file is damaged"):
+            decoder.decode("picture", tmp_path / "pipe.png")
+    with ThreadPoolExecutor(1) as beside:
+        waiting = beside.submit(decoder.decode, "picture", tmp_path / "pipe.png")
+        while decoder._running is None or not decoder._running._popen.pid:
+            time.sleep(0.01)
+        os.kill(decoder._running._popen.pid, signal.SIGSEGV)
+        with pytest.raises(SceneError, match="the decoder crashed with signal 11"):
+            waiting.result()
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.png"), expected)

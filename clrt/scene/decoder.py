@@ -1,0 +1,115 @@
+"""Decodes pictures and compressed meshes in a process of its own, for the libraries that do may crash, hang or take
+all memory where a file is damaged.
+
+The process starts with the first file, decodes those that follow, and ends when it has had nothing to do for a while.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+from contextlib import suppress
+from pathlib import Path
+from signal import strsignal
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+
+#: Seconds that one file may take. The largest picture that is read takes a tenth of it.
+LIMIT = 60.0
+Arrays = dict[str, NDArray[Any]]
+
+_lock = threading.Lock()
+_running: _Process | None = None
+
+
+def decode(kind: str, source: Path | bytes, suffix: str = "") -> tuple[Arrays, dict[str, Any]]:
+    """What is in a file, or in bytes that could be one with the name's ending `suffix`: arrays, and other facts.
+
+    kind: a function of scene.decoding. Raises SceneError with its message, or with how the process ended.
+    """
+    if isinstance(source, Path):
+        return _decoded(kind, source)
+    with tempfile.TemporaryDirectory(prefix="clrt-") as folder:
+        file = Path(folder) / f"embedded{suffix}"
+        file.write_bytes(source)
+        return _decoded(kind, file)
+
+
+def _decoded(kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
+    global _running
+    with _lock:
+        if _running is not None and _running.owner == os.getpid():
+            with suppress(_Ended):  # perhaps only because it had nothing to do
+                return _running.decode(kind, file)
+        _running = _Process()
+        try:
+            return _running.decode(kind, file)
+        except _Ended as end:
+            _running = None
+            raise SceneError(f"the decoder {end}; the file is damaged or too large") from None
+
+
+class _Ended(Exception):
+    """The process is no more; says how it ended."""
+
+
+class _Process:
+    """A process that runs scene.decoding. `owner`: the process that started it; a forked one must not talk to it."""
+
+    def __init__(self) -> None:
+        path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
+        self.owner = os.getpid()
+        self._popen = subprocess.Popen(
+            [sys.executable, "-P", "-m", "clrt.scene.decoding"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"})
+        assert self._popen.stdin and self._popen.stdout
+        self._requests, self._replies = self._popen.stdin, self._popen.stdout
+
+    def decode(self, kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
+        """See above; raises _Ended where the process ends or must be ended."""
+        watch = threading.Timer(LIMIT, self._popen.kill)
+        watch.start()
+        try:
+            self._requests.write(json.dumps([kind, str(file.absolute())]).encode() + b"\n")
+            self._requests.flush()
+            reply = json.loads(self._replies.readline() or "null")
+            if reply is None:
+                raise EOFError
+            arrays = {name: self._array(shape, dtype) for name, (shape, dtype) in reply["arrays"].items()}
+        except (OSError, EOFError):
+            timed_out = not watch.is_alive()
+            raise _Ended(f"took more than {LIMIT:g} s" if timed_out else self._how_it_ended()) from None
+        except BaseException:  # an interrupt, say, after which no reply would match its request
+            self._popen.kill()
+            raise
+        finally:
+            watch.cancel()
+        if "error" in reply:
+            raise SceneError(reply["error"])
+        return arrays, reply["facts"]
+
+    def _array(self, shape: list[int], dtype: str) -> NDArray[Any]:
+        array = np.empty(shape, dtype)
+        view = array.reshape(-1).view(np.uint8).data
+        while len(view):
+            count = self._replies.readinto(view)  # type: ignore[attr-defined]
+            if not count:
+                raise EOFError
+            view = view[count:]
+        return array
+
+    def _how_it_ended(self) -> str:
+        self._popen.kill()  # of one that has ended already its own end counts
+        with suppress(OSError):
+            self._requests.close()
+        self._replies.close()
+        code = self._popen.wait()
+        return f"crashed with signal {-code} ({strsignal(-code)})" if code < 0 else f"ended with code {code}"

@@ -1,0 +1,109 @@
+"""`python -m clrt.scene.decoding`: the process that scene.decoder starts.
+
+It reads requests, [kind, file] in JSON, a line each. A reply is a line of JSON, {"error": ...} or {"arrays": {name:
+[shape, dtype]}, "facts": ...}, and the bytes of the arrays.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Found = tuple[dict[str, NDArray[Any]], dict[str, Any]]
+
+#: Bytes of memory that this process may have, and those of the largest picture: 16384 x 8192 in four floats.
+MOST_MEMORY = 8 * 2**30
+MOST_BYTES = 2**31
+#: A picture that has more bytes for each of its file's is no picture: deflate reaches 1032, JPEG about 300.
+MOST_RATIO = 2000
+#: Seconds without a request after which the process ends.
+IDLE = 2.0
+
+
+def picture(file: str) -> Found:
+    """The pixels of a picture, (h, w, c) uint8, uint16 or float32 as they are stored, alpha not multiplied in.
+
+    Facts: the names of its channels, and the size of the picture of which the pixels may be a part.
+    """
+    import OpenImageIO as oiio
+
+    oiio.attribute("limits:imagesize_MB", MOST_BYTES >> 20)
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    buffer = oiio.ImageBuf(file, 0, 0, config)
+    kinds = {oiio.UINT8: (oiio.UINT8, 1), oiio.UINT16: (oiio.UINT16, 2)}
+    spec = buffer.nativespec()
+    kind, size = kinds.get(spec.format.basetype, (oiio.FLOAT, 4))
+    count = spec.width * spec.height * spec.nchannels * size
+    if count > MOST_RATIO * os.path.getsize(file):
+        raise ValueError(f"{spec.width}x{spec.height} pixels cannot be in {os.path.getsize(file)} bytes")
+    pixels = buffer.get_pixels(kind) if buffer.read(0, 0, True, kind) else None
+    if pixels is None:
+        raise ValueError(_complaint(buffer))
+    return {"pixels": pixels}, {"channels": list(spec.channelnames), "whole": [spec.full_width, spec.full_height],
+                                "cropped": buffer.roi != buffer.roi_full}
+
+
+def _complaint(buffer: Any) -> str:
+    """OpenImageIO's message about a file; it quotes raw bytes of damaged headers, which are not always text."""
+    try:
+        return str(buffer.geterror()).splitlines()[0]
+    except (UnicodeDecodeError, IndexError):
+        return "its header is damaged"
+
+
+KINDS: dict[str, Callable[[str], Found]] = {"picture": picture}
+
+
+def main() -> None:
+    """Answers requests until there are no more. What the libraries print goes to standard error."""
+    with os.fdopen(os.dup(1), "wb") as replies:
+        os.dup2(2, 1)
+        _limit()
+        while True:
+            idle = threading.Timer(IDLE, os._exit, [0])
+            idle.start()
+            line = sys.stdin.readline()
+            idle.cancel()
+            if not line:
+                os._exit(0)  # libraries may crash as they are unloaded
+            _answer(replies, *json.loads(line))
+
+
+def _answer(replies: Any, kind: str, file: str) -> None:
+    arrays: dict[str, NDArray[Any]] = {}
+    facts: dict[str, Any] = {}
+    try:
+        arrays, facts = KINDS[kind](file)
+        reply: dict[str, Any] = {"facts": facts}
+    except MemoryError:
+        reply = {"error": "it needs too much memory"}
+    except Exception as error:  # libraries raise whatever the damage leads to
+        reply = {"error": str(error) or type(error).__name__}
+    arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    reply["arrays"] = {name: [array.shape, array.dtype.str] for name, array in arrays.items()}
+    replies.write(json.dumps(reply).encode() + b"\n")
+    for array in arrays.values():
+        replies.write(array.reshape(-1).view(np.uint8).data)
+    replies.flush()
+
+
+def _limit() -> None:
+    """Bounds memory, and leaves no core dumps behind."""
+    if sys.platform != "win32":
+        import resource
+
+        for kind, most in ((resource.RLIMIT_AS, MOST_MEMORY), (resource.RLIMIT_CORE, 0)):
+            hard = resource.getrlimit(kind)[1]
+            resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,60 @@
+"""Read Radiance pictures (.hdr) without a decoder that could crash: most skies come in them.
+
+The format: G. Ward, "Real Pixels", Graphics Gems II, 1991; Radiance's file format documentation.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Row 0 on top and columns from the left, the only order in use; of widths that run lengths can code.
+_HEADER = re.compile(rb"#\?(?:RADIANCE|RGBE)\n(?:[^\n]{0,4096}\n){0,1000}?\n-Y (\d{1,6}) \+X (\d{1,5})\n")
+_SCALED = re.compile(rb"^(?:EXPOSURE|COLORCORR|FORMAT=32-bit_rle_xyze)", re.MULTILINE)
+
+
+def read_radiance(path: Path) -> NDArray[np.float32] | None:
+    """The pixels, (h, w, 3) float32, linear; None for all but an undamaged file of plain run-length coded RGB rows."""
+    content = path.read_bytes() if path.suffix.lower() == ".hdr" else b""
+    header = _HEADER.match(content)
+    if header is None or _SCALED.search(header[0]):
+        return None
+    height, width = int(header[1]), int(header[2])
+    # A run codes at most 127 bytes in two.
+    if not 8 <= width < 2**15 or height * (4 + 8 * -(-width // 127)) > len(content) - header.end():
+        return None
+    rows = np.empty((height, 4, width), np.uint8)
+    start, mark = header.end(), bytes((2, 2, width >> 8, width & 255))
+    for row in rows:
+        if content[start:start + 4] != mark:
+            return None
+        planes, start = _row(content, start + 4, 4 * width)
+        if planes is None:
+            return None
+        row.reshape(-1)[:] = np.frombuffer(planes, np.uint8)
+    mantissas, exponent = rows[:, :3], rows[:, 3:].astype(np.int32)
+    colours = np.ldexp(mantissas.astype(np.float32), np.where(exponent > 0, exponent - 136, -1000))
+    return np.ascontiguousarray(colours.transpose(0, 2, 1))
+
+
+def _row(content: bytes, start: int, size: int) -> tuple[bytes | None, int]:
+    """A row's `size` bytes and where the next row begins; None for bytes that code more or fewer."""
+    parts, missing = [], size
+    try:
+        while missing > 0:
+            count = content[start]
+            if count > 128:
+                count -= 128
+                parts.append(content[start + 1:start + 2] * count)
+                start += 2
+            else:
+                parts.append(content[start + 1:start + 1 + count])
+                start += 1 + count
+            missing -= count or size + 1
+    except IndexError:
+        return None, start
+    planes = b"".join(parts)
+    return (planes if len(planes) == size else None), start
