@@ -18,9 +18,10 @@ from .scene.file import load as _load
 from .scene.model import Scene
 
 
-def load(path: str | Path) -> Scene:
-    """The scene in a .toml file or a bare model (.glb .gltf .obj .ply .stl .off); SceneError lists all its mistakes."""
-    return _load(Path(path))
+def load(path: str | Path, camera: str | None = None) -> Scene:
+    """The scene in a .toml file or a bare model (.glb .gltf .obj .ply .stl .off), seen by a camera of the model file
+    if one is named; SceneError lists all its mistakes."""
+    return _load(Path(path), camera)
 
 
 def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | None = None, error: float | None = None,

@@ -33,6 +33,7 @@ def command(scene: Path, as_json: bool, lanes: int | None, triangle: str, box: s
         "max_depth": content.render.max_depth,
         "meshes": len(content.meshes), "triangles": sum(len(mesh.faces) for mesh in content.meshes),
         "spheres": len(content.spheres),
+        "cameras": list(content.cameras),
         "materials": dict(Counter(material.kernel for material in materials)),
         "lights": {"entries": int(compiled.counts["lights"][0]),
                    **Counter(type(light).kernel for light in content.lights)},
@@ -50,7 +51,7 @@ def command(scene: Path, as_json: bool, lanes: int | None, triangle: str, box: s
         if isinstance(value, dict):
             value = "  ".join(f"{key} {_short(part)}" for key, part in value.items()) or "none"
         elif isinstance(value, list):
-            value = " ".join(value)
+            value = " ".join(value) or "none"
         click.echo(f"{name:13} {_short(value)}")
 
 

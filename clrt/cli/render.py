@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("-o", "--output", "outputs", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
               help="Picture to write: .png, .exr or .hdr; may be repeated. Default: <scene>.png here.")
+@click.option("--camera", metavar="NAME", help="A camera in the model file; see `clrt info`.")
 @click.option("--size", type=Size(), help="Picture size in pixels.")
 @click.option("--spp", type=click.IntRange(min=1), help="Stop at this many samples a pixel.")
 @click.option("--time", "seconds", type=float, metavar="SECONDS", help="Stop after this time.")
@@ -55,7 +56,7 @@ if TYPE_CHECKING:
 @click.option("--print-kernel", is_flag=True, help="Print the program that would run, and stop.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no warnings.")
 @tracing_options
-def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None, spp: int | None,
+def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tuple[int, int] | None, spp: int | None,
             seconds: float | None, error: float | None, depth: int | None, seed: int | None, devices: tuple[str, ...],
             integrator: str | None, sampler: str | None, pixel_filter: str | None, adaptive: bool | None,
             reference: Path | None, report: Path | None, plot: Path | None, denoise: bool, checkpoint: Path | None,
@@ -86,7 +87,7 @@ def command(scene: Path, outputs: tuple[Path, ...], size: tuple[int, int] | None
         "checkpoint_seconds": checkpoint_every, **tracing}
     with make_progress(progress_kind, quiet) as progress:
         progress.phase("load")
-        content = load(scene)
+        content = load(scene, camera)
         expected = None if reference is None else _read_reference(reference, size or content.render.size)
         planned = planned_spp(content.render, spp, seconds, error)
         renderer = Renderer(content, spp=planned, on_phase=progress.phase, **options)

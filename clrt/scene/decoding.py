@@ -59,7 +59,18 @@ def _complaint(buffer: Any) -> str:
         return "its header is damaged"
 
 
-KINDS: dict[str, Callable[[str], Found]] = {"picture": picture}
+def draco(file: str) -> Found:
+    """Of a compressed mesh the faces, (m, 3) uint32, and each attribute, (n, k), as "attribute" with its number."""
+    import DracoPy
+
+    with open(file, "rb") as content:
+        mesh = DracoPy.decode(content.read())
+    faces = np.asarray(mesh.faces, np.uint32).reshape(-1, 3)
+    return {"faces": faces, **{f"attribute {attribute['unique_id']}": np.asarray(attribute["data"])
+                               for attribute in mesh.attributes}}, {}
+
+
+KINDS: dict[str, Callable[[str], Found]] = {"picture": picture, "draco": draco}
 
 
 def main() -> None:
@@ -87,6 +98,8 @@ def _answer(replies: Any, kind: str, file: str) -> None:
         reply = {"error": "it needs too much memory"}
     except Exception as error:  # libraries raise whatever the damage leads to
         reply = {"error": str(error) or type(error).__name__}
+    if sum(array.nbytes for array in arrays.values()) > MOST_BYTES:
+        arrays, reply = {}, {"error": f"it holds more than {MOST_BYTES >> 30} GiB"}
     arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     reply["arrays"] = {name: [array.shape, array.dtype.str] for name, array in arrays.items()}
     replies.write(json.dumps(reply).encode() + b"\n")

@@ -1,4 +1,4 @@
-"""Read glTF 2.0 (.glb, .gltf): every triangle of its scene, its metallic-roughness materials and its first camera.
+"""Read glTF 2.0 (.glb, .gltf): every triangle of its scene, its metallic-roughness materials and its cameras.
 
 What is left out (skins, morph targets, textures but for their mean colour, ...) is named in one warning in the log.
 """
@@ -6,9 +6,7 @@ What is left out (skins, morph targets, textures but for their mean colour, ...)
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,24 +15,18 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from . import gltf_document as gltf
 from .framing import bounds
+from .gltf_camera import read_cameras
 from .gltf_data import GltfData
+from .gltf_draco import decompress
 from .gltf_material import Materials
-from .model import Camera, Mesh
+from .model import Mesh, Model
 from .normals import Normals, choose_normals
-from .transform import Matrix, quaternion, scaling, transform_mesh, translation, unit
+from .transform import Matrix, quaternion, scaling, transform_mesh, translation
 from .validate import index_problems, mesh_problems
 
 log = logging.getLogger(__name__)
 TRIANGLES, STRIP, FAN = 4, 5, 6
 Placed = tuple[gltf.Node, Matrix]
-
-
-@dataclass(frozen=True)
-class Model:
-    """What a glTF file holds: at least one mesh, and the camera that its scene names first."""
-
-    meshes: list[Mesh]
-    camera: Camera | None
 
 
 def read_gltf(path: Path, normals: Normals = "file") -> Model:
@@ -50,7 +42,8 @@ def read_gltf(path: Path, normals: Normals = "file") -> Model:
         if problems:
             raise SceneError(problems)
         _warn_of_left_out(path, data.document)
-        return Model(meshes, _camera(data.document, nodes, meshes))
+        middle = np.mean(bounds(meshes), axis=0)
+        return Model(meshes=meshes, cameras=read_cameras(path, data.document, nodes, middle))
     except SceneError as error:
         raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 
@@ -112,6 +105,7 @@ def _primitives(data: GltfData, materials: Materials, index: int, normals: Norma
         where = f'mesh "{name}"'
         if primitive.mode < TRIANGLES or "POSITION" not in primitive.attributes:
             continue
+        decompress(data, primitive, where)
         vertices = _vectors(data, primitive.attributes["POSITION"], where)
         corners = _corners(data, primitive, len(vertices), where)
         if len(corners) == 0:
@@ -143,7 +137,7 @@ def _corners(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> ND
             raise SceneError(f"{user}: its indices, accessor {primitive.indices}, are {indices.dtype}; "
                              "they must be unsigned integers")
         order = indices[:, 0].astype(np.int64)
-    if primitive.mode == TRIANGLES:
+    if primitive.mode == TRIANGLES or primitive.indices in data.decoded:
         if len(order) % 3:
             raise SceneError(f"{user}: has {len(order)} corners, which is no multiple of 3; export it again")
         return order.reshape(-1, 3)
@@ -154,25 +148,6 @@ def _corners(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> ND
         odd = first % 2
         corners = np.stack([first, first + 1 + odd, first + 2 - odd], axis=1)
     return order[corners]
-
-
-def _camera(document: gltf.Document, nodes: list[Placed], meshes: list[Mesh]) -> Camera | None:
-    """The first perspective camera in the scene; it looks at the depth of the model's middle."""
-    for node, matrix in nodes:
-        if node.camera is None:
-            continue
-        lens = gltf.entry(document.cameras, node.camera, "camera", "a node").perspective
-        position = matrix[:3, 3]
-        forward, up = unit(-matrix[:3, 2]), unit(matrix[:3, 1])
-        if lens is None or not np.cross(forward, up).any():
-            continue
-        distance = np.linalg.norm(np.mean(bounds(meshes), axis=0) - position) or 1.0
-        x, y, z = position.tolist()
-        at_x, at_y, at_z = (position + distance * forward).tolist()
-        up_x, up_y, up_z = up.tolist()
-        return Camera(position=(x, y, z), look_at=(at_x, at_y, at_z), up=(up_x, up_y, up_z),
-                      fov_degrees=math.degrees(lens.yfov))
-    return None
 
 
 def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
@@ -189,5 +164,6 @@ def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
         "transparency": any(material.alphaMode != "OPAQUE" for material in materials),
     }
     names = [name for name, present in left_out.items() if present]
+    names += sorted(f"the extension {name}" for name in set(document.extensionsUsed) - gltf.EXTENSIONS)
     if names:
         log.warning("%s: left out: %s", path, ", ".join(names))

@@ -32,6 +32,8 @@ class GltfData:
         text, self._chunk = split_glb(content) if content.startswith(b"glTF") else (content, None)
         self.document: Document = parse_document(text)
         self.path = path
+        #: The values of accessors that were compressed, (count, components); see scene.gltf_draco.
+        self.decoded: dict[int, Array] = {}
         self._buffers: dict[int, Bytes] = {}
 
     def resource(self, uri: str, user: str) -> bytes:
@@ -66,7 +68,12 @@ class GltfData:
         if accessor.type != kind:
             raise SceneError(f"{user}: accessor {index} is {accessor.type}, not {kind}; export the file again")
         size = COMPONENTS[kind]
-        if accessor.bufferView is not None:
+        if index in self.decoded:
+            values = self.decoded[index]
+            if values.shape[1] != size:
+                raise SceneError(f"{user}: accessor {index} has {values.shape[1]} components, not {size}; "
+                                 "export the file again")
+        elif accessor.bufferView is not None:
             stride = entry(self.document.bufferViews, accessor.bufferView, "bufferView", f"accessor {index}").byteStride
             values = self._strided(accessor.bufferView, accessor.byteOffset, accessor.componentType,
                                    (accessor.count, size), stride, f"accessor {index}")

@@ -5,7 +5,7 @@ Imported only when a glTF file is read, since it needs pydantic. Unknown propert
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -19,8 +19,8 @@ Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
 ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
-#: Required extensions that this reader follows.
-EXTENSIONS = frozenset({"KHR_mesh_quantization", "KHR_materials_emissive_strength"})
+#: Extensions that this reader follows.
+EXTENSIONS = frozenset({"KHR_draco_mesh_compression", "KHR_mesh_quantization", "KHR_materials_emissive_strength"})
 
 
 class Part(BaseModel):
@@ -113,12 +113,22 @@ class Material(Part):
     extensions: MaterialExtensions = MaterialExtensions()
 
 
+class Draco(Part):
+    bufferView: Index
+    attributes: dict[str, Index]
+
+
+class PrimitiveExtensions(Part):
+    KHR_draco_mesh_compression: Draco | None = None
+
+
 class Primitive(Part):
     attributes: dict[str, Index]
     indices: Index | None = None
     material: Index | None = None
     mode: Annotated[int, Field(ge=0, le=6)] = 4
     targets: list[Any] = []
+    extensions: PrimitiveExtensions = PrimitiveExtensions()
 
 
 class Mesh(Part):
@@ -132,6 +142,7 @@ class Perspective(Part):
 
 class Camera(Part):
     perspective: Perspective | None = None
+    name: str | None = None
 
 
 class Node(Part):
@@ -143,6 +154,7 @@ class Node(Part):
     translation: Vec3 = (0.0, 0.0, 0.0)
     rotation: Vec4 = (0.0, 0.0, 0.0, 1.0)
     scale: Vec3 = (1.0, 1.0, 1.0)
+    name: str | None = None
 
 
 class Scene(Part):
@@ -154,6 +166,7 @@ class Document(Part):
 
     asset: Asset
     extensionsRequired: list[str] = []
+    extensionsUsed: list[str] = []
     accessors: list[Accessor] = []
     buffers: list[Buffer] = []
     bufferViews: list[BufferView] = []
@@ -189,6 +202,11 @@ def entry(items: Sequence[Item], index: int, name: str, user: str) -> Item:
     if index >= len(items):
         raise SceneError(f"{user} uses {name} {index}, but the file has {len(items)}; export the file again")
     return items[index]
+
+
+def unused(name: str, taken: Container[str]) -> str:
+    """The name, with the first number from 2 that makes it none of those that are taken."""
+    return next(new for new in (name, *(f"{name} {number}" for number in range(2, 2**20))) if new not in taken)
 
 
 def _path(location: tuple[int | str, ...]) -> str:

@@ -12,8 +12,8 @@ from annotated_types import Ge, Lt
 from ..errors import SceneError
 from .fields import show
 from .materials import Diffuse
-from .meshes import read_mesh
-from .model import Mesh, Vector
+from .meshes import read_model
+from .model import Mesh, Model, Vector
 from .normals import Normals, choose_normals
 from .transform import Matrix, rotation, scaling, translation
 from .validate import mesh_problems
@@ -50,8 +50,8 @@ class MeshTable:
             raise SceneError(f"{where}.matrix[3]: {show(self.matrix[3])} is not affine; write [0, 0, 0, 1]")
         return np.array(self.matrix, np.float64)
 
-    def read(self, folder: Path, where: str) -> list[Mesh]:
-        """The meshes of its file, which is relative to `folder`, or the one in its vertices and faces, untransformed.
+    def read(self, folder: Path, where: str) -> Model:
+        """What is in its file, which is relative to `folder`, or in its vertices and faces, untransformed.
 
         Raises SceneError for a file that cannot be read, indices out of range, and no geometry or two.
         """
@@ -72,14 +72,14 @@ class MeshTable:
         if problems:
             raise SceneError(problems)
         mesh.normals = choose_normals(self.normals, vertices, faces, None)
-        return [mesh]
+        return Model(meshes=[mesh])
 
-    def _from_file(self, file: str, folder: Path, where: str) -> list[Mesh]:
+    def _from_file(self, file: str, folder: Path, where: str) -> Model:
         try:
-            meshes = read_mesh(folder / file, self.normals)
+            model = read_model(folder / file, self.normals)
         except SceneError as error:
             raise SceneError([f"{where}.file: {problem}" for problem in error.problems]) from None
         if self.name is not None:
-            for mesh in meshes:
-                mesh.name = self.name if len(meshes) == 1 else f"{self.name} {mesh.name}"
-        return meshes
+            for mesh in model.meshes:
+                mesh.name = self.name if len(model.meshes) == 1 else f"{self.name} {mesh.name}"
+        return model

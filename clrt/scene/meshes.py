@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from .model import Mesh
+from .model import Mesh, Model
 from .normals import Normals, choose_normals
 from .obj import obj_material, parse_obj
 from .ply import plain_ply
@@ -23,10 +23,15 @@ SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 
 
 def read_mesh(path: Path, normals: Normals = "file") -> list[Mesh]:
-    """The meshes of a model file, one per material, each with at least one triangle and valid arrays.
+    """The meshes of a model file, as `read_model` reads them."""
+    return read_model(path, normals).meshes
 
-    Polygons are cut into fans. An OBJ file's materials are Diffuse with the color Kd and the emission Ke. `normals`:
-    see `choose_normals`. Raises SceneError naming the file, the mesh, and the index or vertex that is wrong.
+
+def read_model(path: Path, normals: Normals = "file") -> Model:
+    """What a model file holds: meshes, one per material, each with at least one triangle and valid arrays, and cameras.
+
+    Polygons are cut into fans. `normals`: see `choose_normals`. Raises SceneError naming the file, the mesh, and the
+    index or vertex that is wrong.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
@@ -35,9 +40,9 @@ def read_mesh(path: Path, normals: Normals = "file") -> list[Mesh]:
         raise SceneError(f"{path}: {'is a folder, not a model' if path.is_dir() else 'no such model file'}")
     if suffix in (".glb", ".gltf"):
         from .gltf import read_gltf
-        return read_gltf(path, normals).meshes
+        return read_gltf(path, normals)
     try:
-        return _meshes(_parse(path, suffix), path.stem, normals)
+        return Model(meshes=_meshes(_parse(path, suffix), path.stem, normals))
     except SceneError as error:
         raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 

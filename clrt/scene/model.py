@@ -65,6 +65,14 @@ class Mesh:
                     setattr(self, name, np.array(value, dtype))
 
 
+@dataclass(eq=False, kw_only=True)
+class Model:
+    """What a model file holds: at least one mesh, and its cameras by name, the first one first."""
+
+    meshes: list[Mesh]
+    cameras: dict[str, Camera] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Sphere:
     """A sphere seen from outside (or from inside, which is its back side)."""
@@ -112,7 +120,7 @@ class RenderSettings:
 
 @dataclass(eq=False, kw_only=True)
 class Scene:
-    """Everything that one picture needs."""
+    """Everything that one picture needs. `camera` takes it; `cameras`: those of the model files, by name."""
 
     meshes: list[Mesh] = field(default_factory=list)
     spheres: list[Sphere] = field(default_factory=list)
@@ -121,3 +129,4 @@ class Scene:
     environment: Environment = field(default_factory=Environment)
     render: RenderSettings = field(default_factory=RenderSettings)
     name: str = "scene"
+    cameras: dict[str, Camera] = field(default_factory=dict)

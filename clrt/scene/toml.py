@@ -17,7 +17,7 @@ from .pictures import read_picture
 from .sky import SUN
 from .texture_table import TextureReader
 from .textures import WHITE, Texture
-from .transform import transform_mesh
+from .transform import transform_camera, transform_mesh
 
 Kind = TypeVar("Kind")
 Table = Mapping[str, Any]
@@ -33,10 +33,12 @@ class SceneReader:
         self._document: Table = _frozen(document)
         self._materials: dict[str, Material] = {}
         self._textures = TextureReader(path.parent)
+        self._cameras: dict[str, Camera] = {}
         self.problems = [f'key "{key}" {unknown(key, SECTIONS)}' for key in document if key not in SECTIONS]
 
     def scene(self) -> Scene:
-        camera = self._camera(self._table("camera"))
+        lens = self._table("camera")
+        camera = Camera() if "name" in lens else self._camera(lens)
         render = self._build(RenderSettings, self._table("render"), "render")
         environment = self._environment(self._table("environment"))
         for name, values in self._table("materials").items():
@@ -47,14 +49,21 @@ class SceneReader:
                                for i, values in enumerate(self._tables("light"))]
         meshes = [mesh for i, values in enumerate(self._tables("mesh")) for mesh in self._mesh(values, f"mesh[{i}]")]
         return Scene(meshes=meshes, spheres=[sphere for sphere in spheres if sphere], lights=lights,
-                     camera=camera, environment=environment or Environment(),
-                     render=render or RenderSettings(), name=self._path.stem)
+                     camera=self._named_camera(lens) if "name" in lens else camera, cameras=self._cameras,
+                     environment=environment or Environment(), render=render or RenderSettings(), name=self._path.stem)
 
     def _camera(self, values: Table) -> Camera:
         """The camera; if some of it is wrong, what places it, so that this is checked all the same."""
         camera = self._build(Camera, values, "camera")
         place = {key: values[key] for key in ("position", "look_at", "up") if key in values}
         return camera or (Camera() if field_problems(Camera, place, "camera") else Camera(**place))
+
+    def _named_camera(self, values: Table) -> Camera:
+        """The camera of a model file that the table names."""
+        name = str(values["name"])
+        self.problems += camera_problems(name, self._cameras, "camera.name")
+        self.problems += [f"camera: has a name and {key}; keep one of them" for key in values if key != "name"]
+        return self._cameras.get(name, Camera())
 
     def _table(self, name: str) -> Table:
         """The section [name], empty if there is none."""
@@ -144,10 +153,13 @@ class SceneReader:
         geometry = {key: values[key] for key in ("file", "vertices", "faces") if key in values}
         if table is None and field_problems(MeshTable, geometry, where):
             return []
-        meshes = self._tried((table or MeshTable(**geometry)).read, self._path.parent, where) or []
+        model = self._tried((table or MeshTable(**geometry)).read, self._path.parent, where)
         matrix = self._tried((table or MeshTable()).to_world, where)
-        return [transform_mesh(replace(mesh, material=material or mesh.material), matrix)
-                for mesh in meshes if matrix is not None]
+        if model is None or matrix is None:
+            return []
+        for name, camera in model.cameras.items():
+            self._cameras.setdefault(name, transform_camera(camera, matrix))
+        return [transform_mesh(replace(mesh, material=material or mesh.material), matrix) for mesh in model.meshes]
 
     def _tried(self, read: Callable[..., Kind], *arguments: Any) -> Kind | None:
         """read(*arguments), or None if it finds mistakes."""
@@ -156,6 +168,14 @@ class SceneReader:
         except SceneError as error:
             self.problems += error.problems
             return None
+
+
+def camera_problems(name: str, cameras: Mapping[str, Camera], where: str) -> list[str]:
+    """Whether no model file has a camera of this name."""
+    if name in cameras:
+        return []
+    remedy = unknown(name, cameras) if cameras else "is unknown, since no model file of the scene has a camera"
+    return [f"{where}: {show(name)} {remedy}"]
 
 
 def _frozen(value: Any) -> Any:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .model import Mesh, Vector
+from .model import Camera, Mesh, Vector
 
 Matrix = NDArray[np.float64]
 
@@ -73,6 +73,13 @@ def transform_mesh(mesh: Mesh, matrix: Matrix) -> Mesh:
         tangents = np.column_stack([turned, -tangents[:, 3] if mirrored else tangents[:, 3]]).astype(np.float32)
     faces = np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrored else mesh.faces
     return replace(mesh, vertices=vertices, faces=faces, normals=normals, tangents=tangents)
+
+
+def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
+    """The camera under an affine `matrix`; its angle stays."""
+    corners = np.array([[*camera.position, 1], [*camera.look_at, 1], [*camera.up, 0]]) @ matrix.T
+    position, look_at, up = corners[:, :3].tolist()
+    return replace(camera, position=position, look_at=look_at, up=up)
 
 
 def unit(vectors: NDArray[np.floating]) -> NDArray[np.float64]:

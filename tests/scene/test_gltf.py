@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from clrt.scene.gltf import Model, read_gltf
+from clrt.errors import SceneError
+from clrt.scene.file import load
+from clrt.scene.gltf import read_gltf
 from clrt.scene.materials import MetallicRoughness
+from clrt.scene.model import Model
 from .glb import Gltf, ball
 from .shapes import cube, icosphere
 
@@ -181,19 +185,113 @@ def test_missing_texture_is_grey_with_a_warning(tmp_path: Path, caplog: pytest.L
     assert "lost.png" in caplog.text and "left out: textures (their mean colour counts), transparency" in caplog.text
 
 
-def test_camera(tmp_path: Path) -> None:
-    """A camera looks along its own −Z with +Y up (specification 3.10), here turned to look along −X."""
+def cameras() -> Gltf:
+    """A ball that three cameras see: one of no name, one named by its node, one by itself; and an orthographic one."""
     gltf = ball()
-    gltf.document["cameras"] = [{"type": "orthographic"}, {"type": "perspective", "perspective": {"yfov": 0.5}}]
+    gltf.document["cameras"] = [{"type": "orthographic", "name": "plan"},
+                                {"type": "perspective", "perspective": {"yfov": 0.5}},
+                                {"type": "perspective", "perspective": {"yfov": 1.0}, "name": "side"}]
     gltf.node(camera=0)
     gltf.node(camera=1, translation=[10, 1, 0], rotation=[0, 0.5**0.5, 0, 0.5**0.5], scale=[2, 2, 2])
-    camera = read(gltf, tmp_path).camera
-    assert camera is not None
+    gltf.node(camera=2, translation=[0, 0, 5])
+    gltf.node(camera=1, translation=[0, 0, 9], name="side")
+    return gltf
+
+
+def test_cameras(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """A camera looks along its own −Z with +Y up (specification 3.10), here the first is turned to look along −X."""
+    with caplog.at_level(logging.WARNING):
+        found = read(cameras(), tmp_path).cameras
+    assert list(found) == ["camera 1", "side", "side 2"]
+    assert 'left out: camera "plan", which is not perspective' in caplog.text
+    camera = found["camera 1"]
     view = np.subtract(camera.look_at, camera.position)
     assert camera.position == (10.0, 1.0, 0.0)
     assert camera.fov_degrees == pytest.approx(np.degrees(0.5))
     np.testing.assert_allclose(view, [-101**0.5, 0, 0], atol=1e-12)  # as deep as the ball's middle is far
     np.testing.assert_allclose(camera.up, [0, 1, 0], atol=1e-15)
+    assert (found["side"].position, found["side 2"].position) == ((0, 0, 5), (0, 0, 9))
+
+
+def test_cameras_by_name(tmp_path: Path) -> None:
+    """Of a bare model, and of a scene file that names one: there it moves with the model."""
+    model = cameras().write(tmp_path / "a.glb")
+    assert load(model).camera == load(model).cameras["camera 1"]
+    assert load(model, "side 2").camera.position == (0, 0, 9)
+    with pytest.raises(SceneError, match='a.glb: --camera: "Side" is unknown; did you mean "side"'):
+        load(model, "Side")
+    scene = tmp_path / "a.toml"
+    placed = '[[mesh]]\nfile = "a.glb"\nscale = 2\nrotate_degrees = [0, 90, 0]\ntranslate = [1, 0, 0]\n'
+    scene.write_text(f'[camera]\nname = "side"\n{placed}')
+    camera = load(scene).camera
+    np.testing.assert_allclose([camera.position, camera.look_at], [(11, 0, 0), (1, 0, 0)], atol=1e-12)
+    assert load(scene, "side 2").camera.position[0] == 19
+    scene.write_text(f'[camera]\nname = "sid"\nfov_degrees = 3\n{placed}')
+    with pytest.raises(SceneError) as caught:
+        load(scene)
+    assert caught.value.problems == [f'{scene}: camera.name: "sid" is unknown; did you mean "side"?',
+                                     f"{scene}: camera: has a name and fov_degrees; keep one of them"]
+    scene.write_text('[camera]\nname = "side"\n')
+    with pytest.raises(SceneError, match='"side" is unknown, since no model file of the scene has a camera'):
+        load(scene)
+
+
+def compressed() -> Gltf:
+    """A ball compressed with Draco, which keeps positions to 2^-20 of its size; its normals point inward."""
+    import DracoPy
+    content = DracoPy.encode(VERTICES, FACES.astype(np.uint32), quantization_bits=20, preserve_order=True,
+                             normals=-VERTICES.astype(np.float64))
+    numbers = {attribute["attribute_type"]: attribute["unique_id"] for attribute in DracoPy.decode(content).attributes}
+    count = len(DracoPy.decode(content).points)
+    gltf = Gltf()
+    gltf.document["accessors"] = [{"componentType": 5126, "count": count, "type": "VEC3"},
+                                  {"componentType": 5126, "count": count, "type": "VEC3"},
+                                  {"componentType": 5125, "count": FACES.size, "type": "SCALAR"}]
+    gltf.document["extensionsUsed"] = gltf.document["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+    gltf.mesh(attributes={"POSITION": 0, "NORMAL": 1}, indices=2, extensions={"KHR_draco_mesh_compression": {
+        "bufferView": gltf.view(content), "attributes": {"POSITION": numbers[0], "NORMAL": numbers[1]}}})
+    return gltf
+
+
+def test_draco(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING):
+        mesh, = read(compressed(), tmp_path).meshes
+    np.testing.assert_allclose(mesh.vertices[mesh.faces], VERTICES[FACES], atol=1e-5)
+    assert mesh.normals is not None and not caplog.text
+    np.testing.assert_allclose(mesh.normals, -mesh.vertices, atol=1e-5)
+    gltf = compressed()
+    gltf.document["accessors"][1]["count"] = 11
+    with pytest.raises(SceneError, match=r"accessor 1 has 11 elements, but the Draco data \d+; export"):
+        read(gltf, tmp_path)
+    gltf = compressed()
+    gltf.data[8:] = bytes(len(gltf.data) - 8)
+    with pytest.raises(SceneError, match='mesh "mesh 0": its Draco data cannot be decoded: '):
+        read(gltf, tmp_path)
+
+
+def test_draco_without_its_decoder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A message that says what to install; an uncompressed copy, where there is one, serves."""
+    gltf = compressed()
+    monkeypatch.setitem(sys.modules, "DracoPy", None)
+    with pytest.raises(SceneError, match=r"decoder is not installed; pip install 'clrt\[draco\]', or export"):
+        read(gltf, tmp_path)
+    gltf = ball()
+    gltf.document["meshes"][0]["primitives"][0]["extensions"] = {"KHR_draco_mesh_compression": {
+        "bufferView": gltf.view(b"DRACO"), "attributes": {"POSITION": 0}}}
+    np.testing.assert_array_equal(corners(read(gltf, tmp_path)), VERTICES[FACES])
+
+
+def test_extensions(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Those that are only used are named in one warning, those that are required refused."""
+    gltf = ball()
+    gltf.document["extensionsUsed"] = ["EXT_b", "KHR_mesh_quantization", "EXT_a", "EXT_a"]
+    with caplog.at_level(logging.WARNING):
+        read(gltf, tmp_path)
+    warning, = caplog.messages
+    assert warning.endswith("left out: the extension EXT_a, the extension EXT_b")
+    gltf.document["extensionsRequired"] = ["EXT_b", "EXT_meshopt_compression"]
+    with pytest.raises(SceneError, match="needs the extension EXT_b, EXT_meshopt_compression, which is not supported"):
+        read(gltf, tmp_path)
 
 
 def test_files_without_nodes_or_scenes(tmp_path: Path) -> None:

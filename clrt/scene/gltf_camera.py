@@ -1,0 +1,51 @@
+"""The cameras of a glTF file, by name."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import gltf_document as gltf
+from .model import Camera
+from .transform import Matrix, unit
+
+log = logging.getLogger(__name__)
+
+
+def read_cameras(path: Path, document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix]],
+                 middle: NDArray[np.float64]) -> dict[str, Camera]:
+    """The perspective cameras in the scene, each under the name of its node, else its own, else "camera N".
+
+    A name that is taken gets a number. Each looks at the depth of `middle`, (3,). Others are left out with a warning.
+    """
+    cameras: dict[str, Camera] = {}
+    for node, matrix in nodes:
+        if node.camera is None:
+            continue
+        source = gltf.entry(document.cameras, node.camera, "camera", "a node")
+        name = gltf.unused(node.name or source.name or f"camera {node.camera}", cameras)
+        lens = source.perspective
+        if lens is None:
+            log.warning('%s: left out: camera "%s", which is not perspective', path, name)
+        elif (camera := _placed(lens, matrix, middle)) is not None:
+            cameras[name] = camera
+    return cameras
+
+
+def _placed(lens: gltf.Perspective, matrix: Matrix, middle: NDArray[np.float64]) -> Camera | None:
+    """A camera that looks along its node's −Z with +Y up (specification 3.10); None in a node without extent."""
+    position = matrix[:3, 3]
+    forward, up = unit(-matrix[:3, 2]), unit(matrix[:3, 1])
+    if not np.cross(forward, up).any():
+        return None
+    distance = np.linalg.norm(middle - position) or 1.0
+    x, y, z = position.tolist()
+    at_x, at_y, at_z = (position + distance * forward).tolist()
+    up_x, up_y, up_z = up.tolist()
+    return Camera(position=(x, y, z), look_at=(at_x, at_y, at_z), up=(up_x, up_y, up_z),
+                  fov_degrees=math.degrees(lens.yfov))
