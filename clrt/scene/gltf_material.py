@@ -15,7 +15,7 @@ from ..errors import SceneError
 from . import gltf_document as gltf
 from .gltf_data import GltfData
 from .materials import Material, MetallicRoughness
-from .pictures import linear_from_srgb, read_texture
+from .pictures import linear_from_srgb, read_texels
 
 log = logging.getLogger(__name__)
 
@@ -79,9 +79,7 @@ class Materials:
             try:
                 content = (self._data.resource(image.uri or "", user) if image.bufferView is None
                            else self._data.view(image.bufferView, user).tobytes())
-                pixels = read_texture(content, f"image {index}")
-                self._pictures[index] = np.broadcast_to(pixels[..., :3 if pixels.shape[2] > 2 else 1],
-                                                        (*pixels.shape[:2], 3))
+                self._pictures[index] = read_texels(content, f"image {index}")[..., :3]
             except SceneError as error:
                 log.warning("%s: a texture is left out: %s", self._data.path, error)
                 self._pictures[index] = None

@@ -27,26 +27,32 @@ def read_picture(path: Path) -> NDArray[np.float32]:
     if (radiance := read_radiance(path)) is not None:
         return radiance
     pixels, names = _stored(path, str(path))
-    colours = pixels[..., _colour_channels(path, names)]
+    colours = pixels[..., _colour_channels(str(path), names)]
     if colours.dtype == np.float32:
         return colours
     return linear_from_srgb(np.asarray(colours / np.float32(np.iinfo(colours.dtype).max), np.float32))
 
 
-def read_texture(source: Path | bytes, name: str) -> NDArray[np.uint8]:
-    """The pixels of a picture file, or of the bytes of one (PNG, JPEG, WebP): (h, w, c) as stored, row 0 on top.
+def read_texels(source: Path | bytes, name: str = "") -> NDArray[np.uint8]:
+    """The texels of a picture file of at most 16 bits a channel, or of the bytes of one (PNG, JPEG, WebP).
 
-    c: 1 grey, 2 grey and alpha, 3 colours, 4 colours and alpha. Raises SceneError naming the picture by `name`.
+    (h, w, 4) uint8 as stored, row 0 on top, alpha apart. `name`: what messages call the bytes. Raises SceneError as
+    `read_picture`, and for pictures of floats, which would lose most of what they hold.
     """
     if isinstance(source, Path):
         _check_file(source)
-    pixels, _ = _stored(source, name)
-    pixels = pixels[..., :4]
-    if pixels.dtype == np.uint8:
-        return pixels
+    name = name or str(source)
+    pixels, names = _stored(source, name)
     if pixels.dtype == np.float32:
-        raise SceneError(f"{name}: has floating-point pixels; save it as a PNG or JPEG picture")
-    return np.asarray((pixels.astype(np.uint32) + 128) // 257, np.uint8)
+        raise SceneError(f"{name}: holds floats, but textures have 8 bits a channel; convert it to PNG")
+    if pixels.dtype == np.uint16:
+        pixels = (pixels.astype(np.uint32) + 128) // 257
+    texels = np.full((*pixels.shape[:2], 4), 255, np.uint8)
+    texels[..., :3] = pixels[..., _colour_channels(name, names)]
+    for channel, letter in enumerate(names):
+        if letter.upper() == "A":
+            texels[..., 3] = pixels[..., channel]
+    return texels
 
 
 def _check_file(path: Path) -> None:
@@ -82,11 +88,11 @@ def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(encoded <= 0.04045, encoded / 12.92, power).astype(np.float32)
 
 
-def _colour_channels(path: Path, names: list[str]) -> list[int]:
+def _colour_channels(file: str, names: list[str]) -> list[int]:
     """Where red, green and blue are among a file's channels."""
     upper = [name.upper() for name in names]
     if len(names) <= 2:  # grey, or grey and alpha
         return [0, 0, 0]
     if not {"R", "G", "B"} <= set(upper):
-        raise SceneError(f"{path}: no channels R, G, B, but {', '.join(names)}; save its colour layer alone")
+        raise SceneError(f"{file}: no channels R, G, B, but {', '.join(names)}; save its colour layer alone")
     return [upper.index(channel) for channel in "RGB"]

@@ -9,8 +9,8 @@ from typing import Any
 
 from ..errors import SceneError
 from .fields import field_problems
-from .pictures import read_texture
-from .textures import Channel, NonNegative, Pair, Picture, Texture, Wrap, rgba
+from .pictures import read_texels
+from .textures import Channel, NonNegative, Pair, Picture, Texture, Wrap
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,8 +49,7 @@ class TextureReader:
         name = values.pop("image")
         if name not in self._pictures:
             try:
-                file = self._folder / name
-                self._pictures[name] = Picture(rgba(read_texture(file, str(file))), name)
+                self._pictures[name] = Picture(read_texels(self._folder / name), name)
             except SceneError as error:
                 raise SceneError([f"{where}.image: {problem}" for problem in error.problems]) from None
         return Texture(picture=self._pictures[name], **values)

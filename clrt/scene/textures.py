@@ -27,14 +27,6 @@ class Picture:
     name: str = "picture"
 
 
-def rgba(texels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """(h, w, 4) of (h, w, c): c = 1 grey, 2 grey and alpha, 3 colours, 4 colours and alpha."""
-    count = texels.shape[2]
-    alpha = texels[..., -1:] if count in (2, 4) else np.full((*texels.shape[:2], 1), 255, np.uint8)
-    colours = texels[..., :3] if count > 2 else texels[..., [0, 0, 0]]
-    return np.concatenate([colours, alpha], axis=2)
-
-
 WHITE = Picture(np.full((1, 1, 4), 255, np.uint8), "white")
 
 

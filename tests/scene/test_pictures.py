@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from clrt.errors import SceneError
 from clrt.output.images import rgbe_rounded, write_image
 from clrt.scene import decoder
-from clrt.scene.pictures import read_picture, read_texture
+from clrt.scene.pictures import read_picture, read_texels
 from clrt.scene.radiance import read_radiance
 
 FloatArray = NDArray[np.float32]
@@ -128,10 +128,17 @@ def test_textures_are_read_as_stored(mode: str, dtype: str, tmp_path: Path) -> N
     assert output is not None and output.open(str(path), spec)
     output.write_image(stored_pixels if dtype == "u1" else stored_pixels.astype(np.uint16) * 257)
     output.close()
-    np.testing.assert_array_equal(read_texture(path, "a"), stored_pixels)
-    np.testing.assert_array_equal(read_texture(path.read_bytes(), "a"), stored_pixels)
+    expected = np.full((5, 7, 4), 255)
+    expected[..., :3] = stored_pixels[..., :3] if len(mode) > 2 else stored_pixels[..., :1]
+    if mode.endswith("A"):
+        expected[..., 3] = stored_pixels[..., -1]
+    np.testing.assert_array_equal(read_texels(path), expected)
+    np.testing.assert_array_equal(read_texels(path.read_bytes(), "a"), expected)
     with pytest.raises(SceneError, match="image 3: is neither PNG, JPEG nor WebP"):
-        read_texture(b"GIF89a" + bytes(20), "image 3")
+        read_texels(b"GIF89a" + bytes(20), "image 3")
+    write_image(tmp_path / "a.exr", noise(3, 4, 3))
+    with pytest.raises(SceneError, match="a.exr: holds floats, but textures have 8 bits a channel"):
+        read_texels(tmp_path / "a.exr")
 
 
 def test_a_small_file_may_not_claim_a_huge_picture(tmp_path: Path) -> None:
