@@ -64,7 +64,7 @@ def _pieces(value: object) -> Iterator[bytes | memoryview]:
         case _ if is_dataclass(value):
             yield f"{type(value).__name__}:".encode()
             for field in fields(value):
-                if field.name != "name":
+                if field.name not in ("name", "material_name"):
                     yield f"{field.name}=".encode()
                     yield from _pieces(getattr(value, field.name))
         case _:

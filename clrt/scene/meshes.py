@@ -1,4 +1,4 @@
-"""Read model files as meshes. OBJ, STL, OFF and uncommon PLY go through trimesh's parsers; other readers are our own.
+"""Read model files as meshes. STL, OFF and uncommon PLY go through trimesh's parsers; other readers are our own.
 
 The parsers are called directly, since a trimesh.Trimesh no longer tells whether the file had normals. They hand on NaN
 and wrong indices and raise whatever Python raises, so all they return is checked here.
@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from .materials import Diffuse
 from .model import Mesh, Model
 from .normals import Normals, choose_normals
-from .obj import obj_material, parse_obj
+from .obj import parse_obj
 from .ply import plain_ply
 from .validate import index_problems, mesh_problems
 
@@ -53,7 +54,7 @@ def _parse(path: Path, suffix: str) -> dict[str, Any]:
         with np.errstate(all="ignore"), path.open("rb") as file:
             parts: dict[str, Any]
             if suffix == ".obj":
-                parts = parse_obj(path)
+                parts = {"geometry": parse_obj(path)}
             elif suffix == ".ply" and (plain := plain_ply(path)):
                 parts = plain
             elif suffix == ".ply":
@@ -101,7 +102,8 @@ def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
         faces = _triangles(np.asarray(piece["faces"], np.int64), name)
     except (TypeError, ValueError):
         raise SceneError(f'mesh "{name}": its lines have different numbers of values; export it again') from None
-    mesh = Mesh(vertices, faces.astype(np.int32), obj_material(piece.get("visual")), name=name)
+    mesh = Mesh(vertices, faces.astype(np.int32), piece.get("material", Diffuse()), name=name,
+                material_name=piece.get("material_name", ""))
     problems = index_problems(faces, len(vertices), f'mesh "{name}"') or mesh_problems(mesh, "mesh")
     if problems:
         raise SceneError(problems)

@@ -44,6 +44,7 @@ class Mesh:
     interpolated over each face, or None for flat shading. uv, uv1: (n, 2) float32, the two sets of texture coordinates
     (scene.textures). colors: (n, 3) or (n, 4) float32, linear, which multiply the material's color. tangents: (n, 4)
     float32, for normal maps, w the sign of the bitangent as in glTF; computed where they are missing.
+    material_name: what a model file calls the material.
     """
 
     vertices: FloatArray
@@ -55,6 +56,7 @@ class Mesh:
     uv1: FloatArray | None = None
     colors: FloatArray | None = None
     tangents: FloatArray | None = None
+    material_name: str = ""
 
     def __post_init__(self) -> None:
         """Lists become arrays; what is wrong with an array is for `validate` to say."""

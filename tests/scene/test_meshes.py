@@ -189,7 +189,7 @@ def test_obj_materials(library: str, tmp_path: Path, caplog: pytest.LogCaptureFi
     assert meshes[1].material == Diffuse(color=(0.5, 0.5, 1.0), emission=(17.0, 12.0, 4.0))
     assert (meshes[2].name, meshes[1].name) == ("red", "lamp")
     assert len(read_mesh(tmp_path / "box.obj")) == 3
-    assert "textures are left out" in caplog.text
+    assert "box.obj: left out: textures (map_kd)" in caplog.text
     assert ("no material library renamed.mtl" in caplog.text) == (library == "renamed.mtl")
 
 
@@ -211,10 +211,16 @@ STRIPS = TRIANGLE.replace("element face", "element tristrips")
 BROKEN = {
     "nan.obj": (SQUARE.replace("1", "nan", 1) + "f 1 2 3", 'mesh "nan": vertices[1] = [nan, 0.0, 0.0] is not finite'),
     "huge.obj": (SQUARE.replace("1", "1e39", 1) + "f 1 2 3", "vertices[1] = [inf, 0.0, 0.0] is not finite"),
-    "above.obj": (SQUARE + "f 1 2 4", "cannot be read as OBJ"),
+    "above.obj": (SQUARE + "f 1 2 4", "a face uses vertex 4, but the file has 3"),
+    "uv.obj": (SQUARE + "f 1/1 2/1 3/1", "a face uses texture coordinate 1, but the file has 0"),
+    "before.obj": (SQUARE + "f -1 -2 -4", "a face uses vertex 0, but OBJ counts from 1"),
+    "two.obj": (SQUARE + "f 1 2 3\nf 1 2", 'a face "f 1 2" has not 3 corners'),
+    "short.obj": (SQUARE + "v 1 2\nf 1 2 3", 'a line "v 1 2" has not 3 numbers'),
+    "long.obj": (SQUARE + "f 1 2 99999999999999999999", "a corner that is no index"),
+    "mixed.obj": (SQUARE + "f 1/ 2/x 3", "a corner that is no index"),
     "zero.obj": (SQUARE + "f 0 1 2", "a face uses vertex 0, but OBJ counts from 1"),
     "points.obj": (SQUARE, "holds no triangles"),
-    "words.obj": (SQUARE + "f one two three", "cannot be read as OBJ"),
+    "words.obj": (SQUARE + "f one two three", "a face has a corner that is no index"),
     "empty.obj": ("", "holds no triangles"),
     "above.ply": (TRIANGLE.replace("3 0 1 2", "3 0 1 3"), "faces[0] uses vertex 3, but valid are 0 to 2"),
     "below.ply": (TRIANGLE.replace("3 0 1 2", "3 0 1 -1"), "faces[0] uses vertex -1, but valid are 0 to 2"),

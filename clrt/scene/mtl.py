@@ -1,0 +1,108 @@
+"""Materials of Wavefront MTL libraries, with the keys for physically based ones that exporters agree on.
+
+The format: "MTL material format", Wavefront, 1995; PBR keys: Exocortex and Blinn, "Extending OBJ/MTL", as in tinyobj.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..errors import SceneError
+from .materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+
+#: Illumination models by what they ask for beyond a highlight.
+MIRRORS, GLASS = {3, 5, 8}, {4, 6, 7, 9}
+#: Diffuse colours below this are black to the eye: what reflects beneath them is a mirror.
+BLACK = 0.05
+#: Keys of layers and effects that no material here has.
+OTHERS = {"ps": "sheen (Ps)", "pc": "clearcoat (Pc)", "aniso": "anisotropy (aniso)"}
+KEYS = {"kd", "ks", "ke", "ns", "ni", "tf", "tr", "d", "illum", "pr", "pm", *OTHERS}
+
+
+@dataclass
+class Entry:
+    """One newmtl of a library: its `numbers` by key, such as "kd", and of its `maps` what follows the key."""
+
+    name: str
+    numbers: dict[str, list[float]] = field(default_factory=dict)
+    maps: dict[str, str] = field(default_factory=dict)
+
+    def number(self, key: str, missing: float) -> float:
+        return self.numbers[key][0] if key in self.numbers else missing
+
+    def color(self, key: str, missing: float, most: float = 1.0) -> tuple[float, float, float]:
+        """Three numbers from 0 to `most`; one counts for all three."""
+        values = self.numbers.get(key, [missing])
+        red, green, blue = (min(max(value, 0.0), most) for value in (values * 3)[:3])
+        return red, green, blue
+
+    @property
+    def illumination(self) -> int:
+        return int(self.number("illum", 2))
+
+
+def read_library(text: str) -> dict[str, Entry]:
+    """The entries of a library by name. Raises SceneError for what should be a number and is none."""
+    entries: dict[str, Entry] = {}
+    entry = Entry("")
+    for line in text.splitlines():
+        key, *words = line.split("#")[0].split() or [""]
+        key, rest = key.lower(), " ".join(words)
+        if key == "newmtl":
+            name = " ".join(line.split()[1:])  # in which # may stand
+            entry = entries.setdefault(name, Entry(name))
+        elif key.startswith(("map_", "bump", "disp", "decal", "refl", "norm")):
+            entry.maps[key] = rest
+        elif rest and key in KEYS:
+            entry.numbers[key] = _numbers(entry, key, rest)
+    return entries
+
+
+def _numbers(entry: Entry, key: str, rest: str) -> list[float]:
+    words = [word for word in rest.split() if word != "-halo"]
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError:
+        numbers = []
+    wanted = (1, 3) if key in ("kd", "ks", "ke", "tf") else (1, 2, 3)
+    if len(numbers) not in wanted or not all(map(math.isfinite, numbers)):
+        raise SceneError(f'material "{entry.name}": {key.capitalize()} is "{rest[:60]}"; write '
+                         f'{"three numbers" if len(wanted) == 2 else "a number"} in the material library')
+    return numbers
+
+
+def material(entry: Entry) -> Material:
+    """What an entry says without its maps.
+
+    With Pr or Pm, metallic_roughness; else by `illum` glass, a mirror, gloss or diffuse. Gloss is as rough as its
+    exponent Ns says, where GGX is as wide as Blinn's lobe: alpha² = 2/(Ns + 2) (Walter et al. 2007).
+    """
+    shared: dict[str, Any] = {"emission": entry.color("ke", 0.0, math.inf)}
+    color, specular = entry.color("kd", 0.8), entry.color("ks", 0.0)
+    roughness = (2 / (2 + max(entry.number("ns", 0.0), 0.0))) ** 0.25
+    if {"pr", "pm"} & entry.numbers.keys():
+        return MetallicRoughness(color=color, metallic=entry.color("pm", 0.0)[0],
+                                 roughness=entry.color("pr", roughness)[0], **shared)
+    if entry.illumination in GLASS:
+        ior = float(np.clip(entry.number("ni", 1.5), 0.25, 4.0))
+        return Dielectric(color=entry.color("tf", 1.0), ior=ior, **shared)
+    if entry.illumination in MIRRORS and max(color) < BLACK < max(specular):
+        return Mirror(color=specular, **shared)
+    if entry.illumination >= 2 and max(specular) > 0:
+        return MetallicRoughness(color=color, roughness=roughness, **shared)
+    return Diffuse(color=color, **shared)
+
+
+def left_out(entries: Mapping[str, Entry]) -> list[str]:
+    """What the entries have that `material` leaves out, in words."""
+    maps = sorted({key for entry in entries.values() for key in entry.maps})
+    numbers = {key for entry in entries.values() for key in entry.numbers}
+    clear = any(entry.number("d", 1.0) < 1 or entry.number("tr", 0.0) > 0 for entry in entries.values()
+                if entry.illumination not in GLASS)
+    return ([f"textures ({', '.join(maps)})"] * bool(maps) + ["transparency (d, Tr)"] * clear
+            + [words for key, words in OTHERS.items() if key in numbers])

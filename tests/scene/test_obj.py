@@ -1,0 +1,69 @@
+"""OBJ and MTL beyond what all model files have in common."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clrt.errors import SceneError
+from clrt.scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror
+from clrt.scene.meshes import read_mesh
+from clrt.scene.mtl import material, read_library
+from clrt.scene.obj import parse_obj
+
+MTL = {
+    "Kd 0.5 0.25 2": Diffuse(color=(0.5, 0.25, 1)),
+    "Kd 0.5": Diffuse(color=(0.5, 0.5, 0.5)),
+    "": Diffuse(color=(0.8, 0.8, 0.8)),
+    "Kd 1 1 1 # white\nKe 3 2 1\nKs 0 0 0\nNs 50\nillum 2": Diffuse(color=(1, 1, 1), emission=(3, 2, 1)),
+    "illum 1\nKs 1 1 1": Diffuse(),
+    # A highlight of Blinn's exponent 30 is as wide as GGX's of alpha² = 2/32: roughness 1/2.
+    "Kd 0.1 0.2 0.3\nKs 0.5 0.5 0.5\nNs 30\nillum 2": MetallicRoughness(color=(0.1, 0.2, 0.3), roughness=0.5),
+    "Kd 0.1 0.2 0.3\nPr 0.25\nPm 1\nKs 1 1 1\nKe 1 1 1": MetallicRoughness(
+        color=(0.1, 0.2, 0.3), roughness=0.25, metallic=1, emission=(1, 1, 1)),
+    "Kd 0 0 0\nKs 0.9 0.8 0.7\nillum 3": Mirror(color=(0.9, 0.8, 0.7)),
+    "Kd 0 0 0\nNi 1.33\nTf 0.9 1 1\nillum 7": Dielectric(color=(0.9, 1, 1), ior=1.33),
+    "\tkd\t1 0 0\nillum\t4\nd -halo 0.5": Dielectric(),
+}
+
+
+@pytest.mark.parametrize("values", MTL)
+def test_mtl(values: str) -> None:
+    entry = read_library(f"newmtl Glass #3  a\n{values}\nnewmtl other\nKd 0 0 0")["Glass #3 a"]
+    assert material(entry) == MTL[values]
+
+
+def test_mtl_tells_what_it_leaves_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "a.obj").write_text("mtllib my library.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n"
+                                    "usemtl a\nf 1 2 3\nusemtl b\nf 3 2 1")
+    library = tmp_path / "my library.mtl"
+    library.write_text("newmtl a\nd 0.5\nmap_Kd -s 2 2 2 a b.png\nbump c.png\nnewmtl b\nPc 1\nPr 1")
+    with caplog.at_level(logging.WARNING):
+        meshes = read_mesh(tmp_path / "a.obj")
+    assert [mesh.material_name for mesh in meshes] == ["a", "b"]
+    warning, = caplog.messages
+    assert warning.endswith("a.obj: left out: textures (bump, map_kd), transparency (d, Tr), clearcoat (Pc)")
+    assert read_library(library.read_text())["a"].maps["map_kd"] == "-s 2 2 2 a b.png"
+    for wrong, sentence in [("Kd 1 2", 'Kd is "1 2"; write three numbers'), ("Ns nan", 'Ns is "nan"; write a number'),
+                            ("Kd spectral a.rfl", 'Kd is "spectral a.rfl"; write three numbers')]:
+        library.write_text(f"newmtl a\n{wrong}")
+        with pytest.raises(SceneError, match=f'a.obj: my library.mtl: material "a": {wrong[:2]} is'):
+            read_mesh(tmp_path / "a.obj")
+
+
+def test_obj_of_many_forms(tmp_path: Path) -> None:
+    """Corners of all forms, quads beside triangles, comments, continued lines, colours, free spacing."""
+    (tmp_path / "a.obj").write_text(
+        "# made by hand\n  v 0 0 0 1 0 0 # red\nv\t1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\nvt 0 0\nvt 1 0 0\n"
+        "vn 0 0 2\ns off\ng one\nf 1/1/1 2/2/1 3 \\\n4//1\n f 1 3 4 # last\nl 1 2\n")
+    mesh, = read_mesh(tmp_path / "a.obj")
+    expected = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])[[[0, 1, 2], [0, 2, 3], [0, 2, 3]]]
+    np.testing.assert_array_equal(mesh.vertices[mesh.faces], expected)
+    assert mesh.normals is not None
+    np.testing.assert_allclose(mesh.normals, np.tile([0, 0, 1], (len(mesh.vertices), 1)), atol=1e-6)
+    piece = parse_obj(tmp_path / "a.obj")["a"]
+    np.testing.assert_array_equal(piece["uv"][piece["faces"][0]], [[0, 0], [1, 0], [0, 0]])
+    np.testing.assert_array_equal(piece["vertex_colors"][piece["faces"][0]], np.eye(3))
