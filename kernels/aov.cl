@@ -10,14 +10,17 @@
 #include "film.cl"
 #include "bsdf.cl"
 #include "light.cl"
+#include VISIBILITY
 
 typedef struct { real3 albedo, normal; } Seen;
 
-static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal active, int max_depth) {
+static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal active, int max_depth,
+                              Sampler *sampler) {
     Seen seen = {splat(ZERO), splat(ZERO)};
     real3 origin = eye, direction = view, tint = splat(ONE);
     for (int depth = 1;; ++depth) {
-        Hits hits = closest_hit(scene, origin, direction, (real)(INFINITY), active);
+        Surface surface;
+        Hits hits = first_surface(scene, &origin, direction, active, sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
 #if SKY
         ireal escaped = active & !hit;
@@ -30,7 +33,6 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
 #endif
         if (!ANY(hit)) return seen;
 #if PRIMITIVES
-        Surface surface = surface_at(scene, origin, direction, &hits);
         real3 towards = negate(direction);
 #if NORMAL_MAPS
         bend_normal(scene, &surface);
@@ -66,7 +68,7 @@ kernel void aov(SCENE_PARAMETERS, global Aov *pixels, global const uint *tiles, 
     for (uint s = 0; s < launch.sample_count; ++s) {
         Sampler sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
         real3 direction = camera_direction(&scene, &launch, own.x, own.y, next_2d(&sampler));
-        Seen seen = seen_along(&scene, position, direction, own.inside, launch.max_depth);
+        Seen seen = seen_along(&scene, position, direction, own.inside, launch.max_depth, &sampler);
         sum.albedo = add(sum.albedo, seen.albedo);
         sum.normal = add(sum.normal, seen.normal);
     }

@@ -6,6 +6,7 @@
 #include "film.cl"
 #include "bsdf.cl"
 #include "light.cl"
+#include VISIBILITY
 
 #define ROULETTE_DEPTH 4   // edges before Russian roulette may end a path
 
@@ -59,13 +60,11 @@ static inline real3 sampled_light(const Scene *scene, const Surface *surface, co
     ireal useful = active & above & (light.pdf > 0.0f) & is_positive3(contribution);
     if (!ANY(useful)) return splat(ZERO);
     real3 origin = offset_origin(surface->p, surface->p_error, surface->ng, light.wi);
-    real3 direction = choose(light.infinite, light.wi, sub(light.target, origin));
-    real t_max = light.infinite ? (real)(INFINITY) : ONE;
     *rays += useful ? (ureal)(1) : (ureal)(0);
-    ireal blocked = any_hit(scene, origin, direction, t_max, useful);
+    real visible = transmittance(scene, origin, light.target, light.wi, light.infinite, useful);
     real pdf = bsdf_pdf(bsdf, wo, wi);
     real weight = (light.delta ? ONE : power_heuristic(light.pdf, pdf)) / light.pdf;
-    return choose(useful & !blocked, scale(contribution, weight), splat(ZERO));
+    return choose(visible > 0.0f, scale(contribution, weight * visible), splat(ZERO));
 }
 #endif
 
@@ -82,12 +81,9 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
 #endif
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
-        Hits hits = closest_hit(scene, origin, step.wi, (real)(INFINITY), active);
-        ireal hit = active & (hits.primitive >= 0);
         Surface surface;
-#if PRIMITIVES
-        surface = surface_at(scene, origin, step.wi, &hits);
-#endif
+        Hits hits = first_surface(scene, &origin, step.wi, active, sampler, &surface);
+        ireal hit = active & (hits.primitive >= 0);
         real3 found = found_light(scene, &step, &surface, hits.t, hit, active & !hit);
         L = add(L, choose(active, mul(beta, AT_EYE(found)), splat(ZERO)));
         active = hit;

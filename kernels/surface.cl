@@ -17,6 +17,7 @@ typedef struct {
 #endif
 #if VERTEX_COLORS
     real3 tint;
+    real tint_opacity;
 #endif
 #if NORMAL_MAPS
     real3 tangent;        // not of unit length
@@ -67,6 +68,10 @@ static inline void triangle_surface(const Scene *scene, const Hits *hits, ireal 
     surface->tint = mad3(GATHER3(scene->colors, primitive, .c0), b0,
                     mad3(GATHER3(scene->colors, primitive, .c1), b1, scale(GATHER3(scene->colors, primitive, .c2), b2)));
 #endif
+#if VERTEX_COLORS && OPACITY
+    surface->tint_opacity = b0 * GATHER(real, scene->colors, primitive, .c0[3]) + b1 * GATHER(real, scene->colors, primitive, .c1[3])
+                          + b2 * GATHER(real, scene->colors, primitive, .c2[3]);
+#endif
 #if NORMAL_MAPS
     surface->tangent = mad3(GATHER3(scene->tangents, primitive, .t0), b0,
                        mad3(GATHER3(scene->tangents, primitive, .t1), b1, scale(GATHER3(scene->tangents, primitive, .t2), b2)));
@@ -96,6 +101,7 @@ static inline void sphere_surface(const Scene *scene, real3 origin, real3 direct
 #endif
 #if VERTEX_COLORS
     surface->tint = splat(ONE);
+    surface->tint_opacity = ONE;
 #endif
 #if NORMAL_MAPS
     surface->tangent = vector(n.z, ZERO, -n.x);
@@ -130,6 +136,7 @@ static inline Surface surface_at(const Scene *scene, real3 origin, real3 directi
 #endif
 #if VERTEX_COLORS
         surface.tint = choose(is_sphere, other.tint, surface.tint);
+        surface.tint_opacity = is_sphere ? other.tint_opacity : surface.tint_opacity;
 #endif
 #if NORMAL_MAPS
         surface.tangent = choose(is_sphere, other.tangent, surface.tangent);

@@ -137,6 +137,8 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
     features = _features(scene, materials, textures.uv_sets, users, emitters, sky, lone)
     preamble = _preamble(buffers, features, materials, textures.uv_sets, emitters, choices, tree, frame.unit)
     files = {**_files(materials.used, emitters, sky, choices, tree.name, len(triangles) > 0, len(spheres) > 0, lone),
+             "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
+             "OPACITY_FILE": ["opacity.cl"] if "OPACITY" in features else [],
              "TEXTURE_FILES": ["texture.cl"] if textures.uv_sets else [],
              "SAMPLER": [f"sampler/{scene.render.sampler}.cl"],
              "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"]}
@@ -191,7 +193,7 @@ def _features(scene: Scene, materials: Materials, uv_sets: int, users: list[Mate
            "SKY": sky.kernel is not None, "LIGHTS": emitters.count > 0, "LIGHT_TREE": emitters.choice.tree,
            "EMITTERS": any(t in SURFACES for t in emitters.types),
            "TEXTURES": uv_sets > 0, "EMISSION_TEXTURES": any(isinstance(user.emission, Texture) for user in users),
-           "NORMAL_MAPS": bool(materials.mapped("normal_map")),
+           "OPACITY": bool(materials.with_value("opacity")), "NORMAL_MAPS": bool(materials.mapped("normal_map")),
            "VERTEX_COLORS": any(mesh.colors is not None for mesh in scene.meshes),
            "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes)}
     return features | {name for name, present in has.items() if present}
@@ -209,6 +211,7 @@ def _preamble(buffers: Buffers, features: set[str], materials: Materials, uv_set
         typedefs({"Counts": COUNTS, "Pixel": PIXEL, "Aov": AOV, "Launch": LAUNCH}),
         scene_struct(buffers),
         type_list("MATERIAL_TYPES", _numbered(materials.used)),
+        type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),
         type_list("NORMAL_MAPPED_TYPES", _numbered(materials.mapped("normal_map"))),
         defines({"UV_SETS": uv_sets}),
         *(f"#define READ_{name} {'TEXTURED' if reads else 'CONSTANT'}" for name, reads in materials.reads.items()),

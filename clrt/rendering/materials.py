@@ -29,6 +29,10 @@ class Materials:
     reads: dict[str, bool]
     used: list[type[Material]]
 
+    def with_value(self, parameter: str) -> list[type[Material]]:
+        """The types in use that have the parameter."""
+        return [kind for kind in self.used if f"{kind.kernel}_{parameter}" in self.reads]
+
     def mapped(self, parameter: str) -> list[type[Material]]:
         """The types in use that read the parameter from a texture."""
         return [kind for kind in self.used if self.reads.get(f"{kind.kernel}_{parameter}")]
@@ -63,8 +67,7 @@ def pack_materials(users: Iterable[Material], textures: Textures) -> Materials:
 def _values(material: Material, textures: Textures) -> dict[str, Number]:
     """What its record holds: of a texture its factor, and its number as NAME_texture."""
     parameters = material.parameters()
-    if material.normal_map is not None:
-        parameters["normal_map"] = material.normal_map
+    parameters |= material.surface_parameters()
     colors = {field.name for field in fields(material) if isinstance(field.default, tuple)}
     values: dict[str, Number] = {}
     for name, value in parameters.items():

@@ -59,12 +59,17 @@ class Material:
     """What every material has.
 
     emission: radiance in W·sr⁻¹·m⁻² that its front side sends out. normal_map: bends the shading normal (glTF's
-    convention: linear, x to the right and y up in the picture); its factor scales how far.
+    convention: linear, x to the right and y up in the picture); its factor scales how far. opacity: what part of light
+    it stops; the rest goes straight through. With an alpha_cutoff it stops all where the opacity reaches that, and
+    nothing elsewhere. one_sided: from behind it is not there.
     """
 
     kernel: ClassVar[str]
     emission: Radiance | Texture = (0.0, 0.0, 0.0)
     normal_map: Texture | None = None
+    opacity: Unit | Texture = 1.0
+    alpha_cutoff: Unit | None = None
+    one_sided: bool = False
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)
@@ -75,6 +80,16 @@ class Material:
         What only some materials of a type have is 0 for the others.
         """
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in SHARED}
+
+    def surface_parameters(self) -> dict[str, Parameter]:
+        """Those of the fields above that the surface reads, as far as they say anything."""
+        parameters: dict[str, Parameter] = {}
+        if self.normal_map is not None:
+            parameters["normal_map"] = self.normal_map
+        if self.opacity != 1 or self.one_sided:
+            cutoff = -1.0 if self.alpha_cutoff is None else self.alpha_cutoff
+            parameters |= {"opacity": self.opacity, "alpha_cutoff": cutoff, "one_sided": float(self.one_sided)}
+        return parameters
 
     @property
     def radiance(self) -> Radiance:

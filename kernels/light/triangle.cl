@@ -1,5 +1,6 @@
 // A triangle, or the parallelogram of two, that shines from its front side: a point uniform over its area. World frame.
 #include "light/interface.cl"
+#include OPACITY_FILE
 
 static inline LightSample triangle_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
     real2 b = sample_triangle(u);
@@ -20,6 +21,12 @@ static inline LightSample triangle_light_sample(const Scene *scene, ireal index,
     radiance = textured3(scene, GATHER(ireal, scene->triangle_lights, index, .texture), radiance, &at);
 #endif
     s.radiance = choose(front, radiance, splat(ZERO));
+#if OPACITY
+    Hits sampled = {ZERO, b.x, b.y, GATHER(ireal, scene->triangle_lights, index, .primitive)};
+    Surface surface;
+    triangle_surface(scene, &sampled, sampled.primitive, &surface);
+    s.radiance = scale(s.radiance, opacity_at(scene, &surface, s.wi));
+#endif
     s.pdf = front ? d2 / (cosine * GATHER(real, scene->triangle_lights, index, .area)) : ONE;
     s.target = shadow_target(p, q, n);
     s.infinite = s.delta = NO_LANES;
