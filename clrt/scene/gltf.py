@@ -1,6 +1,6 @@
 """Read glTF 2.0 (.glb, .gltf): every triangle of its scene, its metallic-roughness materials and its cameras.
 
-What is left out (skins, morph targets, textures but for their mean colour, ...) is named in one warning in the log.
+What is left out (skins, morph targets, ...) is named in one warning in the log.
 """
 
 from __future__ import annotations
@@ -113,18 +113,38 @@ def _primitives(data: GltfData, materials: Materials, index: int, normals: Norma
         problems = index_problems(corners, len(vertices), where)
         if problems:
             raise SceneError(problems)
-        stored = None
-        if "NORMAL" in primitive.attributes:
-            stored = _vectors(data, primitive.attributes["NORMAL"], where)
-            if len(stored) != len(vertices):
-                raise SceneError(f"{where}: has {len(stored)} normals for {len(vertices)} vertices; export it again")
+        normal, tangent, uv, uv1 = (_attribute(data, primitive, key, kind, len(vertices), where) for key, kind in [
+            ("NORMAL", "VEC3"), ("TANGENT", "VEC4"), ("TEXCOORD_0", "VEC2"), ("TEXCOORD_1", "VEC2")])
         faces = corners.astype(np.int32)
         yield Mesh(vertices, faces, materials.material(primitive, where),
-                   choose_normals(normals, vertices, faces, stored), name)
+                   choose_normals(normals, vertices, faces, normal), name, uv=uv, uv1=uv1,
+                   colors=_colors(data, primitive, len(vertices), where),
+                   tangents=tangent if normals == "file" and normal is not None else None)
 
 
 def _vectors(data: GltfData, accessor: int, user: str) -> NDArray[np.float32]:
     return np.ascontiguousarray(data.array(accessor, "VEC3", user), np.float32)
+
+
+def _attribute(data: GltfData, primitive: gltf.Primitive, key: str, kind: str, n: int,
+               user: str) -> NDArray[np.float32] | None:
+    """What a primitive with `n` vertices has for each of them, (n, k); values that are not finite are 0."""
+    if key not in primitive.attributes:
+        return None
+    values = np.ascontiguousarray(data.array(primitive.attributes[key], kind, user), np.float32)
+    if len(values) != n:
+        raise SceneError(f"{user}: has {len(values)} of {key} for {n} vertices; export it again")
+    return np.where(np.isfinite(values), values, np.float32(0)) if key != "NORMAL" else values
+
+
+def _colors(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> NDArray[np.float32] | None:
+    """Vertex colours, linear, with or without opacity."""
+    if "COLOR_0" not in primitive.attributes:
+        return None
+    accessor = gltf.entry(data.document.accessors, primitive.attributes["COLOR_0"], "accessor", user)
+    kind = accessor.type if accessor.type == "VEC3" else "VEC4"
+    found = _attribute(data, primitive, "COLOR_0", kind, n, user)
+    return None if found is None else found.clip(0, 1)
 
 
 def _corners(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> NDArray[np.int64]:
@@ -153,15 +173,10 @@ def _corners(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> ND
 def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
     """One warning that names what the picture will lack."""
     primitives = [primitive for mesh in document.meshes for primitive in mesh.primitives]
-    materials = document.materials
     left_out = {
         "skins": any(node.skin is not None for node in document.nodes),
         "morph targets": any(primitive.targets for primitive in primitives),
         "points and lines": any(primitive.mode < TRIANGLES for primitive in primitives),
-        "vertex colours": any("COLOR_0" in primitive.attributes for primitive in primitives),
-        "textures (their mean colour counts)": bool(document.textures),
-        "normal maps": any(material.normalTexture for material in materials),
-        "transparency": any(material.alphaMode != "OPAQUE" for material in materials),
     }
     names = [name for name, present in left_out.items() if present]
     names += sorted(f"the extension {name}" for name in set(document.extensionsUsed) - gltf.EXTENSIONS)

@@ -15,12 +15,14 @@ from ..errors import SceneError
 Item = TypeVar("Item")
 Index = Annotated[int, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
+Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
 ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
 #: Extensions that this reader follows.
-EXTENSIONS = frozenset({"KHR_draco_mesh_compression", "KHR_mesh_quantization", "KHR_materials_emissive_strength"})
+EXTENSIONS = frozenset({"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_mesh_quantization",
+                        "KHR_materials_emissive_strength", "KHR_texture_transform"})
 
 
 class Part(BaseModel):
@@ -74,17 +76,50 @@ class Accessor(Part):
 
 
 class Image(Part):
+    name: str | None = None
     uri: str | None = None
     bufferView: Index | None = None
 
 
+class Sampler(Part):
+    magFilter: int | None = None
+    wrapS: Literal[10497, 33648, 33071] = 10497
+    wrapT: Literal[10497, 33648, 33071] = 10497
+
+
+class TextureSource(Part):
+    source: Index
+
+
+class TextureExtensions(Part):
+    EXT_texture_webp: TextureSource | None = None
+
+
 class Texture(Part):
     source: Index | None = None
+    sampler: Index | None = None
+    extensions: TextureExtensions = TextureExtensions()
+
+
+class TextureTransform(Part):
+    offset: Vec2 = (0.0, 0.0)
+    rotation: float = 0.0
+    scale: Vec2 = (1.0, 1.0)
+    texCoord: Index | None = None
+
+
+class TextureInfoExtensions(Part):
+    KHR_texture_transform: TextureTransform = TextureTransform()
 
 
 class TextureInfo(Part):
     index: Index
     texCoord: Index = 0
+    extensions: TextureInfoExtensions = TextureInfoExtensions()
+
+
+class NormalTextureInfo(TextureInfo):
+    scale: float = 1.0
 
 
 class Pbr(Part):
@@ -108,8 +143,9 @@ class Material(Part):
     pbrMetallicRoughness: Pbr = Pbr()
     emissiveFactor: Vec3 = (0.0, 0.0, 0.0)
     emissiveTexture: TextureInfo | None = None
-    normalTexture: Any = None
-    alphaMode: str = "OPAQUE"
+    normalTexture: NormalTextureInfo | None = None
+    alphaMode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
+    alphaCutoff: float = 0.5
     extensions: MaterialExtensions = MaterialExtensions()
 
 
@@ -176,6 +212,7 @@ class Document(Part):
     meshes: list[Mesh] = []
     nodes: list[Node] = []
     scene: Index | None = None
+    samplers: list[Sampler] = []
     scenes: list[Scene] = []
     textures: list[Texture] = []
 

@@ -1,25 +1,25 @@
-"""A glTF primitive's material: the metallic-roughness factors, times the mean of each texture.
-
-Until textures are drawn, a texture counts by the mean of the texels that the primitive's vertices address. For low-poly
-models, whose texture is a palette, that is the primitive's true mean colour.
-"""
+"""A glTF primitive's material: metallic and rough, with its textures where the primitive has coordinates for them."""
 
 from __future__ import annotations
 
 import logging
+import math
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import SceneError
 from . import gltf_document as gltf
 from .gltf_data import GltfData
 from .materials import Material, MetallicRoughness
-from .pictures import linear_from_srgb, read_texels
+from .pictures import read_texels
+from .textures import Channel, Picture, Texture, Wrap
 
 log = logging.getLogger(__name__)
 
-#: Stands for a base colour texture that cannot be read.
+WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
+NEAREST = 9728
+#: A base colour texture that cannot be read counts by this.
 GREY = 0.8
 
 
@@ -28,59 +28,96 @@ class Materials:
 
     def __init__(self, data: GltfData) -> None:
         self._data = data
-        self._pictures: dict[int, NDArray[np.uint8] | None] = {}
+        self._pictures: dict[int, Picture | None] = {}
 
     def material(self, primitive: gltf.Primitive, user: str) -> Material:
-        """The primitive's material with all values cut to their limits; the specification's default if it has none."""
-        source = gltf.Material()
-        if primitive.material is not None:
-            source = gltf.entry(self._data.document.materials, primitive.material, "material", user)
+        """The primitive's material with all values cut to their limits; the specification's default if it has none.
+
+        A texture for which the primitive has no coordinates counts as white, as does one that cannot be read, but for
+        base colours, grey then, and emission, black.
+        """
+        if primitive.material is None:
+            return MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=1.0)
+        source = gltf.entry(self._data.document.materials, primitive.material, "material", user)
         pbr = source.pbrMetallicRoughness
-        color = np.array(pbr.baseColorFactor[:3]) * self._color(pbr.baseColorTexture, primitive, user, GREY)
-        glow = np.array(source.emissiveFactor) * self._color(source.emissiveTexture, primitive, user, 0.0)
-        glow *= source.extensions.KHR_materials_emissive_strength.emissiveStrength
-        roughness, metallic = pbr.roughnessFactor, pbr.metallicFactor
-        if pbr.metallicRoughnessTexture is not None:
-            texels = self._texels(pbr.metallicRoughnessTexture, primitive, user)
-            green, blue = (1.0, 0.0) if texels is None else texels.mean(axis=0, dtype=np.float64)[1:]
-            roughness, metallic = roughness * green, metallic * blue
-        red, green, blue = color.clip(0, 1).tolist()
-        glow_red, glow_green, glow_blue = glow.clip(0).tolist()
-        return MetallicRoughness(color=(red, green, blue), emission=(glow_red, glow_green, glow_blue),
-                                 metallic=float(np.clip(metallic, 0, 1)), roughness=float(np.clip(roughness, 0, 1)))
+        base = self._texture(pbr.baseColorTexture, primitive, user)
+        gloss = self._texture(pbr.metallicRoughnessTexture, primitive, user)
+        made = MetallicRoughness(
+            color=_colored(_cut(pbr.baseColorFactor[:3]), base, pbr.baseColorTexture, GREY),
+            metallic=_numbered(_unit(pbr.metallicFactor), gloss, "blue"),
+            roughness=_numbered(_unit(pbr.roughnessFactor), gloss, "green"),
+            emission=self._emission(source, primitive, user))
+        bend = self._texture(source.normalTexture, primitive, user)
+        if bend is not None and source.normalTexture is not None:
+            made = replace(made, normal_map=replace(bend, factor=max(source.normalTexture.scale, 0.0)))
+        if source.alphaMode == "OPAQUE":
+            return made
+        opacity = _numbered(_unit(pbr.baseColorFactor[3]), base, "alpha")
+        if source.alphaMode == "BLEND":
+            return replace(made, opacity=opacity)
+        return replace(made, opacity=opacity, alpha_cutoff=_unit(source.alphaCutoff))
 
-    def _color(self, info: gltf.TextureInfo | None, primitive: gltf.Primitive, user: str, missing: float,
-               ) -> NDArray[np.float64] | float:
-        """The mean linear colour of a texture, 1 without one, `missing` for one that cannot be read."""
+    def _emission(self, source: gltf.Material, primitive: gltf.Primitive,
+                  user: str) -> tuple[float, float, float] | Texture:
+        strength = max(source.extensions.KHR_materials_emissive_strength.emissiveStrength, 0.0)
+        red, green, blue = (strength * max(value, 0.0) for value in source.emissiveFactor)
+        glow = self._texture(source.emissiveTexture, primitive, user) if max(red, green, blue) else None
+        return _colored((red, green, blue), glow, source.emissiveTexture, 0.0)
+
+    def _texture(self, info: gltf.TextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:
+        """None without one, without coordinates, or where its picture cannot be read."""
         if info is None:
-            return 1.0
-        texels = self._texels(info, primitive, user)
-        return missing if texels is None else linear_from_srgb(texels).mean(axis=0, dtype=np.float64)
-
-    def _texels(self, info: gltf.TextureInfo, primitive: gltf.Primitive, user: str) -> NDArray[np.float32] | None:
-        """The texel, (n, 3) from 0 to 1 as stored, at each vertex's texture coordinates; None if there are none."""
+            return None
         texture = gltf.entry(self._data.document.textures, info.index, "texture", user)
-        coordinates = primitive.attributes.get(f"TEXCOORD_{info.texCoord}")
-        if texture.source is None or coordinates is None:
+        placed = info.extensions.KHR_texture_transform
+        uv_set = info.texCoord if placed.texCoord is None else placed.texCoord
+        if uv_set > 1 or f"TEXCOORD_{uv_set}" not in primitive.attributes:
+            log.warning("%s: %s has no texture coordinates %d; its texture is left out", self._data.path, user, uv_set)
             return None
-        pixels = self._picture(texture.source, f"texture {info.index}")
-        uv = self._data.array(coordinates, "VEC2", user).astype(np.float64)
-        uv = uv[np.isfinite(uv).all(axis=1)]
-        if pixels is None or len(uv) == 0:
+        webp = texture.extensions.EXT_texture_webp
+        source = texture.source if webp is None else webp.source
+        picture = None if source is None else self._picture(source, f"texture {info.index}")
+        if picture is None:
             return None
-        size = np.array(pixels.shape[1::-1])
-        column, row = np.minimum(uv % 1.0 * size, size - 1).astype(np.int64).T
-        return np.asarray(pixels[row, column] / 255, np.float32)
+        sampler = gltf.Sampler()
+        if texture.sampler is not None:
+            sampler = gltf.entry(self._data.document.samplers, texture.sampler, "sampler", f"texture {info.index}")
+        wrap = WRAPS[sampler.wrapS], WRAPS[sampler.wrapT]
+        return Texture(picture=picture, uv_set=uv_set, offset=placed.offset, scale=placed.scale, wrap=wrap,
+                       rotation_degrees=math.degrees(placed.rotation),
+                       filter="nearest" if sampler.magFilter == NEAREST else "linear")
 
-    def _picture(self, index: int, user: str) -> NDArray[np.uint8] | None:
-        """The pixels of an image, (h, w, 3) as stored; None, with a warning, if it cannot be read."""
+    def _picture(self, index: int, user: str) -> Picture | None:
+        """An image; None, with a warning, if it cannot be read."""
         if index not in self._pictures:
             image = gltf.entry(self._data.document.images, index, "image", user)
             try:
                 content = (self._data.resource(image.uri or "", user) if image.bufferView is None
                            else self._data.view(image.bufferView, user).tobytes())
-                self._pictures[index] = read_texels(content, f"image {index}")[..., :3]
+                self._pictures[index] = Picture(read_texels(content, f"image {index}"), image.name or f"image {index}")
             except SceneError as error:
                 log.warning("%s: a texture is left out: %s", self._data.path, error)
                 self._pictures[index] = None
         return self._pictures[index]
+
+
+def _colored(factor: tuple[float, float, float], texture: Texture | None, info: gltf.TextureInfo | None,
+             missing: float) -> tuple[float, float, float] | Texture:
+    """A colour, times its texture; times `missing` where there should be one."""
+    if texture is not None:
+        return replace(texture, factor=factor)
+    red, green, blue = (value * (1.0 if info is None else missing) for value in factor)
+    return red, green, blue
+
+
+def _numbered(factor: float, texture: Texture | None, channel: Channel) -> float | Texture:
+    return factor if texture is None else replace(texture, factor=factor, channel=channel)
+
+
+def _unit(value: float) -> float:
+    return float(np.clip(value, 0, 1))
+
+
+def _cut(color: tuple[float, ...]) -> tuple[float, float, float]:
+    red, green, blue = map(_unit, color)
+    return red, green, blue

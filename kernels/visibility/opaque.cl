@@ -16,5 +16,5 @@ static inline Hits first_surface(const Scene *scene, real3 *origin, real3 direct
 static inline real transmittance(const Scene *scene, real3 origin, real3 target, real3 wi, ireal infinite, ireal active) {
     real3 direction = choose(infinite, wi, sub(target, origin));
     ireal blocked = any_hit(scene, origin, direction, infinite ? (real)(INFINITY) : ONE, active);
-    return active & !blocked ? ONE : ZERO;
+    return (active & !blocked) ? ONE : ZERO;
 }

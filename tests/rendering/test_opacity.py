@@ -88,7 +88,7 @@ def test_a_picture_cuts_holes(device: Device) -> None:
 
 @pytest.mark.parametrize("lanes", [1, 8])
 def test_shadows_of_veils(device: Device, lanes: int) -> None:
-    """What is stopped is missing on the ground, without noise; a one-sided veil stops no ray from behind, shadow rays either."""
+    """What is stopped is missing on the ground, without noise; a one-sided veil stops no ray from behind."""
     ground = quad(Diffuse(color=(0.5, 0.5, 0.5)))
     sun = DirectionalLight(direction=(1, 0, -1), irradiance=(2, 2, 2))
     expected = 0.5 / np.pi * 2 * np.sqrt(0.5)

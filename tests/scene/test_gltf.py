@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from clrt.errors import SceneError
 from clrt.scene.file import load
 from clrt.scene.gltf import read_gltf
-from clrt.scene.materials import MetallicRoughness
+from clrt.scene.materials import MetallicRoughness, as_color
+from clrt.scene.textures import Texture
 from clrt.scene.model import Model
 from .glb import Gltf, ball
 from .shapes import cube, icosphere
@@ -141,7 +142,8 @@ def textured(color: tuple[int, int, int], folder: Path, **material: Any) -> Meta
     gltf = Gltf()
     picture = imageio.imwrite("<bytes>", np.array([[[9, 99, 199], color]], np.uint8), extension=".png")
     gltf.document["images"] = [{"bufferView": gltf.view(picture), "mimeType": "image/png"}]
-    gltf.document["textures"] = [{"source": 0}]
+    gltf.document["samplers"] = [{"magFilter": 9728, "wrapS": 33648, "wrapT": 33071}]
+    gltf.document["textures"] = [{"source": 0, "sampler": 0}]
     gltf.document["materials"] = [material]
     uv = gltf.accessor(np.array([[0.6, 0.5], [0.99, 0.1], [-0.25, 1.0]]))
     gltf.mesh(attributes={"POSITION": gltf.accessor(TRIANGLE), "TEXCOORD_0": uv}, material=0)
@@ -160,16 +162,46 @@ def test_material_factors_are_cut_to_their_limits(tmp_path: Path) -> None:
         color=(1, 0.25, 0), metallic=0.5, roughness=1, emission=(8, 4, 0))
 
 
-def test_texture_counts_by_the_texels_that_the_vertices_address(tmp_path: Path) -> None:
-    """sRGB 188 is linear ((188/255 + 0.055)/1.055)^2.4; metalness and roughness textures are linear."""
-    factors = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0},
-               "baseColorFactor": [1, 0.5, 1, 1]}
-    material = textured((188, 188, 0), tmp_path, pbrMetallicRoughness=factors, emissiveFactor=[2, 2, 2],
-                        emissiveTexture={"index": 0})
-    linear = ((188 / 255 + 0.055) / 1.055) ** 2.4
-    assert material.color == pytest.approx((linear, linear / 2, 0))
-    assert material.emission == pytest.approx((2 * linear, 2 * linear, 0))
-    assert (material.metallic, material.roughness) == pytest.approx((0, 188 / 255))
+def test_textures_of_every_parameter(tmp_path: Path) -> None:
+    """One picture, with its factors, channels, transform and sampler; materials of one file share it."""
+    placed = {"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0.5, 0.25], "rotation": np.pi / 2,
+                                                                   "scale": [2, 3]}}}
+    factors = {"baseColorTexture": placed, "metallicRoughnessTexture": {"index": 0}, "metallicFactor": 0.5,
+               "baseColorFactor": [1, 0.5, 1, 0.75]}
+    material = textured((188, 188, 0), tmp_path, pbrMetallicRoughness=factors, emissiveFactor=[1, 0.5, 1],
+                        emissiveTexture={"index": 0}, normalTexture={"index": 0, "scale": 0.5}, alphaMode="MASK",
+                        alphaCutoff=0.25, extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 4}})
+    color, metallic, roughness, opacity = material.color, material.metallic, material.roughness, material.opacity
+    assert isinstance(color, Texture) and isinstance(metallic, Texture) and isinstance(roughness, Texture)
+    assert isinstance(opacity, Texture) and isinstance(material.emission, Texture) and material.normal_map is not None
+    assert color.picture.texels.tolist() == [[[9, 99, 199, 255], [188, 188, 0, 255]]]
+    assert all(texture.picture is color.picture for texture in material.textures()) and len(material.textures()) == 6
+    assert as_color(color.factor) == pytest.approx((1, 0.5, 1))
+    assert (color.offset, color.scale) == ((0.5, 0.25), (2, 3))
+    assert color.rotation_degrees == pytest.approx(90)
+    assert (color.wrap, color.filter) == (("mirror", "clamp"), "nearest")
+    assert (metallic.channel, metallic.factor, roughness.channel, roughness.factor) == ("blue", 0.5, "green", 1)
+    assert (opacity.channel, opacity.factor, opacity.scale, material.alpha_cutoff) == ("alpha", 0.75, (2, 3), 0.25)
+    assert as_color(material.emission.factor) == pytest.approx((4, 2, 4)) and material.normal_map.factor == 0.5
+
+
+def test_corners(tmp_path: Path) -> None:
+    """Both sets of coordinates, colours of any form, and tangents; a mirrored node turns their bitangents over."""
+    rng = np.random.default_rng(2)
+    uv, uv1 = rng.uniform(0, 1, (2, 3, 2)).astype(np.float32)
+    colors = np.array([[255, 0, 0, 51], [0, 255, 0, 102], [0, 0, 255, 255]])
+    gltf = Gltf()
+    gltf.mesh(attributes={
+        "POSITION": gltf.accessor(TRIANGLE), "NORMAL": gltf.accessor(np.tile([0, 0, 1], (3, 1))),
+        "TANGENT": gltf.accessor(np.tile([1, 0, 0, 1], (3, 1))), "TEXCOORD_0": gltf.accessor(uv),
+        "TEXCOORD_1": gltf.accessor(np.round(uv1 * 65535), "<u2", normalized=True),
+        "COLOR_0": gltf.accessor(colors, "<u1", normalized=True)})
+    gltf.document["nodes"][0]["scale"] = [-1, 1, 1]
+    mesh, = read(gltf, tmp_path).meshes
+    assert mesh.uv is not None and mesh.uv1 is not None and mesh.colors is not None and mesh.tangents is not None
+    assert np.array_equal(mesh.uv, uv) and np.abs(mesh.uv1 - uv1).max() < 1e-5
+    assert np.allclose(mesh.colors, colors / 255)
+    assert np.array_equal(mesh.tangents, np.tile([-1, 0, 0, -1], (3, 1)))
 
 
 def test_missing_texture_is_grey_with_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -182,7 +214,7 @@ def test_missing_texture_is_grey_with_a_warning(tmp_path: Path, caplog: pytest.L
     with caplog.at_level(logging.WARNING):
         material = read(gltf, tmp_path).meshes[0].material
     assert isinstance(material, MetallicRoughness) and material.color == (0.8, 0.8, 0.8)
-    assert "lost.png" in caplog.text and "left out: textures (their mean colour counts), transparency" in caplog.text
+    assert "lost.png" in caplog.text and material.opacity == 1
 
 
 def cameras() -> Gltf:
