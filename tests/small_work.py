@@ -24,7 +24,7 @@ from clrt.tree_query import TRAVERSALS
 from .accel.cases import soup, spheres
 from .rendering.lamps import lamps
 from .rendering.rays import icosphere
-from .rendering.test_variants import everything
+from .rendering.test_variants import everything, painted
 
 SETTINGS = RenderSettings(size=(6, 4), spp=2, max_depth=5, seed=11)
 TRIANGLES = soup(60, 0.5)
@@ -100,6 +100,9 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     yield "ball", picture(device, replace(ball, lights=lamps(3).lights))
     lit = replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)], render=SETTINGS)
     yield "lamps", picture(device, lit)
+    painting = replace(painted(scene()), render=SETTINGS)
+    yield "painted", picture(device, painting)
+    yield "aovs of it", {**render_aovs(started(device, painting), 2)}
     yield "aovs", {**render_aovs(started(device, scene()), 2)}
     for layout in SHAPES:
         build_tree(device, layout, "ploc", soup(0), spheres(30))

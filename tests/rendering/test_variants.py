@@ -17,6 +17,7 @@ from clrt.rendering.compile import OFFSETS, compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight
 from clrt.scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Sampler, Scene, Sphere
+from clrt.scene.textures import Picture, Texture
 from clrt.study.probe import choices
 
 from . import rays
@@ -47,6 +48,24 @@ def everything() -> Scene:
         render=RenderSettings(size=(45, 33), spp=4, max_depth=6, seed=11))
 
 
+def painted(scene: Scene) -> Scene:
+    """The same with textures for all that can be one, by both sets of coordinates, vertex colours, and holes."""
+    texels = np.random.default_rng(5).integers(0, 256, (6, 5, 4), np.uint8)
+    here = Texture(picture=Picture(texels))
+    there = Texture(picture=Picture(texels[1:4]), uv_set=1, wrap=("mirror", "clamp"))
+    floor, lamp, ball = scene.meshes
+    gold = MetallicRoughness(color=there, metallic=here, roughness=replace(here, channel="green", filter="nearest"),
+                             normal_map=here, opacity=replace(here, channel="alpha"))
+    flat = floor.vertices[:, [0, 2]]
+    meshes = [replace(floor, material=Diffuse(color=here, alpha_cutoff=0.3, opacity=there), uv=flat,
+                      uv1=flat[:, ::-1].copy(), colors=np.linspace(0, 1, 16, dtype=np.float32).reshape(4, 4)),
+              replace(lamp, material=Diffuse(emission=replace(here, factor=6.0)), uv=lamp.vertices[:, [0, 2]]),
+              replace(ball, material=gold, uv=ball.vertices[:, :2].copy(), uv1=ball.vertices[:, 1:].copy())]
+    spheres = [*scene.spheres, Sphere(center=(2.0, 0.4, 2.0), radius=0.3,
+                                      material=Diffuse(color=here, emission=there, normal_map=there, one_sided=True))]
+    return replace(scene, meshes=meshes, spheres=spheres)
+
+
 @pytest.fixture(scope="module")
 def reference(device: Device) -> Doubles:
     return film(device, everything(), lanes=8, layout="bvh8").mean
@@ -65,6 +84,16 @@ def test_lanes_layouts_and_builders_agree(device: Device, reference: Doubles, ch
     picture = film(device, everything(), **wanted).mean
     differs = np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)
     assert np.mean(differs) < 1e-3, np.argwhere(differs)
+
+
+@pytest.mark.parametrize("lanes, layout", [(1, "bvh8"), (16, "bvh8"), (8, "cwbvh")])
+def test_lanes_agree_on_textures_and_holes(device: Device, lanes: int, layout: str) -> None:
+    """As above; textures decide at more edges."""
+    scene = painted(everything())
+    expected = film(device, scene, lanes=8, layout="bvh8").mean
+    picture = film(device, scene, lanes=lanes, layout=layout).mean
+    differs = np.any(np.abs(picture - expected) > 1e-5 * (expected + 0.1), axis=2)
+    assert expected.mean() > 0.1 and np.mean(differs) < 4e-3, np.argwhere(differs)
 
 
 @pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh", "list"])
