@@ -12,7 +12,7 @@ import click
 from ..errors import ClrtError
 
 STARTED = time.perf_counter()
-COMMANDS = ("render", "info", "compare", "devices", "bench", "cache")
+COMMANDS = ("render", "info", "convert", "compare", "devices", "bench", "cache")
 
 
 class _Commands(click.Group):

@@ -19,7 +19,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from .textures import Texture
 
 #: Fields whose values are no plain data; whoever holds them checks them.
-ELSEWHERE = frozenset({"image", "material", "picture"})
+ELSEWHERE = frozenset({"image", "material", "materials", "picture"})
 #: Words of the scene format that this version knows but cannot draw yet.
 LATER = frozenset({"aperture_radius", "focus_distance", "projection", "instance", "phong", "blinn_phong", "local",
                    "raster"})

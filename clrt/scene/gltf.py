@@ -119,7 +119,8 @@ def _primitives(data: GltfData, materials: Materials, index: int, normals: Norma
         yield Mesh(vertices, faces, materials.material(primitive, where),
                    choose_normals(normals, vertices, faces, normal), name, uv=uv, uv1=uv1,
                    colors=_colors(data, primitive, len(vertices), where),
-                   tangents=tangent if normals == "file" and normal is not None else None)
+                   tangents=tangent if normals == "file" and normal is not None else None,
+                   material_name="" if primitive.material is None else materials.names[primitive.material])
 
 
 def _vectors(data: GltfData, accessor: int, user: str) -> NDArray[np.float32]:

@@ -243,7 +243,19 @@ def entry(items: Sequence[Item], index: int, name: str, user: str) -> Item:
 
 def unused(name: str, taken: Container[str]) -> str:
     """The name, with the first number from 2 that makes it none of those that are taken."""
-    return next(new for new in (name, *(f"{name} {number}" for number in range(2, 2**20))) if new not in taken)
+    new, number = name, 1
+    while new in taken:
+        number += 1
+        new = f"{name} {number}"
+    return new
+
+
+def material_names(document: Document) -> list[str]:
+    """What each material is called; no two alike."""
+    names: dict[str, None] = {}
+    for index, source in enumerate(document.materials):
+        names[unused(source.name or f"material {index}", names)] = None
+    return list(names)
 
 
 def _path(location: tuple[int | str, ...]) -> str:

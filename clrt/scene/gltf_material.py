@@ -28,6 +28,7 @@ class Materials:
 
     def __init__(self, data: GltfData) -> None:
         self._data = data
+        self.names = gltf.material_names(data.document)
         self._pictures: dict[int, Picture | None] = {}
 
     def material(self, primitive: gltf.Primitive, user: str) -> Material:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -33,6 +34,7 @@ class MeshTable:
     faces: tuple[tuple[Vertex, Vertex, Vertex], ...] | None = None
     uv: tuple[tuple[float, float], ...] | None = None
     material: str | None = None
+    materials: Mapping[str, str] | None = None
     normals: Normals = "file"
     translate: Vector = (0.0, 0.0, 0.0)
     scale: Vector = (1.0, 1.0, 1.0)

@@ -14,7 +14,7 @@ from .materials import MATERIALS, Diffuse, Material
 from .mesh_table import MeshTable
 from .model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from .pictures import read_picture
-from .sky import SUN
+from .sky import SUN, default_sky
 from .texture_table import TextureReader
 from .textures import WHITE, Texture
 from .transform import transform_camera, transform_mesh
@@ -108,7 +108,13 @@ class SceneReader:
         return self._tried(self._textures.read, values, where) or Texture(picture=WHITE)
 
     def _environment(self, values: Table) -> Environment | None:
-        image = None
+        values, image = dict(values), None
+        if (sky := values.pop("sky", None)) is not None:
+            image = default_sky().image
+            if sky != "default":
+                self.problems.append(f'environment.sky: {show(sky)} is unknown; write "default"')
+            self.problems += [f"environment: has a sky and {key}; keep one of them" for key in ("color", "image")
+                              if key in values]
         if "image" in values:
             image = self._picture(values["image"])
             if "color" in values:
@@ -159,7 +165,23 @@ class SceneReader:
             return []
         for name, camera in model.cameras.items():
             self._cameras.setdefault(name, transform_camera(camera, matrix))
-        return [transform_mesh(replace(mesh, material=material or mesh.material), matrix) for mesh in model.meshes]
+        others = self._others(values, {mesh.material_name for mesh in model.meshes}, where)
+        meshes = [replace(mesh, material=others.get(mesh.material_name, material or mesh.material))
+                  for mesh in model.meshes]
+        return [transform_mesh(mesh, matrix) for mesh in meshes]
+
+    def _others(self, values: Table, own: set[str], where: str) -> dict[str, Material]:
+        """What the table writes in the place of the file's `own` materials, by their names."""
+        pairs = values.get("materials", {})
+        if not isinstance(pairs, dict):
+            self.problems.append(f"{where}.materials: {show(pairs)} is not a table; "
+                                 'write { "name in the file" = "NAME" }')
+            return {}
+        if pairs and "material" in values:
+            self.problems.append(f"{where}: has a material and materials; keep one of them")
+        self.problems += [f'{where}.materials: "{name}" {unknown(name, own)}' for name in pairs if name not in own]
+        return {name: self._material({"material": other}, f"{where}.materials") or Diffuse()
+                for name, other in pairs.items()}
 
     def _tried(self, read: Callable[..., Kind], *arguments: Any) -> Kind | None:
         """read(*arguments), or None if it finds mistakes."""

@@ -219,3 +219,24 @@ def test_a_scene_without_light_says_so(tmp_path: Path) -> None:
     (tmp_path / "dark.toml").write_text("[render]\nsize = [4, 4]\nspp = 1\n[[sphere]]\n")
     assert "nothing shines" in clrt("render", "dark.toml", cwd=tmp_path).stderr
     assert clrt("render", "dark.toml", "-q", cwd=tmp_path).stderr == ""
+
+
+def test_convert(tmp_path: Path) -> None:
+    """From one folder to another, by paths that hold; nothing is overwritten unasked."""
+    (tmp_path / "models").mkdir()
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "models" / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    done = clrt("convert", "models/a.obj", "scenes/a.toml", cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "scenes/a.toml\n", "")
+    assert 'file = "../models/a.obj"' in (tmp_path / "scenes" / "a.toml").read_text()
+    for name in ("models/a.obj", "scenes/a.toml"):
+        assert clrt("render", name, "-o", f"{Path(name).suffix[1:]}.exr", "--size", "16x16", "--spp", "4",
+                    cwd=tmp_path).returncode == 0
+    np.testing.assert_array_equal(read_image(tmp_path / "obj.exr"), read_image(tmp_path / "toml.exr"))
+    done = clrt("convert", "models/a.obj", "scenes/a.toml", cwd=tmp_path)
+    assert done.returncode == 2 and "exists already" in done.stderr and "--force" in done.stderr
+    assert clrt("convert", "models/a.obj", "scenes/a.toml", "--force", cwd=tmp_path).returncode == 0
+    assert clrt("convert", "scenes/a.toml", "b.toml", cwd=tmp_path).returncode == 2
+    assert clrt("convert", "models/a.obj", "b.obj", cwd=tmp_path).returncode == 2
+    done = clrt("convert", "models/a.obj", "b.toml", "--camera", "side", cwd=tmp_path)
+    assert done.returncode == 3 and '--camera: "side" is unknown' in done.stderr
