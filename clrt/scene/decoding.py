@@ -21,7 +21,8 @@ Found = tuple[dict[str, NDArray[Any]], dict[str, Any]]
 #: Bytes of memory that this process may have, and those of the largest picture: 16384 x 8192 in four floats.
 MOST_MEMORY = 8 * 2**30
 MOST_BYTES = 2**31
-#: A picture that has more bytes for each of its file's is no picture: deflate reaches 1032, JPEG about 300.
+#: A picture beyond 8192 x 8192 must have a byte in its file for so many of its own: deflate reaches 1032.
+FREE_BYTES = 2**28
 MOST_RATIO = 2000
 #: Seconds without a request after which the process ends.
 IDLE = 2.0
@@ -42,7 +43,7 @@ def picture(file: str) -> Found:
     spec = buffer.nativespec()
     kind, size = kinds.get(spec.format.basetype, (oiio.FLOAT, 4))
     count = spec.width * spec.height * spec.nchannels * size
-    if count > MOST_RATIO * os.path.getsize(file):
+    if count > max(FREE_BYTES, MOST_RATIO * os.path.getsize(file)):
         raise ValueError(f"{spec.width}x{spec.height} pixels cannot be in {os.path.getsize(file)} bytes")
     pixels = buffer.get_pixels(kind) if buffer.read(0, 0, True, kind) else None
     if pixels is None:

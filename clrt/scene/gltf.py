@@ -35,17 +35,22 @@ def read_gltf(path: Path, normals: Normals = "file") -> Model:
     Raises SceneError naming the file and the accessor, node or mesh that is wrong.
     """
     try:
-        data = GltfData(path)
-        nodes = list(_nodes(data.document))
-        meshes = _place(data, nodes, normals)
-        problems = [problem for mesh in meshes for problem in mesh_problems(mesh, "mesh")]
-        if problems:
-            raise SceneError(problems)
-        _warn_of_left_out(path, data.document)
-        middle = np.mean(bounds(meshes), axis=0)
-        return Model(meshes=meshes, cameras=read_cameras(path, data.document, nodes, middle))
+        with np.errstate(all="ignore"):  # what is not finite is refused in words
+            return _read(path, normals)
     except SceneError as error:
         raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+
+
+def _read(path: Path, normals: Normals) -> Model:
+    data = GltfData(path)
+    nodes = list(_nodes(data.document))
+    meshes = _place(data, nodes, normals)
+    problems = [problem for mesh in meshes for problem in mesh_problems(mesh, "mesh")]
+    if problems:
+        raise SceneError(problems)
+    _warn_of_left_out(path, data.document)
+    middle = np.mean(bounds(meshes), axis=0)
+    return Model(meshes=meshes, cameras=read_cameras(path, data.document, nodes, middle))
 
 
 def _nodes(document: gltf.Document) -> Iterator[Placed]:

@@ -15,6 +15,7 @@ import numpy as np
 import OpenImageIO as oiio
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 
 from clrt.errors import SceneError
 from clrt.output.images import rgbe_rounded, write_image
@@ -150,6 +151,15 @@ def test_a_small_file_may_not_claim_a_huge_picture(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(content)
     with pytest.raises(SceneError, match="cannot be decoded as a picture"):
         read_picture(tmp_path / "a.png")
+
+
+def test_a_flat_picture_may_have_a_small_file(tmp_path: Path) -> None:
+    """Two colours in a palette, one bit a pixel, compress to a five-thousandth of their texels."""
+    image = Image.new("P", (512, 512), 1)
+    image.putpalette([255, 0, 0, 0, 128, 255])
+    image.save(tmp_path / "a.png", bits=1)
+    assert (tmp_path / "a.png").stat().st_size < 512 * 512 * 4 / 3000
+    assert (read_texels(tmp_path / "a.png") == [0, 128, 255, 255]).all()
 
 
 def test_a_decoder_that_hangs_or_crashes_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,129 @@
+"""Small good files of every format, which tests.fuzz damages."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+
+import imageio.v3 as imageio
+import numpy as np
+
+from clrt.output.images import write_image
+from .fuzz import FORMATS, LARGEST, OBJ
+from .scene.glb import Gltf, ball
+from .scene.shapes import icosphere
+from .scene.test_gltf import cameras, compressed
+from .scene.test_meshes import (obj, obj_with_normals, off, ply_ascii, ply_big_endian, ply_binary, ply_with_normals,
+                                stl_ascii, stl_binary)
+
+SCENE = """
+[camera]
+position = [0, 1, 5]
+look_at = [0, 1, 0]
+fov_degrees = 30
+[render]
+size = [64, 32]
+spp = 16
+[environment]
+image = "sky.hdr"
+[materials.white]
+type = "diffuse"
+color = [0.73, 0.73, 0.73]
+[materials."my ring"]
+type = "metallic_roughness"
+preset = "gold"
+roughness = 0.2
+[materials.lamp]
+type = "diffuse"
+emission = [17, 12, 4]
+[materials.wood]
+type = "diffuse"
+color = { image = "wood.png", scale = [2, 2] }
+[[mesh]]
+file = "n.ply"
+material = "white"
+[[mesh]]
+file = "a.obj"
+materials = { "" = "lamp" }
+[[mesh]]
+name = "floor"
+vertices = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+faces = [[0, 1, 2]]
+scale = [1, 2, 3]
+rotate_degrees = [90, 0, 90]
+translate = [10, 20, 30]
+[[sphere]]
+center = [0, 1, 0]
+radius = 2
+material = "my ring"
+[[light]]
+type = "point"
+position = [1.5, 4, 3]
+intensity = [60, 58, 50]
+"""
+MTL = """newmtl a
+Kd 0.5 0.25 0.125
+Ks 1 1 1
+Ns 30
+illum 2
+newmtl b
+Pr 0.5
+Pm 1
+Ke 1 2 3
+map_Kd -s 2 2 2 wood.png
+"""
+
+
+def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
+    """One or a few of each format, and those in the folders `more` that are small."""
+    folder.mkdir(parents=True)
+    for name, write in {"a.obj": obj, "n.obj": obj_with_normals, "a.ply": ply_ascii, "b.ply": ply_binary,
+                        "c.ply": ply_big_endian, "n.ply": ply_with_normals, "a.stl": stl_ascii, "b.stl": stl_binary,
+                        "a.off": off}.items():
+        write(folder / name)
+    (folder / "quads.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+        "element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+        "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n3 0 1 2\n")
+    (folder / "a.mtl").write_text(MTL)
+    (folder / "b.obj").write_text(OBJ.replace("damaged", "a"))
+    (folder / "a.toml").write_text(SCENE)
+    pixels = np.random.default_rng(0).random((24, 48, 3), np.float32)
+    pixels[:, 20:40] = 0.5
+    for name in ("sky.hdr", "sky.exr"):
+        write_image(folder / name, pixels)
+    for name in ("wood.png", "wood.jpg"):
+        imageio.imwrite(folder / name, (pixels * 255).astype(np.uint8))
+    for name, document in {"a.glb": ball(), "b.gltf": ball(), "cameras.gltf": cameras(), "draco.glb": compressed(),
+                           "textured.glb": textured((folder / "wood.jpg").read_bytes())}.items():
+        document.write(folder / name)
+    for place in more:
+        for file in sorted(place.rglob("*")):
+            if file.suffix == ".bin":  # by the name that its model knows
+                shutil.copyfile(file, folder / file.name)
+            elif file.is_file() and file.suffix.lower() in FORMATS and file.stat().st_size <= LARGEST:
+                shutil.copyfile(file, folder / f"{place.name}-{file.name.lower()}")
+
+
+def textured(picture: bytes) -> Gltf:
+    """A strided, quantised and sparse ball with a picture inside."""
+    vertices, faces = icosphere(0)
+    gltf = Gltf()
+    rows = np.zeros(len(vertices), [("position", "<i2", 4), ("uv", "<u2", 2)])
+    rows["position"][:, :3], rows["uv"] = vertices * 32767, vertices[:, :2] * 30000 + 32000
+    view = gltf.view(rows.tobytes(), byteStride=rows.itemsize)
+    sparse = {"count": 2, "indices": {"bufferView": gltf.view(bytes([2, 5])), "componentType": 5121},
+              "values": {"bufferView": gltf.view(np.array([[7, 8, 9], [4, 5, 6]], "<i2").tobytes())}}
+    position = gltf.accessor(vertices, "<i2", view, normalized=True, sparse=sparse)
+    uv = gltf.accessor(vertices[:, :2], "<u2", view, byteOffset=8, normalized=True)
+    gltf.document |= {"images": [{"bufferView": gltf.view(picture), "mimeType": "image/jpeg"}],
+                      "textures": [{"source": 0, "sampler": 0}], "samplers": [{"wrapS": 33071}],
+                      "materials": [{"name": "wood", "pbrMetallicRoughness": {
+                          "baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}},
+                          "normalTexture": {"index": 0}, "alphaMode": "MASK"}],
+                      "extensionsUsed": ["KHR_mesh_quantization"]}
+    gltf.mesh(attributes={"POSITION": position, "TEXCOORD_0": uv}, material=0,
+              indices=gltf.accessor(faces.ravel(), "<u1"))
+    gltf.node(mesh=0, matrix=(np.diag([2.0, -1, 3, 1])).ravel().tolist())
+    return gltf

@@ -1,0 +1,47 @@
+"""What `clrt render` makes of the files in some folders: `python -m tests.outcomes FOLDER...` prints a table.
+
+Each file is rendered small in a process of its own: a picture, with the warnings counted, or an error, exit code 3,
+is as it should be.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from clrt.scene.meshes import SUFFIXES
+
+#: Seconds that one file may take.
+LIMIT = 120
+
+
+def outcome(file: Path, picture: Path) -> tuple[str, str]:
+    """picture, error, or what it must not be; and what was said, without the file's path."""
+    command = [sys.executable, "-m", "clrt", "render", str(file), "--size", "64x64", "--spp", "4", "-o", str(picture)]
+    try:
+        done = subprocess.run([*command, "--progress", "json"], capture_output=True, text=True, timeout=LIMIT)
+    except subprocess.TimeoutExpired:
+        return "hang", ""
+    said = [line.replace(f"{file}: ", "").removeprefix("error: ") for line in done.stderr.splitlines()
+            if not line.startswith("{")]
+    kinds = {0: "picture", 3: "error"}
+    kind = "traceback" if "Traceback" in done.stderr else kinds.get(done.returncode, f"code {done.returncode}")
+    return kind, "; ".join(said)
+
+
+def main() -> None:
+    files = sorted(file for folder in sys.argv[1:] for file in Path(folder).rglob("*") if file.suffix in SUFFIXES)
+    counts: dict[str, int] = {}
+    print("| file | outcome | said |\n|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        for file in files:
+            kind, said = outcome(file, Path(folder) / "a.png")
+            counts[kind] = counts.get(kind, 0) + 1
+            print(f"| {file.name} | {kind} | {said.replace('|', '/')} |", flush=True)
+    print(f"\n{len(files)} files: " + ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items())))
+
+
+if __name__ == "__main__":
+    main()
