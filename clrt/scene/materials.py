@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from math import log1p
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
 from annotated_types import Ge, Le
 
@@ -99,6 +99,13 @@ class Material:
     def conflicts(self) -> list[str]:
         """What is wrong with its fields together: "FIELD: fault; remedy"."""
         return []
+
+    def without_textures(self: Self) -> Self:
+        """Itself with the factors of its textures alone."""
+        colors = {field.name for field in fields(self) if isinstance(field.default, tuple)}
+        plain: dict[str, Any] = {name: as_color(value.factor) if name in colors else value.factor
+                                 for name, value in vars(self).items() if isinstance(value, Texture)}
+        return replace(self, **plain | {"normal_map": None})
 
     def textures(self) -> list[Texture]:
         """All that it reads."""

@@ -6,6 +6,7 @@ and wrong indices and raise whatever Python raises, so all they return is checke
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +18,11 @@ from .materials import Diffuse
 from .model import Mesh, Model
 from .normals import Normals, choose_normals
 from .obj import parse_obj
+from .pictures import linear_from_srgb
 from .ply import plain_ply
 from .validate import index_problems, mesh_problems
+
+log = logging.getLogger(__name__)
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 
@@ -99,16 +103,38 @@ def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
             vertices = np.ascontiguousarray(piece["vertices"], np.float32)
             stored = piece.get("vertex_normals")
             stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
+            uv = None if piece.get("uv") is None else _downward(np.asarray(piece["uv"], np.float32))
         faces = _triangles(np.asarray(piece["faces"], np.int64), name)
     except (TypeError, ValueError):
         raise SceneError(f'mesh "{name}": its lines have different numbers of values; export it again') from None
-    mesh = Mesh(vertices, faces.astype(np.int32), piece.get("material", Diffuse()), name=name,
-                material_name=piece.get("material_name", ""))
+    colors = _linear_colors(piece.get("vertex_colors"))
+    plain = Diffuse() if colors is None else Diffuse(color=(1.0, 1.0, 1.0))
+    material = piece.get("material") or plain
+    if uv is None and material.textures():
+        log.warning('mesh "%s" has no texture coordinates; the textures of its material are left out', name)
+        material = material.without_textures()
+    mesh = Mesh(vertices, faces.astype(np.int32), material, name=name, material_name=piece.get("material_name", ""),
+                uv=uv, colors=colors)
     problems = index_problems(faces, len(vertices), f'mesh "{name}"') or mesh_problems(mesh, "mesh")
     if problems:
         raise SceneError(problems)
     mesh.normals = choose_normals(normals, vertices, mesh.faces, stored)
     return mesh
+
+
+def _downward(uv: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Texture coordinates (n, k) with v upwards, as these files have them, or with u alone, as (n, 2)."""
+    v = uv[:, 1] if uv.shape[1] > 1 else np.zeros(len(uv), np.float32)
+    return np.nan_to_num(np.stack([uv[:, 0], 1 - v], axis=1))
+
+
+def _linear_colors(colors: Any) -> NDArray[np.float32] | None:
+    """Vertex colours as these files have them: by sRGB's curve, whole numbers up to 255."""
+    if colors is None:
+        return None
+    given = np.asarray(colors)
+    encoded = np.asarray(given / (255 if np.issubdtype(given.dtype, np.integer) else 1), np.float32)[:, :3]
+    return linear_from_srgb(np.nan_to_num(encoded).clip(0, 1))
 
 
 def _triangles(polygons: NDArray[np.int64], name: str) -> NDArray[np.int64]:

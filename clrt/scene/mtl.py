@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from ..errors import SceneError
 from .materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from .mtl_maps import Maps, strength
+from .textures import Texture
 
 #: Illumination models by what they ask for beyond a highlight.
 MIRRORS, GLASS = {3, 5, 8}, {4, 6, 7, 9}
@@ -21,6 +23,8 @@ MIRRORS, GLASS = {3, 5, 8}, {4, 6, 7, 9}
 BLACK = 0.05
 #: Keys of layers and effects that no material here has.
 OTHERS = {"ps": "sheen (Ps)", "pc": "clearcoat (Pc)", "aniso": "anisotropy (aniso)"}
+#: Maps that are read.
+MAPS = {"map_kd", "map_ke", "map_d", "map_pr", "map_pm", "norm", "map_kn"}
 KEYS = {"kd", "ks", "ke", "ns", "ni", "tf", "tr", "d", "illum", "pr", "pm", *OTHERS}
 
 
@@ -76,33 +80,49 @@ def _numbers(entry: Entry, key: str, rest: str) -> list[float]:
     return numbers
 
 
-def material(entry: Entry) -> Material:
-    """What an entry says without its maps.
+def material(entry: Entry, maps: Maps) -> Material:
+    """What an entry says.
 
     With Pr or Pm, metallic_roughness; else by `illum` glass, a mirror, gloss or diffuse. Gloss is as rough as its
-    exponent Ns says, where GGX is as wide as Blinn's lobe: alpha² = 2/(Ns + 2) (Walter et al. 2007).
+    exponent Ns says, where GGX is as wide as Blinn's lobe: alpha² = 2/(Ns + 2) (Walter et al. 2007). Maps multiply the
+    colours and numbers that they are of, or 1 where these are missing.
     """
-    shared: dict[str, Any] = {"emission": entry.color("ke", 0.0, math.inf)}
-    color, specular = entry.color("kd", 0.8), entry.color("ks", 0.0)
+    found = {key: texture for key, words in entry.maps.items() if key in MAPS and (texture := maps.texture(words))}
+    shared: dict[str, Any] = {"emission": _painted(found.get("map_ke"), entry, "ke", 0.0, math.inf)}
+    if (bend := found.get("norm") or found.get("map_kn")) is not None:
+        shared["normal_map"] = replace(bend, factor=strength(entry.maps.get("norm", entry.maps.get("map_kn", ""))))
     roughness = (2 / (2 + max(entry.number("ns", 0.0), 0.0))) ** 0.25
-    if {"pr", "pm"} & entry.numbers.keys():
-        return MetallicRoughness(color=color, metallic=entry.color("pm", 0.0)[0],
-                                 roughness=entry.color("pr", roughness)[0], **shared)
-    if entry.illumination in GLASS:
+    if entry.illumination in GLASS and not {"pr", "pm"} & entry.numbers.keys():
         ior = float(np.clip(entry.number("ni", 1.5), 0.25, 4.0))
         return Dielectric(color=entry.color("tf", 1.0), ior=ior, **shared)
-    if entry.illumination in MIRRORS and max(color) < BLACK < max(specular):
+    clear = min(max(1.0 - entry.number("d", 1.0 - entry.number("tr", 0.0)), 0.0), 1.0)
+    shared["opacity"] = _numbered(found.get("map_d"), 1.0 - clear)
+    color, specular = _painted(found.get("map_kd"), entry, "kd", 0.8), entry.color("ks", 0.0)
+    if {"pr", "pm"} & entry.numbers.keys() or {"map_pr", "map_pm"} & found.keys():
+        rough = entry.color("pr", 1.0 if "map_pr" in found else roughness)[0]
+        metal = entry.color("pm", 1.0 if "map_pm" in found else 0.0)[0]
+        return MetallicRoughness(color=color, metallic=_numbered(found.get("map_pm"), metal),
+                                 roughness=_numbered(found.get("map_pr"), rough), **shared)
+    black = not isinstance(color, Texture) and max(color) < BLACK
+    if entry.illumination in MIRRORS and black and max(specular) > BLACK:
         return Mirror(color=specular, **shared)
     if entry.illumination >= 2 and max(specular) > 0:
         return MetallicRoughness(color=color, roughness=roughness, **shared)
     return Diffuse(color=color, **shared)
 
 
+def _painted(texture: Texture | None, entry: Entry, key: str, missing: float,
+             most: float = 1.0) -> tuple[float, float, float] | Texture:
+    """A colour, or its map times it."""
+    return entry.color(key, missing, most) if texture is None else replace(texture, factor=entry.color(key, 1.0, most))
+
+
+def _numbered(texture: Texture | None, number: float) -> float | Texture:
+    return number if texture is None else replace(texture, factor=number)
+
+
 def left_out(entries: Mapping[str, Entry]) -> list[str]:
     """What the entries have that `material` leaves out, in words."""
-    maps = sorted({key for entry in entries.values() for key in entry.maps})
+    maps = sorted({key for entry in entries.values() for key in entry.maps} - MAPS)
     numbers = {key for entry in entries.values() for key in entry.numbers}
-    clear = any(entry.number("d", 1.0) < 1 or entry.number("tr", 0.0) > 0 for entry in entries.values()
-                if entry.illumination not in GLASS)
-    return ([f"textures ({', '.join(maps)})"] * bool(maps) + ["transparency (d, Tr)"] * clear
-            + [words for key, words in OTHERS.items() if key in numbers])
+    return [f"textures ({', '.join(maps)})"] * bool(maps) + [words for key, words in OTHERS.items() if key in numbers]

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
-from .materials import Diffuse, Material
+from .materials import Material
 from .mtl import Entry, left_out, material, read_library
+from .mtl_maps import Maps
 
 log = logging.getLogger(__name__)
 Floats = NDArray[np.float64]
@@ -46,7 +47,7 @@ def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
             meshes[name] = {
                 "vertices": points[where[0], :3], "faces": numbers[faces], "vertex_normals": _taken(normals, where[2]),
                 "uv": _taken(uv, where[1]), "vertex_colors": None if colors is None else colors[where[0]],
-                "material": libraries.get(name, Diffuse()), "material_name": name}
+                "material": libraries.get(name), "material_name": name}
     return {name if name and len(meshes) > 1 else path.stem: mesh for name, mesh in meshes.items()}
 
 
@@ -173,7 +174,8 @@ def _libraries(path: Path, text: str) -> dict[str, Material]:
                     raise SceneError([f"{library.name}: {problem}" for problem in error.problems]) from None
     if names := left_out(entries):
         log.warning("%s: left out: %s", path, ", ".join(names))
-    return {name: material(entry) for name, entry in entries.items()}
+    maps = Maps(path.parent)
+    return {name: material(entry, maps) for name, entry in entries.items()}
 
 
 def _text(path: Path) -> str:
