@@ -1,9 +1,18 @@
-// Pinhole camera (Suchiński 3.1, Nadolny algorithm 2): d = a·f·(2x/w − 1)·r − f·(2y/h − 1)·u + v, normalised, with
-// (x, y) drawn from the filter around the pixel's middle, f = tan(fov/2), a = w/h. World frame; the host folds a·f and f
-// into right and up.
+// What a work-item sees: its pixels, and the camera's rays through them. World frame.
+//
+// The camera's file in camera/ provides, for the place (sx, sy) of the picture, which goes from (−1, −1), its upper left
+// corner, to (1, 1), the lower right, and with a wide filter a little beyond:
+//
+//   ray_through(launch, sx, sy, &sampler)     its ray; a camera that draws no numbers leaves them to the path
+//
+// Each says what launch->right, up and forward are to it; clrt/rendering/camera.py makes them.
 #include "sampler.cl"
 #include "vector.cl"
 #include FILTER
+
+typedef struct { real3 origin, direction; } CameraRay;   // direction: unit
+
+#include CAMERA
 
 // What the lanes of a work-item see: LANES pixels of a tile of TILE x TILE. A launch takes those from first_pixel on,
 // counted tile by tile as `tiles` lists them, row by row in each. A lane past the picture's edge is given its first lane's
@@ -31,9 +40,10 @@ static inline bool lane_pixels(const Launch *launch, global const uint *tiles, L
     return true;
 }
 
-static inline real3 camera_direction(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u) {
+// A ray through the pixel (x, y), its place drawn from the filter around the pixel's middle.
+static inline CameraRay camera_ray(const Scene *scene, const Launch *launch, ureal x, ureal y, Sampler *sampler) {
+    real2 u = next_2d(sampler);
     real sx = 2.0f * (TO_REAL(x) + filter_sample(scene, u.x)) / (float)launch->width - 1.0f;
     real sy = 2.0f * (TO_REAL(y) + filter_sample(scene, u.y)) / (float)launch->height - 1.0f;
-    real3 right = broadcast(launch->right), up = broadcast(launch->up), forward = broadcast(launch->forward);
-    return normalize3(mad3(right, sx, mad3(up, -sy, forward)));
+    return ray_through(launch, sx, sy, sampler);
 }

@@ -135,12 +135,11 @@ kernel void path(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles,
     Scene scene = SCENE_ARGUMENTS;
     LanePixels own;
     if (!lane_pixels(&launch, tiles, &own)) return;
-    real3 position = broadcast(launch.position);
     Accumulator pixels = load_pixels(film, AS_INT(own.index));
     for (uint s = 0; s < launch.sample_count; ++s) {
         Sampler sampler = sampler_at(own.code, (ureal)(launch.first_sample + s), launch.seed, launch.block_bits);
-        real3 direction = camera_direction(&scene, &launch, own.x, own.y, next_2d(&sampler));
-        real3 L = radiance(&scene, position, direction, own.inside, launch.max_depth, &sampler, &pixels.rays);
+        CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, &sampler);
+        real3 L = radiance(&scene, ray.origin, ray.direction, own.inside, launch.max_depth, &sampler, &pixels.rays);
         accumulate(&pixels, L, own.inside);
     }
     store_pixels(film, own.index, own.inside, &pixels);

@@ -22,6 +22,7 @@ from ..scene.model import Camera, Scene
 from ..scene.textures import Texture
 from ..scene.scaling import Frame, frame_of, in_frame
 from ..scene.validate import validate
+from .camera import camera_file
 from .corners import pack_corners
 from .emitters import SURFACES, TYPES, Emitters, pack_emitters
 from .environment import Sky, pack_sky
@@ -140,7 +141,7 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
              "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
              "OPACITY_FILE": ["opacity.cl"] if "OPACITY" in features else [],
              "TEXTURE_FILES": ["texture.cl"] if textures.uv_sets else [],
-             "SAMPLER": [f"sampler/{scene.render.sampler}.cl"],
+             "SAMPLER": [f"sampler/{scene.render.sampler}.cl"], "CAMERA": [camera_file(scene.camera)],
              "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"]}
     return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame)
 

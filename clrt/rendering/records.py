@@ -39,7 +39,7 @@ PIXEL = record(sum="3f4", count="u4", sum_error="3f4", dropped="u4", square="3f4
                pad="u4")
 LAUNCH = record(position="3f4", width="u4", right="3f4", height="u4", up="3f4", max_depth="i4", forward="3f4",
                 seed="u4", first_pixel="u4", pixel_count="u4", first_sample="u4", sample_count="u4",
-                block_bits="u4", pad="3u4")
+                block_bits="u4", lens_radius="f4", pad="2u4")
 #: u_row, v_row: what of (u, v, 1) makes the picture's coordinates. first: of its texels.
 TEXTURE = record(u_row="3f4", width="i4", v_row="3f4", height="i4", first="i4", wrap_u="i4", wrap_v="i4", nearest="i4",
                  uv_set="i4", shift="u4", pad="2i4")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pyopencl as cl
@@ -15,10 +14,10 @@ from ..device.launch import Launches, wait_for
 from ..device.open import Device
 from ..device.program import BuiltProgram, build, make_kernel
 from ..errors import DeviceError
-from ..scene.model import Camera
+from .camera import launch_record
 from .compile import CompiledScene
 from .film import Film
-from .records import LAUNCH, PIXEL
+from .records import PIXEL
 from .tiles import TILE_PIXELS, tile_pixels, tiles_of
 from .work import Part, Work
 
@@ -36,7 +35,9 @@ class Session:
                  seed: int, planned_spp: int | None = None) -> None:
         self.device, self.compiled, self.size = device, compiled, size
         self.program: BuiltProgram = build(device, compiled.source)
-        self.launch = _launch_record(compiled.camera, size, max_depth, seed, block_bits(planned_spp))
+        self.launch = launch_record(compiled.camera, size)
+        self.launch["max_depth"], self.launch["seed"] = max_depth, seed
+        self.launch["block_bits"] = block_bits(planned_spp)
         self.work = Work(np.zeros(tiles_of(size), np.int64))
         self._launches = Launches(FIRST_LAUNCH_SAMPLES)
         width, height = size
@@ -166,20 +167,3 @@ def block_bits(planned_spp: int | None) -> int:
     The least power of two for all `planned_spp`; 32, without an end, where it is not known how many there will be.
     """
     return 32 if planned_spp is None else (planned_spp - 1).bit_length()
-
-
-def _launch_record(camera: Camera, size: tuple[int, int], max_depth: int, seed: int, block: int) -> NDArray[Any]:
-    """The LAUNCH record with its camera: right and up carry the picture's half extents (kernels/camera.cl)."""
-    width, height = size
-    forward = np.subtract(camera.look_at, camera.position, dtype=np.float64)
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, np.asarray(camera.up, np.float64))
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
-    extent = np.tan(np.radians(camera.fov_degrees) / 2)
-    record = np.zeros(1, LAUNCH)
-    record["position"], record["forward"] = camera.position, forward
-    record["right"], record["up"] = right * extent * width / height, up * extent
-    record["width"], record["height"], record["max_depth"], record["seed"] = width, height, max_depth, seed
-    record["block_bits"] = block
-    return record

@@ -17,7 +17,9 @@ from .textures import NonNegative
 Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
+Positive = Annotated[float, Gt(0)]
 Pixels = Annotated[int, Ge(1), Le(65536)]
+Projection = Literal["perspective", "orthographic", "equirectangular"]
 Integrator = Literal["path", "direct"]
 Sampler = Literal["sobol", "stratified", "independent"]
 Filter = Literal["box", "tent", "blackman_harris"]
@@ -25,12 +27,22 @@ Filter = Literal["box", "tent", "blackman_harris"]
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:
-    """A pinhole. `fov_degrees`: vertical, full angle. The picture's right is cross(forward, up)."""
+    """What the picture shows; `look_at` is in its middle, and its right is cross(forward, up).
+
+    perspective: through a pinhole, or a thin lens of `aperture_radius` that is sharp at `focus_distance` along the view
+    (None: that of `look_at`); `fov_degrees`: vertical, full angle. orthographic: parallel rays, a picture `view_height`
+    high (None: as high as the perspective is at `look_at`). equirectangular: all directions, laid out as Environment's
+    for a view along +Z.
+    """
 
     position: Vector = (0.0, 0.0, 5.0)
     look_at: Vector = (0.0, 0.0, 0.0)
     up: Vector = (0.0, 1.0, 0.0)
     fov_degrees: Annotated[float, Gt(0), Lt(180)] = 40.0
+    aperture_radius: NonNegative = 0.0
+    focus_distance: Positive | None = None
+    projection: Projection = "perspective"
+    view_height: Positive | None = None
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)
@@ -80,7 +92,7 @@ class Sphere:
     """A sphere seen from outside (or from inside, which is its back side)."""
 
     center: Vector = (0.0, 0.0, 0.0)
-    radius: Annotated[float, Gt(0)] = 1.0
+    radius: Positive = 1.0
     material: Material = field(default_factory=Diffuse)
     name: str = "sphere"
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .lights import Light, PointLight
-from .model import Scene, Sphere, Vector
+from .model import Camera, Scene, Sphere, Vector
 
 #: Scenes whose largest coordinate (the camera's aside) lies between 2^-20 and 2^20 are left as large as they are.
 COMFORTABLE = 20
@@ -74,11 +74,16 @@ def in_frame(scene: Scene, frame: Frame) -> Scene:
     """The scene in a frame, with point lights such that the picture stays the same."""
     if frame == Frame():
         return scene
-    position, look_at = frame.point(scene.camera.position), frame.point(scene.camera.look_at)
     return replace(scene, meshes=[replace(mesh, vertices=frame.points(mesh.vertices)) for mesh in scene.meshes],
-                   camera=replace(scene.camera, position=position, look_at=look_at),
+                   camera=_camera(scene.camera, frame),
                    spheres=[_sphere(sphere, frame) for sphere in scene.spheres],
                    lights=[_light(light, frame) for light in scene.lights])
+
+
+def _camera(camera: Camera, frame: Frame) -> Camera:
+    focus, height = (length and length * frame.unit for length in (camera.focus_distance, camera.view_height))
+    return replace(camera, position=frame.point(camera.position), look_at=frame.point(camera.look_at),
+                   aperture_radius=camera.aperture_radius * frame.unit, focus_distance=focus, view_height=height)
 
 
 def _sphere(sphere: Sphere, frame: Frame) -> Sphere:

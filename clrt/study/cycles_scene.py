@@ -38,6 +38,8 @@ def check_scene(scene: Scene) -> None:
         if isinstance(owner.material, MetallicRoughness) and not _is_metal(owner.material):
             raise UsageError(f"{owner.name}: Cycles can draw metallic_roughness that is all metal, with single "
                              'scattering and smith = "height_correlated"')
+    if scene.camera.projection != "perspective" or scene.camera.aperture_radius:
+        raise UsageError(f"{scene.name}: Cycles is told of pinholes only")
     if scene.render.filter != "box" or scene.render.max_depth < 2:
         raise UsageError(f'{scene.name}: Cycles is compared with filter = "box", and two path edges or more')
 

@@ -41,10 +41,16 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
 
 
 def _sensor(scene: Scene, sampler: str) -> Plugin:
-    """A pinhole and its film: pixels are means over their own squares."""
+    """A pinhole or lens, and its film: pixels are means over their own squares."""
     camera, (width, height) = scene.camera, scene.render.size
+    if camera.projection != "perspective":
+        raise UsageError(f"{scene.name}: Mitsuba is not told of {camera.projection} cameras yet")
     distance = float(np.linalg.norm(np.subtract(camera.look_at, camera.position)))
-    return {"type": "perspective", "fov": camera.fov_degrees, "fov_axis": "y", "to_world": _look_at(camera),
+    lens: Plugin = {"type": "perspective"}
+    if camera.aperture_radius:
+        lens = {"type": "thinlens", "aperture_radius": camera.aperture_radius,
+                "focus_distance": camera.focus_distance or distance}
+    return {**lens, "fov": camera.fov_degrees, "fov_axis": "y", "to_world": _look_at(camera),
             "near_clip": NEAR * distance, "far_clip": FAR * distance, "sampler": {"type": sampler},
             "film": {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
                      "component_format": "float32", "rfilter": {"type": "box"}}}

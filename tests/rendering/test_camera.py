@@ -1,43 +1,73 @@
-"""What lies somewhere in the world lies where float64 says in the picture."""
+"""What lies somewhere in the world lies where float64 says in the picture, through every camera."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from clrt.device.open import Device
+from clrt.rendering.aov import render_aovs
 from clrt.scene.materials import Diffuse
-from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Environment, Projection, RenderSettings, Scene, Sphere
+from clrt.study.significance import sidak
 
-from .pictures import film, frame
+from .pictures import film, frame, pixel_p_values, session
 from .skies import lookup
 
+Doubles = NDArray[np.float64]
 CAMERAS = {
     "plain": Camera(position=(0.0, 0.0, 5.0), look_at=(0.0, 0.0, 0.0), fov_degrees=40),
     "wide": Camera(position=(1.0, 2.0, 3.0), look_at=(4.0, 2.5, -3.0), fov_degrees=110),
     "down": Camera(position=(0.0, 8.0, 0.0), look_at=(0.0, 0.0, 0.0), up=(0.0, 0.0, -1.0), fov_degrees=20),
     "rolled": Camera(position=(-3.0, 1.0, 2.0), look_at=(0.0, 0.0, 0.0), up=(1.0, 2.0, -0.3), fov_degrees=60),
     "far": Camera(position=(1e5, 0.0, 0.0), look_at=(1e5, 0.0, -1.0), fov_degrees=40),
+    "lens": Camera(position=(-3.0, 1.0, 2.0), up=(1.0, 2.0, -0.3), aperture_radius=0.5, focus_distance=20.0),
+    "parallel": Camera(position=(1.0, 2.0, 3.0), look_at=(4.0, 2.5, -3.0), projection="orthographic", view_height=7.0),
+    "as high as": Camera(position=(0.0, 3.0, 4.0), projection="orthographic", fov_degrees=90),
+    "all around": Camera(position=(-3.0, 1.0, 2.0), up=(1.0, 2.0, -0.3), projection="equirectangular"),
 }
+
+
+def seen_at(camera: Camera, size: tuple[int, int], x: Doubles, y: Doubles, depth: Doubles) -> tuple[Doubles, Doubles]:
+    """(n, 3) points that the camera sees at (x, y) in pixels, at a depth, and how wide a pixel is there, (n,)."""
+    forward, right, up, extent = frame(camera)
+    width, height = size
+    a, b = 2 * x / width - 1, 1 - 2 * y / height
+    if camera.projection == "equirectangular":
+        latitude, longitude = np.pi / 2 * b, np.pi * a
+        level = np.outer(np.cos(longitude), forward) + np.outer(np.sin(longitude), right)
+        directions = np.cos(latitude)[:, None] * level + np.outer(np.sin(latitude), up)
+        pixel = np.pi * np.minimum(2 * np.cos(latitude) / width, 1 / height)
+        return camera.position + depth[:, None] * directions, depth * pixel
+    half = depth * extent
+    if camera.projection == "orthographic":
+        distance = np.linalg.norm(np.subtract(camera.look_at, camera.position))
+        half = np.full(len(depth), camera.view_height / 2 if camera.view_height else extent * distance)
+    across = np.outer(half * a * width / height, right) + np.outer(half * b, up)
+    return camera.position + np.outer(depth, forward) + across, 2 * half / height
+
+
+def glowing(centers: Doubles, radii: Doubles) -> list[Sphere]:
+    """Their ratio of green and red tells which is which: 1, 2, ..."""
+    return [Sphere(center=tuple(center), radius=radius, material=Diffuse(emission=(1.0, float(i + 1), 0.0)))
+            for i, (center, radius) in enumerate(zip(centers.tolist(), radii.tolist()))]
 
 
 @pytest.mark.parametrize("name", CAMERAS)
 @pytest.mark.parametrize("size", [(40, 30), (21, 55)], ids=str)
 def test_spheres_lie_where_they_are_seen(device: Device, name: str, size: tuple[int, int]) -> None:
-    """Eight glowing spheres, smaller than a pixel, in the middles of pixels; the ratio of red and green says which."""
+    """Eight glowing spheres, smaller than a pixel, in the middles of pixels; before a lens they are in focus."""
     camera, (width, height) = CAMERAS[name], size
-    forward, right, up, extent = frame(camera)
     rng = np.random.default_rng(1)
-    pixels = rng.permutation(width * height)[:8]
+    pixels = width * (height // 5) + rng.permutation(width * (3 * height // 5))[:8]   # poles are far
     columns, rows = pixels % width, pixels // width
-    depth = rng.uniform(5, 50, 8)
-    x = (2 * (columns + 0.5) / width - 1) * extent * width / height
-    y = (1 - 2 * (rows + 0.5) / height) * extent
-    centers = camera.position + depth[:, None] * (forward + x[:, None] * right + y[:, None] * up)
-    radius = 0.15 * depth * 2 * extent / height
-    spheres = [Sphere(center=tuple(center), radius=float(r), material=Diffuse(emission=(1.0, float(i + 1), 0.0)))
-               for i, (center, r) in enumerate(zip(centers.tolist(), radius))]
-    scene = Scene(spheres=spheres, camera=camera, render=RenderSettings(size=size, spp=256, max_depth=1))
+    depth = np.full(8, camera.focus_distance) if camera.focus_distance else rng.uniform(5, 50, 8)
+    centers, pixel = seen_at(camera, size, columns + 0.5, rows + 0.5, depth)
+    scene = Scene(spheres=glowing(centers, 0.15 * pixel), camera=camera,
+                  render=RenderSettings(size=size, spp=256, max_depth=1))
     picture = film(device, scene).mean
     assert sorted(np.flatnonzero(picture[..., 0])) == sorted(pixels)
     np.testing.assert_allclose(picture[rows, columns, 1] / picture[rows, columns, 0], np.arange(1, 9), rtol=1e-6)
@@ -58,3 +88,114 @@ def test_right_is_cross_of_forward_and_up(device: Device) -> None:
     picture = film(device, Scene(spheres=marks, camera=wide, render=settings)).mean
     assert picture[..., 0].argmax() == 4 * 9 + 7
     assert picture[..., 1].argmax() == 1 * 9 + 4
+
+
+@pytest.mark.parametrize("depth", [6.0, 12.0, 40.0])
+def test_a_point_out_of_focus_is_an_even_disc(device: Device, depth: float) -> None:
+    """Of the radius R·|s − d|/d on the plane of focus, at s, for a lens of radius R and a point at d.
+
+    Its second moment about its middle is half the radius squared, and a sixth of a pixel's side squared as pixels are
+    squares; the inner half of it has as much of the light as of its area.
+    """
+    lens = Camera(position=(0.0, 0.0, 10.0), look_at=(0.0, 0.0, 0.0), fov_degrees=10, aperture_radius=1.0)
+    extent, side = frame(lens)[3], 64
+    center, _ = seen_at(lens, (side, side), np.array([34.0]), np.array([29.5]), np.array([depth]))
+    scene = Scene(spheres=glowing(center, np.array([0.002 * depth])), camera=lens,
+                  render=RenderSettings(size=(side, side), max_depth=1))
+    light = film(device, scene, 1 << 14, sampler="sobol").mean[..., 0]
+    y, x = np.mgrid[:side, :side] + 0.5
+    expected = abs(10 - depth) / depth * side / (2 * extent * 10)
+    distance = np.hypot(x - 34.0, y - 29.5)
+    blurred = 0.002 * side / (2 * extent)   # the sphere's own radius, in pixels
+    assert light[distance > expected + blurred + 1].max() == 0
+    measured = np.sqrt(2 * (np.average(distance**2, weights=light) - 1 / 6 - blurred**2 / 2))
+    assert measured == pytest.approx(expected, rel=0.01)
+    fine = (np.mgrid[:16 * side, :16 * side] + 0.5) / 16
+    disc = np.hypot(fine[0] - 29.5, fine[1] - 34.0) < expected
+    inner, area = distance < 0.7 * expected, disc.reshape(side, 16, side, 16).mean(axis=(1, 3))
+    assert light[inner].sum() / light.sum() == pytest.approx(area[inner].sum() / area.sum(), abs=0.01)
+
+
+def test_all_around_is_the_environments_own_picture(device: Device) -> None:
+    """Along +Z as it is stored, but for its turn and strength; turned like the camera. Pixels are means over it."""
+    image = np.random.default_rng(5).random((6, 12, 3)).astype(np.float32)
+    size, steps = (24, 12), 16
+    v, u = np.meshgrid((np.arange(12 * steps) + 0.5) / (12 * steps), (np.arange(24 * steps) + 0.5) / (24 * steps),
+                       indexing="ij")
+    sine, phi = np.sin(np.pi * v), 2 * np.pi * u
+    w = np.stack([sine * np.sin(phi), np.cos(np.pi * v), -sine * np.cos(phi)], axis=-1).reshape(-1, 3)
+    p_values = []
+    for target, degrees, strength in (((0.0, 0.0, 2.0), 0.0, 1.0), ((0.0, 0.0, 2.0), 70.0, 2.5),
+                                      ((1.0, 0.5, -0.4), -20.0, 0.5)):
+        camera = Camera(position=(0.0, 0.0, 0.0), look_at=target, projection="equirectangular")
+        forward, right, up, _ = frame(camera)
+        seen = lookup(image, w @ np.array([-right, up, forward]), degrees) * strength
+        expected = seen.reshape(12, steps, 24, steps, 3).mean(axis=(1, 3))
+        scene = Scene(environment=Environment(image=image, strength=strength, rotation_degrees=degrees), camera=camera,
+                      render=RenderSettings(size=size, spp=1024))
+        p_values.append(pixel_p_values(film(device, scene), expected))
+    assert np.min(p_values) > sidak(1e-3, np.size(p_values))
+
+
+@pytest.mark.parametrize("filter", ["tent", "blackman_harris"])
+def test_all_around_closes_at_its_ends(device: Device, filter: str) -> None:
+    """Filters reach over the seam and the poles to where the picture goes on: a sky of one color stays that color, and
+    one that is even around its axis stays even."""
+    image = np.repeat(np.random.default_rng(6).random((4, 1, 3)), 8, axis=1).astype(np.float32)
+    camera = Camera(position=(0.0, 0.0, 0.0), look_at=(0.0, 0.0, 1.0), projection="equirectangular")
+    settings = RenderSettings(size=(4, 2), spp=4096, filter=filter)  # type: ignore[arg-type]
+    picture = film(device, Scene(environment=Environment(image=image), camera=camera, render=settings),
+                   sampler="sobol").mean
+    np.testing.assert_allclose(picture, np.broadcast_to(picture[:, :1], picture.shape), rtol=5e-3)
+    assert picture.min() >= image.min() and picture.max() <= image.max()
+
+
+@pytest.mark.parametrize("name", ["lens", "parallel", "all around"])
+def test_guides_are_seen_by_the_same_rays(device: Device, name: str) -> None:
+    """Spheres that glow in their own color: the picture of what glows is that of albedos, sample by sample."""
+    rng = np.random.default_rng(2)
+    centers, _ = seen_at(CAMERAS[name], (24, 18), *rng.uniform(4, 14, (2, 30)), rng.uniform(3, 30, 30))
+    colors = [tuple(color) for color in rng.random((30, 3)).tolist()]
+    spheres = [Sphere(center=tuple(center), radius=1.0, material=Diffuse(color=color, emission=color))
+               for center, color in zip(centers.tolist(), colors)]
+    running = session(device, Scene(spheres=spheres, camera=CAMERAS[name],
+                                    render=RenderSettings(size=(24, 18), spp=16, max_depth=1)), "sobol")
+    for _ in running.render(16):
+        pass
+    picture = running.film().mean
+    assert np.mean(picture.any(axis=2)) > 0.1
+    np.testing.assert_allclose(render_aovs(running, 16)["albedo"], picture, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["lens", "parallel", "as high as", "all around"])
+def test_pictures_do_not_depend_on_the_unit_of_length(device: Device, name: str) -> None:
+    """Bit for bit, for powers of two."""
+    rng = np.random.default_rng(2)
+    centers, _ = seen_at(CAMERAS[name], (24, 18), *rng.uniform(4, 14, (2, 20)), rng.uniform(3, 30, 20))
+    pictures = []
+    for unit in (1.0, 2.0**-40, 2.0**40):
+        camera = CAMERAS[name]
+        x, y, z = (unit * np.array(camera.position)).tolist()
+        at_x, at_y, at_z = (unit * np.array(camera.look_at)).tolist()
+        camera = replace(camera, position=(x, y, z), look_at=(at_x, at_y, at_z),
+                         aperture_radius=camera.aperture_radius * unit,
+                         focus_distance=camera.focus_distance and camera.focus_distance * unit,
+                         view_height=camera.view_height and camera.view_height * unit)
+        scene = Scene(spheres=glowing(centers * unit, np.full(20, unit)), camera=camera,
+                      render=RenderSettings(size=(24, 18), spp=4, max_depth=1))
+        pictures.append(film(device, scene).mean)
+    assert pictures[0].any() and all(np.array_equal(picture, pictures[0]) for picture in pictures)
+
+
+def test_a_camera_compiles_to_its_own_file(device: Device) -> None:
+    """And pinholes draw no numbers for a lens, so the same program has the same picture however its lens is set."""
+    files = {name: {file for file in session(device, Scene(camera=camera)).compiled.files if file.startswith("camera/")}
+             for name, camera in CAMERAS.items()}
+    kinds: dict[Projection, str] = {"perspective": "pinhole", "orthographic": "orthographic",
+                                    "equirectangular": "equirectangular"}
+    for name, camera in CAMERAS.items():
+        assert files[name] == {f"camera/{'thin_lens' if name == 'lens' else kinds[camera.projection]}.cl"}
+    wall = Scene(environment=Environment(image=np.random.default_rng(1).random((9, 18, 3)).astype(np.float32)),
+                 render=RenderSettings(size=(16, 12), spp=4))
+    pictures = [film(device, replace(wall, camera=Camera(focus_distance=focus))).mean for focus in (None, 2.0)]
+    assert np.array_equal(*pictures)

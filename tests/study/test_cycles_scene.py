@@ -9,7 +9,7 @@ import pytest
 
 from clrt.errors import UsageError
 from clrt.scene.materials import MATERIALS, Material, MetallicRoughness
-from clrt.scene.model import RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, RenderSettings, Scene, Sphere
 from clrt.study.cycles_scene import BSDFS, check_scene, frame_of_axes, sphere_triangles, turned
 
 
@@ -48,6 +48,7 @@ def test_spheres_are_triangles_seen_from_outside() -> None:
 @pytest.mark.parametrize(("scene", "words"), [
     (ball(MetallicRoughness(metallic=0.5)), "the ball: .*all metal"),
     (ball(MetallicRoughness(metallic=1.0, smith="separable")), "the ball: .*height_correlated"),
+    (replace(ball(MATERIALS[0]()), camera=Camera(aperture_radius=0.1)), "room: .*pinholes only"),
     (replace(ball(MATERIALS[0]()), render=RenderSettings(max_depth=1)), "room: .*two path edges"),
     (replace(ball(MATERIALS[0]()), render=RenderSettings(filter="tent")), 'room: .*filter = "box"')])
 def test_what_has_no_counterpart_is_refused_by_name(scene: Scene, words: str) -> None:

@@ -45,6 +45,15 @@ def test_camera_looks_where_it_should_with_its_left_to_the_left() -> None:
     np.testing.assert_allclose(np.cross(matrix[:3, 2], [-4, -1.5, -4]), 0, atol=1e-12)
 
 
+def test_lenses_are_told_and_other_cameras_refused() -> None:
+    lens = Camera(position=(0, 0, 4), aperture_radius=0.1)
+    for camera, focus in ((lens, 4), (replace(lens, focus_distance=2.5), 2.5)):
+        sensor = mitsuba_scene(replace(ball(Diffuse()), camera=camera))["sensor"]
+        assert (sensor["type"], sensor["aperture_radius"], sensor["focus_distance"]) == ("thinlens", 0.1, focus)
+    with pytest.raises(UsageError, match="orthographic cameras"):
+        mitsuba_scene(replace(ball(Diffuse()), camera=Camera(projection="orthographic")))
+
+
 def test_depth_counts_edges_and_direct_light_is_two_of_them() -> None:
     for settings, depth in [(RenderSettings(max_depth=5), 5), (RenderSettings(max_depth=5, integrator="direct"), 2)]:
         integrator = mitsuba_scene(replace(ball(Diffuse()), render=settings), "multijitter")["integrator"]

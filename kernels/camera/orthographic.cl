@@ -1,0 +1,7 @@
+// Parallel rays along forward, a unit vector; right, up: half the picture's width and height in the scene. World frame.
+#include "vector.cl"
+
+static inline CameraRay ray_through(const Launch *launch, real sx, real sy, Sampler *sampler) {
+    real3 right = broadcast(launch->right), up = broadcast(launch->up);
+    return (CameraRay){mad3(right, sx, mad3(up, -sy, broadcast(launch->position))), broadcast(launch->forward)};
+}

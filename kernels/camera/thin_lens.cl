@@ -1,0 +1,16 @@
+// Thin lens: all rays through one place of the picture meet in one point of the plane of focus, and cross the lens evenly
+// (Cook, Porter and Carpenter 1984, "Distributed Ray Tracing"). Its middle is where a pinhole would be, so a point at the
+// distance d is seen as a disc, which on the plane of focus, at s, has the radius lens_radius·|s − d|/d.
+//
+// right, up, forward: the pinhole's times s, so that they reach to the plane of focus. World frame.
+#include "sampling.cl"
+
+static inline CameraRay ray_through(const Launch *launch, real sx, real sy, Sampler *sampler) {
+    real3 right = broadcast(launch->right), up = broadcast(launch->up), forward = broadcast(launch->forward);
+    real3 in_focus = mad3(right, sx, mad3(up, -sy, forward));
+    real2 u = next_2d(sampler);
+    real s, c, r = launch->lens_radius * sqrt(u.x);
+    sincos_turns(u.y, &s, &c);
+    real3 on_lens = mad3(normalize3(right), r * c, scale(normalize3(up), r * s));
+    return (CameraRay){add(broadcast(launch->position), on_lens), normalize3(sub(in_focus, on_lens))};
+}
