@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from .output.image import Image as Image
     from .query import RayQuery as RayQuery
     from .rendering.renderer import Renderer as Renderer, State as State
-    from .scene.lights import DirectionalLight as DirectionalLight, PointLight as PointLight
+    from .scene.lights import (DirectionalLight as DirectionalLight, PointLight as PointLight,
+                               SpotLight as SpotLight)
     from .scene.materials import (Dielectric as Dielectric, Diffuse as Diffuse, MetallicRoughness as MetallicRoughness,
                                   Mirror as Mirror)
     from .scene.model import (Camera as Camera, Environment as Environment, Mesh as Mesh,
@@ -40,7 +41,7 @@ _HOME = {
     "output.image": ("Image",),
     "query": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
-    "scene.lights": ("DirectionalLight", "PointLight"),
+    "scene.lights": ("DirectionalLight", "PointLight", "SpotLight"),
     "scene.materials": ("Dielectric", "Diffuse", "MetallicRoughness", "Mirror"),
     "scene.model": ("Camera", "Environment", "Mesh", "RenderSettings", "Scene", "Sphere"),
 }

@@ -66,7 +66,7 @@ kernel void aov(SCENE_PARAMETERS, global Aov *pixels, global const uint *tiles, 
     Seen sum = {splat(ZERO), splat(ZERO)};
     for (uint s = 0; s < launch.sample_count; ++s) {
         Sampler sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
-        CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, &sampler);
+        CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler);
         Seen seen = seen_along(&scene, ray.origin, ray.direction, own.inside, launch.max_depth, &sampler);
         sum.albedo = add(sum.albedo, seen.albedo);
         sum.normal = add(sum.normal, seen.normal);

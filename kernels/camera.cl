@@ -40,9 +40,8 @@ static inline bool lane_pixels(const Launch *launch, global const uint *tiles, L
     return true;
 }
 
-// A ray through the pixel (x, y), its place drawn from the filter around the pixel's middle.
-static inline CameraRay camera_ray(const Scene *scene, const Launch *launch, ureal x, ureal y, Sampler *sampler) {
-    real2 u = next_2d(sampler);
+// A ray through the pixel (x, y): u draws the place from the filter around the pixel's middle, which is that of (½, ½).
+static inline CameraRay camera_ray(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u, Sampler *sampler) {
     real sx = 2.0f * (TO_REAL(x) + filter_sample(scene, u.x)) / (float)launch->width - 1.0f;
     real sy = 2.0f * (TO_REAL(y) + filter_sample(scene, u.y)) / (float)launch->height - 1.0f;
     return ray_through(launch, sx, sy, sampler);

@@ -138,7 +138,7 @@ kernel void path(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles,
     Accumulator pixels = load_pixels(film, AS_INT(own.index));
     for (uint s = 0; s < launch.sample_count; ++s) {
         Sampler sampler = sampler_at(own.code, (ureal)(launch.first_sample + s), launch.seed, launch.block_bits);
-        CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, &sampler);
+        CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler);
         real3 L = radiance(&scene, ray.origin, ray.direction, own.inside, launch.max_depth, &sampler, &pixels.rays);
         accumulate(&pixels, L, own.inside);
     }

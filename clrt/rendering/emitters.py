@@ -8,20 +8,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene.lights import DirectionalLight, PointLight
+from ..scene.lights import DirectionalLight, PointLight, SpotLight
 from ..scene.model import Scene
 from ..scene.textures import Texture
 from .environment import LUMINANCE, Sky
 from .light_choice import LightChoice, pack_choice
-from .light_groups import Doubles, joined, round_lights
-from .records import DIRECTIONAL_LIGHT, POINT_LIGHT, SPHERE_LIGHT
+from .light_groups import Doubles, joined, round_lights, spot_lights
+from .records import DIRECTIONAL_LIGHT, POINT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT
 from .textures import Textures
 from .triangle_lights import pack_triangle_lights
 
 #: The types in the order of their lights' numbers, infinite ones last; the kernel file is light/<name>.cl, the sky's is
 #: chosen by pack_sky.
-TYPES = ("triangle", "sphere", "point", "directional", "sky")
+TYPES = ("triangle", "sphere", "point", "spot", "directional", "sky")
 SURFACES = ("triangle", "sphere")
+#: Over no less in its cosine does a spot fall off: its inverse is a number of float32.
+STEEPEST = 1e-30
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,9 @@ def pack_emitters(scene: Scene, triangles: NDArray[np.float32], sky: Sky, textur
     flat = pack_triangle_lights(scene.meshes, triangles, textures)
     shines = np.array([any(sphere.material.radiance) for sphere in scene.spheres], bool)
     of_sphere = np.where(shines, len(flat.records) + np.cumsum(shines) - 1, -1).astype(np.int32)
-    balls, points, beams = _sphere_lights(scene, textures), _point_lights(scene), _directional_lights(scene)
-    records = {"triangle": flat.records, "sphere": balls, "point": points, "directional": beams}
+    balls, points, spots = _sphere_lights(scene, textures), _point_lights(scene), _spot_lights(scene)
+    beams = _directional_lights(scene)
+    records = {"triangle": flat.records, "sphere": balls, "point": points, "spot": spots, "directional": beams}
     counts = {kind: len(array) for kind, array in records.items() if len(array)}
     infinite = _doubles(beams, "towards") * _luminance(beams, "irradiance")[:, None]
     infinite = np.column_stack([np.zeros(len(beams)), infinite])
@@ -61,7 +64,9 @@ def pack_emitters(scene: Scene, triangles: NDArray[np.float32], sky: Sky, textur
     groups = joined([
         flat.groups,
         round_lights(_doubles(balls, "center"), radius, np.pi * radius**2 * _luminance(balls, "radiance")),
-        round_lights(_doubles(points, "position"), np.zeros(len(points)), _luminance(points, "intensity"))])
+        round_lights(_doubles(points, "position"), np.zeros(len(points)), _luminance(points, "intensity")),
+        spot_lights(_doubles(spots, "position"), _doubles(spots, "axis"), 1 - _doubles(spots, "outer"),
+                    _luminance(spots, "intensity"))])
     choice = pack_choice(groups, infinite)
     buffers = {f"{kind}_lights": (f"{kind.title()}Light", records[kind]) for kind in counts if kind != "sky"}
     return Emitters(buffers | choice.buffers, counts, flat.light, of_sphere, choice)
@@ -82,6 +87,18 @@ def _point_lights(scene: Scene) -> NDArray[Any]:
     records = np.zeros(len(lamps), POINT_LIGHT)
     for record, lamp in zip(records, lamps):
         record["position"], record["intensity"] = lamp.position, lamp.intensity
+    return records
+
+
+def _spot_lights(scene: Scene) -> NDArray[Any]:
+    lamps = [light for light in scene.lights if isinstance(light, SpotLight) and any(light.intensity)]
+    records = np.zeros(len(lamps), SPOT_LIGHT)
+    for record, lamp in zip(records, lamps):
+        # 1 − cos x = 2 sin² (x/2), which small angles keep their digits in.
+        inner, outer = 2 * np.sin(np.radians([lamp.inner_degrees, lamp.outer_degrees]) / 2) ** 2
+        record["position"], record["intensity"] = lamp.position, lamp.intensity
+        record["axis"] = np.asarray(lamp.direction) / np.linalg.norm(lamp.direction)
+        record["outer"], record["slope"] = outer, 1 / max(outer - inner, STEEPEST)
     return records
 
 

@@ -12,6 +12,10 @@ from ..accel.tree import Tree
 
 Doubles = NDArray[np.float64]
 
+#: By how much the cones of spots are widened, in radians and in the cosine, since float32 rounds what they are compared
+#: with.
+WIDER, LESS = 1e-3, 2e-6
+
 
 @dataclass(frozen=True, eq=False)
 class LightGroups:
@@ -20,6 +24,7 @@ class LightGroups:
     low, high: (n, 3), the boxes around them. radius: (n,), of a sphere around the box's middle that holds them. axis:
     (n, 3), unit, or 0. cos_cone: (n,), the cosine of the angle from the axis within which all their normals lie, −1
     where these point everywhere. intensity: (n,), luminance of radiance times area, or of W/sr, all together.
+    cos_reach: (n,), the cosine of the angle from the nearest normal up to which they shine, 0 for surfaces.
     """
 
     low: Doubles
@@ -28,6 +33,7 @@ class LightGroups:
     axis: Doubles
     cos_cone: Doubles
     intensity: Doubles
+    cos_reach: Doubles
 
     def __len__(self) -> int:
         return len(self.intensity)
@@ -36,14 +42,23 @@ class LightGroups:
 def flat_lights(corners: Doubles, normal: Doubles, intensity: Doubles) -> LightGroups:
     """Flat lights with corners (n, k, 3) that shine on the side of their unit normals (n, 3)."""
     low, high = corners.min(axis=1), corners.max(axis=1)
-    return LightGroups(low, high, _half_diagonal(low, high), normal, np.ones(len(normal)), intensity)
+    ones = np.ones(len(normal))
+    return LightGroups(low, high, _half_diagonal(low, high), normal, ones, intensity, 0 * ones)
 
 
 def round_lights(center: Doubles, radius: Doubles, intensity: Doubles) -> LightGroups:
     """Balls, (n, 3) and (n,), that shine everywhere."""
     around = radius[:, None]
     everywhere = -np.ones(len(center))
-    return LightGroups(center - around, center + around, radius, np.zeros_like(center), everywhere, intensity)
+    return LightGroups(center - around, center + around, radius, np.zeros_like(center), everywhere, intensity,
+                       0 * everywhere)
+
+
+def spot_lights(place: Doubles, axis: Doubles, cos_outer: Doubles, intensity: Doubles) -> LightGroups:
+    """Points (n, 3) that shine in cones around unit axes (n, 3), whose angles have the cosines (n,)."""
+    ones = np.ones(len(place))
+    reach = np.cos(np.minimum(np.arccos(np.clip(cos_outer, -1, 1)) + WIDER, np.pi / 2)) - LESS
+    return LightGroups(place, place, 0 * ones, axis, ones, intensity, np.maximum(reach, 0))
 
 
 def joined(parts: Sequence[LightGroups]) -> LightGroups:
@@ -70,14 +85,15 @@ def groups_of_nodes(tree: Tree, lights: LightGroups) -> LightGroups:
     norm = np.linalg.norm(axis, axis=1)
     axis /= np.where(norm > 0, norm, 1)[:, None]
     low, high = tree.aabb_min.astype(np.float64), tree.aabb_max.astype(np.float64)
-    radius, cos_cone = _half_diagonal(low, high), np.empty(len(leaf))
+    radius, cos_cone, cos_reach = _half_diagonal(low, high), np.empty(len(leaf)), np.empty(len(leaf))
     radius[leaf] = lights.radius[own]
     for level in levels:
         start = np.cumsum(count[level]) - count[level]
         inside = tree.order[np.arange(count[level].sum()) + np.repeat(first[level] - start, count[level])]
         cosine = np.einsum("ij,ij->i", lights.axis[inside], np.repeat(axis[level], count[level], axis=0))
         cos_cone[level] = np.minimum.reduceat(np.where(lights.cos_cone[inside] < 0, -1.0, cosine), start)
-    return LightGroups(low, high, radius, axis, np.clip(cos_cone, -1, 1), intensity)
+        cos_reach[level] = np.minimum.reduceat(lights.cos_reach[inside], start)
+    return LightGroups(low, high, radius, axis, np.clip(cos_cone, -1, 1), intensity, cos_reach)
 
 
 def _half_diagonal(low: Doubles, high: Doubles) -> Doubles:

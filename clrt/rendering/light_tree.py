@@ -72,5 +72,5 @@ def group_records(groups: LightGroups, below: Integers) -> NDArray[Any]:
     records = np.zeros(len(groups), LIGHT_GROUP)
     records["center"], records["radius"] = (groups.low + groups.high) / 2, groups.radius
     records["axis"], records["cos_cone"] = groups.axis, groups.cos_cone
-    records["intensity"], records["below"] = groups.intensity, below
+    records["intensity"], records["cos_reach"], records["below"] = groups.intensity, groups.cos_reach, below
     return records

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
+
+from annotated_types import Ge, Gt, Le, Lt
 
 from .materials import Radiance, tuples_for_lists
 
@@ -32,5 +34,21 @@ class DirectionalLight:
         tuples_for_lists(self)
 
 
-Light = PointLight | DirectionalLight
-LIGHTS: tuple[type[Light], ...] = (PointLight, DirectionalLight)
+@dataclass(frozen=True, kw_only=True)
+class SpotLight:
+    """A point that shines in a cone around `direction`: `intensity` W/sr up to `inner_degrees` from it, then less, and
+    nothing from `outer_degrees` on (KHR_lights_punctual of glTF, its falloff)."""
+
+    kernel: ClassVar[str] = "spot"
+    position: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    intensity: Radiance
+    inner_degrees: Annotated[float, Ge(0), Lt(90)] = 0.0
+    outer_degrees: Annotated[float, Gt(0), Le(90)] = 45.0
+
+    def __post_init__(self) -> None:
+        tuples_for_lists(self)
+
+
+Light = PointLight | SpotLight | DirectionalLight
+LIGHTS: tuple[type[Light], ...] = (PointLight, SpotLight, DirectionalLight)

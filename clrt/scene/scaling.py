@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .lights import Light, PointLight
+from .lights import DirectionalLight, Light
 from .model import Camera, Scene, Sphere, Vector
 
 #: Scenes whose largest coordinate (the camera's aside) lies between 2^-20 and 2^20 are left as large as they are.
@@ -71,7 +71,7 @@ def frame_of(scene: Scene) -> Frame:
 
 
 def in_frame(scene: Scene, frame: Frame) -> Scene:
-    """The scene in a frame, with point lights such that the picture stays the same."""
+    """The scene in a frame, with point and spot lights such that the picture stays the same."""
     if frame == Frame():
         return scene
     return replace(scene, meshes=[replace(mesh, vertices=frame.points(mesh.vertices)) for mesh in scene.meshes],
@@ -91,7 +91,7 @@ def _sphere(sphere: Sphere, frame: Frame) -> Sphere:
 
 
 def _light(light: Light, frame: Frame) -> Light:
-    if not isinstance(light, PointLight):
+    if isinstance(light, DirectionalLight):
         return light
     red, green, blue = (value * frame.unit**2 for value in light.intensity)
     return replace(light, position=frame.point(light.position), intensity=(red, green, blue))

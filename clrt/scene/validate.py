@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .fields import field_problems, show
-from .lights import LIGHTS, DirectionalLight
+from .lights import LIGHTS, PointLight, SpotLight
 from .materials import Diffuse, Material
 from .model import Camera, Environment, FloatArray, Mesh, RenderSettings, Scene, Sphere
 
@@ -199,7 +199,11 @@ def _environment_problems(environment: Environment) -> list[str]:
 def _light_problems(light: object, where: str) -> list[str]:
     if not isinstance(light, LIGHTS):
         return [f"{where}: {show(light)} is no light; write a {' or '.join(kind.__name__ for kind in LIGHTS)}"]
-    problems = _object_problems(light, type(light), where)
-    if not problems and isinstance(light, DirectionalLight) and not any(light.direction):
+    if problems := _object_problems(light, type(light), where):
+        return problems
+    if not isinstance(light, PointLight) and not any(light.direction):
         problems.append(f"{where}.direction: [0, 0, 0] is no direction; write the one the light travels in")
+    if isinstance(light, SpotLight) and light.inner_degrees >= light.outer_degrees:
+        problems.append(f"{where}.inner_degrees: {light.inner_degrees:g} is not below outer_degrees, "
+                        f"{light.outer_degrees:g}; write less")
     return problems

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import UsageError
 from ..output.images import write_image
-from ..scene.lights import Light, PointLight
+from ..scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ..scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
 from ..scene.textures import untextured
@@ -38,6 +38,8 @@ def check_scene(scene: Scene) -> None:
         if isinstance(owner.material, MetallicRoughness) and not _is_metal(owner.material):
             raise UsageError(f"{owner.name}: Cycles can draw metallic_roughness that is all metal, with single "
                              'scattering and smith = "height_correlated"')
+    if any(isinstance(light, SpotLight) for light in scene.lights):
+        raise UsageError(f"{scene.name}: Cycles is not told of spot lights, which fall off otherwise there")
     if scene.camera.projection != "perspective" or scene.camera.aperture_radius:
         raise UsageError(f"{scene.name}: Cycles is told of pinholes only")
     if scene.render.filter != "box" or scene.render.max_depth < 2:
@@ -169,6 +171,7 @@ def _light(data: Any, light: Light) -> tuple[Any, NDArray[np.float64]]:
         made = data.lights.new("light", "POINT")
         made.shadow_soft_size, made.energy, made.color = 0.0, POINT_WATT, light.intensity
         return made, frame_of_axes(np.eye(3), light.position)
+    assert isinstance(light, DirectionalLight)
     made = data.lights.new("light", "SUN")
     made.angle, made.energy, made.color = 0.0, 1.0, light.irradiance
     z = -np.asarray(light.direction) / np.linalg.norm(light.direction)

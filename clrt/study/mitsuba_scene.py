@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..scene.lights import Light, PointLight
+from ..scene.lights import Light, PointLight, SpotLight
 from ..scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
 from ..scene.textures import untextured
@@ -122,6 +122,8 @@ def _two_sided(bsdf: Plugin) -> Plugin:
 def _light(light: Light) -> Plugin:
     if isinstance(light, PointLight):
         return {"type": "point", "position": list(light.position), "intensity": _rgb(light.intensity)}
+    if isinstance(light, SpotLight):
+        raise UsageError("spot: Mitsuba's spots fall off by the angle, ours by its cosine, squared")
     return {"type": "directional", "direction": list(light.direction), "irradiance": _rgb(light.irradiance)}
 
 

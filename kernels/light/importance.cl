@@ -1,8 +1,8 @@
 // How much light a group of lights can bring to a point, were nothing in between, and choices in proportion to it.
 //
-// A group is what lies in a sphere and shines within 90 degrees of normals that lie in a cone. Its importance is the
-// irradiance by it as if all came from its middle, with both cosines at their best: 0 only where it can bring none
-// (after Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", eq. 3).
+// A group is what lies in a sphere and shines within 90 degrees, spots within less, of normals that lie in a cone. Its
+// importance is the irradiance by it as if all came from its middle, with both cosines at their best: 0 only where it can
+// bring none (after Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", eq. 3).
 // World frame.
 #include "vector.cl"
 
@@ -18,6 +18,16 @@ static inline real along_cone(real along, real distance, real cos_cone) {
     return along > cos_cone * distance ? distance : turned;
 }
 
+#if LIGHT_SPOT
+// Whether a sphere of radius r lies, at least in part, within an angle of the nearest direction, whose cosine is cos_reach;
+// `along`: along_cone's.
+static inline ireal is_reached(real along, real distance, real r, real cos_reach) {
+    real cosine = along / distance, size = r / distance, cos_size = safe_sqrt(1.0f - size * size);
+    real nearest = cosine * cos_size + safe_sqrt(1.0f - cosine * cosine) * size;
+    return (size >= 1.0f) | (cosine >= cos_size) | (nearest >= cos_reach);
+}
+#endif
+
 // Of scene->light_groups[group] at p. n: unit, on the side of the surface that is lit. Inlined, or it costs half as much
 // again.
 __attribute__((always_inline)) static inline real importance(const Scene *scene, ireal group, real3 p, real3 n) {
@@ -29,6 +39,9 @@ __attribute__((always_inline)) static inline real importance(const Scene *scene,
     real shining = best_cosine(along, distance, r);
     real brought = GATHER(real, scene->light_groups, group, .intensity) * lit * shining / maximum(d2, r * r);
     ireal brings = (lit > 0.0f) & (shining > 0.0f);
+#if LIGHT_SPOT
+    brings = brings & is_reached(along, distance, r, GATHER(real, scene->light_groups, group, .cos_reach));
+#endif
     return brings ? brought : ZERO;
 }
 

@@ -65,7 +65,8 @@ def test_spheres_lie_where_they_are_seen(device: Device, name: str, size: tuple[
     pixels = width * (height // 5) + rng.permutation(width * (3 * height // 5))[:8]   # poles are far
     columns, rows = pixels % width, pixels // width
     depth = np.full(8, camera.focus_distance) if camera.focus_distance else rng.uniform(5, 50, 8)
-    centers, pixel = seen_at(camera, size, columns + 0.5, rows + 0.5, depth)
+    x, y = np.array([columns, rows]) + 0.5
+    centers, pixel = seen_at(camera, size, x, y, depth.astype(np.float64))
     scene = Scene(spheres=glowing(centers, 0.15 * pixel), camera=camera,
                   render=RenderSettings(size=size, spp=256, max_depth=1))
     picture = film(device, scene).mean
@@ -154,7 +155,8 @@ def test_all_around_closes_at_its_ends(device: Device, filter: str) -> None:
 def test_guides_are_seen_by_the_same_rays(device: Device, name: str) -> None:
     """Spheres that glow in their own color: the picture of what glows is that of albedos, sample by sample."""
     rng = np.random.default_rng(2)
-    centers, _ = seen_at(CAMERAS[name], (24, 18), *rng.uniform(4, 14, (2, 30)), rng.uniform(3, 30, 30))
+    x, y, depth = rng.uniform([[4], [4], [3]], [[20], [14], [30]], (3, 30))
+    centers, _ = seen_at(CAMERAS[name], (24, 18), x, y, depth)
     colors = [tuple(color) for color in rng.random((30, 3)).tolist()]
     spheres = [Sphere(center=tuple(center), radius=1.0, material=Diffuse(color=color, emission=color))
                for center, color in zip(centers.tolist(), colors)]
@@ -171,13 +173,13 @@ def test_guides_are_seen_by_the_same_rays(device: Device, name: str) -> None:
 def test_pictures_do_not_depend_on_the_unit_of_length(device: Device, name: str) -> None:
     """Bit for bit, for powers of two."""
     rng = np.random.default_rng(2)
-    centers, _ = seen_at(CAMERAS[name], (24, 18), *rng.uniform(4, 14, (2, 20)), rng.uniform(3, 30, 20))
+    x, y, depth = rng.uniform([[4], [4], [3]], [[20], [14], [30]], (3, 20))
+    centers, _ = seen_at(CAMERAS[name], (24, 18), x, y, depth)
     pictures = []
     for unit in (1.0, 2.0**-40, 2.0**40):
         camera = CAMERAS[name]
-        x, y, z = (unit * np.array(camera.position)).tolist()
-        at_x, at_y, at_z = (unit * np.array(camera.look_at)).tolist()
-        camera = replace(camera, position=(x, y, z), look_at=(at_x, at_y, at_z),
+        position, look_at = (tuple((unit * np.array(p)).tolist()) for p in (camera.position, camera.look_at))
+        camera = replace(camera, position=position, look_at=look_at,
                          aperture_radius=camera.aperture_radius * unit,
                          focus_distance=camera.focus_distance and camera.focus_distance * unit,
                          view_height=camera.view_height and camera.view_height * unit)
@@ -198,4 +200,4 @@ def test_a_camera_compiles_to_its_own_file(device: Device) -> None:
     wall = Scene(environment=Environment(image=np.random.default_rng(1).random((9, 18, 3)).astype(np.float32)),
                  render=RenderSettings(size=(16, 12), spp=4))
     pictures = [film(device, replace(wall, camera=Camera(focus_distance=focus))).mean for focus in (None, 2.0)]
-    assert np.array_equal(*pictures)
+    assert np.array_equal(pictures[0], pictures[1])

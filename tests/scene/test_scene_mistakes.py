@@ -99,7 +99,7 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
     ('[materials.a]\ntype = "diffuse"\ncolor = "red"', 'materials.a.color: "red" is not a list; write the numbers in'),
     ('[materials]\na = "diffuse"', 'materials.a: "diffuse" is not a table; write its keys below [materials.a]'),
     ('[render]\nintegrator = "raster"', 'render.integrator: "raster" is not supported yet'),
-    ('[camera]\nprojection = "ortographic"', 'camera.projection: "ortographic" is unknown; did you mean "orthographic"?'),
+    ('[camera]\nprojection = "ortographic"', 'camera.projection: "ortographic" is unknown; did you mean "orthographic'),
     ('[camera]\nprojection = "orthographic"\naperture_radius = 0.1',
      'camera.aperture_radius: 0.1 is of no use to projection = "orthographic"; leave it out'),
     ('[camera]\nprojection = "equirectangular"\nfocus_distance = 2', "camera.focus_distance: 2 is of no use to"),
@@ -126,7 +126,12 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
     ('[[mesh]]\nfile = "models/triangle.obj"\nscale = [1e39, 1, 1]', "mesh[0].scale: [1e+39, 1, 1] is beyond"),
     ('[[mesh]]\nfile = "models"', "models: a model must be one of .glb, .gltf"),
     ('[[sphere]]\nmaterial = "gold"', 'sphere[0].material: "gold" is unknown; none is defined'),
-    ('[[light]]\ntype = { point = 1 }', "light[0].type: { point = 1 } is unknown; write one of directional, point"),
+    ('[[light]]\ntype = { point = 1 }', "light[0].type: { point = 1 } is unknown; write one of directional, point, "),
+    ('[[light]]\ntype = "spot"\nposition = [0, 0, 0]\ndirection = [0, 0, 0]\nintensity = [1, 1, 1]',
+     "light[0].direction: [0, 0, 0] is no direction; write the one the light travels in"),
+    ('[[light]]\ntype = "spot"\nposition = [0, 0, 0]\ndirection = [0, 0, 1]\nintensity = [1, 1, 1]\n'
+     'inner_degrees = 45',
+     "light[0].inner_degrees: 45 is not below outer_degrees, 45; write less"),
     ('[environment]\nimage = 3', "environment.image: 3 is not a text; write a file name in quotes"),
     ('[camera\nposition = 3', "is not valid TOML: "),
 ])

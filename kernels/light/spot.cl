@@ -1,0 +1,22 @@
+// A point that shines in a cone: intensity·f²/d², where f falls evenly in the cosine of the angle from the axis, from 1 at the
+// inner cone to 0 at the outer one (Khronos, KHR_lights_punctual). World frame.
+//
+// Cosines are taken as 1 − cos, so that a narrow cone keeps its digits.
+#include "light/interface.cl"
+
+static inline LightSample spot_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
+    LightSample s;
+    s.target = GATHER3(scene->spot_lights, index, .position);
+    real3 d = sub(s.target, p);
+    real inverse = rsqrt(dot3(d, d));
+    s.wi = scale(d, inverse);
+    real3 off_axis = add(s.wi, GATHER3(scene->spot_lights, index, .axis));
+    real height = 0.5f * dot3(off_axis, off_axis);
+    real f = (GATHER(real, scene->spot_lights, index, .outer) - height) * GATHER(real, scene->spot_lights, index, .slope);
+    f = minimum(maximum(f, ZERO), ONE) * inverse;
+    s.radiance = scale(GATHER3(scene->spot_lights, index, .intensity), f * f);
+    s.pdf = ONE;
+    s.infinite = NO_LANES;
+    s.delta = ALL_LANES;
+    return s;
+}
