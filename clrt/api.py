@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .output.data import check_denoisable
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
 from .rendering.aov import render_aovs
@@ -32,6 +33,8 @@ def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | N
     denoiser = Denoiser() if denoise else None
     scene = scene if isinstance(scene, Scene) else load(scene)
     renderer = Renderer(scene, spp=planned_spp(scene.render, spp, time, error), **options)
+    if denoise:
+        check_denoisable(renderer.settings.integrator)
     aovs = render_aovs(renderer.session) if denoiser else {}
     state = None
     for state in renderer.passes(spp=spp, time=time, error=error, reference=reference):

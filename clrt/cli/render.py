@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers.")
 @click.option("--device", "devices", multiple=True, metavar="SEL",
               help="Number, id, part of a name, cpu or gpu; see `clrt devices`.")
-@click.option("--integrator", type=click.Choice(["path", "direct"]), help="What to compute.")
+@click.option("--integrator", type=click.Choice(["path", "direct", "normals", "albedo", "depth"]),
+              help="What to compute.")
 @click.option("--sampler", type=click.Choice(["sobol", "stratified", "independent"]), help="Where samples come from.")
 @click.option("--filter", "pixel_filter", type=click.Choice(["box", "tent", "blackman_harris"]), help="Pixel filter.")
 @click.option("--adaptive", is_flag=True, default=None, help="More samples where the error is larger.")
@@ -63,6 +64,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             checkpoint_every: float, resume: bool, view: str, exposure: float, progress_kind: str | None,
             print_kernel: bool, quiet: bool, **tracing: Any) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
+    from ..output.data import check_denoisable
     from ..output.denoise import Denoiser
     from ..rendering.renderer import Renderer
     from ..rendering.stops import check_stops, planned_spp
@@ -90,6 +92,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         content = load(scene, camera)
         expected = None if reference is None else _read_reference(reference, size or content.render.size)
         planned = planned_spp(content.render, spp, seconds, error)
+        if denoiser is not None:
+            check_denoisable(integrator or content.render.integrator)
         renderer = Renderer(content, spp=planned, on_phase=progress.phase, **options)
         if print_kernel:
             click.echo(renderer.compiled.source)

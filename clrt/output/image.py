@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .data import shown_data
 from .images import write_image
 
 
@@ -22,8 +23,12 @@ class Image:
     raw: NDArray[np.float32] | None = None
 
     def save(self, path: str | Path, *, view: str = "srgb", exposure: float = 0.0) -> Path:
-        """Writes .exr, .hdr (linear) or .png (through `view` after 2^exposure); OutputError where that fails."""
-        write_image(Path(path), self.pixels, metadata=self.metadata(), view=view, exposure=exposure)
+        """Writes .exr, .hdr (linear) or .png (through `view` after 2^exposure; normals and depths by `shown_data`).
+        OutputError where that fails."""
+        pixels, data = self.pixels, shown_data(self.report.get("integrator", "path"), self.pixels)
+        if data is not None and Path(path).suffix.lower() == ".png":
+            pixels, view, exposure = data, "raw", 0.0
+        write_image(Path(path), pixels, metadata=self.metadata(), view=view, exposure=exposure)
         return Path(path)
 
     def metadata(self) -> dict[str, str]:

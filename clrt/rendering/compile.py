@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -37,6 +37,8 @@ from .tiles import TILE
 LARGEST_UNIT = 2.0**127
 #: Where rays leave a surface.
 OFFSETS = {"bound": "offset/bound.cl", "ulp": "offset/ulp.cl", "fixed": "offset/fixed.cl"}
+#: Integrators that follow paths (kernels/path.cl); others show what is seen first (kernels/picture.cl).
+WITH_LIGHT = ("path", "direct")
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,11 @@ class CompiledScene:
         return compose(self.preamble, entry, self.chosen_files)
 
     @property
+    def kernel(self) -> str:
+        """The name of the entry's kernel."""
+        return self.entry.removesuffix(".cl")
+
+    @property
     def files(self) -> list[str]:
         """The kernel files that the program is made of."""
         return files_of(self.source)
@@ -91,11 +98,11 @@ class CompiledScene:
         return sum(array.nbytes for _, array in self.buffers.values())
 
 
-def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
+def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
                   device: Device | None = None) -> CompiledScene:
     """Validates and packs `scene` for the kernel file `entry`; SceneError lists all that is wrong with it.
 
-    device: where large trees are built, if given.
+    entry: None for the scene's integrator; device: where large trees are built, if given.
     """
     validate(scene)
     frame = frame_of(scene)
@@ -136,13 +143,19 @@ def compile_scene(scene: Scene, choices: Choices, entry: str = "path.cl",
         counts[f"{kind}_lights"] = count
 
     features = _features(scene, materials, textures.uv_sets, users, emitters, sky, lone)
-    preamble = _preamble(buffers, features, materials, textures.uv_sets, emitters, choices, tree, frame.unit)
+    integrator = scene.render.integrator
+    unit = frame.unit if choices.offset != "bound" or integrator == "depth" else None
+    preamble = _preamble(buffers, features, materials, textures.uv_sets, emitters, choices, tree, unit)
+    # A depth is that of what is in focus: the ray through the middle of a lens.
+    camera = replace(scene.camera, aperture_radius=0.0) if integrator == "depth" else scene.camera
     files = {**_files(materials.used, emitters, sky, choices, tree.name, len(triangles) > 0, len(spheres) > 0, lone),
              "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
              "OPACITY_FILE": ["opacity.cl"] if "OPACITY" in features else [],
              "TEXTURE_FILES": ["texture.cl"] if textures.uv_sets else [],
-             "SAMPLER": [f"sampler/{scene.render.sampler}.cl"], "CAMERA": [camera_file(scene.camera)],
+             "SAMPLER": [f"sampler/{scene.render.sampler}.cl"], "CAMERA": [camera_file(camera)],
+             "PICTURE": [f"picture/{integrator}.cl"],
              "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"]}
+    entry = entry or ("path.cl" if integrator in WITH_LIGHT else "picture.cl")
     return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame)
 
 
@@ -201,9 +214,9 @@ def _features(scene: Scene, materials: Materials, uv_sets: int, users: list[Mate
 
 
 def _preamble(buffers: Buffers, features: set[str], materials: Materials, uv_sets: int, emitters: Emitters,
-              choices: Choices, tree: Layout, unit: float) -> str:
-    # Only offsets that are lengths of the scene's know its unit: others share programs whatever it is.
-    lengths = {} if choices.offset == "bound" else {"SCENE_UNIT": min(unit, LARGEST_UNIT)}
+              choices: Choices, tree: Layout, unit: float | None) -> str:
+    # Only programs that know lengths of the scene's know its unit: others are shared whatever it is.
+    lengths = {} if unit is None else {"SCENE_UNIT": min(unit, LARGEST_UNIT)}
     surfaces = [t for t in emitters.types if t in SURFACES]
     return "\n".join([
         defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(tree), **lengths}),

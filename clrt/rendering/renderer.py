@@ -19,7 +19,7 @@ from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
 from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
 from .checkpoint import open_checkpoints
-from .compile import OFFSETS, Choices, compile_scene
+from .compile import OFFSETS, WITH_LIGHT, Choices, compile_scene
 from .film import RELATIVE_FLOOR, Film
 from .kept import Kept
 from .noise import NoiseEstimate
@@ -82,7 +82,7 @@ class Renderer:
         _check(choices)
         on_phase("build")
         self.compiled = compile_scene(self.scene, choices, device=self.device)
-        if not {"LIGHTS", "SKY"} & set(self.compiled.features):
+        if settings.integrator in WITH_LIGHT and not {"LIGHTS", "SKY"} & set(self.compiled.features):
             logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
         self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene,
                                                    self.compiled.choices, self.device.info.name)

@@ -16,6 +16,7 @@ def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
     return {
         "scene": renderer.scene.name, "device": info.name, "platform": info.platform, "driver": info.driver,
         "version": _version(), "width": width, "height": height, "spp": state.spp,
+        "integrator": renderer.settings.integrator,
         "max_depth": renderer.settings.max_depth, "seed": renderer.settings.seed, "seconds": renderer.seconds,
         "samples": samples, "samples_per_second": samples / seconds,
         "rays": state.film.rays, "rays_per_second": state.film.rays / seconds,

@@ -48,7 +48,7 @@ class Session:
             self._tiles = on_device(device, np.zeros(1, np.uint32))
         except cl.Error as error:
             raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes do not fit: {error}") from error
-        self._kernel = make_kernel(device, self.program, "path")
+        self._kernel = make_kernel(device, self.program, compiled.kernel)
         #: What every kernel of the scene takes first (SCENE_PARAMETERS).
         self.scene_arguments = [*scene, compiled.counts[0]]
         self._kernel.set_args(*self.scene_arguments, self._film, self._tiles, self.launch[0])

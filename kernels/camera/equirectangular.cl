@@ -2,6 +2,8 @@
 // where it does in the environment's picture (light/image_sky.cl). right, up, forward: unit. World frame.
 #include "sampling.cl"
 
+#define ALL_AROUND 1    // nothing lies behind
+
 // Beyond its ends the picture goes on: around, and over the poles.
 static inline real wrapped(real turns) { return turns - floor(turns); }
 

@@ -31,9 +31,9 @@ radius = 1
 material = "red"
 """
 REPORT_FIELDS = {
-    "scene", "device", "platform", "driver", "version", "width", "height", "spp", "max_depth", "seed", "seconds",
-    "samples", "samples_per_second", "rays", "rays_per_second", "stop_reason", "noise", "nonfinite_samples", "bvh",
-    "kernel", "peak_device_bytes", "history", "total_seconds"}
+    "scene", "device", "platform", "driver", "version", "width", "height", "spp", "integrator", "max_depth", "seed",
+    "seconds", "samples", "samples_per_second", "rays", "rays_per_second", "stop_reason", "noise", "nonfinite_samples",
+    "bvh", "kernel", "peak_device_bytes", "history", "total_seconds"}
 BVH_FIELDS = {"triangles", "spheres", "instances", "nodes", "bytes", "build_seconds", "sah_cost", "layout"}
 
 

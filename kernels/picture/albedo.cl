@@ -1,0 +1,9 @@
+// What part of white light the surface reflects or lets through, head on.
+#include "bsdf.cl"
+
+static inline real2 picture_place(Sampler *sampler) { return next_2d(sampler); }
+
+static inline real3 picture_value(const Scene *scene, const Launch *launch, real3 direction, real t,
+                                  const Surface *surface) {
+    return bsdf_albedo(scene, surface->material);
+}
