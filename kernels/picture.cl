@@ -3,7 +3,8 @@
 // The file in picture/ provides
 //
 //   picture_place(&sampler)                              where in the pixel its ray goes through, see camera_ray
-//   picture_value(scene, launch, direction, t, surface)  what the picture has of a surface that is t along the ray
+//   picture_value(scene, launch, direction, t, &surface) what the picture has of a surface that is t along the ray, not
+//                                                        turned to any side yet
 //
 // One work-item takes LANES pixels through `sample_count` samples, as path.cl does.
 #include "camera.cl"
@@ -17,7 +18,6 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
     ireal hit = active & (hits.primitive >= 0);
     if (!ANY(hit)) return splat(ZERO);
     Surface surface = surface_at(scene, ray->origin, ray->direction, &hits);
-    turn_towards(&surface, negate(ray->direction));
     return choose(hit, picture_value(scene, launch, ray->direction, hits.t, &surface), splat(ZERO));
 #else
     return splat(ZERO);

@@ -17,8 +17,8 @@ from .validate import scene_problems
 def load(path: str | Path, camera: str | None = None) -> Scene:
     """The scene in a .toml file, or a model file's meshes with a camera that frames them, a sky and a sun.
 
-    A glTF model's own first camera is used if it has one. camera: the name of one in a model file instead. Raises one
-    SceneError with all mistakes in the file, each as "FILE: object: value is wrong; remedy".
+    A glTF model's own first camera and lights are used if it has any. camera: the name of one in a model file instead.
+    Raises one SceneError with all mistakes in the file, each as "FILE: object: value is wrong; remedy".
     """
     path = Path(path)
     if not path.is_file():
@@ -37,11 +37,11 @@ def load(path: str | Path, camera: str | None = None) -> Scene:
 
 
 def _load_model(path: Path) -> Scene:
-    """A bare model in the default light, seen by its own first camera, or by one that frames it."""
+    """A bare model under the default sky, with its lights or the sun, and its first camera or one that frames it."""
     model = read_model(path)
     camera = next(iter(model.cameras.values()), None) or frame(model.meshes)
-    return Scene(meshes=model.meshes, camera=camera, cameras=model.cameras, environment=default_sky(), lights=[SUN],
-                 name=path.stem)
+    return Scene(meshes=model.meshes, camera=camera, cameras=model.cameras, environment=default_sky(),
+                 lights=model.lights or [SUN], name=path.stem)
 
 
 def _load_toml(path: Path) -> tuple[Scene, list[str]]:

@@ -1,4 +1,4 @@
-"""Read glTF 2.0 (.glb, .gltf): every triangle of its scene, its metallic-roughness materials and its cameras.
+"""Read glTF 2.0 (.glb, .gltf): every triangle of its scene, its metallic-roughness materials, cameras and lights.
 
 What is left out (skins, morph targets, ...) is named in one warning in the log.
 """
@@ -18,6 +18,7 @@ from .framing import bounds
 from .gltf_camera import read_cameras
 from .gltf_data import GltfData
 from .gltf_draco import decompress
+from .gltf_lights import read_lights
 from .gltf_material import Materials
 from .model import Mesh, Model
 from .normals import Normals, choose_normals
@@ -50,7 +51,8 @@ def _read(path: Path, normals: Normals) -> Model:
         raise SceneError(problems)
     _warn_of_left_out(path, data.document)
     middle = np.mean(bounds(meshes), axis=0)
-    return Model(meshes=meshes, cameras=read_cameras(path, data.document, nodes, middle))
+    return Model(meshes=meshes, cameras=read_cameras(path, data.document, nodes, middle),
+                 lights=list(read_lights(data.document, nodes)))
 
 
 def _nodes(document: gltf.Document) -> Iterator[Placed]:
@@ -183,6 +185,7 @@ def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
         "skins": any(node.skin is not None for node in document.nodes),
         "morph targets": any(primitive.targets for primitive in primitives),
         "points and lines": any(primitive.mode < TRIANGLES for primitive in primitives),
+        "ranges of lights": any(light.range for light in document.extensions.KHR_lights_punctual.lights),
     }
     names = [name for name, present in left_out.items() if present]
     names += sorted(f"the extension {name}" for name in set(document.extensionsUsed) - gltf.EXTENSIONS)

@@ -15,14 +15,15 @@ from ..errors import SceneError
 Item = TypeVar("Item")
 Index = Annotated[int, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
+NonNegative = Annotated[float, Field(ge=0)]
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 Vec4 = tuple[float, float, float, float]
 ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
 #: Extensions that this reader follows.
-EXTENSIONS = frozenset({"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_mesh_quantization",
-                        "KHR_materials_emissive_strength", "KHR_texture_transform"})
+EXTENSIONS = frozenset({"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual",
+                        "KHR_materials_emissive_strength", "KHR_mesh_quantization", "KHR_texture_transform"})
 
 
 class Part(BaseModel):
@@ -181,6 +182,35 @@ class Camera(Part):
     name: str | None = None
 
 
+class Spot(Part):
+    innerConeAngle: Annotated[float, Field(ge=0)] = 0.0
+    outerConeAngle: Annotated[float, Field(gt=0, le=1.5708)] = 0.7853981633974483
+
+
+class Light(Part):
+    type: Literal["directional", "point", "spot"]
+    color: tuple[NonNegative, NonNegative, NonNegative] = (1.0, 1.0, 1.0)
+    intensity: NonNegative = 1.0
+    range: float | None = None
+    spot: Spot = Spot()
+
+
+class Lights(Part):
+    lights: list[Light] = []
+
+
+class UsedLight(Part):
+    light: Index
+
+
+class NodeExtensions(Part):
+    KHR_lights_punctual: UsedLight | None = None
+
+
+class DocumentExtensions(Part):
+    KHR_lights_punctual: Lights = Lights()
+
+
 class Node(Part):
     children: list[Index] = []
     mesh: Index | None = None
@@ -191,6 +221,7 @@ class Node(Part):
     rotation: Vec4 = (0.0, 0.0, 0.0, 1.0)
     scale: Vec3 = (1.0, 1.0, 1.0)
     name: str | None = None
+    extensions: NodeExtensions = NodeExtensions()
 
 
 class Scene(Part):
@@ -215,6 +246,7 @@ class Document(Part):
     samplers: list[Sampler] = []
     scenes: list[Scene] = []
     textures: list[Texture] = []
+    extensions: DocumentExtensions = DocumentExtensions()
 
 
 def parse_document(text: bytes) -> Document:

@@ -81,10 +81,11 @@ class Mesh:
 
 @dataclass(eq=False, kw_only=True)
 class Model:
-    """What a model file holds: at least one mesh, and its cameras by name, the first one first."""
+    """What a model file holds: at least one mesh, its cameras by name, the first one first, and its lights."""
 
     meshes: list[Mesh]
     cameras: dict[str, Camera] = field(default_factory=dict)
+    lights: list[Light] = field(default_factory=list)
 
 
 @dataclass(frozen=True, kw_only=True)

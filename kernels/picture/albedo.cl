@@ -4,6 +4,9 @@
 static inline real2 picture_place(Sampler *sampler) { return next_2d(sampler); }
 
 static inline real3 picture_value(const Scene *scene, const Launch *launch, real3 direction, real t,
-                                  const Surface *surface) {
-    return bsdf_albedo(scene, surface->material);
+                                  Surface *surface) {
+    turn_towards(surface, negate(direction));
+    Bsdf bsdf;
+    bsdf_at(scene, surface, &bsdf);
+    return bsdf_albedo(&bsdf);
 }

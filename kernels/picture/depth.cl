@@ -5,7 +5,7 @@
 static inline real2 picture_place(Sampler *sampler) { return (real2){(real)(0.5f), (real)(0.5f)}; }
 
 static inline real3 picture_value(const Scene *scene, const Launch *launch, real3 direction, real t,
-                                  const Surface *surface) {
+                                  Surface *surface) {
 #if ALL_AROUND
     real depth = t;
 #else

@@ -1,9 +1,13 @@
 // The shading normal on the camera's side, unit before it is averaged over the pixel. World frame.
-#include "surface.cl"
+#include "bsdf.cl"
 
 static inline real2 picture_place(Sampler *sampler) { return next_2d(sampler); }
 
 static inline real3 picture_value(const Scene *scene, const Launch *launch, real3 direction, real t,
-                                  const Surface *surface) {
+                                  Surface *surface) {
+#if NORMAL_MAPS
+    bend_normal(scene, surface);
+#endif
+    turn_towards(surface, negate(direction));
     return surface->ns;
 }
