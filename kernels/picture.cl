@@ -11,13 +11,16 @@
 #include "film.cl"
 #include "surface.cl"
 #include PICTURE
+#include VISIBILITY
 
-static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active) {
+static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active,
+                               Sampler *sampler) {
 #if PRIMITIVES
-    Hits hits = closest_hit(scene, ray->origin, ray->direction, (real)(INFINITY), active);
+    real3 origin = ray->origin;
+    Surface surface;
+    Hits hits = first_surface(scene, &origin, ray->direction, active, sampler, &surface);
     ireal hit = active & (hits.primitive >= 0);
     if (!ANY(hit)) return splat(ZERO);
-    Surface surface = surface_at(scene, ray->origin, ray->direction, &hits);
     return choose(hit, picture_value(scene, launch, ray->direction, hits.t, &surface), splat(ZERO));
 #else
     return splat(ZERO);
@@ -34,7 +37,7 @@ kernel void picture(SCENE_PARAMETERS, global Pixel *film, global const uint *til
         Sampler sampler = sampler_at(own.code, (ureal)(launch.first_sample + s), launch.seed, launch.block_bits);
         CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, picture_place(&sampler), &sampler);
         pixels.rays += own.inside ? (ureal)(1) : (ureal)(0);
-        accumulate(&pixels, seen_along(&scene, &launch, &ray, own.inside), own.inside);
+        accumulate(&pixels, seen_along(&scene, &launch, &ray, own.inside, &sampler), own.inside);
     }
     store_pixels(film, own.index, own.inside, &pixels);
 }
