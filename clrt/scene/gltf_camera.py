@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +20,10 @@ log = logging.getLogger(__name__)
 
 def read_cameras(path: Path, document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix]],
                  middle: NDArray[np.float64]) -> dict[str, Camera]:
-    """The perspective cameras in the scene, each under the name of its node, else its own, else "camera N".
+    """The cameras in the scene, each under the name of its node, else its own, else "camera N".
 
-    A name that is taken gets a number. Each looks at the depth of `middle`, (3,). Others are left out with a warning.
+    A name that is taken gets a number. Each looks at the depth of `middle`, (3,). One that shows nothing is left out
+    with a warning.
     """
     cameras: dict[str, Camera] = {}
     for node, matrix in nodes:
@@ -29,15 +31,14 @@ def read_cameras(path: Path, document: gltf.Document, nodes: Iterable[tuple[gltf
             continue
         source = gltf.entry(document.cameras, node.camera, "camera", "a node")
         name = gltf.unused(node.name or source.name or f"camera {node.camera}", cameras)
-        lens = source.perspective
-        if lens is None:
-            log.warning('%s: left out: camera "%s", which is not perspective', path, name)
-        elif (camera := _placed(lens, matrix, middle)) is not None:
+        if source.perspective is None and (source.orthographic is None or source.orthographic.ymag == 0):
+            log.warning('%s: left out: camera "%s", which has neither an angle nor a height', path, name)
+        elif (camera := _placed(source, matrix, middle)) is not None:
             cameras[name] = camera
     return cameras
 
 
-def _placed(lens: gltf.Perspective, matrix: Matrix, middle: NDArray[np.float64]) -> Camera | None:
+def _placed(source: gltf.Camera, matrix: Matrix, middle: NDArray[np.float64]) -> Camera | None:
     """A camera that looks along its node's −Z with +Y up (specification 3.10); None in a node without extent."""
     position = matrix[:3, 3]
     forward, up = unit(-matrix[:3, 2]), unit(matrix[:3, 1])
@@ -47,5 +48,8 @@ def _placed(lens: gltf.Perspective, matrix: Matrix, middle: NDArray[np.float64])
     x, y, z = position.tolist()
     at_x, at_y, at_z = (position + distance * forward).tolist()
     up_x, up_y, up_z = up.tolist()
-    return Camera(position=(x, y, z), look_at=(at_x, at_y, at_z), up=(up_x, up_y, up_z),
-                  fov_degrees=math.degrees(lens.yfov))
+    camera = Camera(position=(x, y, z), look_at=(at_x, at_y, at_z), up=(up_x, up_y, up_z))
+    if source.perspective is not None:
+        return replace(camera, fov_degrees=math.degrees(source.perspective.yfov))
+    assert source.orthographic is not None
+    return replace(camera, projection="orthographic", view_height=2 * abs(source.orthographic.ymag))

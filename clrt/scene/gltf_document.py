@@ -177,8 +177,13 @@ class Perspective(Part):
     yfov: Annotated[float, Field(gt=0, lt=3.14159)]
 
 
+class Orthographic(Part):
+    ymag: float
+
+
 class Camera(Part):
     perspective: Perspective | None = None
+    orthographic: Orthographic | None = None
     name: str | None = None
 
 

@@ -76,10 +76,13 @@ def transform_mesh(mesh: Mesh, matrix: Matrix) -> Mesh:
 
 
 def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
-    """The camera under an affine `matrix`; its angle stays."""
+    """The camera under an affine `matrix`; its angle stays, and its lengths go with `up`."""
     corners = np.array([[*camera.position, 1], [*camera.look_at, 1], [*camera.up, 0]]) @ matrix.T
     position, look_at, up = corners[:, :3].tolist()
-    return replace(camera, position=position, look_at=look_at, up=up)
+    stretch = float(np.linalg.norm(up) / np.linalg.norm(camera.up))
+    focus, height = (length and length * stretch for length in (camera.focus_distance, camera.view_height))
+    return replace(camera, position=position, look_at=look_at, up=up, focus_distance=focus, view_height=height,
+                   aperture_radius=camera.aperture_radius * stretch)
 
 
 def unit(vectors: NDArray[np.floating]) -> NDArray[np.float64]:

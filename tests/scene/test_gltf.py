@@ -218,15 +218,18 @@ def test_missing_texture_is_grey_with_a_warning(tmp_path: Path, caplog: pytest.L
 
 
 def cameras() -> Gltf:
-    """A ball that three cameras see: one of no name, one named by its node, one by itself; and an orthographic one."""
+    """A ball that three cameras see: one of no name, one named by its node, one by itself; one orthographic; and one
+    that shows nothing."""
     gltf = ball()
-    gltf.document["cameras"] = [{"type": "orthographic", "name": "plan"},
+    gltf.document["cameras"] = [{"type": "orthographic", "name": "nothing"},
                                 {"type": "perspective", "perspective": {"yfov": 0.5}},
-                                {"type": "perspective", "perspective": {"yfov": 1.0}, "name": "side"}]
+                                {"type": "perspective", "perspective": {"yfov": 1.0}, "name": "side"},
+                                {"type": "orthographic", "name": "plan", "orthographic": {"xmag": 9, "ymag": -1.5}}]
     gltf.node(camera=0)
     gltf.node(camera=1, translation=[10, 1, 0], rotation=[0, 0.5**0.5, 0, 0.5**0.5], scale=[2, 2, 2])
     gltf.node(camera=2, translation=[0, 0, 5])
     gltf.node(camera=1, translation=[0, 0, 9], name="side")
+    gltf.node(camera=3, translation=[0, 0, 4], scale=[5, 5, 5])
     return gltf
 
 
@@ -234,8 +237,10 @@ def test_cameras(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """A camera looks along its own −Z with +Y up (specification 3.10), here the first is turned to look along −X."""
     with caplog.at_level(logging.WARNING):
         found = read(cameras(), tmp_path).cameras
-    assert list(found) == ["camera 1", "side", "side 2"]
-    assert 'left out: camera "plan", which is not perspective' in caplog.text
+    assert list(found) == ["camera 1", "side", "side 2", "plan"]
+    assert 'left out: camera "nothing", which has neither an angle nor a height' in caplog.text
+    plan = found["plan"]
+    assert (plan.projection, plan.view_height, plan.position) == ("orthographic", 3, (0, 0, 4))   # whatever the scale
     camera = found["camera 1"]
     view = np.subtract(camera.look_at, camera.position)
     assert camera.position == (10.0, 1.0, 0.0)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from clrt.scene.model import Mesh
-from clrt.scene.transform import quaternion, rotation, scaling, transform_mesh, translation, unit
+from clrt.scene.model import Camera, Mesh
+from clrt.scene.transform import quaternion, rotation, scaling, transform_camera, transform_mesh, translation, unit
 from .shapes import icosphere, volume
 
 EPS = float(np.finfo(np.float32).eps)
@@ -54,6 +54,15 @@ def test_flattening_keeps_the_normals_across_the_sheet() -> None:
 def test_what_leaves_float32_is_infinite() -> None:
     mesh = transform_mesh(Mesh(*icosphere(0)), scaling((1e39, 1, 1)))
     assert np.isinf(mesh.vertices[:, 0]).any() and mesh.vertices.dtype == np.float32
+
+
+def test_a_cameras_lengths_are_scaled() -> None:
+    lens = Camera(position=(0, 0, 1), aperture_radius=0.1, focus_distance=2.0)
+    turned = transform_camera(lens, rotation((0, 90, 0)) @ scaling((3, 3, 3)))
+    assert (turned.aperture_radius, turned.focus_distance, turned.view_height) == pytest.approx((0.3, 6.0, None))
+    assert turned.position == pytest.approx((3, 0, 0))
+    plan = transform_camera(Camera(projection="orthographic", view_height=4.0), scaling((0.5, 0.5, 0.5)))
+    assert (plan.view_height, plan.focus_distance) == (2.0, None)
 
 
 def test_unit() -> None:
