@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .output.data import check_denoisable
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
-from .rendering.aov import render_aovs
+from .rendering.guides import render_guides
 from .rendering.renderer import Renderer
 from .rendering.report import render_report
 from .rendering.stops import planned_spp
@@ -35,10 +35,10 @@ def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | N
     renderer = Renderer(scene, spp=planned_spp(scene.render, spp, time, error), **options)
     if denoise:
         check_denoisable(renderer.settings.integrator)
-    aovs = render_aovs(renderer.session) if denoiser else {}
+    guides = render_guides(renderer.session) if denoiser else {}
     state = None
     for state in renderer.passes(spp=spp, time=time, error=error, reference=reference):
         pass
     assert state is not None  # passes() yields at least once
-    image = Image(state.pixels, render_report(renderer, state))
-    return denoised(image, denoiser, aovs, reference) if denoiser else image
+    image = Image(state.pixels, render_report(renderer, state), aovs=renderer.aovs(state))
+    return denoised(image, denoiser, guides, reference) if denoiser else image

@@ -11,6 +11,9 @@
 typedef struct {
     real3 sum, sum_error, square, square_error;
     ureal count, dropped, rays;
+#if DIRECT_LIGHT
+    real3 direct, direct_error;   // of the same samples: what came with two edges at most
+#endif
 } Accumulator;
 
 static inline void two_sum(real *sum, real *error, real x) {
@@ -21,7 +24,8 @@ static inline void two_sum(real *sum, real *error, real x) {
     *error = e - (*sum - s);
 }
 
-static inline void accumulate(Accumulator *a, real3 sample, ireal counted) {
+// Which lanes' samples are kept.
+static inline ireal accumulate(Accumulator *a, real3 sample, ireal counted) {
     real3 size = absolute3(sample);
     ireal finite = (size.x <= BRIGHTEST) & (size.y <= BRIGHTEST) & (size.z <= BRIGHTEST);
     ireal kept = counted & finite;
@@ -35,12 +39,26 @@ static inline void accumulate(Accumulator *a, real3 sample, ireal counted) {
     two_sum(&a->square.x, &a->square_error.x, minimum(L.x * L.x, (real)(BRIGHTEST)));
     two_sum(&a->square.y, &a->square_error.y, minimum(L.y * L.y, (real)(BRIGHTEST)));
     two_sum(&a->square.z, &a->square_error.z, minimum(L.z * L.z, (real)(BRIGHTEST)));
+    return kept;
 }
+
+#if DIRECT_LIGHT
+static inline void accumulate_direct(Accumulator *a, real3 sample, ireal kept) {
+    real3 L = choose(kept, sample, splat(ZERO));
+    two_sum(&a->direct.x, &a->direct_error.x, L.x);
+    two_sum(&a->direct.y, &a->direct_error.y, L.y);
+    two_sum(&a->direct.z, &a->direct_error.z, L.z);
+}
+#endif
 
 static inline Accumulator load_pixels(global const Pixel *film, ireal pixel) {
     return (Accumulator){GATHER3(film, pixel, .sum), GATHER3(film, pixel, .sum_error), GATHER3(film, pixel, .square),
                          GATHER3(film, pixel, .square_error), GATHER(ureal, film, pixel, .count),
-                         GATHER(ureal, film, pixel, .dropped), GATHER(ureal, film, pixel, .rays)};
+                         GATHER(ureal, film, pixel, .dropped), GATHER(ureal, film, pixel, .rays),
+#if DIRECT_LIGHT
+                         GATHER3(film, pixel, .direct), GATHER3(film, pixel, .direct_error),
+#endif
+    };
 }
 
 static inline void store_rows(global float *row, const real3 *value, int lane) {
@@ -57,6 +75,10 @@ static inline void store_pixels(global Pixel *film, ureal index, ireal stored, c
         store_rows(pixel->sum_error, &a->sum_error, lane);
         store_rows(pixel->square, &a->square, lane);
         store_rows(pixel->square_error, &a->square_error, lane);
+#if DIRECT_LIGHT
+        store_rows(pixel->direct, &a->direct, lane);
+        store_rows(pixel->direct_error, &a->direct_error, lane);
+#endif
         pixel->count = LANE_UINT(a->count, lane);
         pixel->dropped = LANE_UINT(a->dropped, lane);
         pixel->rays = LANE_UINT(a->rays, lane);

@@ -68,8 +68,9 @@ static inline real3 sampled_light(const Scene *scene, const Surface *surface, co
 }
 #endif
 
+// What arrives at the eye; direct: what of it came with two edges at most, where that is compiled in.
 static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ireal active, int max_depth,
-                             Sampler *sampler, ureal *rays) {
+                             Sampler *sampler, ureal *rays, real3 *direct) {
     real3 L = splat(ZERO), beta = splat(ONE), origin = eye;
     Step step;
     step.p = eye;
@@ -86,6 +87,9 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
         ireal hit = active & (hits.primitive >= 0);
         real3 found = found_light(scene, &step, &surface, hits.t, hit, active & !hit);
         L = add(L, choose(active, mul(beta, AT_EYE(found)), splat(ZERO)));
+#if DIRECT_LIGHT
+        if (depth <= 2) *direct = L;
+#endif
         active = hit;
         if (depth >= max_depth || !ANY(active)) return L;
 
@@ -100,8 +104,8 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
         Bsdf bsdf;
         bsdf_at(scene, &surface, &bsdf);
 #if LIGHTS
-        real3 direct = sampled_light(scene, &surface, &bsdf, shading, wo, active, sampler, rays);
-        L = add(L, mul(beta, AT_EYE(direct)));
+        real3 sampled = sampled_light(scene, &surface, &bsdf, shading, wo, active, sampler, rays);
+        L = add(L, mul(beta, AT_EYE(sampled)));
 #endif
         // 3. Go on in a direction drawn from the material.
         real2 u = next_2d(sampler), choice = next_2d(sampler);
@@ -139,8 +143,13 @@ kernel void path(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles,
     for (uint s = 0; s < launch.sample_count; ++s) {
         Sampler sampler = sampler_at(own.code, (ureal)(launch.first_sample + s), launch.seed, launch.block_bits);
         CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler);
-        real3 L = radiance(&scene, ray.origin, ray.direction, own.inside, launch.max_depth, &sampler, &pixels.rays);
-        accumulate(&pixels, L, own.inside);
+        real3 direct;
+        real3 L = radiance(&scene, ray.origin, ray.direction, own.inside, launch.max_depth, &sampler, &pixels.rays,
+                           &direct);
+        ireal kept = accumulate(&pixels, L, own.inside);
+#if DIRECT_LIGHT
+        accumulate_direct(&pixels, direct, kept);
+#endif
     }
     store_pixels(film, own.index, own.inside, &pixels);
 }

@@ -14,8 +14,11 @@ from clrt.accel.build import build_tree
 from clrt.accel.device_builder import SHAPES
 from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, UPPER_LEVELS, HitTests
 from clrt.device.open import Device
-from clrt.rendering.aov import render_aovs
+from clrt.rendering.aovs import AOVS, film_aovs
 from clrt.rendering.compile import OFFSETS, compile_scene
+from clrt.rendering.film import Film
+from clrt.rendering.first_hits import first_hits
+from clrt.rendering.guides import render_guides
 from clrt.rendering.session import Session
 from clrt.scene.model import Environment, Mesh, RenderSettings, Scene, Sphere
 from clrt.study.probe import choices
@@ -52,10 +55,14 @@ def started(device: Device, what: Scene, **chosen: Any) -> Session:
 
 def picture(device: Device, what: Scene, **chosen: Any) -> Answers:
     """Its mean, (h, w, 3). chosen: see Choices."""
-    session = started(device, what, **chosen)
-    for _ in session.render(what.render.spp):
+    return {"mean": film(started(device, what, **chosen), what.render.spp).mean}
+
+
+def film(session: Session, spp: int) -> Film:
+    """What it renders."""
+    for _ in session.render(spp):
         pass
-    return {"mean": session.film().mean}
+    return session.film()
 
 
 def hits(query: clrt.RayQuery | clrt.InstancedRayQuery) -> Answers:
@@ -102,8 +109,10 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     yield "lamps", picture(device, lit)
     painting = replace(painted(scene()), render=SETTINGS)
     yield "painted", picture(device, painting)
-    yield "aovs of it", {**render_aovs(started(device, painting), 2)}
-    yield "aovs", {**render_aovs(started(device, scene()), 2)}
+    yield "guides of it", {**render_guides(started(device, painting), 2)}
+    apart = started(device, scene(), direct_light=True)
+    yield "aovs", {**first_hits(apart, scene(), AOVS), **film_aovs(film(apart, SETTINGS.spp), AOVS)}
+    yield "guides", {**render_guides(started(device, scene()), 2)}
     for layout in SHAPES:
         build_tree(device, layout, "ploc", soup(0), spheres(30))
     build_tree(device, device.layout, "reinsertion", soup(120, 0.3))

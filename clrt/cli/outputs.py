@@ -20,10 +20,11 @@ if TYPE_CHECKING:
 
 @dataclass
 class Outputs:
-    """pictures: of the end result; denoise: whether the raw ones are kept beside them; view, exposure: of .png
-    pictures. One that cannot be written keeps none of the others from being written."""
+    """pictures: of the end result, with its aovs; denoise: whether the raw ones are kept beside them; view, exposure:
+    of .png pictures. One that cannot be written keeps none of the others from being written."""
 
     pictures: tuple[Path, ...]
+    aovs: tuple[str, ...]
     denoise: bool
     view: str
     exposure: float
@@ -38,6 +39,13 @@ class Outputs:
 
         return tuple(map(raw_path, self.pictures)) if self.denoise else ()
 
+    @property
+    def beside(self) -> tuple[Path, ...]:
+        """Where the AOVs go that are files of their own."""
+        from ..output.layers import files_beside
+
+        return tuple(path for picture in self.pictures for path in files_beside(picture, self.aovs).values())
+
     def check(self, reference: Path | None, checkpoint: Path | None) -> None:
         """Finds out before the render whether its results can be written, and over none of its inputs."""
         from ..output.files import check_target
@@ -46,10 +54,13 @@ class Outputs:
         from ..output.view import check_view
 
         check_view(self.view)
-        for picture in [*self.pictures, *self.raws]:
+        if self.aovs and all(picture.suffix.lower() == ".hdr" for picture in self.pictures):
+            raise UsageError("an .hdr holds the picture alone; for --aov name an .exr or .png, too, with -o")
+        for picture in [*self.pictures, *self.raws, *self.beside]:
             check_writable(picture)
-            if picture in self.raws and picture in self.pictures:
-                raise UsageError(f"{picture}: is where the raw picture is kept; name another picture with -o")
+            for others, what in ((self.raws, "the raw picture is kept"), (self.beside, "an AOV is written")):
+                if picture in others and picture in self.pictures:
+                    raise UsageError(f"{picture}: is where {what}; name another picture with -o")
             if reference is not None and picture.resolve() == reference.resolve():
                 raise UsageError(f"{picture}: is the reference, and would be overwritten; name another picture with -o")
         for other in (self.report, checkpoint):
@@ -57,14 +68,18 @@ class Outputs:
                 check_target(other)
         if self.plot is not None:
             check_plot(self.plot)
-        results = [*self.pictures, *self.raws, self.report, self.plot, reference]
+        results = [*self.pictures, *self.raws, *self.beside, self.report, self.plot, reference]
         if checkpoint is not None and checkpoint.resolve() in [path.resolve() for path in results if path]:
             raise UsageError(f"{checkpoint}: is named for something else, too; name another --checkpoint")
 
     def save(self, image: Image, raw: bool = False) -> None:
         """Writes the pictures, or the raw ones."""
+        from ..output.layers import files_beside
+
         for path in self.raws if raw else self.pictures:
-            self._write(lambda: image.save(path, view=self.view, exposure=self.exposure))
+            if self._write(lambda: image.save(path, view=self.view, exposure=self.exposure)):
+                for other in files_beside(path, image.aovs).values():
+                    click.echo(str(other))
 
     def save_measures(self, renderer: Renderer, image: Image) -> None:
         """Writes report and plot, and then raises OutputError where anything could not be written."""
@@ -78,9 +93,11 @@ class Outputs:
         if self._errors:
             raise OutputError("; ".join(map(str, self._errors)))
 
-    def _write(self, write: Callable[[], Path]) -> None:
-        """Prints where the file was written."""
+    def _write(self, write: Callable[[], Path]) -> bool:
+        """Whether it was written; prints where."""
         try:
             click.echo(str(write()))
         except OutputError as error:
             self._errors.append(error)
+            return False
+        return True

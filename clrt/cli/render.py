@@ -7,6 +7,7 @@ import gc
 import logging
 import signal
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
 @click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error by.")
 @click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what was done.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
+@click.option("--aov", "aovs", multiple=True, metavar="NAME,...",
+              help="Pictures beside it: layers of an .exr, files beside a .png. An unknown NAME lists them.")
 @click.option("--denoise", is_flag=True,
               help="Denoise the picture; the raw one is kept beside it as <stem>.raw<suffix>.")
 @click.option("--checkpoint", type=click.Path(path_type=Path), metavar="FILE",
@@ -60,12 +63,13 @@ if TYPE_CHECKING:
 def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tuple[int, int] | None, spp: int | None,
             seconds: float | None, error: float | None, depth: int | None, seed: int | None, devices: tuple[str, ...],
             integrator: str | None, sampler: str | None, pixel_filter: str | None, adaptive: bool | None,
-            reference: Path | None, report: Path | None, plot: Path | None, denoise: bool, checkpoint: Path | None,
-            checkpoint_every: float, resume: bool, view: str, exposure: float, progress_kind: str | None,
-            print_kernel: bool, quiet: bool, **tracing: Any) -> None:
+            reference: Path | None, report: Path | None, plot: Path | None, aovs: tuple[str, ...], denoise: bool,
+            checkpoint: Path | None, checkpoint_every: float, resume: bool, view: str, exposure: float,
+            progress_kind: str | None, print_kernel: bool, quiet: bool, **tracing: Any) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
     from ..output.data import check_denoisable
     from ..output.denoise import Denoiser
+    from ..rendering.aovs import chosen_aovs
     from ..rendering.renderer import Renderer
     from ..rendering.stops import check_stops, planned_spp
     from ..scene.file import load
@@ -75,7 +79,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         raise UsageError(f"--device is given {len(devices)} times; this version renders on one device, so name one")
     if resume and checkpoint is None:
         raise UsageError("--resume goes on from a checkpoint; name its file with --checkpoint")
-    results = Outputs(outputs or (Path(f"{scene.stem}.png"),), denoise, view, exposure, report, plot)
+    beside = chosen_aovs(",".join(aovs)) if aovs else ()
+    results = Outputs(outputs or (Path(f"{scene.stem}.png"),), beside, denoise, view, exposure, report, plot)
     results.check(reference, checkpoint)
     check_stops(spp, seconds, error)
     denoiser = Denoiser() if denoise else None
@@ -86,7 +91,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         "size": size, "max_depth": depth, "seed": seed, "device": devices[0] if devices else None,
         "integrator": integrator, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
         "checkpoint": None if print_kernel else checkpoint, "resume": resume and not print_kernel,
-        "checkpoint_seconds": checkpoint_every, **tracing}
+        "checkpoint_seconds": checkpoint_every, "aovs": beside, **tracing}
     with make_progress(progress_kind, quiet) as progress:
         progress.phase("load")
         content = load(scene, camera)
@@ -109,19 +114,21 @@ def _render(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, den
     """Renders to the goal, or until it is interrupted, and writes the results."""
     from ..output.denoise import denoised
     from ..output.image import Image
-    from ..rendering.aov import render_aovs
+    from ..rendering.guides import render_guides
     from ..rendering.report import render_report
 
-    aovs = render_aovs(renderer.session) if denoiser else {}
+    guides = render_guides(renderer.session) if denoiser else {}
     progress.phase("render")
     for state in renderer.passes(spp=goal.spp, time=goal.seconds, error=goal.error, reference=expected):
         progress.state(state, goal)
     progress.phase("write")
-    image = Image(state.pixels, render_report(renderer, state))
-    results.save(image, raw=denoiser is not None)
-    if denoiser is not None:
+    image = Image(state.pixels, render_report(renderer, state), aovs=renderer.aovs(state))
+    if denoiser is None:
+        results.save(image)
+    else:
+        results.save(replace(image, aovs={}), raw=True)
         progress.phase("denoise")
-        image = denoised(image, denoiser, aovs, expected)
+        image = denoised(image, denoiser, guides, expected)
         results.save(image)
     results.save_measures(renderer, image)
 

@@ -74,19 +74,19 @@ class Denoiser:
             raise DeviceError(f"Open Image Denoise failed: {problem}")
 
 
-def denoised(image: Image, denoiser: Denoiser, aovs: Mapping[str, FloatArray],
+def denoised(image: Image, denoiser: Denoiser, guides: Mapping[str, FloatArray],
              reference: FloatArray | None = None) -> Image:
     """The image with denoised pixels, its own as `raw`, and in its report `denoise` (docs/report.md).
 
-    aovs: `albedo` and `normal` of rendering.aov; reference: what the picture should be; all of the image's shape.
+    guides: `albedo` and `normal` of rendering.guides; reference: what the picture should be; all of the image's shape.
     """
     start = time.perf_counter()
-    pixels = denoiser(image.pixels, aovs["albedo"], aovs["normal"])
+    pixels = denoiser(image.pixels, guides["albedo"], guides["normal"])
     done: dict[str, Any] = {"seconds": time.perf_counter() - start, "device": denoiser.name,
                             "bias": _bias(pixels, image.pixels)}
     if reference is not None:
         done |= {"relmse": relmse(pixels, reference), "reference_bias": _bias(pixels, reference)}
-    return Image(pixels, {**image.report, "denoise": done}, image.pixels)
+    return Image(pixels, {**image.report, "denoise": done}, image.pixels, image.aovs)
 
 
 def raw_path(path: Path) -> Path:

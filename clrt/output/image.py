@@ -15,26 +15,29 @@ from .images import write_image
 
 @dataclass(frozen=True)
 class Image:
-    """pixels: (height, width, 3) float32, linear Rec. 709; report: what made it, see `clrt render --report`;
-    raw: the pixels before they were denoised, None where they were not."""
+    """pixels: (height, width, 3) float32, linear Rec. 709; report: what made it, see `clrt render --report`; raw: the
+    pixels before they were denoised, None where they were not; aovs: pictures beside it, by name (docs/aovs.md)."""
 
     pixels: NDArray[np.float32]
     report: dict[str, Any] = field(default_factory=dict)
     raw: NDArray[np.float32] | None = None
+    aovs: dict[str, NDArray[np.generic]] = field(default_factory=dict)
 
     def save(self, path: str | Path, *, view: str = "srgb", exposure: float = 0.0) -> Path:
         """Writes .exr, .hdr (linear) or .png (through `view` after 2^exposure; normals and depths by `shown_data`).
-        OutputError where that fails."""
+
+        The AOVs become layers of an .exr, and .png files beside a .png. OutputError where that fails.
+        """
         pixels, data = self.pixels, shown_data(self.report.get("integrator", "path"), self.pixels)
         if data is not None and Path(path).suffix.lower() == ".png":
             pixels, view, exposure = data, "raw", 0.0
-        write_image(Path(path), pixels, metadata=self.metadata(), view=view, exposure=exposure)
+        write_image(Path(path), pixels, metadata=self.metadata(), view=view, exposure=exposure, aovs=self.aovs)
         return Path(path)
 
     def metadata(self) -> dict[str, str]:
         """The report's plain values, for the file's header."""
         return {f"clrt:{key}": str(value) for key, value in self.report.items()
-                if isinstance(value, (str, int, float)) and not isinstance(value, bool)}
+                if isinstance(value, (str, int, float))}
 
     def _repr_png_(self) -> bytes:
         """How a notebook shows the picture."""

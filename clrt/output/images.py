@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import OutputError
 from ..scene.pictures import read_picture
 from .files import check_target, replacing
+from .layers import Pictures, drawn, files_beside, layered
 from .view import check_view, to_display
 
 FloatArray = NDArray[np.float32]
@@ -37,8 +38,10 @@ def check_writable(path: Path) -> None:
 
 
 def write_image(path: Path, pixels: FloatArray, *, metadata: Mapping[str, str] | None = None,
-                exposure: float = 0.0, view: str = "srgb") -> None:
+                exposure: float = 0.0, view: str = "srgb", aovs: Pictures | None = None) -> None:
     """Write (h, w, 3) float32 linear pixels in the format that the extension names, in one step (see `replacing`).
+
+    `aovs`, if any, are layers of an .exr and files beside a .png (see `layers`); an .hdr has none.
 
     `exposure` (stops) and `view` apply to .png alone. An .exr keeps every bit; an .hdr is rounded to RGBE, with
     NaN and negative values as 0. `metadata` is kept in .exr and .png; names with a colon, such as "clrt:spp", meet
@@ -46,18 +49,23 @@ def write_image(path: Path, pixels: FloatArray, *, metadata: Mapping[str, str] |
     """
     check_writable(path)
     check_view(view)
+    about, aovs = metadata or {}, aovs or {}
     match path.suffix.lower():
         case ".png":
-            # Level 3 writes a noisy 512² picture in 40 ms, level 6 in 52 ms and 2 % smaller. That the colours are sRGB
-            # is written by default; to say so takes 25 ms, in which OpenImageIO loads all colour spaces that it knows.
-            options: dict[str, str | int] = {"png:compressionLevel": 3}
-            samples: NDArray[Any] = to_display(pixels, view, exposure)
+            _write_png(path, to_display(pixels, view, exposure), about)
         case ".hdr":
-            options, samples = {}, rgbe_rounded(pixels)
+            _write(path, rgbe_rounded(pixels), about)
         case _:
-            options, samples = {"compression": "zip"}, pixels
-    with replacing(path) as temporary:
-        _write(temporary, samples, {**(metadata or {}), **options})
+            samples, names = layered(pixels, aovs)
+            _write(path, samples, {**about, "compression": "zip"}, names)
+    for name, other in files_beside(path, aovs).items():
+        _write_png(other, drawn(name, aovs[name], view, exposure), about)
+
+
+def _write_png(path: Path, samples: NDArray[np.uint8], metadata: Mapping[str, str]) -> None:
+    # Level 3 writes a noisy 512² picture in 40 ms, level 6 in 52 ms and 2 % smaller. That the colours are sRGB is
+    # written by default; to say so takes 25 ms, in which OpenImageIO loads all colour spaces that it knows.
+    _write(path, samples, {**metadata, "png:compressionLevel": 3})
 
 
 def rgbe_rounded(pixels: FloatArray) -> FloatArray:
@@ -73,12 +81,20 @@ def rgbe_rounded(pixels: FloatArray) -> FloatArray:
     return rounded.astype(np.float32)
 
 
-def _write(path: Path, samples: NDArray[Any], attributes: Mapping[str, str | int]) -> None:
-    """Write uint8 or float32 samples as they are; OSError with the writer's reason if that fails."""
+def _write(path: Path, samples: NDArray[Any], attributes: Mapping[str, str | int],
+           channels: Sequence[str] = ("R", "G", "B")) -> None:
+    """Write uint8 or float32 samples as they are, in one step; OutputError with the writer's reason if that fails."""
+    with replacing(path) as temporary:
+        _write_file(temporary, samples, attributes, channels)
+
+
+def _write_file(path: Path, samples: NDArray[Any], attributes: Mapping[str, str | int],
+                channels: Sequence[str]) -> None:
     import OpenImageIO as oiio
 
-    height, width, channels = samples.shape
-    spec = oiio.ImageSpec(width, height, channels, samples.dtype.name if samples.dtype == np.uint8 else "float")
+    height, width = samples.shape[:2]
+    spec = oiio.ImageSpec(width, height, len(channels), samples.dtype.name if samples.dtype == np.uint8 else "float")
+    spec.channelnames = tuple(channels)
     for name, value in attributes.items():
         spec.attribute(name, value)
     output = oiio.ImageOutput.create(str(path))

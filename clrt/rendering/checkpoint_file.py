@@ -1,6 +1,6 @@
 """The file of a checkpoint: a header and arrays, with a checksum, in two generations.
 
-    clrt checkpoint 1\\n
+    clrt checkpoint 2\\n
     JSON in one line: {"header": …, "shapes": {name: [rows, columns …], …}}\\n
     the arrays' bytes, one after the other
     SHA-256 of all that, 32 bytes
@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MAGIC = b"clrt checkpoint 1\n"
+MAGIC = b"clrt checkpoint 2\n"
 #: Bytes, more than any header has.
 LONGEST_HEADER = 1 << 16
 

@@ -28,7 +28,7 @@ from .emitters import SURFACES, TYPES, Emitters, pack_emitters
 from .environment import Sky, pack_sky
 from .filters import filter_quantiles
 from .materials import Materials, pack_materials
-from .records import AOV, COUNTS, LAUNCH, NORMALS, PIXEL, SPHERE, TRIANGLE
+from .records import COUNTS, GUIDE, LAUNCH, NORMALS, PIXEL, PIXEL_WITH_DIRECT, SPHERE, TRIANGLE
 from .textures import Textures
 from .tiles import TILE
 
@@ -43,7 +43,8 @@ WITH_LIGHT = ("path", "direct")
 
 @dataclass(frozen=True)
 class Choices:
-    """What a device or a user chooses about the program. lanes: paths a work-item (1, 8 or 16); offset: see OFFSETS.
+    """What a device or a user chooses about the program. lanes: paths a work-item (1, 8 or 16); offset: see OFFSETS;
+    direct_light: whether the film keeps it apart.
 
     layout: a name in LAYOUTS, or None for the one that fits the device and the scene.
     """
@@ -53,6 +54,12 @@ class Choices:
     builder: str | None = None
     tests: HitTests = HitTests()
     offset: str = "bound"
+    direct_light: bool = False
+
+    @property
+    def pixel(self) -> np.dtype[Any]:
+        """The record of a pixel of the film."""
+        return PIXEL_WITH_DIRECT if self.direct_light else PIXEL
 
 
 @dataclass(frozen=True)
@@ -78,9 +85,9 @@ class CompiledScene:
         """The program's text."""
         return self.source_of(self.entry)
 
-    def source_of(self, entry: str) -> str:
-        """The text of the same scene's program with another kernel file as its entry."""
-        return compose(self.preamble, entry, self.chosen_files)
+    def source_of(self, entry: str, *preamble: str) -> str:
+        """The text of the same scene's program with another kernel file as its entry, and what that needs before it."""
+        return compose("\n".join([self.preamble, *preamble]), entry, self.chosen_files)
 
     @property
     def kernel(self) -> str:
@@ -143,6 +150,8 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
         counts[f"{kind}_lights"] = count
 
     features = _features(scene, materials, textures.uv_sets, users, emitters, sky, lone)
+    if choices.direct_light:
+        features.add("DIRECT_LIGHT")
     integrator = scene.render.integrator
     unit = frame.unit if choices.offset != "bound" or integrator == "depth" else None
     preamble = _preamble(buffers, features, materials, textures.uv_sets, emitters, choices, tree, unit)
@@ -222,7 +231,7 @@ def _preamble(buffers: Buffers, features: set[str], materials: Materials, uv_set
         defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(tree), **lengths}),
         defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
         defines({feature: 1 for feature in sorted(features)}),
-        typedefs({"Counts": COUNTS, "Pixel": PIXEL, "Aov": AOV, "Launch": LAUNCH}),
+        typedefs({"Counts": COUNTS, "Pixel": choices.pixel, "Guide": GUIDE, "Launch": LAUNCH}),
         scene_struct(buffers),
         type_list("MATERIAL_TYPES", _numbered(materials.used)),
         type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),

@@ -28,7 +28,7 @@ def relative_to(mean: NDArray[np.float64], variance: NDArray[np.float64]) -> NDA
 
 
 class Film:
-    """A copy of the device's film. pixels: (height, width) PIXEL records."""
+    """A copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT."""
 
     def __init__(self, pixels: NDArray[Any]) -> None:
         self.pixels = pixels
@@ -36,7 +36,15 @@ class Film:
     @cached_property
     def mean(self) -> NDArray[np.float64]:
         """(height, width, 3): mean of the samples kept; 0 where there are none."""
-        total = self.pixels["sum"].astype(np.float64) + self.pixels["sum_error"]
+        return self._mean_of("sum")
+
+    @property
+    def direct(self) -> NDArray[np.float64]:
+        """(height, width, 3): what of the mean came with two path edges at most; only of a film that keeps it apart."""
+        return self._mean_of("direct")
+
+    def _mean_of(self, name: str) -> NDArray[np.float64]:
+        total = self.pixels[name].astype(np.float64) + self.pixels[f"{name}_error"]
         return np.asarray(total / np.maximum(self.pixels["count"], 1)[..., None])
 
     @cached_property
@@ -49,7 +57,8 @@ class Film:
         with np.errstate(divide="ignore", invalid="ignore"):
             squares = (self.pixels["square"].astype(np.float64) + self.pixels["square_error"]) / count
             summed = squares >= (1 - 1e-6) * self.mean**2    # false for NaN, too
-            return np.where(summed, np.maximum(squares - self.mean**2, 0) / (count - 1), self.mean**2)
+            variance = np.where(summed, np.maximum(squares - self.mean**2, 0) / (count - 1), self.mean**2)
+        return np.where(count < 2, np.nan, variance)
 
     @cached_property
     def relative_to(self) -> NDArray[np.float64]:

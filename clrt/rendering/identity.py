@@ -29,7 +29,13 @@ def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:
     width, height = scene.render.size
     return {"version": version("clrt"), "kernels": kernel_digest(), "size": f"{width}x{height}",
             **{name: str(value) for name, value in settings.items()}, "offset": choices.offset,
+            "direct_light": str(choices.direct_light),
             **{part: _digest(getattr(scene, part)) for part in PARTS}}
+
+
+def scene_hash(scene: Scene) -> str:
+    """SHA-256 of all that shines, reflects or is seen in the scene."""
+    return _digest([getattr(scene, part) for part in PARTS])
 
 
 def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:

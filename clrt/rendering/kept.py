@@ -11,14 +11,15 @@ import numpy as np
 from .checkpoint_file import Arrays
 from .film import Film
 from .noise import NoiseEstimate
-from .records import PIXEL
+from .records import DIRECT, PIXEL, PIXEL_WITH_DIRECT
 from .tiles import tiles_of
 from .work import Part, Work
 
 #: The columns of a history, NaN where an entry has none of it.
 HISTORY = ("spp", "seconds", "noise", "relmse")
 KINDS: dict[str, np.dtype[Any]] = {
-    "film": PIXEL, "samples": np.dtype(np.int64), "then": np.dtype(np.int64), "tiles": np.dtype(np.uint32),
+    "film": PIXEL, "direct": DIRECT, "samples": np.dtype(np.int64), "then": np.dtype(np.int64),
+    "tiles": np.dtype(np.uint32),
     "parts": np.dtype(np.int64), "noise_mean": np.dtype(np.float32), "noise_changes": np.dtype(np.float64),
     "noise_level": np.dtype(np.int64), "history": np.dtype(np.float64)}
 MOST_SAMPLES = 1 << 32
@@ -41,7 +42,7 @@ def to_arrays(kept: Kept) -> Arrays:
     """As KINDS says. parts: (k, 4); history: (n, 4), see HISTORY; the others as Work and NoiseEstimate say."""
     work, (mean, changes, level) = kept.work, kept.noise.arrays()
     rows = [[np.nan if entry.get(name) is None else entry[name] for name in HISTORY] for entry in kept.history]
-    arrays = {"film": kept.film.pixels, "samples": work.samples, "then": work.then, "tiles": work.tiles,
+    arrays = {**_film_parts(kept.film), "samples": work.samples, "then": work.then, "tiles": work.tiles,
               "parts": np.array(work.parts).reshape(-1, 4), "noise_mean": mean, "noise_changes": changes,
               "noise_level": level, "history": np.array(rows).reshape(-1, 4)}
     return {name: arrays[name].astype(kind, copy=False) for name, kind in KINDS.items()}
@@ -51,9 +52,16 @@ def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -
     """What was kept of a picture of (width, height); ValueError where the parts do not fit each other."""
     planned, seconds = header.get("planned_spp"), header.get("seconds")
     if not (planned is None or type(planned) is int and planned > 0) or type(seconds) is not float or not (
-            0 <= seconds < np.inf and _work_fits(arrays, size) and _noise_fits(arrays, size)):
+            0 <= seconds < np.inf and _film_fits(header, arrays, size) and _work_fits(arrays, size)
+            and _noise_fits(arrays, size)):
         raise ValueError(NO_SENSE)
     work, noise = Work(arrays["samples"]), NoiseEstimate(planned)
+    film = arrays["film"]
+    if arrays["direct"].size:
+        film = np.empty(film.shape, PIXEL_WITH_DIRECT)
+        for part in ("film", "direct"):
+            for name in arrays[part].dtype.names or ():
+                film[name] = arrays[part][name]
     work.then, work.tiles = arrays["then"], arrays["tiles"]
     work.parts = deque(Part(*part) for part in arrays["parts"].tolist())
     noise.restore(arrays["noise_mean"], arrays["noise_changes"], arrays["noise_level"])
@@ -61,13 +69,26 @@ def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -
     for spp, second, error, relmse in arrays["history"].tolist():
         entry = {"spp": int(spp), "seconds": second, "noise": None if np.isnan(error) else error}
         history.append(entry if np.isnan(relmse) else {**entry, "relmse": relmse})
-    return Kept(planned, seconds, history, Film(arrays["film"]), work, noise)
+    return Kept(planned, seconds, history, Film(film), work, noise)
+
+
+def _film_parts(film: Film) -> Arrays:
+    """Its pixels without, and where it has that, with their direct light alone."""
+    names = film.pixels.dtype.names or ()
+    direct = film.pixels[list(DIRECT.names or ())] if "direct" in names else np.zeros((0, 0), DIRECT)
+    return {"film": film.pixels[list(PIXEL.names or ())], "direct": direct}
+
+
+def _film_fits(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -> bool:
+    """Whether the film is of this size, and keeps direct light apart as the render does."""
+    direct = size[::-1] if header["facts"].get("direct_light") == "True" else (0, 0)
+    return bool(arrays["film"].shape == size[::-1] and arrays["direct"].shape == direct)
 
 
 def _work_fits(arrays: Arrays, size: tuple[int, int]) -> bool:
-    """Whether film and work are of this size, and no launch would reach beyond the film or 2³² samples."""
+    """Whether the work is of this size, and no launch would reach beyond the film or 2³² samples."""
     samples, then, tiles, parts = (arrays[name] for name in ("samples", "then", "tiles", "parts"))
-    return bool(arrays["film"].shape == size[::-1] and samples.shape == then.shape == tiles_of(size)
+    return bool(samples.shape == then.shape == tiles_of(size)
                 and np.all((0 <= samples) & (samples <= then) & (then <= MOST_SAMPLES))
                 and tiles.ndim == 1 and np.all(tiles < samples.size) and parts.shape[1:] == (4,)
                 and all(0 <= part.first < part.end <= len(tiles) and 0 <= part.samples < MOST_SAMPLES

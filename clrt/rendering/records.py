@@ -48,8 +48,11 @@ TEXTURE = record(u_row="3f4", width="i4", v_row="3f4", height="i4", first="i4", 
 TEXEL = np.dtype([("rgba", "u4")])
 #: Of a byte that is encoded by sRGB's curve.
 LINEAR = np.dtype([("linear", "f4")])
-#: Of a pixel's AOVs (kernels/aov.cl); what is not named pad is a picture of its own.
-AOV = record(albedo="3f4", pad0="i4", normal="3f4", pad1="i4")
+#: What guides a denoiser at a pixel (kernels/guides.cl); what is not named pad is a picture of its own.
+GUIDE = record(albedo="3f4", pad0="i4", normal="3f4", pad1="i4")
+#: Where DIRECT_LIGHT is compiled in, a pixel has the sum of its samples' direct light, too.
+DIRECT = record(direct="3f4", pad0="u4", direct_error="3f4", pad1="u4")
+PIXEL_WITH_DIRECT = np.dtype([*PIXEL.descr, *DIRECT.descr])
 #: A filter's quantile, in pixels from a pixel's edge.
 FILTER = np.dtype([("quantile", "f4")])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -18,9 +18,11 @@ from ..device.open import open_device
 from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
 from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
+from .aovs import LIGHT, chosen_aovs, film_aovs
 from .checkpoint import open_checkpoints
 from .compile import OFFSETS, WITH_LIGHT, Choices, compile_scene
 from .film import RELATIVE_FLOOR, Film
+from .first_hits import MEANS, OF_THE_MIDDLE, first_hits
 from .kept import Kept
 from .noise import NoiseEstimate
 from .session import Session
@@ -61,6 +63,7 @@ class Renderer:
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
     checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the end; resume:
     go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
+    aovs: pictures that are made beside, by their names (docs/aovs.md); those of a state: see `aovs`.
     Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
 
@@ -71,14 +74,15 @@ class Renderer:
                  sphere: str = "robust", offset: str = "bound", builder: str | None = None, layout: str | None = None,
                  lanes: int | None = None, on_phase: Callable[[str], None] = lambda phase: None,
                  checkpoint: str | Path | None = None, resume: bool = False,
-                 checkpoint_seconds: float = 30.0) -> None:
+                 checkpoint_seconds: float = 30.0, aovs: str | Iterable[str] = ()) -> None:
+        self._aovs = chosen_aovs(aovs)
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
                                  "sampler": sampler, "filter": filter, "adaptive": adaptive}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
         self.device = open_device(device)
         choices = Choices(lanes or self.device.lanes, layout, builder,
-                          HitTests(triangle, box, sphere), offset)
+                          HitTests(triangle, box, sphere), offset, bool(set(LIGHT) & set(self._aovs)))
         _check(choices)
         on_phase("build")
         self.compiled = compile_scene(self.scene, choices, device=self.device)
@@ -92,6 +96,7 @@ class Renderer:
         self._planned_spp = kept.planned_spp if kept else planned
         self.session = Session(self.device, self.compiled, settings.size, depth, settings.seed, self._planned_spp)
         self._noise = kept.noise if kept else NoiseEstimate(self._planned_spp)
+        self._first_hits = self._seen_first()
         self.history: list[dict[str, Any]] = kept.history if kept else []
         self.stop_reason: str | None = None
         self.seconds = kept.seconds if kept else 0.0
@@ -152,6 +157,16 @@ class Renderer:
         noise = self._noise.at(film, tile_samples)
         self._last = State(self.session.samples_done, self.seconds, noise, relmse, film)
         return self._last
+
+    def aovs(self, state: State) -> dict[str, NDArray[np.generic]]:
+        """The pictures beside the state's, by the names and in the order that they were asked for."""
+        made = self._first_hits | film_aovs(state.film, self._aovs)
+        return {name: made[name] for name in self._aovs}
+
+    def _seen_first(self) -> dict[str, NDArray[np.generic]]:
+        """AOVs that need no render: they are made before, so that an interrupted one has them, too."""
+        seen = set(self._aovs) & {*MEANS, *OF_THE_MIDDLE}
+        return first_hits(self.session, self.scene, seen) if seen else {}
 
     def _reached(self, spp: int | None, time: float | None, error: float | None) -> str | None:
         """The stop reason where an earlier call, or the render it goes on with, came so far already."""

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from typing import Any
 
+from .identity import scene_hash
 from .renderer import Renderer, State
 
 
 def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
     """The report's fields, as listed in docs/report.md. `state` is the last one."""
     info, compiled, session = renderer.device.info, renderer.compiled, renderer.session
-    width, height = session.size
+    (width, height), settings = session.size, renderer.settings
     samples = state.film.samples
     seconds = renderer.seconds or float("nan")
     return {
-        "scene": renderer.scene.name, "device": info.name, "platform": info.platform, "driver": info.driver,
-        "version": _version(), "width": width, "height": height, "spp": state.spp,
-        "integrator": renderer.settings.integrator,
-        "max_depth": renderer.settings.max_depth, "seed": renderer.settings.seed, "seconds": renderer.seconds,
+        "scene": renderer.scene.name, "scene_hash": scene_hash(renderer.scene), "version": _version(),
+        "device": info.name, "platform": info.platform, "driver": info.driver,
+        "width": width, "height": height, "spp": state.spp,
+        "max_depth": settings.max_depth, "seed": settings.seed, "integrator": settings.integrator,
+        "sampler": settings.sampler, "filter": settings.filter, "adaptive": settings.adaptive,
+        "seconds": renderer.seconds,
         "samples": samples, "samples_per_second": samples / seconds,
         "rays": state.film.rays, "rays_per_second": state.film.rays / seconds,
         "stop_reason": renderer.stop_reason, "noise": state.noise, "nonfinite_samples": state.film.nonfinite_samples,

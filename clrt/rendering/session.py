@@ -17,7 +17,6 @@ from ..errors import DeviceError
 from .camera import launch_record
 from .compile import CompiledScene
 from .film import Film
-from .records import PIXEL
 from .tiles import TILE_PIXELS, tile_pixels, tiles_of
 from .work import Part, Work
 
@@ -44,7 +43,7 @@ class Session:
         self._check_memory()
         try:
             scene = [on_device(device, array) for _, array in compiled.buffers.values()]
-            self._film = on_device(device, np.zeros(width * height, PIXEL))
+            self._film = on_device(device, np.zeros(width * height, compiled.choices.pixel))
             self._tiles = on_device(device, np.zeros(1, np.uint32))
         except cl.Error as error:
             raise DeviceError(f"{device.info.name}: {self.device_bytes} bytes do not fit: {error}") from error
@@ -57,7 +56,8 @@ class Session:
     def _check_memory(self) -> None:
         """DeviceError with the numbers where the picture or a buffer of the scene cannot fit."""
         info, (width, height) = self.device.info, self.size
-        largest = max([width * height * PIXEL.itemsize, *(a.nbytes for _, a in self.compiled.buffers.values())])
+        film = width * height * self.compiled.choices.pixel.itemsize
+        largest = max([film, *(a.nbytes for _, a in self.compiled.buffers.values())])
         if largest > info.max_alloc_bytes or self.device_bytes > info.global_bytes:
             raise DeviceError(f"{info.name}: a picture of {width}x{height} and its scene need {self.device_bytes} "
                               f"bytes, {largest} of them in one buffer; the device has {info.global_bytes}, and at "
@@ -72,7 +72,7 @@ class Session:
     @property
     def device_bytes(self) -> int:
         """Memory of all buffers on the device."""
-        return self.compiled.bytes + self.size[0] * self.size[1] * PIXEL.itemsize
+        return self.compiled.bytes + self.size[0] * self.size[1] * self.compiled.choices.pixel.itemsize
 
     @property
     def tile_samples(self) -> NDArray[np.int64]:
@@ -150,7 +150,7 @@ class Session:
     def film(self) -> Film:
         """The film so far; waits for the launches in flight."""
         self.wait()
-        pixels = np.empty((self.size[1], self.size[0]), PIXEL)
+        pixels = np.empty((self.size[1], self.size[0]), self.compiled.choices.pixel)
         wait_for(cl.enqueue_copy(self.device.queue, pixels, self._film, is_blocking=False))
         return Film(pixels)
 

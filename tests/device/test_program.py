@@ -21,7 +21,9 @@ from clrt.device import cache, program
 from clrt.device.open import Device
 from clrt.device.program import build, compose, files_of
 from clrt.errors import KernelError
+from clrt.rendering.aovs import AOVS
 from clrt.rendering.compile import OFFSETS, Choices, compile_scene
+from clrt.rendering.first_hits import first_hit_program
 from clrt.scene.materials import MATERIALS
 from clrt.scene.model import Environment, Filter, Sampler
 from clrt.study.bsdfs import variants
@@ -112,7 +114,7 @@ def test_every_kernel_file_is_used(device: Device) -> None:
         used |= set(compile_scene(scene, Choices()).files)
     for count in (1, 40):
         used |= set(compile_scene(lamps(count), Choices()).files)
-    for entry in ("aov.cl", "study/probe.cl"):
+    for entry in ("guides.cl", "first_hit.cl", "study/probe.cl"):
         used |= set(compile_scene(everything(), Choices(), entry).files)
     assert sorted(used) == FILES
 
@@ -122,8 +124,8 @@ def test_programs_build_without_a_warning(device: Device, capfd: pytest.CaptureF
     scene = everything()
     scene.spheres = scene.spheres + [type(scene.spheres[0])(material=material)
                                      for kind in MATERIALS for material in variants(kind)]
-    for entry in ("path.cl", "aov.cl"):
-        source = compile_scene(scene, Choices(device.lanes, device.layout), entry).source
+    compiled = compile_scene(scene, Choices(device.lanes, device.layout, direct_light=True))
+    for source in (compiled.source, compiled.source_of("guides.cl"), first_hit_program(compiled, AOVS)[0]):
         built = build(device, source + "\n// its own text, so that no cache has it")
         log = built.program.get_build_info(device.cl, cl.program_build_info.LOG)  # type: ignore[no-untyped-call]
         assert not re.findall(r".*\.cl:\d+:\d+: warning.*", log)

@@ -18,7 +18,7 @@ import clrt
 from clrt.output.compare import relmse
 from clrt.output.denoise import Denoiser, raw_path
 from clrt.output.images import read_image
-from clrt.rendering.aov import render_aovs
+from clrt.rendering.guides import render_guides
 from clrt.scene.model import RenderSettings
 
 from ..rendering.test_variants import everything
@@ -62,7 +62,7 @@ def image(converged: Floats) -> clrt.Image:
 
 @pytest.fixture(scope="module")
 def guides() -> dict[str, Floats]:
-    return render_aovs(clrt.Renderer(scene()).session)
+    return render_guides(clrt.Renderer(scene()).session)
 
 
 def command(*arguments: object) -> list[str]:

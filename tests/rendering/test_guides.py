@@ -1,4 +1,4 @@
-"""Pictures beside the picture: albedo and normals of what is seen, through mirrors, too."""
+"""What guides a denoiser: albedo and normals of what is seen, through mirrors, too."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.device.open import Device
-from clrt.rendering import aov
-from clrt.rendering.aov import render_aovs
+from clrt.rendering import pixels
+from clrt.rendering.guides import render_guides
 from clrt.scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 
@@ -34,8 +34,8 @@ FURNACE: dict[Material, float] = {
     MetallicRoughness(metallic=1.0, color=(1.0, 1.0, 1.0), roughness=0.9, multiple_scattering=True): 4e-3}
 
 
-def aovs(device: Device, scene: Scene, samples: int = 4, lanes: int | None = None) -> dict[str, Floats]:
-    return render_aovs(session(device, scene, "sobol", **({} if lanes is None else {"lanes": lanes})), samples)
+def guides(device: Device, scene: Scene, samples: int = 4, lanes: int | None = None) -> dict[str, Floats]:
+    return render_guides(session(device, scene, "sobol", **({} if lanes is None else {"lanes": lanes})), samples)
 
 
 def back(material: Material, z: float = -1.0) -> Mesh:
@@ -63,7 +63,7 @@ def test_albedo_is_what_a_furnace_shows(device: Device, material: Material, tole
     scene = Scene(meshes=[back(material)], spheres=others, environment=Environment(color=(1.0, 1.0, 1.0)),
                   camera=replace(INSIDE, fov_degrees=1e-2), render=RenderSettings(size=(16, 16), max_depth=2))
     shown = film(device, scene, 4096, sampler="sobol").mean.mean(axis=(0, 1))
-    np.testing.assert_allclose(aovs(device, scene)["albedo"].mean(axis=(0, 1)), shown, atol=tolerance)
+    np.testing.assert_allclose(guides(device, scene)["albedo"].mean(axis=(0, 1)), shown, atol=tolerance)
 
 
 def test_normals_of_a_sphere(device: Device) -> None:
@@ -83,7 +83,7 @@ def test_normals_of_a_sphere(device: Device) -> None:
     cells = (size[1], 6, size[0], 6)
     expected = np.einsum("hiwjk,i,j->hwk", normals.reshape(*cells, 3), weights / 2, weights / 2)
     covered = inside.reshape(cells).min(axis=(1, 3)) > 0.05 * radius**2
-    found = aovs(device, scene, 1024)
+    found = guides(device, scene, 1024)
     assert covered.sum() > 50
     np.testing.assert_allclose(found["normal"][covered], expected[covered], atol=2e-4)
     colors = np.broadcast_to(RED, expected.shape)[covered]
@@ -92,19 +92,19 @@ def test_normals_of_a_sphere(device: Device) -> None:
 
 def test_normals_face_the_camera(device: Device) -> None:
     """Also those of a wall that is seen from behind, and of one whose shading normals lean."""
-    everywhere(aovs(device, Scene(meshes=[back(Diffuse())], camera=INSIDE, render=FLAT))["normal"], (0, 0, 1))
+    everywhere(guides(device, Scene(meshes=[back(Diffuse())], camera=INSIDE, render=FLAT))["normal"], (0, 0, 1))
     behind = replace(INSIDE, position=(0.0, 0.0, -3.0))
-    everywhere(aovs(device, Scene(meshes=[back(Diffuse())], camera=behind, render=FLAT))["normal"], (0, 0, -1))
+    everywhere(guides(device, Scene(meshes=[back(Diffuse())], camera=behind, render=FLAT))["normal"], (0, 0, -1))
     leaning = back(Diffuse())
     leaning.normals = np.tile(np.array([0.6, 0.0, 0.8], np.float32), (4, 1))
-    everywhere(aovs(device, Scene(meshes=[leaning], camera=INSIDE, render=FLAT))["normal"], (0.6, 0, 0.8))
+    everywhere(guides(device, Scene(meshes=[leaning], camera=INSIDE, render=FLAT))["normal"], (0.6, 0, 0.8))
 
 
 def test_sky_is_its_radiance_up_to_one_without_a_normal(device: Device) -> None:
-    found = aovs(device, Scene(environment=Environment(color=(2.0, 0.5, 0.25)), render=FLAT))
+    found = guides(device, Scene(environment=Environment(color=(2.0, 0.5, 0.25)), render=FLAT))
     everywhere(found["albedo"], (1.0, 0.5, 0.25))
     everywhere(found["normal"], (0, 0, 0))
-    black = aovs(device, Scene(render=FLAT))
+    black = guides(device, Scene(render=FLAT))
     assert not black["albedo"].any() and not black["normal"].any()
 
 
@@ -113,17 +113,17 @@ def test_mirrors_are_followed(device: Device) -> None:
     tinted, behind = Mirror(color=(0.9, 0.8, 0.5)), front(Diffuse(color=RED))
     wall = Scene(meshes=[back(tinted), behind], environment=Environment(color=(0.5, 1.0, 4.0)), camera=INSIDE,
                  render=replace(FLAT, max_depth=4))
-    found = aovs(device, wall)
+    found = guides(device, wall)
     everywhere(found["albedo"], (0.63, 0.16, 0.05))
     everywhere(found["normal"], (0, 0, -1))
-    found = aovs(device, replace(wall, meshes=[back(tinted), front(Diffuse(color=RED), 99.0)]))
+    found = guides(device, replace(wall, meshes=[back(tinted), front(Diffuse(color=RED), 99.0)]))
     everywhere(found["albedo"], (0.45, 0.8, 0.5))
     everywhere(found["normal"], (0, 0, 0))
     twice = [back(tinted), front(Mirror(color=GREY)), back(Diffuse(color=RED), -0.5)]
-    found = aovs(device, replace(wall, meshes=twice, camera=replace(INSIDE, look_at=(0.0, 0.0, 2.0))))
+    found = guides(device, replace(wall, meshes=twice, camera=replace(INSIDE, look_at=(0.0, 0.0, 2.0))))
     everywhere(found["albedo"], (0.35, 0.1, 0.05))
     for depth, seen in ((1, False), (2, True)):
-        found = aovs(device, replace(wall, render=replace(FLAT, max_depth=depth)))
+        found = guides(device, replace(wall, render=replace(FLAT, max_depth=depth)))
         assert found["albedo"].all() == found["normal"].any() == seen
 
 
@@ -132,11 +132,11 @@ def test_glass_is_looked_through(device: Device) -> None:
     glass, wall = Dielectric(color=(0.9, 0.8, 0.5)), back(Diffuse(color=RED))
     side = quad([(1.9, -2, 0.5), (1.9, -2, 2), (1.9, 2, 2), (1.9, 2, 0.5)], Diffuse(color=GREY))
     pane = Scene(meshes=[front(glass, -0.5), back(glass, 0.5), wall, side], camera=INSIDE, render=FLAT)
-    found = aovs(device, pane)
+    found = guides(device, pane)
     everywhere(found["albedo"], (0.7 * 0.9**2, 0.2 * 0.8**2, 0.1 * 0.5**2))
     everywhere(found["normal"], (0, 0, 1))
     grazing = replace(INSIDE, position=(-1.9, 0.0, 0.51), look_at=(1.9, 0.0, 0.49), fov_degrees=0.1)
-    found = aovs(device, replace(pane, camera=grazing))
+    found = guides(device, replace(pane, camera=grazing))
     everywhere(found["albedo"], GREY)
     everywhere(found["normal"], (-1, 0, 0))
 
@@ -144,7 +144,7 @@ def test_glass_is_looked_through(device: Device) -> None:
 def test_edges_are_shares_of_the_pixel(device: Device) -> None:
     """A wall over half of the middle column: half its albedo, half its normal."""
     half = quad([(-2, -2, -1), (0, -2, -1), (0, 2, -1), (-2, 2, -1)], Diffuse(color=RED))
-    found = aovs(device, Scene(meshes=[half], camera=INSIDE, render=RenderSettings(size=(5, 3))), 64)
+    found = guides(device, Scene(meshes=[half], camera=INSIDE, render=RenderSettings(size=(5, 3))), 64)
     np.testing.assert_allclose(found["albedo"][:, 2], np.tile(np.multiply(RED, 0.5), (3, 1)), rtol=0.04)
     np.testing.assert_allclose(found["normal"][:, 2], [[0, 0, 0.5]] * 3, atol=0.02)
     assert not found["albedo"][:, 3:].any() and found["albedo"][:, :2].min() > 0.09
@@ -152,18 +152,18 @@ def test_edges_are_shares_of_the_pixel(device: Device) -> None:
 
 def test_lanes_and_launches_agree(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """To float rounding, but for samples on an edge, which a rounding may turn; and bit for bit however it is cut."""
-    pictures = [aovs(device, everything(), lanes=lanes) for lanes in (8, 1)]
+    pictures = [guides(device, everything(), lanes=lanes) for lanes in (8, 1)]
     for name, picture in pictures[1].items():
         assert np.mean(np.abs(picture - pictures[0][name]).max(axis=2) > 1e-5) < 1e-3, name
-    monkeypatch.setattr(aov, "FIRST_LAUNCH_SAMPLES", 1)
-    monkeypatch.setattr(aov, "FEWEST_TILES", 2)
-    for name, picture in aovs(device, everything(), lanes=8).items():
+    monkeypatch.setattr(pixels, "FIRST_LAUNCH_SAMPLES", 1)
+    monkeypatch.setattr(pixels, "FEWEST_TILES", 2)
+    for name, picture in guides(device, everything(), lanes=8).items():
         assert picture.tobytes() == pictures[0][name].tobytes(), name
 
 
 def test_they_are_in_range(device: Device) -> None:
     """Of all kinds of surfaces, lights and materials. What the camera looks at turns to it."""
-    found = aovs(device, everything(), 16)
+    found = guides(device, everything(), 16)
     assert all(picture.dtype == np.float32 and picture.shape == (33, 45, 3) for picture in found.values())
     assert found["albedo"].min() >= 0 and found["albedo"].max() <= 1
     assert np.linalg.norm(found["normal"], axis=2).max() <= 1 + 1e-6

@@ -1,11 +1,11 @@
-// What is seen, without its light: pictures beside the picture (AOVs), which guide a denoiser.
+// What is seen, without its light: pictures that guide a denoiser.
 //
 // One work-item takes LANES pixels and averages `sample_count` camera rays of each. Rays go on from mirrors and glass,
 // there by the likelier of reflection and refraction, since guides are to be free of noise. The first surface that is
 // neither is what is seen, as Open Image Denoise asks, its albedo tinted by their colors. The sky has its radiance, up
 // to 1, for albedo, and no normal. World frame.
 //
-// To add one: a field of the record AOV (clrt/rendering/records.py), its like in Seen, and what it is, below.
+// To add one: a field of the record GUIDE (clrt/rendering/records.py), its like in Seen, and what it is, below.
 #include "camera.cl"
 #include "film.cl"
 #include "bsdf.cl"
@@ -59,7 +59,7 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
 }
 
 __attribute__((vec_type_hint(real)))
-kernel void aov(SCENE_PARAMETERS, global Aov *pixels, global const uint *tiles, const Launch launch) {
+kernel void guides(SCENE_PARAMETERS, global Guide *pixels, global const uint *tiles, const Launch launch) {
     Scene scene = SCENE_ARGUMENTS;
     LanePixels own;
     if (!lane_pixels(&launch, tiles, &own)) return;
@@ -75,7 +75,7 @@ kernel void aov(SCENE_PARAMETERS, global Aov *pixels, global const uint *tiles, 
     real3 albedo = scale(sum.albedo, share), normal = scale(sum.normal, share);
     for (int lane = 0; lane < LANES; ++lane) {
         if (!LANE_INT(own.inside, lane)) continue;
-        global Aov *pixel = pixels + LANE_UINT(own.index, lane);
+        global Guide *pixel = pixels + LANE_UINT(own.index, lane);
         store_rows(pixel->albedo, &albedo, lane);
         store_rows(pixel->normal, &normal, lane);
     }

@@ -1,0 +1,52 @@
+"""Pictures beside the picture (AOVs): which there are, and where they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError
+from .film import Film
+from .first_hits import MEANS, OF_THE_MIDDLE
+
+#: What the film of the render itself holds; of these the first two ask it to keep direct light apart.
+LIGHT = ("direct", "indirect")
+OF_THE_FILM = (*LIGHT, "variance", "samples")
+AOVS = (*MEANS, *OF_THE_MIDDLE, *OF_THE_FILM)
+
+
+def chosen_aovs(names: str | Iterable[str]) -> tuple[str, ...]:
+    """The names, each once; text is taken for names with commas between. UsageError for one that is none of AOVS."""
+    given = names.split(",") if isinstance(names, str) else names
+    chosen = tuple(dict.fromkeys(name.strip() for name in given))
+    for name in chosen:
+        if name not in AOVS:
+            meant = "".join(f"; did you mean {match}?" for match in get_close_matches(name, AOVS, 1))
+            raise UsageError(f"no AOV {name!r}; there are {', '.join(AOVS)}{meant}")
+    return chosen
+
+
+def film_aovs(film: Film, names: Iterable[str]) -> dict[str, NDArray[np.generic]]:
+    """Those of OF_THE_FILM that `names` has: (height, width, 3) float32, but samples (height, width) uint32.
+
+    variance is that of a pixel's mean, were its samples independent; NaN of fewer than two.
+    """
+    wanted = set(names)
+    pictures: dict[str, NDArray[np.generic]] = {
+        "variance": film.variance.astype(np.float32), "samples": film.pixels["count"].copy()}
+    if wanted & set(LIGHT):
+        pictures |= zip(LIGHT, split_light(film))
+    return {name: picture for name, picture in pictures.items() if name in wanted}
+
+
+def split_light(film: Film) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Direct and indirect light (height, width, 3), rounded so that their sum is the picture to the last bit.
+
+    Of p − d and p − (p − d), where 0 <= d <= p, one is exact (Sterbenz 1974).
+    """
+    picture = film.mean.astype(np.float32)
+    indirect = picture - np.minimum(film.direct.astype(np.float32), picture)
+    return picture - indirect, indirect

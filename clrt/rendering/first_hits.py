@@ -1,0 +1,76 @@
+"""Pictures of what each pixel's camera rays meet first (kernels/first_hit.cl)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.preamble import typedefs
+from ..device.records import record
+from ..scene.materials import Material
+from ..scene.model import Scene
+from .compile import CompiledScene
+from .pixels import render_pixels
+from .session import Session
+
+#: Means over each pixel's rays, and what belongs to the ray through its middle.
+MEANS = ("albedo", "normal", "geometric_normal")
+OF_THE_MIDDLE = ("position", "depth", "primitive", "object", "material")
+#: Camera rays a pixel.
+SAMPLES = 16
+
+
+def first_hits(session: Session, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
+    """Those of MEANS and OF_THE_MIDDLE that `names` has, of the scene that the session renders.
+
+    As docs/aovs.md says: (height, width, 3) float32, but depth (height, width) float32 and ids (height, width) int32.
+    KernelError and DeviceError where the device fails.
+    """
+    means = [name for name in MEANS if name in names]
+    source, kind = first_hit_program(session.compiled, names)
+    seen = render_pixels(session, source, "first_hit", kind, SAMPLES if means else 0)
+    pictures: dict[str, NDArray[np.generic]] = {name: np.ascontiguousarray(seen[name]) for name in means}
+    missed = seen["primitive"] < 0
+    if "position" in (kind.names or ()):
+        pictures |= _places(session, seen["position"].astype(np.float64), missed)
+    ids = _ids(scene, seen["primitive"])
+    pictures |= {name: np.where(missed, -1, numbers).astype(np.int32) for name, numbers in ids.items()}
+    return {name: picture for name, picture in pictures.items() if name in names}
+
+
+def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[str, np.dtype[Any]]:
+    """The program's text, with nothing that `names` does not need, and the record that it writes."""
+    lists = {"SEEN_MEANS": [name for name in MEANS if name in names],
+             "SEEN_MIDDLE": ["position"] if {"position", "depth"} & set(names) else []}
+    fields = {"primitive": "i4", "pad": "3i4"}
+    for name in sum(lists.values(), []):
+        fields |= {name: "3f4", f"pad_{name}": "i4"}
+    kind = record(**fields)
+    defines = [f"#define {macro}(X) {' '.join(f'X({name})' for name in listed)}" for macro, listed in lists.items()]
+    return compiled.source_of("first_hit.cl", typedefs({"FirstHit": kind}), *defines), kind
+
+
+def _places(session: Session, seen: NDArray[np.float64], missed: NDArray[np.bool_]) -> dict[str, NDArray[np.generic]]:
+    """Position and depth of points (height, width, 3) in the compiled scene's frame."""
+    camera, frame = session.compiled.camera, session.compiled.frame
+    axis = np.subtract(camera.look_at, camera.position, dtype=np.float64)
+    depth = (seen - camera.position) @ (axis / np.linalg.norm(axis)) / frame.unit
+    return {"position": np.where(missed[..., None], 0, seen / frame.unit + frame.center).astype(np.float32),
+            "depth": np.where(missed, np.inf, depth).astype(np.float32)}
+
+
+def _ids(scene: Scene, primitive: NDArray[np.int32]) -> dict[str, NDArray[np.int64]]:
+    """For primitives of the compiled scene: which of their object they are, which object that is, and its material."""
+    sizes = [len(mesh.faces) for mesh in scene.meshes] + [1] * len(scene.spheres)
+    if not sizes:
+        nothing = np.zeros(primitive.shape, np.int64)
+        return {"primitive": nothing, "object": nothing, "material": nothing}
+    ends = np.cumsum(sizes)
+    which = np.searchsorted(ends, np.maximum(primitive, 0), side="right")
+    distinct: dict[Material, int] = {}
+    users = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
+    materials = np.array([distinct.setdefault(material, len(distinct)) for material in users])
+    return {"primitive": primitive - (ends - sizes)[which], "object": which, "material": materials[which]}

@@ -1,0 +1,72 @@
+// What the camera's rays meet first, without its light: pictures beside the picture (AOVs) for those who compose it.
+//
+// One work-item takes LANES pixels. SEEN_MEANS lists what is averaged over `sample_count` camera rays of each, as the
+// picture itself is; SEEN_MIDDLE what is that of the one ray through the pixel's middle, with its primitive: means of
+// places are of no place. The host writes both lists, of what is asked for. Where nothing is met all are 0, and the
+// primitive is -1. World frame.
+//
+// To add one: a function seen_NAME here, and its name in clrt/rendering/first_hits.py.
+#include "camera.cl"
+#include "film.cl"
+#include "surface.cl"
+#include "bsdf.cl"
+
+#if PRIMITIVES
+static inline real3 seen_albedo(const Scene *scene, const Surface *surface) {
+    return bsdf_albedo(scene, surface->material);
+}
+
+static inline real3 seen_normal(const Scene *scene, const Surface *surface) { return surface->ns; }
+
+static inline real3 seen_geometric_normal(const Scene *scene, const Surface *surface) { return surface->ng; }
+
+static inline real3 seen_position(const Scene *scene, const Surface *surface) { return surface->p; }
+
+// The surface that a ray meets, turned towards the camera; which lanes meet one, and the primitive.
+static inline ireal meet(const Scene *scene, real3 eye, real3 direction, ireal active, Surface *surface,
+                         ireal *primitive) {
+    Hits hits = closest_hit(scene, eye, direction, (real)(INFINITY), active);
+    ireal hit = active & (hits.primitive >= 0);
+    *primitive = hit ? hits.primitive : (ireal)(-1);
+    *surface = surface_at(scene, eye, direction, &hits);
+    turn_towards(surface, negate(direction));
+    surface->p = mad3(direction, hits.t, eye);   // its own is drawn in from a triangle's edges
+    return hit;
+}
+#endif
+
+__attribute__((vec_type_hint(real)))
+kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const uint *tiles, const Launch launch) {
+    Scene scene = SCENE_ARGUMENTS;
+    LanePixels own;
+    if (!lane_pixels(&launch, tiles, &own)) return;
+    real3 eye = broadcast(launch.position);
+    ireal primitive = (ireal)(-1);
+#define BEGIN(name) real3 name = splat(ZERO);
+    SEEN_MEANS(BEGIN)
+    SEEN_MIDDLE(BEGIN)
+#if PRIMITIVES
+    Surface surface;
+    ireal hit, other;
+#define ADD(name) name = add(name, choose(hit, seen_##name(&scene, &surface), splat(ZERO)));
+    for (uint s = 0; s < launch.sample_count; ++s) {
+        Sampler sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
+        real3 direction = camera_direction(&scene, &launch, own.x, own.y, next_2d(&sampler));
+        hit = meet(&scene, eye, direction, own.inside, &surface, &other);
+        SEEN_MEANS(ADD)
+    }
+    real2 middle = {(real)(0.5f), (real)(0.5f)};
+    hit = meet(&scene, eye, camera_direction(&scene, &launch, own.x, own.y, middle), own.inside, &surface, &primitive);
+    SEEN_MIDDLE(ADD)
+#endif
+#define DIVIDE(name) name = scale(name, (real)(1.0f / (float)launch.sample_count));
+    SEEN_MEANS(DIVIDE)
+    for (int lane = 0; lane < LANES; ++lane) {
+        if (!LANE_INT(own.inside, lane)) continue;
+        global FirstHit *pixel = pixels + LANE_UINT(own.index, lane);
+        pixel->primitive = LANE_INT(primitive, lane);
+#define STORE(name) store_rows(pixel->name, &name, lane);
+        SEEN_MEANS(STORE)
+        SEEN_MIDDLE(STORE)
+    }
+}

@@ -1,0 +1,187 @@
+"""Pictures beside the picture: what each is, against float64 and against the picture itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import clrt
+from clrt.errors import CheckpointError, UsageError
+from clrt.rendering.aovs import AOVS, chosen_aovs
+from clrt.rendering.compile import Choices, compile_scene
+from clrt.rendering.renderer import Renderer
+from clrt.scene.materials import Dielectric, Diffuse, Mirror
+from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+
+from .pictures import frame, quad, view_rays
+from .test_variants import everything
+
+Doubles = NDArray[np.float64]
+Pictures = dict[str, NDArray[Any]]
+RED = (0.7, 0.2, 0.1)
+SIZE = (20, 15)
+CAMERA = Camera(position=(3.0, 2.0, 4.0), fov_degrees=30)
+CENTER, RADIUS = np.array([0.2, -0.1, 0.0]), 0.9
+
+
+def rendered(scene: Scene, names: str = ",".join(AOVS), spp: int = 4, **options: Any) -> tuple[Doubles, Pictures]:
+    """The picture's pixels, float32, and its AOVs."""
+    image = clrt.render(scene, spp=spp, aovs=names, **options)
+    return image.pixels, image.aovs  # type: ignore[return-value]
+
+
+def ball_on_floor(at: Doubles = np.zeros(3), scale: float = 1.0) -> Scene:
+    """A red sphere above a white floor of 2 triangles, under an empty sky, moved and scaled."""
+    def place(p: Any) -> Any:
+        return tuple((scale * np.array(p, np.float64) + at).tolist())
+
+    floor = quad([place(p) for p in [(-2, -1, 2), (2, -1, 2), (2, -1, -2), (-2, -1, -2)]], Diffuse(color=(1, 1, 1)))
+    camera = replace(CAMERA, position=place(CAMERA.position), look_at=place(CAMERA.look_at))
+    return Scene(meshes=[floor], spheres=[Sphere(center=place(CENTER), radius=scale * RADIUS,
+                                                 material=Diffuse(color=RED))],
+                 camera=camera, environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=SIZE))
+
+
+def middles(size: tuple[int, int] = SIZE) -> tuple[Doubles, Doubles]:
+    """(h, w, 3) unit directions of the rays through the pixels' middles, and their distances to the sphere, or inf."""
+    w = view_rays(CAMERA, size, *np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5))
+    w /= np.linalg.norm(w, axis=-1, keepdims=True)
+    to_center = CENTER - CAMERA.position
+    along = w @ to_center
+    inside = RADIUS**2 - to_center @ to_center + along**2
+    return w, np.where(inside > 0, along - np.sqrt(np.maximum(inside, 0)), np.inf)
+
+
+@pytest.mark.parametrize("at, scale", [((0, 0, 0), 1.0), ((4e3, -3e3, 0), 1.0), ((0, 0, 0), 2.0**-40),
+                                       ((0, 0, 0), 2.0**30)], ids=str)
+def test_places_and_numbers_are_those_of_the_middle_s_ray(at: Any, scale: float) -> None:
+    """Whatever the filter, wherever the scene stands, in its own units."""
+    _, found = rendered(ball_on_floor(np.array(at), scale), "depth,position,primitive,object,material",
+                        filter="blackman_harris")
+    w, ball = middles()
+    floor = (-1 - CAMERA.position[1]) / w[..., 1]
+    met = CAMERA.position + floor[..., None] * w
+    on_floor = (floor > 0) & (np.abs(met[..., [0, 2]]).max(axis=2) < 2) & ~(ball < np.inf)
+    t = np.where(on_floor, floor, ball)
+    missed = np.isinf(t)
+    assert missed.any() and on_floor.any() and (ball < np.inf).sum() > 20
+    depth = scale * t * (w @ frame(CAMERA)[0])
+    np.testing.assert_allclose(found["depth"], depth, rtol=1e-6)
+    position = np.where(missed[..., None], 0, scale * (CAMERA.position + np.where(missed, 0, t)[..., None] * w)
+                        + np.array(at))
+    np.testing.assert_allclose(found["position"], position, atol=2e-6 * scale + 1e-7 * np.abs(at).max())
+    expected = np.where(missed, -1, np.where(on_floor, 0, 1))
+    assert np.array_equal(found["object"], expected) and np.array_equal(found["material"], expected)
+    half = met[..., 0] > -met[..., 2]   # of the floor: corners 0 1 2, then 0 2 3
+    assert np.array_equal(found["primitive"], np.where(missed, -1, on_floor & ~half))
+
+
+def test_numbers_count_by_objects_and_by_materials() -> None:
+    """Triangles in their mesh; meshes, then spheres; materials that are alike are one."""
+    def wall(x: float, material: Any) -> Mesh:
+        return quad([(x - 0.5, -2, 0), (x + 0.5, -2, 0), (x + 0.5, 2, 0), (x - 0.5, 2, 0)], material)
+
+    scene = Scene(meshes=[wall(-1, Diffuse(color=RED)), wall(0, Mirror()), wall(1, Diffuse(color=RED))],
+                  spheres=[Sphere(center=(2, 0, 0), radius=0.4, material=Dielectric()),
+                           Sphere(center=(3, 0, 0), radius=0.4, material=Mirror())],
+                  camera=Camera(position=(1, 0, 50), look_at=(1, 0, 0), fov_degrees=1.146),
+                  environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=(5, 1)))
+    _, found = rendered(scene, "object,material,primitive")
+    assert found["object"].tolist() == [[0, 1, 2, 3, 4]]
+    assert found["material"].tolist() == [[0, 1, 0, 2, 1]]
+    assert set(found["primitive"][0, :3].tolist()) <= {0, 1} and found["primitive"][0, 3:].tolist() == [0, 0]
+
+
+def test_albedo_and_normals_are_of_the_first_surface() -> None:
+    """A mirror has its own, and a sky none. Where a normal leans, the geometric one does not."""
+    wall = quad([(-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1)], Mirror(color=(0.9, 0.8, 0.5)))
+    wall.normals = np.tile(np.array([0.6, 0.0, 0.8], np.float32), (4, 1))
+    scene = Scene(meshes=[wall], environment=Environment(color=(2, 2, 2)), render=RenderSettings(size=(3, 2)),
+                  camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
+    _, found = rendered(scene, "albedo,normal,geometric_normal")
+    for name, expected in (("albedo", (0.9, 0.8, 0.5)), ("normal", (0.6, 0, 0.8)), ("geometric_normal", (0, 0, 1))):
+        np.testing.assert_allclose(found[name], np.broadcast_to(expected, (2, 3, 3)), rtol=1e-6, atol=1e-7)
+    _, found = rendered(replace(scene, meshes=[]), "albedo,normal,object,depth,position")
+    assert not found["albedo"].any() and not found["normal"].any() and not found["position"].any()
+    assert np.all(found["object"] == -1) and np.all(found["depth"] == np.inf)
+
+
+def test_albedo_is_a_mean_over_the_pixel() -> None:
+    """A wall over half of the middle column."""
+    half = quad([(-2, -2, -1), (0, -2, -1), (0, 2, -1), (-2, 2, -1)], Diffuse(color=RED))
+    scene = Scene(meshes=[half], environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=(5, 3)),
+                  camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
+    _, found = rendered(scene, "albedo")
+    np.testing.assert_allclose(found["albedo"][:, 2], np.tile(np.multiply(RED, 0.5), (3, 1)), rtol=0.13)
+    np.testing.assert_allclose(found["albedo"][:, :2], np.broadcast_to(RED, (3, 2, 3)), rtol=1e-6)
+    assert not found["albedo"][:, 3:].any()
+
+
+@pytest.mark.parametrize("options", [{}, {"adaptive": True}, {"lanes": 1}, {"filter": "blackman_harris"}], ids=str)
+def test_direct_and_indirect_light_add_up_to_the_picture(options: dict[str, Any]) -> None:
+    """To the last bit; and the picture is the one that there is without them. Direct light is what paths of two edges
+    bring, so it is the picture of depth 2, of the same samples."""
+    pixels, found = rendered(everything(), "indirect,direct", 32, **options)
+    assert list(found) == ["indirect", "direct"]
+    assert np.array_equal(found["direct"] + found["indirect"], pixels)
+    assert found["direct"].min() >= 0 and found["indirect"].min() >= 0 and found["indirect"].max() > 0.1
+    if "adaptive" not in options:
+        np.testing.assert_allclose(clrt.render(everything(), spp=32, **options).pixels, pixels, rtol=1e-6, atol=1e-7)
+        shallow = clrt.render(everything(), spp=32, max_depth=2, **options).pixels
+        np.testing.assert_allclose(found["direct"], shallow, rtol=1e-6, atol=np.spacing(pixels.max()))
+
+
+def test_light_of_two_edges_is_all_direct() -> None:
+    for options in ({"integrator": "direct"}, {"max_depth": 1}):
+        pixels, found = rendered(everything(), "direct,indirect", **options)
+        assert np.array_equal(found["direct"], pixels) and not found["indirect"].any()
+
+
+def test_variance_is_that_of_the_mean() -> None:
+    """Among pictures of other seeds, of independent samples: their sample variance has 199 degrees of freedom."""
+    scene = ball_on_floor()
+    scene.render = replace(scene.render, sampler="independent", size=(8, 6))
+    runs = [rendered(scene, "variance,samples", 16, seed=seed) for seed in range(200)]
+    measured = np.var([pixels for pixels, _ in runs], axis=0, ddof=1, dtype=np.float64)
+    told = np.mean([found["variance"] for _, found in runs], axis=0, dtype=np.float64)
+    assert told.mean() == pytest.approx(measured.mean(), rel=0.05)   # 0.1 each of 48 pixels, and channels alike
+    assert all(np.all(found["samples"] == 16) for _, found in runs)
+    assert np.all(np.isnan(rendered(scene, "variance", 1)[1]["variance"]))
+
+
+def test_samples_are_counted_where_they_went() -> None:
+    image = clrt.render(everything(), spp=64, adaptive=True, aovs=["samples"])
+    counts = image.aovs["samples"]
+    assert counts.dtype == np.uint32 and len(np.unique(counts)) > 1
+    assert int(counts.sum()) + image.report["nonfinite_samples"] == image.report["samples"]
+
+
+def test_only_what_is_asked_for_is_compiled() -> None:
+    """Nothing of the picture's program knows of AOVs, but with direct or indirect light."""
+    plain, light = (compile_scene(everything(), Choices(direct_light=apart)) for apart in (False, True))
+    assert set(light.features) - set(plain.features) == {"DIRECT_LIGHT"} and light.files == plain.files
+    assert "first_hit.cl" not in plain.files
+    for names, apart in (("albedo,depth,variance,samples", False), ("direct", True), ("indirect", True)):
+        assert Renderer(everything(), aovs=names).compiled.choices.direct_light == apart
+
+
+def test_a_checkpoint_keeps_direct_light(tmp_path: Any) -> None:
+    """And one without it is another render's."""
+    path = tmp_path / "a.ck"
+    for _ in Renderer(everything(), spp=24, aovs="direct", checkpoint=path).passes(spp=8):
+        pass
+    resumed = Renderer(everything(), spp=24, aovs="direct", checkpoint=path, resume=True)
+    *_, state = resumed.passes(spp=24)
+    np.testing.assert_array_equal(resumed.aovs(state)["direct"], rendered(everything(), "direct", 24)[1]["direct"])
+    with pytest.raises(CheckpointError, match="direct_light True instead of False"):
+        Renderer(everything(), spp=24, checkpoint=path, resume=True)
+
+
+def test_names() -> None:
+    assert chosen_aovs(" depth,albedo, depth") == chosen_aovs(["depth", "albedo"]) == ("depth", "albedo")
+    with pytest.raises(UsageError, match="no AOV 'normals'; there are albedo, .*; did you mean normal"):
+        clrt.render(everything(), aovs=["normals"])
