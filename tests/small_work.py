@@ -14,6 +14,7 @@ from clrt.accel.build import build_tree
 from clrt.accel.device_builder import SHAPES
 from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, UPPER_LEVELS, HitTests
 from clrt.device.open import Device
+from clrt.output.layers import layered
 from clrt.rendering.aovs import AOVS, film_aovs
 from clrt.rendering.compile import OFFSETS, compile_scene
 from clrt.rendering.film import Film
@@ -111,7 +112,9 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     yield "painted", picture(device, painting)
     yield "guides of it", {**render_guides(started(device, painting), 2)}
     apart = started(device, scene(), direct_light=True)
-    yield "aovs", {**first_hits(apart, scene(), AOVS), **film_aovs(film(apart, SETTINGS.spp), AOVS)}
+    light = film(apart, SETTINGS.spp)
+    every = first_hits(apart, scene(), AOVS) | film_aovs(light, AOVS)
+    yield "aovs", {"layers": layered(light.mean.astype(np.float32), every)[0]}
     yield "guides", {**render_guides(started(device, scene()), 2)}
     for layout in SHAPES:
         build_tree(device, layout, "ploc", soup(0), spheres(30))

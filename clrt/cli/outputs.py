@@ -51,9 +51,9 @@ class Outputs:
         from ..output.files import check_target
         from ..output.images import check_writable
         from ..output.plots import check_plot
-        from ..output.view import check_view
+        from ..output.view import view_called
 
-        check_view(self.view)
+        view_called(self.view)
         if self.aovs and all(picture.suffix.lower() == ".hdr" for picture in self.pictures):
             raise UsageError("an .hdr holds the picture alone; for --aov name an .exr or .png, too, with -o")
         for picture in [*self.pictures, *self.raws, *self.beside]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -14,13 +15,15 @@ from ..errors import OutputError
 from ..scene.pictures import read_picture
 from .files import check_target, replacing
 from .layers import Pictures, drawn, files_beside, layered
-from .view import check_view, to_display
+from .view import to_display, view_called
 
 FloatArray = NDArray[np.float32]
 
 EXTENSIONS = (".png", ".exr", ".hdr")
 #: The largest value that RGBE can hold: mantissa 255 of 256, exponent 127.
 RGBE_MAX = 255 / 256 * 2.0**127
+
+_log = logging.getLogger(__name__)
 
 #: A picture that was written is read like any other.
 read_image = read_picture
@@ -48,18 +51,29 @@ def write_image(path: Path, pixels: FloatArray, *, metadata: Mapping[str, str] |
     none of the formats' own. Raises OutputError, and UsageError for an unknown view.
     """
     check_writable(path)
-    check_view(view)
+    view_called(view)
     about, aovs = metadata or {}, aovs or {}
     match path.suffix.lower():
         case ".png":
+            _tell_flaws(path, pixels)
             _write_png(path, to_display(pixels, view, exposure), about)
         case ".hdr":
+            _tell_flaws(path, pixels)
             _write(path, rgbe_rounded(pixels), about)
         case _:
             samples, names = layered(pixels, aovs)
             _write(path, samples, {**about, "compression": "zip"}, names)
     for name, other in files_beside(path, aovs).items():
         _write_png(other, drawn(name, aovs[name], view, exposure), about)
+
+
+def _tell_flaws(path: Path, pixels: FloatArray) -> None:
+    """Warns of values that are no light, which formats other than .exr cannot hold."""
+    flaws = (np.isnan(pixels), pixels < 0, np.isposinf(pixels))
+    nan, negative, infinite = map(np.count_nonzero, flaws)
+    if nan or negative or infinite:
+        _log.warning("%s: of the picture's values %d are NaN and %d negative, written as 0, and %d infinite, written "
+                     "as the brightest", path, nan, negative, infinite)
 
 
 def _write_png(path: Path, samples: NDArray[np.uint8], metadata: Mapping[str, str]) -> None:

@@ -1,4 +1,4 @@
-"""View transforms: linear Rec. 709 radiance to the 8 bits of a display.
+"""View transforms: linear Rec. 709 radiance to the 8 bits of a display (docs/colour.md).
 
 Every view takes (h, w, 3) float32 in [0, 1e15] and returns the display's signal, which is then cut to [0, 1].
 To add one: write its function and list it in VIEWS.
@@ -13,13 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
+from .ocio import ACES, ocio_view
 
 FloatArray = NDArray[np.float32]
+View = Callable[[FloatArray], FloatArray]
 
 #: The luminance that "reinhard" shows as white: four stops above 1.
 REINHARD_WHITE = 16.0
 #: Brighter is shown as this: far beyond any display, and its square still fits into float32.
 BRIGHTEST = 1e15
+#: "agx": Rec. 709 with its primaries drawn towards white, and what becomes 0 and 1 of it, as binary logarithms.
+AGX_INSET = np.array([[0.842479062253094, 0.0784335999999992, 0.0792237451477643],
+                      [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
+                      [0.0423756549057051, 0.0784336, 0.879142973793104]], np.float32)
+AGX_DARKEST, AGX_BRIGHTEST = -12.47393, 4.026069
+#: Its curve's steepest place, middle grey, 10 stops below and 6.5 above; its slope there; what bends toe and shoulder.
+AGX_PIVOT, AGX_SLOPE, AGX_TOE, AGX_SHOULDER = (10 / 16.5, 0.5), 2.0, 3.0, 3.25
+#: "pbr_neutral": below this nothing is compressed; how fast what is brighter loses its colour; Fresnel's offset.
+NEUTRAL_START, NEUTRAL_DESATURATION, NEUTRAL_OFFSET = 0.8 - 0.04, 0.15, 0.04
 
 
 def srgb(linear: FloatArray) -> FloatArray:
@@ -43,14 +54,54 @@ def reinhard(linear: FloatArray) -> FloatArray:
     return srgb(linear * scale[..., np.newaxis])
 
 
-VIEWS: dict[str, Callable[[FloatArray], FloatArray]] = {"srgb": srgb, "raw": raw, "reinhard": reinhard}
+def agx(linear: FloatArray) -> FloatArray:
+    """AgX Base: what is bright fades to white along the way of film (Sobotka, github.com/sobotka/AgX).
+
+    The published config has the curve as a table of 4096 values; this is what the table was made from.
+    """
+    stops = np.log2(np.maximum(linear @ AGX_INSET.T, np.float32(2**AGX_DARKEST)))
+    x = np.clip((stops - AGX_DARKEST) / (AGX_BRIGHTEST - AGX_DARKEST), 0, 1).astype(np.float32)
+    return np.where(x < AGX_PIVOT[0], 0.5 - _agx_half(AGX_PIVOT[0] - x, *AGX_PIVOT, AGX_TOE),
+                    0.5 + _agx_half(x - AGX_PIVOT[0], 1 - AGX_PIVOT[0], 1 - AGX_PIVOT[1], AGX_SHOULDER))
 
 
-def check_view(name: str) -> None:
-    """Raise UsageError unless there is a view of this name."""
-    if name not in VIEWS:
-        meant = "".join(f"; did you mean {match}?" for match in get_close_matches(name, VIEWS, 1))
-        raise UsageError(f"no view transform {name!r}; there are {', '.join(VIEWS)}{meant}")
+def _agx_half(away: FloatArray, width: float, height: float, power: float) -> FloatArray:
+    """How far the curve has come `away` from the pivot: a hyperbola that is `height` at `width`."""
+    scale = ((AGX_SLOPE * width) ** -power * ((AGX_SLOPE * width / height) ** power - 1)) ** (-1 / power)
+    term = AGX_SLOPE * np.maximum(away, 0) / scale
+    return np.asarray(scale * term / (1 + term**power) ** (1 / power), np.float32)
+
+
+def pbr_neutral(linear: FloatArray) -> FloatArray:
+    """Colours of surfaces as they are, brighter ones compressed towards white; then the sRGB curve.
+
+    Khronos PBR Neutral (github.com/KhronosGroup/ToneMapping).
+    """
+    least = linear.min(axis=-1, keepdims=True)
+    color = linear - np.where(least < 2 * NEUTRAL_OFFSET, least - least**2 / (4 * NEUTRAL_OFFSET), NEUTRAL_OFFSET)
+    peak = color.max(axis=-1, keepdims=True)
+    room = 1 - NEUTRAL_START
+    over = np.maximum(peak, NEUTRAL_START)
+    new_peak = 1 - room**2 / (over + room - NEUTRAL_START)
+    whiteness = 1 - 1 / (NEUTRAL_DESATURATION * (over - new_peak) + 1)
+    bright = color * (new_peak / over) * (1 - whiteness) + new_peak * whiteness
+    return srgb(np.where(peak < NEUTRAL_START, color, bright).astype(np.float32))
+
+
+VIEWS: dict[str, View] = {"srgb": srgb, "agx": agx, "pbr_neutral": pbr_neutral, "reinhard": reinhard, "raw": raw}
+
+
+def view_called(name: str) -> View:
+    """The view of this name: of VIEWS, `aces`, or one of OpenColorIO (see `ocio`); UsageError if there is none."""
+    if name in VIEWS:
+        return VIEWS[name]
+    kind, _, view = name.partition(":")
+    if name == "aces":
+        return ocio_view(*ACES)
+    if kind == "ocio":
+        return ocio_view("", view)
+    meant = "".join(f"; did you mean {match}?" for match in get_close_matches(name, [*VIEWS, "aces"], 1))
+    raise UsageError(f"no view transform {name!r}; there are {', '.join(VIEWS)}, aces and ocio:VIEW{meant}")
 
 
 def to_display(pixels: FloatArray, view: str = "srgb", exposure: float = 0.0) -> NDArray[np.uint8]:
@@ -59,10 +110,10 @@ def to_display(pixels: FloatArray, view: str = "srgb", exposure: float = 0.0) ->
     NaN and negative values become 0, +Inf 255; the rest is rounded to nearest, halves up, without dithering.
     Raises UsageError for an unknown view.
     """
-    check_view(view)
+    shown = view_called(view)
     with np.errstate(over="ignore", invalid="ignore"):
         exposed = pixels * np.exp2(np.float32(exposure))
     linear = np.clip(np.nan_to_num(exposed, nan=0.0, posinf=BRIGHTEST), np.float32(0), np.float32(BRIGHTEST))
-    signal: FloatArray = np.clip(VIEWS[view](linear), 0, 1)
+    signal: FloatArray = np.clip(shown(linear), 0, 1)
     levels: FloatArray = np.floor(255 * signal + np.float32(0.5))
     return levels.astype(np.uint8)

@@ -14,6 +14,10 @@ from clrt.output.compare import compare, compare_files, relmse
 from clrt.output.images import read_image, write_image
 
 
+Floats64 = NDArray[np.float64]
+Color = tuple[float, float, float]
+
+
 def picture(*pixels: tuple[float, float, float]) -> NDArray[np.float32]:
     return np.array([pixels], np.float32)
 
@@ -75,6 +79,50 @@ def test_ldr_flip_of_black_and_white_is_one() -> None:
     white = np.ones((64, 64, 3), np.float32)
     assert compare(0 * white, white, hdr=False)["flip"] == pytest.approx(1, abs=0.05)
     assert compare(5 * white, white, hdr=False)["flip"] == 0
+
+
+def flip_of_colors(x: Floats64, r: Floats64) -> float:
+    """LDR-FLIP of two even pictures of linear Rec. 709 colours in [0, 1] (Andersson et al. 2020, sections 4.1 and 4.3).
+
+    Nothing is filtered there and no feature seen, so it is the HyAB distance in Hunt-adjusted L*a*b*, redistributed.
+    """
+    to_xyz = np.array([[0.41239079926595934, 0.357584339383878, 0.1804807884018343],
+                       [0.21263900587151027, 0.715168678767756, 0.07219231536073371],
+                       [0.01933081871559182, 0.11919477979462598, 0.9505321522496607]])
+
+    def hunt(linear: Floats64) -> Floats64:
+        t = to_xyz @ linear / to_xyz.sum(axis=1)
+        f = np.where(t > (6 / 29)**3, np.cbrt(t), t / (3 * (6 / 29)**2) + 4 / 29)
+        lightness = 116 * f[1] - 16
+        return np.array([lightness, 0.01 * lightness * 500 * (f[0] - f[1]), 0.01 * lightness * 200 * (f[1] - f[2])])
+
+    def distance(a: Floats64, b: Floats64) -> float:
+        difference = hunt(a) - hunt(b)
+        return float((abs(difference[0]) + math.hypot(*difference[1:])) ** 0.7)
+
+    most = distance(np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    knee, found = 0.4 * most, distance(x, r)
+    return 0.95 * found / knee if found < knee else 0.95 + 0.05 * (found - knee) / (most - knee)
+
+
+def aces(x: Floats64) -> Floats64:
+    """The tone mapper of HDR-FLIP (Andersson et al. 2021, section 4)."""
+    return np.asarray((0.36 * 2.51 * x**2 + 0.6 * 0.03 * x) / (0.36 * 2.43 * x**2 + 0.6 * 0.59 * x + 0.14))
+
+
+COLORS = [(0.2, 0.5, 0.1), (0.21, 0.5, 0.1), (0.9, 0.1, 0.4), (0.02, 0.02, 0.03), (1.0, 1.0, 1.0)]
+
+
+@pytest.mark.parametrize("image, reference", [(a, b) for a in COLORS for b in COLORS if a != b], ids=str)
+def test_flip_of_even_pictures_has_a_closed_form(image: Color, reference: Color) -> None:
+    """Also of a high range: there is one exposure then, which brings the reference to where aces is 0.85."""
+    x, r = np.array(image), np.array(reference)
+    pictures = [np.full((32, 32, 3), color, np.float32) for color in (x, r)]
+    assert compare(*pictures, hdr=False)["flip"] == pytest.approx(flip_of_colors(x, r), abs=2e-4)
+    shown = np.roots([0.36 * (2.51 - 0.85 * 2.43), 0.6 * (0.03 - 0.85 * 0.59), -0.85 * 0.14]).max()
+    gain = shown / (r @ [0.2126, 0.7152, 0.0722])
+    toned = [np.clip(aces(gain * color), 0, 1) for color in (x, r)]
+    assert compare(*pictures)["flip"] == pytest.approx(flip_of_colors(*toned), abs=2e-4)
 
 
 @pytest.mark.parametrize("first, second, hdr", [("a.png", "b.png", False), ("a.exr", "b.png", True),

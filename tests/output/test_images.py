@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import struct
 import subprocess
@@ -218,3 +219,16 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
     write_image(tmp_path / "link.exr", noise())
     assert (tmp_path / "link.exr").is_symlink()
     assert np.array_equal(read_image(tmp_path / "real.exr"), noise())
+
+
+@pytest.mark.parametrize("name, told", [("a.png", True), ("a.hdr", True), ("a.exr", False)])
+def test_values_that_are_no_light_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture, name: str,
+                                              told: bool) -> None:
+    """An .exr keeps them."""
+    flawed = np.array([[[math.nan, math.nan, -1], [-math.inf, math.inf, 0.5], [0, -0.0, 3e38]]], np.float32)
+    write_image(tmp_path / name, flawed)
+    message = (f"{tmp_path / name}: of the picture's values 2 are NaN and 2 negative, written as 0, and 1 infinite, "
+               "written as the brightest")
+    assert caplog.messages == [message] * told
+    write_image(tmp_path / name, np.ones((1, 1, 3), np.float32))
+    assert len(caplog.messages) == told

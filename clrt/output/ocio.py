@@ -1,0 +1,76 @@
+"""Views of OpenColorIO (opencolorio.org), as part of OpenImageIO: ACES, and those of the user's own config."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from difflib import get_close_matches
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError
+
+FloatArray = NDArray[np.float32]
+
+#: A config that OpenColorIO has built in, and its view of ACES 2.0 for plain displays.
+ACES = ("ocio://cg-config-v4.0.0_aces-v2.0_ocio-v2.5", "sRGB - Display/ACES 2.0 - SDR 100 nits (Rec.709)")
+#: Where $OCIO names none.
+DEFAULT = "ocio://default"
+#: What configs call linear Rec. 709.
+REC709 = ("lin_rec709_scene", "lin_rec709", "lin_srgb", "Linear Rec.709", "Linear BT.709", "Utility - Linear - sRGB")
+
+
+def ocio_view(config: str, view: str) -> Callable[[FloatArray], FloatArray]:
+    """A view of a config: VIEW of its default display, DISPLAY/VIEW, or with an empty `view` the default one.
+
+    config: a file or ocio://NAME; if empty the one that the environment variable OCIO names, or OpenColorIO's default.
+    UsageError where there is no such config or view, or it has no colour space of linear Rec. 709.
+    """
+    import OpenImageIO as oiio
+
+    config = config or os.environ.get("OCIO") or DEFAULT
+    colors = _config(config)
+    display, view = _display_view(config, colors, view)
+    source = next((name for name in REC709 if colors.getColorSpaceIndex(colors.resolve(name)) >= 0), None)
+    if source is None:
+        raise UsageError(f"{config}: none of its colour spaces is called {', '.join(REC709)}; give the one of linear "
+                         f"Rec. 709 the alias {REC709[1]}")
+
+    def shown(linear: FloatArray) -> FloatArray:
+        buffer = oiio.ImageBufAlgo.ociodisplay(oiio.ImageBuf(np.ascontiguousarray(linear)), display, view,
+                                               colors.resolve(source), colorconfig=config)
+        if buffer.has_error:
+            raise UsageError(f"{config}: OpenColorIO cannot show {display}/{view}: {buffer.geterror()}")
+        return np.asarray(buffer.get_pixels(oiio.FLOAT))
+
+    return shown
+
+
+@lru_cache
+def _config(config: str) -> Any:
+    import OpenImageIO as oiio
+
+    colors = oiio.ColorConfig(config)
+    if problem := colors.geterror():
+        remedy = ("install a newer OpenImageIO" if config.startswith("ocio:") else
+                  "set the environment variable OCIO to one, or to nothing")
+        raise UsageError(f"{config}: is no OpenColorIO config that can be used ({problem.splitlines()[0]}); {remedy}")
+    return colors
+
+
+def _display_view(config: str, colors: Any, name: str) -> tuple[str, str]:
+    """The display and view that are meant."""
+    display = colors.getDefaultDisplayName()
+    views = colors.getViewNames(display)
+    if name in views or not name:
+        return display, name or colors.getDefaultViewName(display)
+    all_views = {f"{each}/{view}": (each, view) for each in colors.getDisplayNames()
+                 for view in colors.getViewNames(each)}
+    if name in all_views:
+        return all_views[name]
+    meant = "".join(f"; did you mean ocio:{match}?" for match in get_close_matches(name, [*views, *all_views], 1))
+    raise UsageError(f"{config}: no view {name!r}; of {display} there are {', '.join(views)}, and others as "
+                     f"DISPLAY/VIEW of {', '.join(colors.getDisplayNames())}{meant}")
