@@ -5,16 +5,19 @@
 // places are of no place. The host writes both lists, of what is asked for. Where nothing is met all are 0, and the
 // primitive is -1. World frame.
 //
-// To add one: a function seen_NAME here, and its name in clrt/rendering/first_hits.py.
+// SEEN_FILES are those of the materials, where albedo is asked for. To add one: a function seen_NAME here, and its name
+// in clrt/rendering/first_hits.py.
 #include "camera.cl"
 #include "film.cl"
 #include "surface.cl"
-#include "bsdf.cl"
+#include SEEN_FILES
 
 #if PRIMITIVES
+#if SEEN_ALBEDO
 static inline real3 seen_albedo(const Scene *scene, const Surface *surface) {
     return bsdf_albedo(scene, surface->material);
 }
+#endif
 
 static inline real3 seen_normal(const Scene *scene, const Surface *surface) { return surface->ns; }
 

@@ -15,16 +15,20 @@ from .options import tracing_options
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
+@click.option("--aov", "aovs", multiple=True, metavar="NAME,...", help="With what these pictures beside it need.")
 @tracing_options
-def command(scene: Path, as_json: bool, lanes: int | None, triangle: str, box: str, sphere: str, offset: str,
-            builder: str | None, layout: str | None) -> None:
+def command(scene: Path, as_json: bool, aovs: tuple[str, ...], lanes: int | None, triangle: str, box: str, sphere: str,
+            offset: str, builder: str | None, layout: str | None) -> None:
     """Show what SCENE contains and what is compiled for it; renders nothing and needs no device."""
     from ..accel.kernels import HitTests
+    from ..rendering.aovs import chosen_aovs, needs_direct_light, seen_first
     from ..rendering.compile import Choices, compile_scene
+    from ..rendering.first_hits import first_hit_program
     from ..scene.file import load
 
+    names = chosen_aovs(",".join(aovs)) if aovs else ()
     content = load(scene)
-    choices = Choices(lanes or 8, layout, builder, HitTests(triangle, box, sphere), offset)
+    choices = Choices(lanes or 8, layout, builder, HitTests(triangle, box, sphere), offset, needs_direct_light(names))
     compiled = compile_scene(content, choices)
     tree = compiled.tree
     materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}
@@ -44,6 +48,9 @@ def command(scene: Path, as_json: bool, lanes: int | None, triangle: str, box: s
         "buffers": {name: array.nbytes for name, (_, array) in compiled.buffers.items()},
         "bytes": compiled.bytes,
     }
+    if seen := seen_first(names):
+        program = first_hit_program(compiled, seen)[0]
+        report["first_hit"] = {"aovs": " ".join(seen), "kernel_bytes": len(program.encode())}
     if as_json:
         click.echo(json.dumps(report))
         return

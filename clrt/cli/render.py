@@ -54,7 +54,8 @@ if TYPE_CHECKING:
 @click.option("--checkpoint-every", type=click.FloatRange(min=0), default=30.0, show_default=True, metavar="SECONDS",
               help="How often; less often where that would take more than 2 % of the time.")
 @click.option("--resume", is_flag=True, help="Go on from --checkpoint; without one yet, begin.")
-@click.option("--view", default="srgb", show_default=True, metavar="NAME", help="View transform of .png pictures.")
+@click.option("--view", default="srgb", show_default=True, metavar="NAME",
+              help="View transform of .png pictures: srgb, agx, pbr_neutral, reinhard, raw, aces, ocio:VIEW.")
 @click.option("--exposure", default=0.0, metavar="EV", help="Exposure of .png pictures, in stops.")
 @click.option("--progress", "progress_kind", type=click.Choice(["bar", "plain", "json"]), help="Progress on stderr.")
 @click.option("--print-kernel", is_flag=True, help="Print the program that would run, and stop.")

@@ -56,6 +56,7 @@ def write_image(path: Path, pixels: FloatArray, *, metadata: Mapping[str, str] |
     match path.suffix.lower():
         case ".png":
             _tell_flaws(path, pixels)
+            about = {**about, "clrt:view": view, "clrt:exposure": str(exposure)}
             _write_png(path, to_display(pixels, view, exposure), about)
         case ".hdr":
             _tell_flaws(path, pixels)

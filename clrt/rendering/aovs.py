@@ -29,6 +29,16 @@ def chosen_aovs(names: str | Iterable[str]) -> tuple[str, ...]:
     return chosen
 
 
+def needs_direct_light(names: Iterable[str]) -> bool:
+    """Whether the film has to keep direct light apart for them."""
+    return not set(LIGHT).isdisjoint(names)
+
+
+def seen_first(names: Iterable[str]) -> tuple[str, ...]:
+    """Those that are of what rays meet first (`first_hits`)."""
+    return tuple(name for name in names if name in (*MEANS, *OF_THE_MIDDLE))
+
+
 def film_aovs(film: Film, names: Iterable[str]) -> dict[str, NDArray[np.generic]]:
     """Those of OF_THE_FILM that `names` has: (height, width, 3) float32, but samples (height, width) uint32.
 
@@ -37,7 +47,7 @@ def film_aovs(film: Film, names: Iterable[str]) -> dict[str, NDArray[np.generic]
     wanted = set(names)
     pictures: dict[str, NDArray[np.generic]] = {
         "variance": film.variance.astype(np.float32), "samples": film.pixels["count"].copy()}
-    if wanted & set(LIGHT):
+    if needs_direct_light(wanted):
         pictures |= zip(LIGHT, split_light(film))
     return {name: picture for name, picture in pictures.items() if name in wanted}
 

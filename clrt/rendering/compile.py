@@ -85,9 +85,12 @@ class CompiledScene:
         """The program's text."""
         return self.source_of(self.entry)
 
-    def source_of(self, entry: str, *preamble: str) -> str:
-        """The text of the same scene's program with another kernel file as its entry, and what that needs before it."""
-        return compose("\n".join([self.preamble, *preamble]), entry, self.chosen_files)
+    def source_of(self, entry: str, *preamble: str, **files: list[str]) -> str:
+        """The text of the same scene's program with another kernel file as its entry.
+
+        preamble, files: what that needs besides, before it and for its own `#include NAME`.
+        """
+        return compose("\n".join([self.preamble, *preamble]), entry, {**self.chosen_files, **files})
 
     @property
     def kernel(self) -> str:

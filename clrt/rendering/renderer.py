@@ -18,11 +18,11 @@ from ..device.open import open_device
 from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
 from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
-from .aovs import LIGHT, chosen_aovs, film_aovs
+from .aovs import chosen_aovs, film_aovs, needs_direct_light, seen_first
 from .checkpoint import open_checkpoints
 from .compile import OFFSETS, WITH_LIGHT, Choices, compile_scene
 from .film import RELATIVE_FLOOR, Film
-from .first_hits import MEANS, OF_THE_MIDDLE, first_hits
+from .first_hits import first_hits
 from .kept import Kept
 from .noise import NoiseEstimate
 from .session import Session
@@ -82,7 +82,7 @@ class Renderer:
         self.scene = replace(scene, render=settings)
         self.device = open_device(device)
         choices = Choices(lanes or self.device.lanes, layout, builder,
-                          HitTests(triangle, box, sphere), offset, bool(set(LIGHT) & set(self._aovs)))
+                          HitTests(triangle, box, sphere), offset, needs_direct_light(self._aovs))
         _check(choices)
         on_phase("build")
         self.compiled = compile_scene(self.scene, choices, device=self.device)
@@ -165,7 +165,7 @@ class Renderer:
 
     def _seen_first(self) -> dict[str, NDArray[np.generic]]:
         """AOVs that need no render: they are made before, so that an interrupted one has them, too."""
-        seen = set(self._aovs) & {*MEANS, *OF_THE_MIDDLE}
+        seen = seen_first(self._aovs)
         return first_hits(self.session, self.scene, seen) if seen else {}
 
     def _reached(self, spp: int | None, time: float | None, error: float | None) -> str | None:

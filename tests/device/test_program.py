@@ -114,7 +114,8 @@ def test_every_kernel_file_is_used(device: Device) -> None:
         used |= set(compile_scene(scene, Choices()).files)
     for count in (1, 40):
         used |= set(compile_scene(lamps(count), Choices()).files)
-    for entry in ("guides.cl", "first_hit.cl", "study/probe.cl"):
+    used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
+    for entry in ("guides.cl", "study/probe.cl"):
         used |= set(compile_scene(everything(), Choices(), entry).files)
     assert sorted(used) == FILES
 

@@ -10,9 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
+from clrt.device.program import files_of
 from clrt.errors import CheckpointError, UsageError
 from clrt.rendering.aovs import AOVS, chosen_aovs
 from clrt.rendering.compile import Choices, compile_scene
+from clrt.rendering.first_hits import first_hit_program
 from clrt.rendering.renderer import Renderer
 from clrt.scene.materials import Dielectric, Diffuse, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
@@ -165,6 +167,9 @@ def test_only_what_is_asked_for_is_compiled() -> None:
     plain, light = (compile_scene(everything(), Choices(direct_light=apart)) for apart in (False, True))
     assert set(light.features) - set(plain.features) == {"DIRECT_LIGHT"} and light.files == plain.files
     assert "first_hit.cl" not in plain.files
+    programs = {names: files_of(first_hit_program(plain, names)[0]) for names in (("depth",), ("albedo",))}
+    assert "first_hit.cl" in programs["depth",] and "bsdf.cl" in programs["albedo",]
+    assert not any(name.startswith(("bsdf", "light")) for name in programs["depth",])
     for names, apart in (("albedo,depth,variance,samples", False), ("direct", True), ("indirect", True)):
         assert Renderer(everything(), aovs=names).compiled.choices.direct_light == apart
 
