@@ -5,17 +5,19 @@
 // places are of no place. The host writes both lists, of what is asked for. Where nothing is met all are 0, and the
 // primitive is -1. World frame.
 //
-// SEEN_FILES are those of the materials, where albedo is asked for. To add one: a function seen_NAME here, and its name
-// in clrt/rendering/first_hits.py.
+// SEEN_FILES are those of the materials, where what is asked for depends on them. To add one: a function seen_NAME here,
+// and its name in clrt/rendering/first_hits.py.
 #include "camera.cl"
 #include "film.cl"
 #include "surface.cl"
 #include SEEN_FILES
 
 #if PRIMITIVES
-#if SEEN_ALBEDO
+#if SEEN_MATERIALS
 static inline real3 seen_albedo(const Scene *scene, const Surface *surface) {
-    return bsdf_albedo(scene, surface->material);
+    Bsdf bsdf;
+    bsdf_at(scene, surface, &bsdf);
+    return bsdf_albedo(&bsdf);
 }
 #endif
 
@@ -32,6 +34,9 @@ static inline ireal meet(const Scene *scene, real3 eye, real3 direction, ireal a
     ireal hit = active & (hits.primitive >= 0);
     *primitive = hit ? hits.primitive : (ireal)(-1);
     *surface = surface_at(scene, eye, direction, &hits);
+#if SEEN_MATERIALS && NORMAL_MAPS
+    bend_normal(scene, surface);
+#endif
     turn_towards(surface, negate(direction));
     surface->p = mad3(direction, hits.t, eye);   // its own is drawn in from a triangle's edges
     return hit;

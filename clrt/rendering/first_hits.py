@@ -50,8 +50,9 @@ def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[
         fields |= {name: "3f4", f"pad_{name}": "i4"}
     kind = record(**fields)
     defines = [f"#define {macro}(X) {' '.join(f'X({name})' for name in listed)}" for macro, listed in lists.items()]
-    materials = ["bsdf.cl"] if "albedo" in names else []
-    return compiled.source_of("first_hit.cl", f"#define SEEN_ALBEDO {len(materials)}", typedefs({"FirstHit": kind}),
+    bent = "normal" in names and "NORMAL_MAPS" in compiled.features
+    materials = ["bsdf.cl"] if bent or "albedo" in names else []
+    return compiled.source_of("first_hit.cl", f"#define SEEN_MATERIALS {len(materials)}", typedefs({"FirstHit": kind}),
                               *defines, SEEN_FILES=materials), kind
 
 

@@ -18,6 +18,7 @@ from clrt.rendering.first_hits import first_hit_program
 from clrt.rendering.renderer import Renderer
 from clrt.scene.materials import Dielectric, Diffuse, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.textures import Picture, Texture
 
 from .pictures import frame, quad, view_rays
 from .test_variants import everything
@@ -110,6 +111,24 @@ def test_albedo_and_normals_are_of_the_first_surface() -> None:
     _, found = rendered(replace(scene, meshes=[]), "albedo,normal,object,depth,position")
     assert not found["albedo"].any() and not found["normal"].any() and not found["position"].any()
     assert np.all(found["object"] == -1) and np.all(found["depth"] == np.inf)
+
+
+def test_textures_and_normal_maps_are_seen() -> None:
+    """An albedo is its texels', and a normal bent, but not the geometric one; materials not asked for are left out."""
+    def plain(*rgb: int) -> Texture:
+        return Texture(picture=Picture(np.full((2, 2, 4), (*rgb, 255), np.uint8)))
+
+    wall = quad([(-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1)],
+                Diffuse(color=plain(255, 0, 255), normal_map=plain(204, 128, 204)))
+    wall.uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
+    scene = Scene(meshes=[wall], environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=(3, 2)),
+                  camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
+    bent = np.array([204, 128, 204]) / 127.5 - 1
+    for names in ("albedo,normal,geometric_normal", "normal"):
+        _, found = rendered(scene, names)
+        expected: dict[str, Any] = {"albedo": (1, 0, 1), "normal": bent / np.linalg.norm(bent), "geometric_normal": (0, 0, 1)}
+        for name, aov in found.items():
+            np.testing.assert_allclose(aov, np.broadcast_to(expected[name], (2, 3, 3)), atol=1e-6)
 
 
 def test_albedo_is_a_mean_over_the_pixel() -> None:
