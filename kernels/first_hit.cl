@@ -9,7 +9,7 @@
 // and its name in clrt/rendering/first_hits.py.
 #include "camera.cl"
 #include "film.cl"
-#include "surface.cl"
+#include VISIBILITY
 #include SEEN_FILES
 
 #if PRIMITIVES
@@ -27,13 +27,13 @@ static inline real3 seen_geometric_normal(const Scene *scene, const Surface *sur
 
 static inline real3 seen_position(const Scene *scene, const Surface *surface) { return surface->p; }
 
-// The surface that a ray meets, turned towards the camera; which lanes meet one, and the primitive.
-static inline ireal meet(const Scene *scene, real3 eye, real3 direction, ireal active, Surface *surface,
-                         ireal *primitive) {
-    Hits hits = closest_hit(scene, eye, direction, (real)(INFINITY), active);
+// The surface that stops a ray, turned towards the camera; which lanes meet one, and the primitive.
+static inline ireal meet(const Scene *scene, real3 eye, real3 direction, ireal active, Sampler *sampler,
+                         Surface *surface, ireal *primitive) {
+    real3 origin = eye;
+    Hits hits = first_surface(scene, &origin, direction, active, sampler, surface);
     ireal hit = active & (hits.primitive >= 0);
     *primitive = hit ? hits.primitive : (ireal)(-1);
-    *surface = surface_at(scene, eye, direction, &hits);
 #if SEEN_MATERIALS && NORMAL_MAPS
     bend_normal(scene, surface);
 #endif
@@ -55,16 +55,19 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
     SEEN_MIDDLE(BEGIN)
 #if PRIMITIVES
     Surface surface;
+    Sampler sampler;
     ireal hit, other;
 #define ADD(name) name = add(name, choose(hit, seen_##name(&scene, &surface), splat(ZERO)));
     for (uint s = 0; s < launch.sample_count; ++s) {
-        Sampler sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
+        sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
         real3 direction = camera_direction(&scene, &launch, own.x, own.y, next_2d(&sampler));
-        hit = meet(&scene, eye, direction, own.inside, &surface, &other);
+        hit = meet(&scene, eye, direction, own.inside, &sampler, &surface, &other);
         SEEN_MEANS(ADD)
     }
     real2 middle = {(real)(0.5f), (real)(0.5f)};
-    hit = meet(&scene, eye, camera_direction(&scene, &launch, own.x, own.y, middle), own.inside, &surface, &primitive);
+    real3 direction = camera_direction(&scene, &launch, own.x, own.y, middle);
+    sampler = sampler_at(own.code, (ureal)(0), launch.seed, launch.block_bits);
+    hit = meet(&scene, eye, direction, own.inside, &sampler, &surface, &primitive);
     SEEN_MIDDLE(ADD)
 #endif
 #define DIVIDE(name) name = scale(name, (real)(1.0f / (float)launch.sample_count));

@@ -1,5 +1,5 @@
 // What a ray meets where every surface stops it.
-#include "bsdf.cl"
+#include "surface.cl"
 #include "sampler.cl"
 
 // The surfaces that rays meet; lanes that meet nothing get that of primitive 0. The origin stays.

@@ -126,9 +126,27 @@ def test_textures_and_normal_maps_are_seen() -> None:
     bent = np.array([204, 128, 204]) / 127.5 - 1
     for names in ("albedo,normal,geometric_normal", "normal"):
         _, found = rendered(scene, names)
-        expected: dict[str, Any] = {"albedo": (1, 0, 1), "normal": bent / np.linalg.norm(bent), "geometric_normal": (0, 0, 1)}
+        expected: dict[str, Any] = {
+            "albedo": (1, 0, 1), "normal": bent / np.linalg.norm(bent), "geometric_normal": (0, 0, 1)}
         for name, aov in found.items():
             np.testing.assert_allclose(aov, np.broadcast_to(expected[name], (2, 3, 3)), atol=1e-6)
+
+
+def test_what_is_not_there_is_looked_through() -> None:
+    """A pane of no opacity, and the back of one with one side: what is behind is met, as far off as it is."""
+    def wall(z: float, material: Diffuse) -> Mesh:
+        return quad([(-2, -2, z), (2, -2, z), (2, 2, z), (-2, 2, z)], material)
+
+    back = wall(0.2, Diffuse(one_sided=True))
+    back.faces = back.faces[:, ::-1].copy()
+    scene = Scene(meshes=[wall(0.5, Diffuse(opacity=0.0)), back, wall(-1, Diffuse(color=RED))],
+                  environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=(3, 2)),
+                  camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
+    _, found = rendered(scene, "object,depth,position,albedo")
+    assert np.all(found["object"] == 2)
+    np.testing.assert_allclose(found["depth"], 1.9, rtol=1e-6)
+    np.testing.assert_allclose(found["position"][..., 2], -1, rtol=1e-6)
+    np.testing.assert_allclose(found["albedo"], np.broadcast_to(RED, (2, 3, 3)), rtol=1e-6)
 
 
 def test_albedo_is_a_mean_over_the_pixel() -> None:
