@@ -28,17 +28,17 @@ static inline real3 seen_geometric_normal(const Scene *scene, const Surface *sur
 static inline real3 seen_position(const Scene *scene, const Surface *surface) { return surface->p; }
 
 // The surface that stops a ray, turned towards the camera; which lanes meet one, and the primitive.
-static inline ireal meet(const Scene *scene, real3 eye, real3 direction, ireal active, Sampler *sampler,
-                         Surface *surface, ireal *primitive) {
-    real3 origin = eye;
-    Hits hits = first_surface(scene, &origin, direction, active, sampler, surface);
+static inline ireal meet(const Scene *scene, const CameraRay *ray, ireal active, Sampler *sampler, Surface *surface,
+                         ireal *primitive) {
+    real3 origin = ray->origin;
+    Hits hits = first_surface(scene, &origin, ray->direction, active, sampler, surface);
     ireal hit = active & (hits.primitive >= 0);
     *primitive = hit ? hits.primitive : (ireal)(-1);
 #if SEEN_MATERIALS && NORMAL_MAPS
     bend_normal(scene, surface);
 #endif
-    turn_towards(surface, negate(direction));
-    surface->p = mad3(direction, hits.t, eye);   // its own is drawn in from a triangle's edges
+    turn_towards(surface, negate(ray->direction));
+    surface->p = mad3(ray->direction, hits.t, ray->origin);   // its own is drawn in from a triangle's edges
     return hit;
 }
 #endif
@@ -48,7 +48,6 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
     Scene scene = SCENE_ARGUMENTS;
     LanePixels own;
     if (!lane_pixels(&launch, tiles, &own)) return;
-    real3 eye = broadcast(launch.position);
     ireal primitive = (ireal)(-1);
 #define BEGIN(name) real3 name = splat(ZERO);
     SEEN_MEANS(BEGIN)
@@ -60,14 +59,16 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
 #define ADD(name) name = add(name, choose(hit, seen_##name(&scene, &surface), splat(ZERO)));
     for (uint s = 0; s < launch.sample_count; ++s) {
         sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
-        real3 direction = camera_direction(&scene, &launch, own.x, own.y, next_2d(&sampler));
-        hit = meet(&scene, eye, direction, own.inside, &sampler, &surface, &other);
+        CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler);
+        hit = meet(&scene, &ray, own.inside, &sampler, &surface, &other);
         SEEN_MEANS(ADD)
     }
     real2 middle = {(real)(0.5f), (real)(0.5f)};
-    real3 direction = camera_direction(&scene, &launch, own.x, own.y, middle);
+    Launch pinhole = launch;
+    pinhole.lens_radius = 0.0f;   // the ray through the middle of a lens, too
     sampler = sampler_at(own.code, (ureal)(0), launch.seed, launch.block_bits);
-    hit = meet(&scene, eye, direction, own.inside, &sampler, &surface, &primitive);
+    CameraRay ray = camera_ray(&scene, &pinhole, own.x, own.y, middle, &sampler);
+    hit = meet(&scene, &ray, own.inside, &sampler, &surface, &primitive);
     SEEN_MIDDLE(ADD)
 #endif
 #define DIVIDE(name) name = scale(name, (real)(1.0f / (float)launch.sample_count));

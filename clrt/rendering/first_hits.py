@@ -60,7 +60,11 @@ def _places(session: Session, seen: NDArray[np.float64], missed: NDArray[np.bool
     """Position and depth of points (height, width, 3) in the compiled scene's frame."""
     camera, frame = session.compiled.camera, session.compiled.frame
     axis = np.subtract(camera.look_at, camera.position, dtype=np.float64)
-    depth = (seen - camera.position) @ (axis / np.linalg.norm(axis)) / frame.unit
+    ahead = seen - camera.position
+    if camera.projection == "equirectangular":
+        depth = np.linalg.norm(ahead, axis=-1) / frame.unit
+    else:
+        depth = ahead @ (axis / np.linalg.norm(axis)) / frame.unit
     return {"position": np.where(missed[..., None], 0, seen / frame.unit + frame.center).astype(np.float32),
             "depth": np.where(missed, np.inf, depth).astype(np.float32)}
 

@@ -18,7 +18,7 @@ from ..device.open import open_device
 from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
 from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
-from .aovs import chosen_aovs, film_aovs, needs_direct_light, seen_first
+from .aovs import LIGHT, chosen_aovs, film_aovs, needs_direct_light, seen_first
 from .checkpoint import open_checkpoints
 from .compile import OFFSETS, WITH_LIGHT, Choices, compile_scene
 from .film import RELATIVE_FLOOR, Film
@@ -81,6 +81,9 @@ class Renderer:
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
         self.device = open_device(device)
+        if needs_direct_light(self._aovs) and settings.integrator not in WITH_LIGHT:
+            raise UsageError(f"the AOVs {' and '.join(LIGHT)} are of light, and the integrator is "
+                             f"{settings.integrator}; choose {' or '.join(WITH_LIGHT)}")
         choices = Choices(lanes or self.device.lanes, layout, builder,
                           HitTests(triangle, box, sphere), offset, needs_direct_light(self._aovs))
         _check(choices)

@@ -174,6 +174,25 @@ def test_direct_and_indirect_light_add_up_to_the_picture(options: dict[str, Any]
         np.testing.assert_allclose(found["direct"], shallow, rtol=1e-6, atol=np.spacing(pixels.max()))
 
 
+@pytest.mark.parametrize("camera", [
+    {"aperture_radius": 0.3, "focus_distance": 2.0}, {"projection": "orthographic"}, {"projection": "equirectangular"}],
+    ids=str)
+def test_depth_is_what_the_integrator_of_it_shows(camera: dict[str, Any]) -> None:
+    """For every camera; of a lens the ray through its middle."""
+    scene = ball_on_floor()
+    scene.camera = replace(scene.camera, **camera)
+    _, found = rendered(scene, "depth")
+    shown = clrt.render(scene, spp=1, integrator="depth").pixels[..., 0]
+    missed = np.isinf(found["depth"])
+    assert 0 < missed.sum() < missed.size and np.array_equal(missed, shown == 0)
+    np.testing.assert_allclose(found["depth"][~missed], shown[~missed], rtol=1e-6)
+
+
+def test_light_needs_an_integrator_of_light() -> None:
+    with pytest.raises(UsageError, match="the AOVs direct and indirect are of light, and the integrator is normals"):
+        clrt.render(everything(), aovs="indirect", integrator="normals")
+
+
 def test_light_of_two_edges_is_all_direct() -> None:
     for options in ({"integrator": "direct"}, {"max_depth": 1}):
         pixels, found = rendered(everything(), "direct,indirect", **options)

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.device.open import Device
-from clrt.rendering.aov import render_aovs
+from clrt.rendering.guides import render_guides
 from clrt.scene.materials import Diffuse
 from clrt.scene.model import Camera, Environment, Projection, RenderSettings, Scene, Sphere
 from clrt.study.significance import sidak
@@ -166,7 +166,7 @@ def test_guides_are_seen_by_the_same_rays(device: Device, name: str) -> None:
         pass
     picture = running.film().mean
     assert np.mean(picture.any(axis=2)) > 0.1
-    np.testing.assert_allclose(render_aovs(running, 16)["albedo"], picture, atol=1e-6)
+    np.testing.assert_allclose(render_guides(running, 16)["albedo"], picture, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["lens", "parallel", "as high as", "all around"])

@@ -14,7 +14,7 @@ from clrt.api import render
 from clrt.device.open import Device
 from clrt.errors import UsageError
 from clrt.output.images import read_image
-from clrt.rendering.aov import render_aovs
+from clrt.rendering.guides import render_guides
 from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Integrator, RenderSettings, Scene, Sphere
 
@@ -106,7 +106,7 @@ def test_pictures_are_what_guides_are(device: Device) -> None:
         running = session(device, replace(scene, render=settings), "sobol")
         for _ in running.render(16):
             pass
-        np.testing.assert_allclose(render_aovs(running, 16)[guide], running.film().mean, atol=1e-6)
+        np.testing.assert_allclose(render_guides(running, 16)[guide], running.film().mean, atol=1e-6)
 
 
 @pytest.mark.parametrize("integrator", ["normals", "albedo", "depth"])
