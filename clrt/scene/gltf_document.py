@@ -8,28 +8,19 @@ from __future__ import annotations
 from collections.abc import Container, Sequence
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from ..errors import SceneError
+from .gltf_looks import Image, Index, Material, Part, Sampler, Texture, Vec3, Vec4
 
 Item = TypeVar("Item")
-Index = Annotated[int, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
 NonNegative = Annotated[float, Field(ge=0)]
-Vec2 = tuple[float, float]
-Vec3 = tuple[float, float, float]
-Vec4 = tuple[float, float, float, float]
 ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
 #: Extensions that this reader follows.
 EXTENSIONS = frozenset({"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual",
                         "KHR_materials_emissive_strength", "KHR_mesh_quantization", "KHR_texture_transform"})
-
-
-class Part(BaseModel):
-    """Any object of the document: numbers are finite."""
-
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
 
 class Asset(Part):
@@ -74,80 +65,6 @@ class Accessor(Part):
     byteOffset: Index = 0
     normalized: bool = False
     sparse: Sparse | None = None
-
-
-class Image(Part):
-    name: str | None = None
-    uri: str | None = None
-    bufferView: Index | None = None
-
-
-class Sampler(Part):
-    magFilter: int | None = None
-    wrapS: Literal[10497, 33648, 33071] = 10497
-    wrapT: Literal[10497, 33648, 33071] = 10497
-
-
-class TextureSource(Part):
-    source: Index
-
-
-class TextureExtensions(Part):
-    EXT_texture_webp: TextureSource | None = None
-
-
-class Texture(Part):
-    source: Index | None = None
-    sampler: Index | None = None
-    extensions: TextureExtensions = TextureExtensions()
-
-
-class TextureTransform(Part):
-    offset: Vec2 = (0.0, 0.0)
-    rotation: float = 0.0
-    scale: Vec2 = (1.0, 1.0)
-    texCoord: Index | None = None
-
-
-class TextureInfoExtensions(Part):
-    KHR_texture_transform: TextureTransform = TextureTransform()
-
-
-class TextureInfo(Part):
-    index: Index
-    texCoord: Index = 0
-    extensions: TextureInfoExtensions = TextureInfoExtensions()
-
-
-class NormalTextureInfo(TextureInfo):
-    scale: float = 1.0
-
-
-class Pbr(Part):
-    baseColorFactor: Vec4 = (1.0, 1.0, 1.0, 1.0)
-    metallicFactor: float = 1.0
-    roughnessFactor: float = 1.0
-    baseColorTexture: TextureInfo | None = None
-    metallicRoughnessTexture: TextureInfo | None = None
-
-
-class EmissiveStrength(Part):
-    emissiveStrength: float = 1.0
-
-
-class MaterialExtensions(Part):
-    KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
-
-
-class Material(Part):
-    name: str | None = None
-    pbrMetallicRoughness: Pbr = Pbr()
-    emissiveFactor: Vec3 = (0.0, 0.0, 0.0)
-    emissiveTexture: TextureInfo | None = None
-    normalTexture: NormalTextureInfo | None = None
-    alphaMode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
-    alphaCutoff: float = 0.5
-    extensions: MaterialExtensions = MaterialExtensions()
 
 
 class Draco(Part):

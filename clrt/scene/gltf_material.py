@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import SceneError
 from . import gltf_document as gltf
+from . import gltf_looks as looks
 from .gltf_data import GltfData
 from .materials import Material, MetallicRoughness
 from .pictures import read_texels
@@ -58,14 +59,14 @@ class Materials:
             return replace(made, opacity=opacity)
         return replace(made, opacity=opacity, alpha_cutoff=_unit(source.alphaCutoff))
 
-    def _emission(self, source: gltf.Material, primitive: gltf.Primitive,
+    def _emission(self, source: looks.Material, primitive: gltf.Primitive,
                   user: str) -> tuple[float, float, float] | Texture:
         strength = max(source.extensions.KHR_materials_emissive_strength.emissiveStrength, 0.0)
         red, green, blue = (strength * max(value, 0.0) for value in source.emissiveFactor)
         glow = self._texture(source.emissiveTexture, primitive, user) if max(red, green, blue) else None
         return _colored((red, green, blue), glow, source.emissiveTexture, 0.0)
 
-    def _texture(self, info: gltf.TextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:
+    def _texture(self, info: looks.TextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:
         """None without one, without coordinates, or where its picture cannot be read."""
         if info is None:
             return None
@@ -80,7 +81,7 @@ class Materials:
         picture = None if source is None else self._picture(source, f"texture {info.index}")
         if picture is None:
             return None
-        sampler = gltf.Sampler()
+        sampler = looks.Sampler()
         if texture.sampler is not None:
             sampler = gltf.entry(self._data.document.samplers, texture.sampler, "sampler", f"texture {info.index}")
         wrap = WRAPS[sampler.wrapS], WRAPS[sampler.wrapT]
@@ -102,7 +103,7 @@ class Materials:
         return self._pictures[index]
 
 
-def _colored(factor: tuple[float, float, float], texture: Texture | None, info: gltf.TextureInfo | None,
+def _colored(factor: tuple[float, float, float], texture: Texture | None, info: looks.TextureInfo | None,
              missing: float) -> tuple[float, float, float] | Texture:
     """A colour, times its texture; times `missing` where there should be one."""
     if texture is not None:

@@ -1,0 +1,92 @@
+"""The parts of a glTF 2.0 document that say how surfaces look, by the names of the specification (section 5)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Index = Annotated[int, Field(ge=0)]
+Vec2 = tuple[float, float]
+Vec3 = tuple[float, float, float]
+Vec4 = tuple[float, float, float, float]
+
+
+class Part(BaseModel):
+    """Any object of the document: numbers are finite."""
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
+
+class Image(Part):
+    name: str | None = None
+    uri: str | None = None
+    bufferView: Index | None = None
+
+
+class Sampler(Part):
+    magFilter: int | None = None
+    wrapS: Literal[10497, 33648, 33071] = 10497
+    wrapT: Literal[10497, 33648, 33071] = 10497
+
+
+class TextureSource(Part):
+    source: Index
+
+
+class TextureExtensions(Part):
+    EXT_texture_webp: TextureSource | None = None
+
+
+class Texture(Part):
+    source: Index | None = None
+    sampler: Index | None = None
+    extensions: TextureExtensions = TextureExtensions()
+
+
+class TextureTransform(Part):
+    offset: Vec2 = (0.0, 0.0)
+    rotation: float = 0.0
+    scale: Vec2 = (1.0, 1.0)
+    texCoord: Index | None = None
+
+
+class TextureInfoExtensions(Part):
+    KHR_texture_transform: TextureTransform = TextureTransform()
+
+
+class TextureInfo(Part):
+    index: Index
+    texCoord: Index = 0
+    extensions: TextureInfoExtensions = TextureInfoExtensions()
+
+
+class NormalTextureInfo(TextureInfo):
+    scale: float = 1.0
+
+
+class Pbr(Part):
+    baseColorFactor: Vec4 = (1.0, 1.0, 1.0, 1.0)
+    metallicFactor: float = 1.0
+    roughnessFactor: float = 1.0
+    baseColorTexture: TextureInfo | None = None
+    metallicRoughnessTexture: TextureInfo | None = None
+
+
+class EmissiveStrength(Part):
+    emissiveStrength: float = 1.0
+
+
+class MaterialExtensions(Part):
+    KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
+
+
+class Material(Part):
+    name: str | None = None
+    pbrMetallicRoughness: Pbr = Pbr()
+    emissiveFactor: Vec3 = (0.0, 0.0, 0.0)
+    emissiveTexture: TextureInfo | None = None
+    normalTexture: NormalTextureInfo | None = None
+    alphaMode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
+    alphaCutoff: float = 0.5
+    extensions: MaterialExtensions = MaterialExtensions()
