@@ -17,11 +17,12 @@ from .accel.layouts import LANES, Layout
 from .accel.wide import EMPTY
 from .device.arrays import resident
 from .device.launch import wait_for
+from .device.loops import loop_turns
 from .device.open import Device
 from .device.preamble import defines, scene_struct, typedefs
 from .device.program import build, compose, make_kernel
 from .device.records import record
-from .errors import UsageError
+from .errors import DeviceError, UsageError
 from .scene.ray_arrays import Rays, ray_arrays
 from .scene.scaling import Frame
 
@@ -133,7 +134,19 @@ class TreeQuery:
             with np.errstate(over="ignore"):
                 inputs = [np.ascontiguousarray(array, np.float32) for array in (origins, directions, t_max)]
             self._ask_chunk(name, inputs, answers[part])
+            self._check_loops(answers[part])
         return answers
+
+    def _check_loops(self, answers: NDArray[Any]) -> None:
+        """DeviceError where the driver ended loops before they had an answer (kernels/query.cl)."""
+        turns = loop_turns(self.device)
+        if turns is None:
+            return
+        ended = answers["primitive"] == -2 if answers.dtype.names else answers.view(np.uint8) == 2
+        if ended.any():
+            raise DeviceError(f"{self.device.info.name} ({self.device.info.platform}): the driver ends all loops of a "
+                              f"work-item after {turns} turns, and {np.count_nonzero(ended)} of {len(answers)} rays "
+                              f"need more in the layout {self.tree.name}; use another device or layout")
 
     def _ask_chunk(self, name: str, inputs: list[NDArray[np.float32]], answers: NDArray[Any]) -> None:
         """Writes over `answers`; a CPU works on the arrays themselves."""
@@ -156,7 +169,7 @@ class TreeQuery:
         """The traversal for these rays."""
         packets = (self.device.lanes == LANES and self._tests.triangle == "watertight" and self._hit is HIT
                    and not self._counts["spheres"])
-        if name == "next_hit" or (self._traversal == "packet" and not packets):
+        if name == "next_hit" or loop_turns(self.device) is not None or (self._traversal == "packet" and not packets):
             return "single"
         if self._traversal is not None:
             return self._traversal
@@ -179,7 +192,8 @@ class TreeQuery:
         _check("traversal", traversal, TRAVERSALS)
         triangles, spheres = bool(self._counts["triangles"]), bool(self._counts["spheres"])
         instances = self._hit is INSTANCE_HIT
-        has = tree_features(triangles, spheres) | {"INSTANCES": instances, "NEXT_HIT": name == "next_hit"}
+        has = tree_features(triangles, spheres) | {"INSTANCES": instances, "NEXT_HIT": name == "next_hit",
+                                                   "LOOP_LIMIT": loop_turns(self.device) is not None}
         fetched = max((array.dtype.itemsize for array in self.tree.buffers.values()), default=0)
         values = {"LANES": self.device.lanes, **tree_defines(self.tree)}
         values |= {feature: 1 for feature, present in has.items() if present}

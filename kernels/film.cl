@@ -4,6 +4,7 @@
 // second float (Knuth's two-sum), so the mean stays right to a few units in the last place for any n. The two-sum
 // has no products, hence nothing to contract. Samples that are not finite, or so bright that a sum of 2^24 of them
 // would overflow, are dropped and counted.
+#include "loops.cl"
 #include "vector.cl"
 
 #define BRIGHTEST 1e31f
@@ -67,7 +68,9 @@ static inline void store_rows(global float *row, const real3 *value, int lane) {
     row[2] = LANE(value->z, lane);
 }
 
+// Nothing is stored where the driver ended loops early: the host then misses samples.
 static inline void store_pixels(global Pixel *film, ureal index, ireal stored, const Accumulator *a) {
+    if (loops_ended(2 + (LANE_UINT(index, 0) == 0xffffffff))) return;
     for (int lane = 0; lane < LANES; ++lane) {
         if (!LANE_INT(stored, lane)) continue;
         global Pixel *pixel = film + LANE_UINT(index, lane);

@@ -10,10 +10,15 @@
 #define ANY_HIT any_hit
 #endif
 
+// Answers of work-items whose loops the driver ended early say so: primitive −2, blocked 2.
+#define LOOPS_ENDED loops_ended(2 + (first == 0xffffffff))
+
 static inline void store_hits(global RayHit *hits, const Rays *rays, uint first, uint count, const Hits *found) {
+    bool ended = LOOPS_ENDED;
     for (uint lane = 0; lane < LANES && first + lane < count; ++lane) {
         hits[first + lane] = ray_hit(LANE(found->t, lane), LANE(found->u, lane), LANE(found->v, lane),
                                      LANE_INT(found->primitive, lane), LANE_INT(found->instance, lane), LANE(rays->to_t, lane));
+        if (ended) hits[first + lane].primitive = -2;
     }
 }
 
@@ -50,6 +55,8 @@ kernel void query_any_hit(SCENE_PARAMETERS, QUERY_RAYS, global uchar *blocked, f
     if (first >= count) return;
     Rays rays = load_rays(origins, directions, t_max, unit, first, count);
     ireal found = ANY_HIT(&scene, rays.origin, rays.direction, rays.t_max, rays.valid);
-    for (uint lane = 0; lane < LANES && first + lane < count; ++lane) blocked[first + lane] = LANE_INT(found, lane) != 0;
+    bool ended = LOOPS_ENDED;
+    for (uint lane = 0; lane < LANES && first + lane < count; ++lane)
+        blocked[first + lane] = ended ? 2 : LANE_INT(found, lane) != 0;
 }
 #endif

@@ -3,6 +3,7 @@
 //
 // `unit` is the power of two by which the tree's lengths were multiplied (clrt/scene/scaling.py). Directions are brought
 // to a length near 1 by a power of two, too, so that neither matters: a t of the host's is t·to_t.
+#include "loops.cl"
 #include "traverse/trace.cl"
 
 #define QUERY_RAYS global const float *origins, global const float *directions, global const float *t_max

@@ -9,6 +9,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 
+from .loops import loop_turns
 from .open import Device
 from .pages import advise_huge_pages
 from .program import build, make_kernel
@@ -16,6 +17,8 @@ from .program import build, make_kernel
 #: Work-items a compute unit, and the fewest items that one of them gets.
 WORK_ITEMS = {"cpu": 16, "gpu": 512}
 SMALLEST_BLOCK = {"cpu": 256, "gpu": 16}
+#: Turns that the loops of a kernel may take for one item.
+ITEM_TURNS = 1024
 #: Work-items that scan together where that pays, as in build/scan.cl, and what they get at least.
 SCAN_ITEMS, SCAN_PART = 256, 8192
 
@@ -83,7 +86,9 @@ class Blocks:
     def block(self, count: int) -> int:
         """How many items each work-item gets."""
         kind = "cpu" if self.device.info.type == "cpu" else "gpu"
-        return max(SMALLEST_BLOCK[kind], -(-count // (WORK_ITEMS[kind] * self.device.info.compute_units)))
+        block = max(SMALLEST_BLOCK[kind], -(-count // (WORK_ITEMS[kind] * self.device.info.compute_units)))
+        turns = loop_turns(self.device)
+        return block if turns is None else max(1, min(block, turns // ITEM_TURNS))
 
     def number(self, count: int) -> int:
         """How many blocks there are."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..accel.build import FEW_SPHERES, build_tree, fitting_layout
 from ..accel.kernels import HitTests, tree_buffers, tree_defines, tree_features, tree_files
 from ..accel.layouts import Layout, leaf_spheres
+from ..device.loops import loop_turns
 from ..device.open import Device
 from ..device.preamble import Buffers, defines, scene_struct, type_list, typedefs
 from ..device.program import compose, files_of
@@ -153,6 +154,8 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
         counts[f"{kind}_lights"] = count
 
     features = _features(scene, materials, textures.uv_sets, users, emitters, sky, lone)
+    if device is not None and loop_turns(device) is not None:
+        features.add("LOOP_LIMIT")
     if choices.direct_light:
         features.add("DIRECT_LIGHT")
     integrator = scene.render.integrator

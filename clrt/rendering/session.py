@@ -17,6 +17,8 @@ from ..errors import DeviceError
 from .camera import launch_record
 from .compile import CompiledScene
 from .film import Film
+from .loop_limit import check_samples, most_samples
+from .records import PIXEL
 from .tiles import TILE_PIXELS, tile_pixels, tiles_of
 from .work import Part, Work
 
@@ -39,6 +41,8 @@ class Session:
         self.launch["block_bits"] = block_bits(planned_spp)
         self.work = Work(np.zeros(tiles_of(size), np.int64))
         self._launches = Launches(FIRST_LAUNCH_SAMPLES)
+        primitives = int(compiled.counts["triangles"][0] + compiled.counts["spheres"][0])
+        self._most_samples = most_samples(device, compiled.tree, primitives, max_depth)
         width, height = size
         self._check_memory()
         try:
@@ -117,6 +121,8 @@ class Session:
     def _work(self) -> Iterator[None]:
         """Launches what is in hand."""
         while self.work.parts:
+            if self._most_samples is not None:
+                self.work.shorten(self._most_samples)
             samples = self.work.parts[0].more * TILE_PIXELS
             share = self.work.cut(max(FEWEST_TILES, self._launches.size // samples))
             tiles = share.end - share.first
@@ -152,7 +158,9 @@ class Session:
         self.wait()
         pixels = np.empty((self.size[1], self.size[0]), self.compiled.choices.pixel)
         wait_for(cl.enqueue_copy(self.device.queue, pixels, self._film, is_blocking=False))
-        return Film(pixels)
+        film = Film(pixels)
+        check_samples(self.device, film, self.work, self.size)
+        return film
 
     def restore(self, film: Film, work: Work) -> None:
         """Goes on from a film of this size and the work that it was rendered by."""

@@ -39,6 +39,13 @@ class Work:
         for part in self.parts:
             self.then.ravel()[tiles[part.first:part.end]] += part.more
 
+    def shorten(self, most: int) -> None:
+        """Leaves the first part at most so many samples; the rest of them are another part, behind it."""
+        part = self.parts[0]
+        if part.more > most:
+            self.parts[0] = part._replace(samples=part.samples + most, more=part.more - most)
+            self.parts.appendleft(part._replace(more=most))
+
     def cut(self, tiles: int) -> Part:
         """Takes at most so many tiles out of hand, of the first part. With the last of them all have their samples."""
         part = self.parts.popleft()

@@ -22,12 +22,3 @@ kernel void words(uint count, uint block, global const uint *in, global uint *ou
         WORD(float_to_byte, (uint)(uchar)floor(as_float((a & 0x7fffff) | 0x42800000)))   // from 64 up to 128
     }
 }
-
-// Numbers after so many turns of a loop. There are drivers that end loops early.
-kernel void turns(uint count, uint block, global const uint *in, uint turns, global uint *out) {
-    FOR_BLOCK(i) {
-        uint a = in[i];
-        for (uint k = 0; k < turns; ++k) a = a * 1664525u + 1013904223u;
-        out[i] = a;
-    }
-}

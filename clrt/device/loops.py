@@ -1,0 +1,62 @@
+"""Drivers that end loops early.
+
+Mesa's llvmpipe lets each vector of work-items turn its loops 65 535 times, all loops together, nested ones and those
+of all functions; from then on every loop ends after its first turn, without an error. (LP_MAX_TGSI_LOOP_ITERATIONS, a
+guard against shaders without end.) So where there is such a limit, launches are cut to keep below it, and kernels find
+out by themselves whether they did (kernels/loops.cl).
+"""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pyopencl as cl
+
+from . import cache
+from .open import Device
+from .program import build, compose, make_kernel
+from .verdicts import identity_of
+
+#: How the names of the files end that keep what was found, and turns up to which it is looked for.
+KIND, TURNS = "loops.json", 100_000
+_MULTIPLIER, _INCREMENT = 1664525, 1013904223
+_known: dict[str, int | None] = {}
+
+
+def loop_turns(device: Device) -> int | None:
+    """How many turns all loops of a work-item may take together; None without such a limit.
+
+    Kept in memory and on disk. Drivers that run work-items one by one run their loops as they are, and are not asked.
+    """
+    if device.vectors:
+        return None
+    if device.info.id not in _known:
+        name, of = f"{device.info.id}.{KIND}", identity_of(device.info)
+        try:
+            kept = json.loads(cache.read_file(name) or b"null")
+            turns = kept["turns"] if kept["of"] == of and isinstance(kept["turns"], int | None) else -1
+        except (ValueError, TypeError, LookupError, RecursionError):
+            turns = -1
+        if turns == -1:
+            turns = measured_turns(device)
+            cache.write_file(name, json.dumps({"of": of, "turns": turns}).encode())
+        _known[device.info.id] = turns
+    return _known[device.info.id]
+
+
+def measured_turns(device: Device) -> int | None:
+    """How many of TURNS turns a loop takes; None if all, 0 if the loop went wrong in some other way."""
+    kernel = make_kernel(device, build(device, compose("", "check/turns.cl", {})), "turns")
+    number = np.full(1, 7, np.uint32)
+    given, made = (cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=number)
+                   for _ in range(2))
+    kernel.set_args(given, np.uint32(TURNS), made)
+    cl.enqueue_nd_range_kernel(device.queue, kernel, (1,), (1,))
+    cl.enqueue_copy(device.queue, number, made)
+    numbers = [7]
+    for _ in range(TURNS):
+        numbers.append((_MULTIPLIER * numbers[-1] + _INCREMENT) % (1 << 32))
+    if number[0] == numbers[-1]:
+        return None
+    return numbers.index(number[0]) if number[0] in numbers else 0

@@ -1,0 +1,39 @@
+"""Renders on devices whose driver ends loops early (device/loops.py): few samples a launch, and none may be missing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..accel.layouts import Layout
+from ..device.loops import loop_turns
+from ..device.open import Device
+from ..errors import DeviceError
+from .film import Film
+from .tiles import tile_pixels
+from .work import Work
+
+#: Turns that an edge of a path takes beside its two rays, and a ray takes in a large tree, both on the high side.
+EDGE_TURNS, RAY_TURNS = 64, 1000
+#: The part of a limit that a launch may use: work-items that run as one vector wait for each other in every loop.
+MARGIN = 4
+
+
+def most_samples(device: Device, tree: Layout, primitives: int, max_depth: int) -> int | None:
+    """Samples of a pixel in one launch, at least 1; None where the device's driver ends no loops."""
+    turns = loop_turns(device)
+    if turns is None:
+        return None
+    ray = min(tree.nodes + primitives, RAY_TURNS)
+    return max(1, turns // (MARGIN * max_depth * (2 * ray + EDGE_TURNS)))
+
+
+def check_samples(device: Device, film: Film, work: Work, size: tuple[int, int]) -> None:
+    """DeviceError where loops of work-items that are done were ended: the film then lacks their samples."""
+    turns = loop_turns(device)
+    if turns is None or work.parts:
+        return
+    wanted = int(np.sum(work.samples * tile_pixels(size)))
+    if film.samples < wanted:
+        raise DeviceError(f"{device.info.name} ({device.info.platform}): the driver ends all loops of a work-item "
+                          f"after {turns} turns, and {wanted - film.samples} of {wanted} samples of this scene need "
+                          "more; use another device, or make paths shorter with --depth")

@@ -1,0 +1,122 @@
+"""Drivers that end loops early: nothing they ended passes for a picture or a hit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.device import program
+from clrt.device.loops import loop_turns, measured_turns
+from clrt.device.open import Device
+from clrt.errors import DeviceError
+from clrt.query import RayQuery
+from clrt.rendering import compile as compiling
+from clrt.rendering import loop_limit
+from clrt.rendering.renderer import Renderer
+from clrt.rendering.work import Part, Work
+from clrt.scene.materials import Diffuse
+from clrt.scene.model import Camera, Mesh, Scene
+
+from ..check.sabotage import sabotaged
+
+SIZE, SPP = (16, 24), 8
+
+
+def shining_ball(rows: int) -> Mesh:
+    """Seen from inside; from everywhere 0.01 comes, and all is reflected."""
+    theta, phi = np.meshgrid(np.linspace(0, np.pi, rows + 1), np.linspace(0, 2 * np.pi, 2 * rows + 1), indexing="ij")
+    points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
+    corners = np.stack([a, c, b, a, d, c], axis=2).reshape(-1, 3).astype(np.float32)
+    faces = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+    p0, p1, p2 = corners[faces].transpose(1, 0, 2)
+    flat = np.linalg.norm(np.cross(p1 - p0, p2 - p0), axis=1) < 1e-6
+    return Mesh(corners, faces[~flat], Diffuse(color=(1.0, 1.0, 1.0), emission=(0.01, 0.01, 0.01)))
+
+
+def scene(rows: int = 3) -> Scene:
+    """What the camera sees after d edges is 0.01 d."""
+    return Scene(meshes=[shining_ball(rows)],
+                 camera=Camera(position=(0.1, 0.2, 0.3), look_at=(0.0, -0.1, -1.0), fov_degrees=70))
+
+
+def picture(device: Device, depth: int = 6, rows: int = 3, spp: int = SPP) -> NDArray[np.float32]:
+    renderer = Renderer(scene(rows), device=device.info.id, size=SIZE, max_depth=depth, layout="list")
+    *_, state = renderer.passes(spp=spp)
+    return state.pixels
+
+
+def limit(patch: pytest.MonkeyPatch, turns: int) -> None:
+    """Has the renderer believe that the device's driver ends loops after so many turns."""
+    for module in (compiling, loop_limit):
+        patch.setattr(module, "loop_turns", lambda device: turns)
+
+
+def test_a_limit_is_found_where_there_is_one(device: Device) -> None:
+    assert measured_turns(device) == loop_turns(device)
+
+
+@pytest.mark.parametrize("turns", [1, 30_000, 100_000])
+def test_short_launches_change_nothing(device: Device, turns: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = picture(device)
+    limit(monkeypatch, turns)
+    launched = list[Part]()
+
+    def cut(work: Work, tiles: int, original: Callable[[Work, int], Part] = Work.cut) -> Part:
+        launched.append(original(work, tiles))
+        return launched[-1]
+
+    monkeypatch.setattr(Work, "cut", cut)
+    assert np.array_equal(picture(device), whole)
+    most = max(part.more for part in launched)
+    # An edge has two rays, which a list's triangles take a turn each: 6 rows of 6 quads, less a triangle at the poles.
+    assert most == 1 or 2 * 6 * 30 * most < turns
+
+
+def test_work_is_shortened_in_order() -> None:
+    work = Work(np.zeros((1, 3), np.int64))
+    work.take(np.arange(3), [Part(0, 3, 0, 7)])
+    done = []
+    while work.parts:
+        work.shorten(3)
+        done.append(work.cut(2))
+    assert done == [Part(0, 2, 0, 3), Part(2, 3, 0, 3), Part(0, 2, 3, 3), Part(2, 3, 3, 3), Part(0, 2, 6, 1),
+                    Part(2, 3, 6, 1)]
+    assert work.samples.tolist() == [[7, 7, 7]]
+
+
+def test_samples_that_were_ended_are_missed(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if loops of every fifth pixel had been ended."""
+    limit(monkeypatch, 50_000)
+    folder = sabotaged(tmp_path / "kernels", r"return a != 31;", "return a != 31 || get_global_id(0) % 5 == 0;")
+    monkeypatch.setattr(program, "kernel_folder", lambda: folder)
+    with pytest.raises(DeviceError, match=r"after 50000 turns, and (77|8\d) of 384 samples .* need more"):
+        picture(device)
+
+
+def test_too_many_turns_are_refused(device: Device) -> None:
+    """Of a path with 1024 edges and a long list; where there is no limit, all of its light arrives."""
+    if loop_turns(device) is None:
+        assert abs(picture(device, 1024, 12, spp=1).mean() / 10.24 - 1) < 0.01
+    else:
+        with pytest.raises(DeviceError, match="need more"):
+            picture(device, 1024, 12, spp=1)
+
+
+def test_too_long_lists_are_refused(device: Device) -> None:
+    triangles = np.zeros((100_000, 3, 3), np.float32)
+    triangles += np.arange(100_000, dtype=np.float32)[:, None, None] / 64 + np.eye(3, dtype=np.float32)
+    query = RayQuery(triangles.reshape(-1, 3), np.arange(300_000, dtype=np.int32).reshape(-1, 3),
+                     device=device.info.id, layout="list")
+    rays = [(-1.0, -1.0, -1.0), (3000.0, 0.0, 0.0)], [(1.0, 1.0, 1.0), (0.0, 1.0, 0.0)]
+    if loop_turns(device) is None:
+        assert query.closest_hit(*rays)["primitive"].tolist() == [0, -1]
+        assert query.any_hit(*rays).tolist() == [True, False]
+    else:
+        for ask in (query.closest_hit, query.any_hit):
+            with pytest.raises(DeviceError, match="rays need more in the layout list"):
+                ask(*rays)
