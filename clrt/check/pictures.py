@@ -11,6 +11,7 @@ from ..rendering.renderer import Renderer
 from ..scene.lights import PointLight
 from ..scene.materials import Diffuse, Material, Mirror
 from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
+from .effort import effort, share
 from .findings import Findings
 
 SIZE = 16
@@ -77,7 +78,7 @@ def check_room(device: Device, findings: Findings) -> None:
         meshes=walls, spheres=[Sphere(center=(-0.4, -0.3, -0.4), radius=0.4, material=mirror),
                                Sphere(center=(0.5, -0.6, -0.2), radius=0.3, material=diffuse)],
         camera=Camera(position=(0.1, 0.2, 0.9), look_at=(0.0, -0.1, -1.0), fov_degrees=70)),
-        spp=256, max_depth=DEPTH)
+        spp=256, max_depth=DEPTH, size=SIZE if effort(device) * 256 >= 2 else SIZE // 2)
     truth = shine * (1 - share**DEPTH) / (1 - share)
     count, mean = film.samples, film.mean.mean(axis=(0, 1))
     squares = (film.pixels["square"].astype(np.float64) + film.pixels["square_error"]).sum(axis=(0, 1)) / count
@@ -91,10 +92,10 @@ def _quad(corner: ArrayLike, side: ArrayLike, other: ArrayLike, material: Materi
     return Mesh(np.stack([a, a + b, a + b + c, a + c]), np.array([[0, 1, 2], [0, 2, 3]], np.int32), material)
 
 
-def _film(device: Device, findings: Findings, scene: Scene, spp: int, max_depth: int = 8) -> Film:
-    """The scene's film after `spp` samples a pixel, of which a simulator makes 2; a failure where some are lost."""
-    spp = 2 if device.info.type == "simulator" else spp
-    renderer = Renderer(scene, device=device.info.id, size=(SIZE, SIZE), max_depth=max_depth)
+def _film(device: Device, findings: Findings, scene: Scene, spp: int, max_depth: int = 8, size: int = SIZE) -> Film:
+    """The scene's film of size² pixels after `spp` samples each, fewer if it is slow; a failure where some are lost."""
+    spp = share(device, spp, 2)
+    renderer = Renderer(scene, device=device.info.id, size=(size, size), max_depth=max_depth)
     *_, state = renderer.passes(spp=spp)
     count, dropped = (state.film.pixels[name].ravel() for name in ("count", "dropped"))
     findings.expect(count == spp, "samples of a pixel", ("kept", count), ("dropped", dropped))

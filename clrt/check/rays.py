@@ -9,40 +9,50 @@ from numpy.typing import NDArray
 
 from ..device.open import Device
 from ..query import RayQuery
+from .effort import effort, share
 from .findings import Findings
-from .star import Doubles, Rays, Star, make_star, rays_from_elsewhere, rays_from_inside
+from .star import SQUARES, Doubles, Rays, Star, make_star, rays_from_elsewhere, rays_from_inside
 
 ELSEWHERE = 300
+#: Squares along an edge of the surface, and rays from inside, that a slow device gets at least.
+FEW_SQUARES, FEW_RAYS = 4, 128
 #: A hit's point follows from some 30 operations on coordinates, each of which may round.
 ROUNDINGS = 30.0
 
 
 def check_rays(device: Device, findings: Findings) -> None:
     """Through the tree that the device uses, in the surface's order and in none: the ways differ (tree_query.py)."""
-    star = make_star()
+    star = _star(device)
     query, inside = _query(device, star), _rays(device, star)
-    for rays in (inside, _shuffled(inside), rays_from_elsewhere(star, ELSEWHERE)):
+    for rays in (inside, _shuffled(inside), rays_from_elsewhere(star, share(device, ELSEWHERE, FEW_RAYS))):
         _check_hits(query, star, rays, findings)
 
 
 def check_binary_tree(device: Device, findings: Findings) -> None:
     """Through the plain binary tree."""
-    star = make_star()
+    star = _star(device)
     _check_hits(_query(device, star, layout="bvh2"), star, _shuffled(_rays(device, star)), findings)
 
 
 def check_tree_builder(device: Device, findings: Findings) -> None:
     """Through a tree that the device built: the hits are those of a tree of numpy's, to the bit."""
-    star = make_star()
+    star = _star(device)
     rays = _shuffled(_rays(device, star))
     built = _check_hits(_query(device, star, builder="ploc"), star, rays, findings)
     other = _query(device, star, builder="sah").closest_hit(rays.origins, rays.directions)
     findings.expect(built == other, "hits in the device's tree", ("gave", built), ("and in numpy's", other))
 
 
+def _star(device: Device) -> Star:
+    """A surface with as many triangles as suit the device."""
+    return make_star(2 * max(FEW_SQUARES // 2, round(SQUARES // 2 * effort(device) ** 0.5)))
+
+
 def _rays(device: Device, star: Star) -> Rays:
-    """From inside; for a simulator, which takes milliseconds for each, a few."""
-    return rays_from_inside(star).take(slice(None, None, 61 if device.info.type == "simulator" else 1))
+    """From inside: through each triangle to all its parts, or as many of these as suit the device, evenly spread."""
+    rays = rays_from_inside(star)
+    n = len(rays.t)
+    return rays.take(np.linspace(0, n - 1, share(device, n, FEW_RAYS)).astype(np.int64))
 
 
 def _shuffled(rays: Rays) -> Rays:

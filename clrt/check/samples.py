@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..device.open import Device
+from .effort import share
 from .findings import Findings
 from .probe import Probe
 
@@ -47,16 +48,16 @@ def check_sums(device: Device, findings: Findings) -> None:
     Samples are k or k·2^12 with k < 2^8, so the sum of 128 of them, and what it lacks as a second float, are whole
     numbers of 24 bits times a power of two: who adds them as floats, or reorders the additions, loses some.
     """
-    rng = np.random.default_rng(6)
-    samples = rng.integers(0, 256, (SAMPLES, COUNT)) << 12 * rng.integers(0, 2, (SAMPLES, COUNT))
+    rng, count = np.random.default_rng(6), share(device, COUNT // 16, 1) * 16
+    samples = rng.integers(0, 256, (SAMPLES, count)) << 12 * rng.integers(0, 2, (SAMPLES, count))
     kept = rng.random(samples.shape) < 63 / 64
     others = rng.choice(np.array([np.nan, np.inf, -np.inf, 2e31], np.float32), samples.shape)
     sums, counts = Probe(device, "samples", device.lanes).run(
-        "sums", COUNT // device.lanes, np.where(kept, samples, others).astype(np.float32), SAMPLES,
-        out=[(np.float32, 4 * COUNT), (np.uint32, 2 * COUNT)])
+        "sums", count // device.lanes, np.where(kept, samples, others).astype(np.float32), SAMPLES,
+        out=[(np.float32, 4 * count), (np.uint32, 2 * count)])
     counted = np.concatenate([kept.sum(axis=0), (~kept).sum(axis=0)])
     findings.same(counts, counted, "samples kept, and samples dropped")
-    pairs = sums.reshape(2, 2, COUNT).astype(np.float64)
+    pairs = sums.reshape(2, 2, count).astype(np.float64)
     for name, (total, error), values in zip(("sum", "sum of squares"), pairs, (samples, samples**2)):
         truth = np.where(kept, values, 0).sum(axis=0)                 # below 2^48: of whole numbers, hence exact
         findings.same(total + error, truth.astype(np.float64), name)   # in float64 this sum is exact, too

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Integers = NDArray[np.int64]
 Doubles = NDArray[np.float64]
 
-#: Squares along an edge of the cube, and what its points are multiplied by.
+#: Squares along an edge of the cube, a multiple of 2, and what its points are multiplied by.
 SQUARES, FACTORS = 16, (16, 21)
 #: Of a triangle's corners the sums in whose directions rays run, and what they meet there (see Rays).
 WEIGHTS = np.array([(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (2, 3, 4)])
@@ -48,16 +48,16 @@ class Rays(NamedTuple):
         return Rays(self.origins[order], self.directions[order], self.t[order], self.corners[order])
 
 
-def make_star() -> Star:
-    """The surface, with the same factors every time: 3072 triangles."""
-    half = SQUARES // 2
+def make_star(squares: int = SQUARES) -> Star:
+    """The surface, with the same factors every time: 12 triangles for each of an edge's squares times as many."""
+    half = squares // 2
     grid = np.stack(np.meshgrid(*[np.arange(-half, half + 1)] * 3, indexing="ij"), axis=-1)
     outside = np.abs(grid).max(axis=-1) == half
     number = np.cumsum(outside).reshape(outside.shape) - 1
     factors = np.random.default_rng(7).integers(*FACTORS, (outside.sum(), 1))
     sides = []
     for axis in range(3):
-        for side in (0, SQUARES):
+        for side in (0, squares):
             square = np.moveaxis(number, (axis, (axis + 1) % 3, (axis + 2) % 3), (0, 1, 2))[side]
             a, b, c, d = square[:-1, :-1], square[1:, :-1], square[1:, 1:], square[:-1, 1:]
             triangles = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
