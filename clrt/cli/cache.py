@@ -6,16 +6,19 @@ import click
 
 
 @click.command()
-@click.option("--clear", is_flag=True, help="Delete them.")
+@click.option("--clear", is_flag=True, help="Delete all of it.")
 def command(clear: bool) -> None:
-    """Show the folder of compiled programs, what is known of devices, and reference pictures, or clear it."""
-    from ..device import cache, platforms, speeds, verdicts
+    """Show the folder of compiled programs, what is known of devices, and reference pictures, or clear it.
 
-    folder = cache.cache_folder()
-    if clear:
-        probes, measured = (cache.clear(f"*.{kind}") for kind in (platforms.KIND, speeds.KIND))
-        click.echo(f"{folder}: {cache.clear()} programs, {cache.clear(cache.REFERENCES)} references, {probes} probes "
-                   f"of drivers, {measured} speeds and {verdicts.forget_verdicts()} checks deleted")
-        return
-    stored = list(folder.glob("*.bin"))
-    click.echo(f"{folder}: {len(stored)} programs, {sum(file.stat().st_size for file in stored)} bytes")
+    All of it is made again when it is needed. Drivers keep programs in caches of their own.
+    """
+    from ..device import cache
+
+    sizes = cache.sizes()
+    click.echo(cache.cache_folder())
+    for kind, (count, size) in sizes.items():
+        if count:
+            deleted = f", {cache.clear(cache.KINDS[kind])} deleted" if clear else ""
+            click.echo(f"  {kind:20} {count:6} {size:14_} bytes{deleted}")
+    if not any(count for count, _ in sizes.values()):
+        click.echo("  empty")

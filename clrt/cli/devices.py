@@ -28,7 +28,8 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     """List the OpenCL devices, best first; * marks the one used when none is named.
 
     Checks and measurements take some seconds a device, measurements of simulators minutes: these are among them only
-    if they are named. A device that fails its check is used only if it is named, until its driver or clrt changes or it passes.
+    if they are named. A device that fails its check is used only if it is named, until its driver or clrt changes or
+    it passes.
     """
     from ..device.discover import NOTHING, as_dict, find_devices, select
 

@@ -1,4 +1,4 @@
-"""Files kept between runs: program binaries, what is known of devices and drivers, and reference pictures.
+"""Files kept between runs: program binaries, what is known of devices and drivers, reference pictures, the last logs.
 
 Whatever is wrong with the folder (absent, read-only, damaged), a file is not there, and what it held is made anew.
 Files are put in place by a rename, so readers never see half of one; a binary follows its SHA-256.
@@ -9,10 +9,16 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
+from contextlib import suppress
+from datetime import datetime, timezone
 from pathlib import Path
 
 #: The names of scenes' reference pictures (study/reference.py).
 REFERENCES = "reference-*.npz"
+#: What is kept, and the names of its files.
+KINDS = {"programs": "*.bin", "reference pictures": REFERENCES, "probes of drivers": "*.driver.json",
+         "checks of devices": "*.check.json", "speeds of devices": "*.bench.json", "loop limits": "*.loops.json",
+         "logs": "last-*.log", "unfinished files": "unfinished-*"}
 
 
 def cache_folder() -> Path:
@@ -37,7 +43,7 @@ def write_file(name: str, content: bytes) -> bool:
     try:
         folder = cache_folder()
         folder.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=folder)
+        handle, temporary = tempfile.mkstemp(dir=folder, prefix="unfinished-")
         with os.fdopen(handle, "wb") as file:
             file.write(content)
         os.replace(temporary, folder / name)
@@ -56,6 +62,29 @@ def read_binary(key: str) -> bytes | None:
 def write_binary(key: str, binary: bytes) -> None:
     """Stores `binary` under `key` if that is possible."""
     write_file(f"{key}.bin", hashlib.sha256(binary).digest() + binary)
+
+
+def keep_log(kind: str, text: str) -> None:
+    """Keeps the last log of its kind, "build" or "error", if that is possible, for `clrt doctor`."""
+    when = datetime.now(timezone.utc).isoformat(timespec="seconds")
+    write_file(f"last-{kind}.log", f"{when}\n{text}\n".encode(errors="replace"))
+
+
+def kept_logs() -> dict[str, str]:
+    """The logs that are kept, by their kind."""
+    logs = {kind: read_file(f"last-{kind}.log") for kind in ("build", "error")}
+    return {kind: log.decode(errors="replace") for kind, log in logs.items() if log}
+
+
+def sizes() -> dict[str, tuple[int, int]]:
+    """How many files of each of KINDS there are, and their bytes."""
+    found = {}
+    for kind, pattern in KINDS.items():
+        bytes_each = []
+        with suppress(OSError):
+            bytes_each = [file.stat().st_size for file in cache_folder().glob(pattern)]
+        found[kind] = len(bytes_each), sum(bytes_each)
+    return found
 
 
 def clear(pattern: str = "*.bin") -> int:

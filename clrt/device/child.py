@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from contextlib import suppress
+from pathlib import Path
 from typing import IO
 
 
@@ -22,6 +23,15 @@ def end_child(child: subprocess.Popen[str]) -> None:
     child.kill()
     with suppress(subprocess.TimeoutExpired):
         child.wait(1.0)
+
+
+def cpu_seconds(child: subprocess.Popen[str]) -> float:
+    """The processor time that it took so far; 0 where that is not known (it has ended, or this is not Linux)."""
+    try:
+        fields = Path(f"/proc/{child.pid}/stat").read_text(errors="replace").rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    except (OSError, IndexError, ValueError):
+        return 0.0
 
 
 def told_end(code: int) -> str:

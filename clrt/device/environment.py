@@ -10,19 +10,41 @@ import os
 import tempfile
 from pathlib import Path
 
+#: Where Linux has memory that looks like files, also in containers whose file system is read-only.
+MEMORY = "/dev/shm"
+
 
 def provide_cache_folders() -> None:
     """Points XDG_CACHE_HOME and POCL_CACHE_DIR to a temporary folder unless the user's cache folder can be written."""
+    temporary = _temporary()
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    try:
-        Path(home).mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=home):
-            return
-    except (OSError, RuntimeError):
-        folder = os.path.join(tempfile.gettempdir(), f"clrt-cache-{os.getuid() if hasattr(os, 'getuid') else 0}")
-        os.makedirs(folder, exist_ok=True)
+    if not _writable(home):
+        folder = os.path.join(temporary, f"clrt-cache-{os.getuid() if hasattr(os, 'getuid') else 0}")
+        if not _writable(folder):
+            folder = tempfile.mkdtemp(prefix="clrt-cache-")
         os.environ["XDG_CACHE_HOME"] = folder
         os.environ.setdefault("POCL_CACHE_DIR", os.path.join(folder, "pocl"))
+
+
+def _writable(folder: str) -> bool:
+    """Whether it is there, or can be made, is the user's own, and takes files. Without a home "~" stays as it is."""
+    try:
+        if not os.path.isabs(folder):
+            return False
+        Path(folder).mkdir(mode=0o700, parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return not hasattr(os, "getuid") or os.stat(folder).st_uid == os.getuid()
+    except (OSError, RuntimeError):
+        return False
+
+
+def _temporary() -> str:
+    """The folder for temporary files; in memory where there is none."""
+    try:
+        return tempfile.gettempdir()
+    except OSError:
+        os.environ["TMPDIR"] = tempfile.tempdir = MEMORY    # for processes that are started, too
+        return MEMORY
 
 
 provide_cache_folders()

@@ -14,21 +14,23 @@ import time
 from collections.abc import Sequence
 from typing import IO
 
-from .child import end_child, last_line, start_child, told_end
+from .child import cpu_seconds, end_child, last_line, start_child, told_end
 from .describe import describe, size_of
 from .loader import devices_of, load
 
 #: Seconds that all probes together may take. A slow start of many GPUs is no hang.
 LIMIT = 7.0
+#: On a busy machine they may take longer: so many times, as long as a probe computes in so many seconds at least once.
+PATIENCE, IDLE = 4.0, 2.0
 
 
 def probe(libraries: Sequence[str], limit: float = LIMIT) -> list[str]:
     """What is wrong with each driver, empty where nothing is; they are asked all at once."""
-    deadline = time.monotonic() + limit
     logs = [(tempfile.TemporaryFile(), tempfile.TemporaryFile()) for _ in libraries]
     children = [start_child(__name__, library, *log) for library, log in zip(libraries, logs)]
     try:
-        return [_fault(child, *log, deadline) for child, log in zip(children, logs)]
+        _wait(children, limit)
+        return [_fault(child, *log, limit) for child, log in zip(children, logs)]
     finally:
         for child, log in zip(children, logs):
             end_child(child)
@@ -36,11 +38,25 @@ def probe(libraries: Sequence[str], limit: float = LIMIT) -> list[str]:
                 file.close()
 
 
-def _fault(child: subprocess.Popen[str], output: IO[bytes], errors: IO[bytes], deadline: float) -> str:
-    try:
-        code = child.wait(max(0.0, deadline - time.monotonic()))
-    except subprocess.TimeoutExpired:
-        return f"it hangs: no answer in {LIMIT:g} s"
+def _wait(children: Sequence[subprocess.Popen[str]], limit: float) -> None:
+    """Until all have ended, or those that have not do nothing, or have had the time of all for themselves."""
+    start = time.monotonic()
+    busy = {child: (0.0, start) for child in children}     # the processor time that each took, and when that last grew
+    while busy:
+        time.sleep(0.02)
+        now = time.monotonic()
+        for child, (before, since) in list(busy.items()):
+            seconds = cpu_seconds(child)
+            busy[child] = before, since = (seconds, now) if seconds > before else (before, since)
+            late = now - start > limit and (now - since > min(IDLE, limit) or before > limit)
+            if child.poll() is not None or late or now - start > PATIENCE * limit:
+                del busy[child]
+
+
+def _fault(child: subprocess.Popen[str], output: IO[bytes], errors: IO[bytes], limit: float) -> str:
+    code = child.poll()
+    if code is None:
+        return f"it hangs: no answer in {limit:g} s"
     if code:
         return told_end(code) + last_line(errors)
     output.seek(0)

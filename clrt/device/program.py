@@ -19,7 +19,8 @@ from importlib.resources.abc import Traversable
 import pyopencl as cl
 
 from ..errors import KernelError
-from .cache import read_binary, write_binary
+from .background import in_background
+from .cache import keep_log, read_binary, write_binary
 from .open import Device
 from .sources import kernel_folder
 
@@ -112,11 +113,29 @@ def _from_binary(device: Device, binary: bytes) -> cl.Program | None:
 
 
 def _compile(device: Device, source: str) -> cl.Program:
+    where, start = f"{device.info.name} ({device.info.platform})", time.perf_counter()
+    program = cl.Program(device.context, source)
     try:
-        return _quietly_built(cl.Program(device.context, source), OPTIONS)
+        in_background(where, lambda: _quietly_built(program, OPTIONS))
+        log = f"built in {time.perf_counter() - start:.2f} s\n{_build_log(device, program)}"
     except cl.Error as error:
         log = str(error).strip()
-        raise KernelError(f"{device.info.name} ({device.info.platform}) cannot build the kernel:\n{log}") from error
+        raise KernelError(f"{where} cannot build the kernel:\n{log}") from error
+    except KernelError as error:
+        log = str(error)
+        raise
+    finally:
+        keep_log("build", f"{where}, driver {device.info.driver}\n{', '.join(files_of(source))}\n{log}")
+    return program
+
+
+def _build_log(device: Device, program: cl.Program) -> str:
+    """What the compiler said."""
+    try:
+        log = program.get_build_info(device.cl, cl.program_build_info.LOG)  # type: ignore[no-untyped-call]
+        return str(log).strip()
+    except (cl.Error, UnicodeDecodeError):
+        return ""
 
 
 def _quietly_built(program: cl.Program, options: list[str]) -> cl.Program:

@@ -10,6 +10,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from ..device.arrays import on_device
+from ..device.background import in_background
 from ..device.launch import Launches, wait_for
 from ..device.open import Device
 from ..device.program import BuiltProgram, build, make_kernel
@@ -70,7 +71,7 @@ class Session:
     def _warm_up(self) -> None:
         """Launches no work: some drivers compile at the first launch, which belongs to the time of the build."""
         start = time.perf_counter()
-        wait_for(self._launch())
+        wait_for(in_background(self.device.info.name, self._launch))
         self.build_seconds = self.program.build_seconds + time.perf_counter() - start
 
     @property

@@ -13,6 +13,7 @@ import pytest
 
 from clrt.device.drivers import Driver, installed_drivers
 from clrt.device.platforms import faults_of
+from clrt.device.probe import probe
 
 from .fake_drivers import FAULTS, environment, listed, loads, make_driver, run
 
@@ -153,3 +154,14 @@ def test_drivers_that_no_icd_file_finds(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.delenv("OCL_ICD_VENDORS")
     monkeypatch.delenv("OPENCL_VENDOR_PATH", raising=False)
     assert linked / "libnvidia-opencl.so.1" in {Path(driver.library) for driver in installed_drivers()}
+
+
+def test_a_slow_start_on_a_busy_machine_is_no_hang(tmp_path: Path) -> None:
+    """One works now and then for longer than the limit, one does nothing, one never ends."""
+    vendors = tmp_path / "vendors"
+    spin = "for (long k = 0; k < 20000000; k++) __asm__ volatile(\"\")"
+    slow = make_driver(vendors, "slow", ON_LOAD=f"for (int i = 0; i < 25; i++) {{ {spin}; usleep(80000); }}")
+    hangs = make_driver(vendors, "hangs", **FAULTS["hangs"])
+    spins = make_driver(vendors, "spins", ON_LOAD="for (;;) __asm__ volatile(\"\")")
+    found = probe([str(slow), str(hangs), str(spins)], limit=1.5)
+    assert found[0] == "" and all("it hangs" in fault for fault in found[1:])

@@ -1,0 +1,40 @@
+"""Compilers work in the background: signals come through meanwhile, and one that hangs is given up."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from typing import TypeVar
+
+from ..errors import KernelError
+
+T = TypeVar("T")
+#: Seconds after which a compiler is slow, and after which it is taken for one that hangs.
+SLOW, LIMIT = 15.0, 600.0
+_log = logging.getLogger(__name__)
+
+
+def in_background(where: str, work: Callable[[], T]) -> T:
+    """What `work` returns or raises, which is done in a thread; KernelError where it takes longer than LIMIT.
+
+    where: whose compiler it is, for messages. What it holds on to is lost where it hangs, but the process can go on.
+    """
+    results, errors, done = list[T](), list[BaseException](), threading.Event()
+
+    def run() -> None:
+        try:
+            results.append(work())
+        except BaseException as error:  # whatever it is, it belongs to who waits
+            errors.append(error)
+        done.set()
+
+    threading.Thread(target=run, daemon=True, name="clrt compiles").start()
+    if not done.wait(SLOW):
+        _log.warning("%s has been compiling a kernel for %g s; it is given up after %g s", where, SLOW, LIMIT)
+        if not done.wait(LIMIT - SLOW):
+            raise KernelError(f"{where} has been compiling a kernel for {LIMIT:g} s: its compiler hangs, or is far too "
+                              "slow. Update the driver, or choose another device (`clrt devices`)")
+    if errors:
+        raise errors[0]
+    return results[0]
