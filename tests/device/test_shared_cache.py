@@ -1,0 +1,93 @@
+"""The cache folder between processes, and where there is none to write to."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clrt.device import background, cache
+from clrt.errors import KernelError
+from clrt.output.images import read_image
+
+SCENE = "[render]\nsize = [16, 8]\nspp = 2\n[environment]\ncolor = [1, 1, 1]\n[[sphere]]\n"
+RENDER = (sys.executable, "-P", "-m", "clrt", "render", "scene.toml", "-q", "-o")
+DROP_CAPABILITY, CAPABILITIES = 24, 64     # of prctl
+
+
+def surroundings(**more: str) -> dict[str, str]:
+    """The environment without any variable that says where caches are, and these."""
+    named = ("CLRT_CACHE_DIR", "XDG_CACHE_HOME", "POCL_CACHE_DIR", "HOME", "TMPDIR")
+    return {name: value for name, value in os.environ.items() if name not in named} | more
+
+
+def no_rights() -> None:
+    """Of root over files that permissions keep from it; for others there is nothing to drop."""
+    for capability in range(CAPABILITIES):
+        ctypes.CDLL(None).prctl(DROP_CAPABILITY, capability, 0, 0, 0)
+
+
+def test_eight_processes_start_on_a_cold_cache(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE)
+    places = surroundings(HOME=str(tmp_path), CLRT_CACHE_DIR=str(tmp_path / "cache"))
+    started = [subprocess.Popen([*RENDER, f"{number}.exr"], cwd=tmp_path, env=places, stderr=subprocess.PIPE)
+               for number in range(8)]
+    told = [process.communicate(timeout=200)[1] for process in started]
+    assert [process.returncode for process in started] == [0] * 8, told
+    pictures = [read_image(tmp_path / f"{number}.exr") for number in range(8)]
+    assert all(np.array_equal(picture, pictures[0]) for picture in pictures) and pictures[0].max() > 0
+    assert not list((tmp_path / "cache").glob("unfinished-*"))
+
+
+@pytest.mark.parametrize("home", ["a read-only home", "no home", "a home that cannot be told"])
+def test_whatever_the_home_is(tmp_path: Path, home: str) -> None:
+    """The picture is written, and nothing into a folder named ~."""
+    (tmp_path / "scene.toml").write_text(SCENE)
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o555)
+    places = {"a read-only home": {"HOME": str(closed), "CLRT_CACHE_DIR": str(closed / "clrt")},
+              "no home": {}, "a home that cannot be told": {"HOME": "~"}}[home]
+    result = subprocess.run([*RENDER, "picture.png"], cwd=tmp_path, env=surroundings(TMPDIR=str(tmp_path), **places),
+                            capture_output=True, text=True, timeout=100, preexec_fn=no_rights)
+    assert (result.returncode, result.stdout) == (0, "picture.png\n"), result.stderr
+    assert not (tmp_path / "~").exists() and not list(closed.iterdir())
+
+
+def test_a_compiler_that_hangs_is_given_up(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    monkeypatch.setattr(background, "SLOW", 0.1)
+    monkeypatch.setattr(background, "LIMIT", 0.4)
+    comes_back, start = threading.Event(), time.monotonic()
+    with pytest.raises(KernelError, match="Fake GPU has been compiling a kernel for 0.4 s"):
+        background.in_background("Fake GPU", comes_back.wait)
+    assert 0.4 <= time.monotonic() - start < 100
+    assert "Fake GPU has been compiling a kernel for 0.1 s" in caplog.text
+    comes_back.set()
+
+
+def test_what_a_compiler_gives_or_raises_comes_through() -> None:
+    assert background.in_background("Fake GPU", lambda: 7) == 7
+    with pytest.raises(ZeroDivisionError):
+        background.in_background("Fake GPU", lambda: 1 // 0)
+
+
+def test_everything_that_is_kept_is_of_a_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path / "cache"))
+    names = ["0a.bin", "1.check.json", "1.bench.json", "2.driver.json", "1.loops.json", "reference-7.npz",
+             "unfinished-1"]
+    for name in names:
+        assert cache.write_file(name, b"1234")
+    cache.keep_log("build", "all is well")
+    assert cache.kept_logs()["build"].endswith("all is well\n")
+    (tmp_path / "cache" / "2.bin").mkdir()
+    sizes = cache.sizes()
+    assert set(sizes) == set(cache.KINDS) and all(count >= 1 for count, _ in sizes.values())
+    assert sizes["speeds of devices"] == (1, 4)
+    assert sum(cache.clear(pattern) for pattern in cache.KINDS.values()) == len(names) + 1
+    assert [path.name for path in (tmp_path / "cache").iterdir()] == ["2.bin"]
