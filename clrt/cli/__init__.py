@@ -5,14 +5,15 @@ from __future__ import annotations
 import os
 import sys
 import time
+import traceback
 from importlib import import_module
 
 import click
 
-from ..errors import ClrtError
+from ..errors import ClrtError, DeviceError, KernelError
 
 STARTED = time.perf_counter()
-COMMANDS = ("render", "info", "convert", "compare", "devices", "bench", "cache")
+COMMANDS = ("render", "info", "convert", "compare", "devices", "bench", "cache", "doctor")
 
 
 class _Commands(click.Group):
@@ -46,9 +47,21 @@ def main(arguments: list[str] | None = None) -> None:
         error.show()
         sys.exit(2)
     except ClrtError as error:
+        if isinstance(error, DeviceError | KernelError):
+            _keep(str(error))
         print("\n".join(f"error: {line}" for line in getattr(error, "problems", [str(error)])), file=sys.stderr)
         sys.exit(error.exit_code)
     except (KeyboardInterrupt, click.Abort):
         print("interrupted", file=sys.stderr)
         sys.exit(130)
+    except Exception:
+        _keep(traceback.format_exc())
+        raise
     sys.exit(0)
+
+
+def _keep(error: str) -> None:
+    """For `clrt doctor`."""
+    from ..device.cache import keep_log
+
+    keep_log("error", error)

@@ -1,0 +1,78 @@
+"""`clrt doctor`: all that someone who is to help with a device or driver needs to know, in one piece."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..errors import UsageError
+
+FORMS = (".txt", ".json", ".zip")
+
+
+@click.command()
+@click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="FILE",
+              help="Write it there: .txt, .json or .zip, which has both and the logs.")
+def command(as_json: bool, output: Path | None) -> None:
+    """Report versions, drivers, devices, their checks, the cache and the last logs.
+
+    Homes, user and machine are not named. Paths elsewhere are, so look through it before you publish it. Run
+    `clrt devices --check` first: what it found is part of the report.
+    """
+    if output is not None and output.suffix.lower() not in FORMS:
+        raise UsageError(f"{output}: a report is a {', '.join(FORMS)} file; name one of these")
+    from ..device.diagnosis import diagnosis
+
+    if output is not None:
+        from ..output.files import check_target
+
+        check_target(output)
+    found = diagnosis()
+    if output is not None:
+        _write(output, found)
+        click.echo(str(output))
+    else:
+        click.echo(json.dumps(found, indent=1) if as_json else as_text(found), nl=as_json)
+
+
+def as_text(found: dict[str, Any]) -> str:
+    """For people: a heading for each part, and below it what there is, by name."""
+    return "".join(f"== {name}\n" + "".join(f"{line}\n" for line in _lines(value)) + "\n"
+                   for name, value in found.items())
+
+
+def _lines(value: Any, indent: str = "") -> Iterator[str]:
+    if isinstance(value, dict):
+        for name, item in value.items():
+            if isinstance(item, dict | list) or "\n" in str(item):
+                yield f"{indent}{name}:"
+                yield from _lines(item, indent + "    ")
+            else:
+                yield f"{indent}{name}: {item}"
+    elif isinstance(value, list):
+        for item in value:
+            first, *rest = [*_lines(item)] or [""]
+            yield f"{indent}- {first}"
+            yield from (f"{indent}  {line}" for line in rest)
+    else:
+        yield from (f"{indent}{line}" for line in str(value).splitlines())
+
+
+def _write(path: Path, found: dict[str, Any]) -> None:
+    from ..output.files import replacing
+
+    texts = {"report.txt": as_text(found), "report.json": json.dumps(found, indent=1) + "\n"}
+    texts |= {f"last-{kind}.log": log for kind, log in found["logs"].items()}
+    with replacing(path) as temporary:
+        if path.suffix.lower() == ".zip":
+            with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as pack:
+                for name, text in texts.items():
+                    pack.writestr(name, text)
+        else:
+            temporary.write_text(texts[f"report{path.suffix.lower()}"], encoding="utf-8")
