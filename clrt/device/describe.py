@@ -10,6 +10,7 @@ import pyopencl as cl
 
 from .drivers import Driver
 from .hardware import hardware
+from .pocl import lacks_linker
 from .speeds import Speed
 from .verdicts import Verdict
 
@@ -117,6 +118,9 @@ def _unusable(device: cl.Device) -> str:
         return "the driver says that it is not available"
     if not device.compiler_available:
         return "its driver has no compiler"
+    if lacks_linker(device):
+        return ("its compiler needs the linker `ld`, which is not in PATH: install it (Debian's package is named "
+                "binutils) or set PATH")
     if not device.endian_little:
         return "it is big-endian"
     if device.max_mem_alloc_size < MINIMUM_ALLOCATION:

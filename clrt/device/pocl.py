@@ -9,6 +9,8 @@ run. It touches nothing unless exactly one such pair is found.
 from __future__ import annotations
 
 import ctypes
+import os
+import shutil
 import struct
 from pathlib import Path
 
@@ -25,6 +27,11 @@ PROCESSORS = {
 }
 SEARCHED_BYTES = 1024
 _names: list[ctypes.Array[ctypes.c_char]] = []  # PoCL keeps the pointer, so the strings must live as long as it
+
+
+def lacks_linker(device: cl.Device) -> bool:
+    """Whether PoCL 3, which calls `ld` for each kernel and aborts the process without it, would not find it."""
+    return "PoCL 3." in device.platform.version and shutil.which("ld", path=os.environ.get("PATH", "")) is None
 
 
 def best_processor(flags: set[str]) -> str:

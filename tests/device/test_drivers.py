@@ -165,3 +165,14 @@ def test_a_slow_start_on_a_busy_machine_is_no_hang(tmp_path: Path) -> None:
     spins = make_driver(vendors, "spins", ON_LOAD="for (;;) __asm__ volatile(\"\")")
     found = probe([str(slow), str(hangs), str(spins)], limit=1.5)
     assert found[0] == "" and all("it hangs" in fault for fault in found[1:])
+
+
+def test_a_linker_that_is_missing_is_told(tmp_path: Path) -> None:
+    """PoCL 3 would abort the process as it compiles the first kernel."""
+    row = next(row for row in listed(tmp_path, PATH=str(tmp_path), OCL_ICD_VENDORS=str(tmp_path))
+               if row["platform"] == "Portable Computing Language")
+    assert not row["usable"] and "`ld`" in row["why"] and "binutils" in row["why"]
+    (tmp_path / "scene.toml").write_text(SCENE)
+    result = run(tmp_path, "-m", "clrt", "render", "scene.toml", "--device", "pthread", PATH=str(tmp_path),
+                 OCL_ICD_VENDORS=str(tmp_path))
+    assert result.returncode == 4 and "cannot be used: its compiler needs the linker `ld`" in result.stderr
