@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..errors import DeviceError
+from .logs import verbose_option
 
 if TYPE_CHECKING:
     from ..device.describe import DeviceInfo
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 @click.option("--device", "selectors", multiple=True, metavar="SEL", help="Only this one; may be repeated.")
 @click.option("--limit", type=click.FloatRange(1.0), default=300.0, show_default=True, metavar="SECONDS",
               help="What a check or measurement of a device may take.")
+@verbose_option
 def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...], limit: float) -> None:
     """List the OpenCL devices, best first; * marks the one used when none is named.
 

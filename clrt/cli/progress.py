@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections import deque
 from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,16 @@ PHASES = {"load": "loading the scene", "build": "building the tree", "compile": 
 
 class Progress:
     """Shows nothing; the others override what they show."""
+
+    def __init__(self) -> None:
+        self._pace = Pace()
+
+    def _left(self, state: State, goal: Goal) -> float | None:
+        self._pace.add(state.seconds, state.film.samples)
+        return time_left(state, goal, self._pace.rate)
+
+    def _told(self, state: State) -> str:
+        return describe(state, self._pace.rate)
 
     def phase(self, name: str) -> None:
         """A phase of PHASES begins."""
@@ -39,8 +50,8 @@ class PlainProgress(Progress):
         _say(PHASES[name])
 
     def state(self, state: State, goal: Goal) -> None:
-        left = time_left(state, goal)
-        _say(f"{describe(state)}" + (f"  about {left:.0f} s left" if left is not None else ""))
+        left = self._left(state, goal)
+        _say(self._told(state) + (f"  about {left:.0f} s left" if left is not None else ""))
 
 
 class JsonProgress(Progress):
@@ -50,9 +61,10 @@ class JsonProgress(Progress):
         _say(json.dumps({"phase": name}))
 
     def state(self, state: State, goal: Goal) -> None:
+        left = self._left(state, goal)
         values: dict[str, Any] = {"phase": "render", "spp": state.spp, "seconds": state.seconds, "noise": state.noise,
-                                  "relmse": state.relmse, "samples_per_second": rate(state),
-                                  "seconds_left": time_left(state, goal)}
+                                  "relmse": state.relmse, "samples_per_second": self._pace.rate,
+                                  "seconds_left": left}
         _say(json.dumps(values))
 
 
@@ -60,6 +72,7 @@ class BarProgress(Progress):
     """A bar that is redrawn in place, with rate, noise and time left."""
 
     def __init__(self) -> None:
+        super().__init__()
         from rich.console import Console
         from rich.progress import BarColumn, Progress as Bar, TextColumn
 
@@ -71,8 +84,8 @@ class BarProgress(Progress):
         self._bar.update(self._task, description=PHASES[name])
 
     def state(self, state: State, goal: Goal) -> None:
-        left = time_left(state, goal)
-        status = describe(state) + (f"  {left:.0f} s left" if left is not None else "")
+        left = self._left(state, goal)
+        status = self._told(state) + (f"  {left:.0f} s left" if left is not None else "")
         self._bar.update(self._task, total=1.0, completed=goal.done(state), status=status)
 
     def __enter__(self) -> Progress:
@@ -92,9 +105,27 @@ def make_progress(kind: str | None, quiet: bool) -> Progress:
     return {"bar": BarProgress, "plain": PlainProgress, "json": JsonProgress}[kind]()
 
 
-def rate(state: State) -> float:
-    """Samples a second since the render began."""
-    return state.film.samples / max(state.seconds, 1e-9)
+class Pace:
+    """How fast a render is of late: speeds change with other programs, and with where samples go."""
+
+    WINDOW = 10.0
+
+    def __init__(self) -> None:
+        self._seen: deque[tuple[float, int]] = deque()
+
+    def add(self, seconds: float, samples: int) -> None:
+        """So many samples, of all pixels, were there after so many seconds."""
+        self._seen.append((seconds, samples))
+        while len(self._seen) > 2 and seconds - self._seen[1][0] >= self.WINDOW:
+            self._seen.popleft()
+
+    @property
+    def rate(self) -> float:
+        """Samples a second in the last WINDOW seconds, or since the last time before; at first since the start."""
+        (start, before), (end, samples) = self._seen[0], self._seen[-1]
+        if end <= start or samples <= before:
+            start, before = 0.0, 0
+        return (samples - before) / max(end - start, 1e-9)
 
 
 @dataclass(frozen=True)
@@ -113,22 +144,25 @@ class Goal:
         return min(1.0, max(parts, default=0.0))
 
 
-def time_left(state: State, goal: Goal) -> float | None:
-    """Seconds until the render stops by what comes first; None where nothing is known. Noise² falls as 1/samples."""
+def time_left(state: State, goal: Goal, rate: float) -> float | None:
+    """Seconds until the render, at so many samples a second, stops by what comes first; None where that is not known.
+
+    Noise² falls as 1/samples.
+    """
     ends = [] if goal.seconds is None else [goal.seconds - state.seconds]
     if goal.spp is not None:
-        ends.append((goal.spp - state.spp) * state.seconds / max(1, state.spp))
+        ends.append((goal.spp * state.film.pixels.size - state.film.samples) / rate)
     if goal.error is not None and state.noise:
-        ends.append(((state.noise / goal.error) ** 2 - 1) * state.seconds)
+        ends.append(((state.noise / goal.error) ** 2 - 1) * state.film.samples / rate)
     return max(0.0, min(ends)) if ends else None
 
 
-def describe(state: State) -> str:
-    """Samples, time, rate and error in one line."""
+def describe(state: State, rate: float) -> str:
+    """Samples, time, samples a second and error in one line."""
     error = "" if state.noise is None else f"  noise {state.noise:.4f}"
     if state.relmse is not None:
         error += f"  relMSE {state.relmse:.3g}"
-    return f"{state.spp} spp  {state.seconds:.1f} s  {rate(state) / 1e6:.2f} Msamples/s{error}"
+    return f"{state.spp} spp  {state.seconds:.1f} s  {rate / 1e6:.2f} Msamples/s{error}"
 
 
 def _say(line: str) -> None:

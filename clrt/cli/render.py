@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import gc
-import logging
 import signal
 import sys
 from dataclasses import replace
@@ -15,6 +14,7 @@ import click
 
 from ..errors import UsageError
 from .interrupt import Interruptible
+from .logs import silence, verbose_option
 from .options import Size, tracing_options
 from .outputs import Outputs
 from .progress import Goal, Progress, make_progress
@@ -60,6 +60,7 @@ if TYPE_CHECKING:
 @click.option("--progress", "progress_kind", type=click.Choice(["bar", "plain", "json"]), help="Progress on stderr.")
 @click.option("--print-kernel", is_flag=True, help="Print the program that would run, and stop.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no warnings.")
+@verbose_option
 @tracing_options
 def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tuple[int, int] | None, spp: int | None,
             seconds: float | None, error: float | None, depth: int | None, seed: int | None, devices: tuple[str, ...],
@@ -86,7 +87,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     check_stops(spp, seconds, error)
     denoiser = Denoiser() if denoise else None
     if quiet:
-        logging.disable(logging.WARNING)
+        silence()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's end is Ctrl-C, too
     options: dict[str, Any] = {
         "size": size, "max_depth": depth, "seed": seed, "device": devices[0] if devices else None,

@@ -22,6 +22,7 @@ from .platforms import load_platforms
 from .speeds import kept_speed
 from .verdicts import kept_verdict
 
+log = logging.getLogger(__name__)
 NOTHING = 'no OpenCL device: install one with `pip install "pyopencl[pocl]"` or a GPU driver'
 ORDER = ("gpu", "accelerator", "cpu", "simulator", "none")
 Found = list[tuple[DeviceInfo, cl.Device | None]]
@@ -56,7 +57,8 @@ def choose(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
     """The device that `selector` names (see `select`); a warning is logged where its check failed."""
     info, device = select(selector)
     if info.failed:
-        logging.getLogger(__name__).warning("%s is used though its check failed: %s", info.name, _failures(info))
+        log.warning("%s is used though its check failed: %s", info.name, _failures(info))
+    log.info("device %d, %s (%s): %s", info.index, info.name, info.platform, info.why)
     return info, device
 
 

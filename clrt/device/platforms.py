@@ -20,6 +20,7 @@ from . import cache
 from .drivers import Driver, installed_drivers
 from .loader import load
 
+log = logging.getLogger(__name__)
 #: How the names of the files end that keep what probes found.
 KIND = "driver.json"
 #: Seconds for which a fault is believed.
@@ -39,6 +40,7 @@ def load_platforms(again: bool = False) -> tuple[list[cl.Platform], Faults]:
         if sys.platform == "linux":
             faults = faults_of(installed_drivers(), again)
             good = [driver.library for driver, fault in faults.items() if not fault]
+            log.debug("loading the OpenCL drivers %s", ", ".join(good) or "none")
             _loaded = load(good), {driver: fault for driver, fault in faults.items() if fault}
         else:
             _loaded = load(None), {}
@@ -57,8 +59,8 @@ def faults_of(drivers: list[Driver], again: bool = False) -> Faults:
             content = {"state": _state(driver), "fault": fault, "when": time.time()}
             cache.write_file(_name(driver), json.dumps(content).encode())
             if fault and not again:
-                logging.getLogger(__name__).warning("the OpenCL driver %s is left out: %s; `clrt devices` says more",
-                                                    driver.library, fault)
+                log.warning("the OpenCL driver %s is left out: %s; `clrt devices` says more",
+                            driver.library, fault)
     return {driver: fault or "" for driver, fault in faults.items()}
 
 

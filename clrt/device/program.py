@@ -9,6 +9,7 @@ known troubles with -I (spaces in paths, driver caches that ignore included file
 from __future__ import annotations
 
 import hashlib
+import logging
 import re
 import time
 import warnings
@@ -24,6 +25,7 @@ from .cache import keep_log, read_binary, write_binary
 from .open import Device
 from .sources import kernel_folder
 
+log = logging.getLogger(__name__)
 OPTIONS = ["-cl-std=CL1.2"]
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|(\w+))\s*$')
 _built: dict[str, cl.Program] = {}
@@ -88,7 +90,10 @@ def build(device: Device, source: str) -> BuiltProgram:
         if not cached:
             keeps_its_own = device.info.platform == "Portable Computing Language"
             write_binary(key, b"" if keeps_its_own else _binary(_built[context_key]))
-    return BuiltProgram(_built[context_key], time.perf_counter() - start, cached)
+    seconds = time.perf_counter() - start
+    log.info("program of %d files %s in %.2f s", len(files_of(source)), "found" if cached else "built", seconds)
+    log.debug("its files: %s", " ".join(files_of(source)))
+    return BuiltProgram(_built[context_key], seconds, cached)
 
 
 def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:

@@ -1,0 +1,83 @@
+"""What a render tells while it goes on, to people and to programs."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clrt.cli.progress import Goal, Pace, time_left
+from clrt.rendering.film import Film
+from clrt.rendering.records import PIXEL
+from clrt.rendering.renderer import State
+
+SCENE = "[render]\nsize = [16, 8]\nspp = 4\n[environment]\ncolor = [1, 1, 1]\n[[sphere]]\n"
+STATE = {"phase", "spp", "seconds", "noise", "relmse", "samples_per_second", "seconds_left"}
+
+
+def render(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    (folder / "scene.toml").write_text(SCENE)
+    return subprocess.run([sys.executable, "-P", "-m", "clrt", "render", "scene.toml", *arguments], cwd=folder,
+                          capture_output=True, text=True, timeout=200)
+
+
+def state(spp: int, seconds: float, noise: float | None = None) -> State:
+    """Of ten pixels."""
+    pixels = np.zeros((2, 5), PIXEL)
+    pixels["count"] = spp
+    return State(spp, seconds, noise, None, Film(pixels))
+
+
+def test_the_pace_is_that_of_late() -> None:
+    """A hundred a second at first, then ten."""
+    pace, samples = Pace(), 0.0
+    for second in range(1, 101):
+        samples += 100 if second <= 50 else 10
+        pace.add(float(second), int(samples))
+        assert pace.rate == pytest.approx(100 if second <= 50 else 10 if second >= 60 else pace.rate)
+    assert 10 < 5500 / 100 < 100, "the mean since the start is neither"
+
+
+def test_the_first_pace_is_the_mean_so_far() -> None:
+    """Also where the time did not go on."""
+    pace = Pace()
+    pace.add(2.0, 400)
+    assert pace.rate == 200
+    pace.add(2.0, 400)
+    assert pace.rate == 200
+
+
+@pytest.mark.parametrize(("goal", "left"), [
+    (Goal(40, None, None), 15.0),            # ten pixels lack 30 samples each, at 20 a second
+    (Goal(None, 5.0, None), 2.0),
+    (Goal(40, 5.0, None), 2.0),
+    (Goal(None, None, 0.1), 15.0),           # half the noise takes four times the samples
+    (Goal(None, None, None), None)])
+def test_the_time_left(goal: Goal, left: float | None) -> None:
+    assert time_left(state(10, 3.0, noise=0.2), goal, 20.0) == (None if left is None else pytest.approx(left))
+
+
+def test_json_progress_is_a_line_an_object(tmp_path: Path) -> None:
+    result = render(tmp_path, "--progress", "json")
+    told: list[dict[str, Any]] = [json.loads(line) for line in result.stderr.splitlines()]
+    phases = [each["phase"] for each in told]
+    assert result.returncode == 0 and list(dict.fromkeys(phases)) == ["load", "build", "compile", "render", "write"]
+    states = [each for each in told if len(each) > 1]
+    assert [each["spp"] for each in states] == [1, 2, 4] and all(set(each) == STATE for each in states)
+    assert all(each["samples_per_second"] > 0 and each["seconds_left"] >= 0 for each in states)
+
+
+@pytest.mark.parametrize(("options", "shown", "hidden"), [
+    (["-q"], [], ["loading", "device 0"]),
+    ([], ["loading the scene", "rendering", "4 spp", "writing"], ["device", "program of"]),
+    (["-v"], ["device ", "chosen as", "program of"], ["its files"]),
+    (["-vv"], ["device ", "its files: path.cl"], [])])
+def test_how_much_is_told(tmp_path: Path, options: list[str], shown: list[str], hidden: list[str]) -> None:
+    result = render(tmp_path, "--progress", "plain", *options)
+    assert (result.returncode, result.stdout) == (0, "scene.png\n"), result.stderr
+    assert all(word in result.stderr for word in shown) and not any(word in result.stderr for word in hidden)
