@@ -19,7 +19,6 @@ from .camera import launch_record
 from .compile import CompiledScene
 from .film import Film
 from .loop_limit import check_samples, most_samples
-from .records import PIXEL
 from .tiles import TILE_PIXELS, tile_pixels, tiles_of
 from .work import Part, Work
 
