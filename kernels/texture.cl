@@ -41,7 +41,7 @@ typedef struct {
     real weight[4];
 } Footprint;
 
-static inline real wrapped(real u, ireal wrap) {
+static inline real on_picture(real u, ireal wrap) {
     real turns = floor(u), pair = u - 2.0f * floor(0.5f * u);
     real mirrored = pair > 1.0f ? 2.0f - pair : pair;
     real clamped = u > 0.0f ? (u < 1.0f ? u : ONE) : ZERO;
@@ -65,8 +65,8 @@ static inline Footprint footprint(const Scene *scene, ireal texture, const Coord
     real3 u_row = GATHER3(scene->textures, texture, .u_row), v_row = GATHER3(scene->textures, texture, .v_row);
     ireal wrap_u = GATHER(ireal, scene->textures, texture, .wrap_u), wrap_v = GATHER(ireal, scene->textures, texture, .wrap_v);
     ireal width = GATHER(ireal, scene->textures, texture, .width), height = GATHER(ireal, scene->textures, texture, .height);
-    real x = wrapped(u_row.x * u + u_row.y * v + u_row.z, wrap_u) * TO_REAL(width) - 0.5f;
-    real y = wrapped(v_row.x * u + v_row.y * v + v_row.z, wrap_v) * TO_REAL(height) - 0.5f;
+    real x = on_picture(u_row.x * u + u_row.y * v + u_row.z, wrap_u) * TO_REAL(width) - 0.5f;
+    real y = on_picture(v_row.x * u + v_row.y * v + v_row.z, wrap_v) * TO_REAL(height) - 0.5f;
     real left = floor(x), top = floor(y);
     ireal nearest = GATHER(ireal, scene->textures, texture, .nearest) != 0;
     real right_share = x - left, lower_share = y - top;

@@ -28,7 +28,7 @@ from clrt.tree_query import TRAVERSALS
 from .accel.cases import soup, spheres
 from .rendering.lamps import lamps
 from .rendering.rays import icosphere
-from .rendering.test_variants import everything, painted
+from .rendering.test_variants import everything, painted, sights
 
 SETTINGS = RenderSettings(size=(6, 4), spp=2, max_depth=5, seed=11)
 TRIANGLES = soup(60, 0.5)
@@ -111,6 +111,8 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     painting = replace(painted(scene()), render=SETTINGS)
     yield "painted", picture(device, painting)
     yield "guides of it", {**render_guides(started(device, painting), 2)}
+    for name, sight in sights(painting):
+        yield name, picture(device, sight)
     apart = started(device, scene(), direct_light=True)
     light = film(apart, SETTINGS.spp)
     every = first_hits(apart, scene(), AOVS) | film_aovs(light, AOVS)

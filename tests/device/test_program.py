@@ -30,7 +30,7 @@ from clrt.scene.model import Environment, Filter, Sampler
 from clrt.study.bsdfs import variants
 
 from ..rendering.lamps import lamps
-from ..rendering.test_variants import everything
+from ..rendering.test_variants import everything, painted, sights
 
 KERNELS = Path(str(files("clrt.kernels")))
 FILES = sorted(str(path.relative_to(KERNELS)) for path in KERNELS.rglob("*.cl"))
@@ -98,6 +98,7 @@ def test_every_kernel_file_is_used(device: Device) -> None:
         used |= set(files_of(refit.program_source(layout)))
     for file in probe.FILES:
         used |= set(files_of(probe.source(file, device.lanes)))
+    used |= set(files_of(compose("", "check/turns.cl", {})))
     for shape in SHAPES.values():
         used |= set(files_of(program_source(shape, True, True, True)))
     for layout in ("bvh8", "bvh2", "cwbvh", "list"):
@@ -115,6 +116,8 @@ def test_every_kernel_file_is_used(device: Device) -> None:
         used |= set(compile_scene(scene, Choices()).files)
     for count in (1, 40):
         used |= set(compile_scene(lamps(count), Choices()).files)
+    for scene in (painted(everything()), *(sight for _, sight in sights(everything()))):
+        used |= set(compile_scene(scene, Choices()).files)
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
     for entry in ("guides.cl", "study/probe.cl"):
         used |= set(compile_scene(everything(), Choices(), entry).files)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -14,9 +15,9 @@ from clrt.device.open import Device
 from clrt.rendering import compile as compile_module
 from clrt.rendering import session as session_module
 from clrt.rendering.compile import OFFSETS, compile_scene
-from clrt.scene.lights import DirectionalLight, PointLight
+from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from clrt.scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror
-from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Sampler, Scene, Sphere
+from clrt.scene.model import Camera, Environment, Integrator, Mesh, RenderSettings, Sampler, Scene, Sphere
 from clrt.scene.textures import Picture, Texture
 from clrt.study.probe import choices
 
@@ -42,7 +43,8 @@ def everything() -> Scene:
                  Sphere(center=(0.0, 0.3, 1.5), radius=0.3, material=plastic),
                  Sphere(center=(0.7, 0.35, 2.0), radius=0.35, material=Dielectric())],
         lights=[PointLight(position=(3.0, 2.0, 2.0), intensity=(5.0, 5.0, 9.0)),
-                DirectionalLight(direction=(1.0, -2.0, -1.0), irradiance=(0.5, 0.4, 0.3))],
+                DirectionalLight(direction=(1.0, -2.0, -1.0), irradiance=(0.5, 0.4, 0.3)),
+                SpotLight(position=(-3.0, 3.0, 2.0), direction=(1.0, -1.0, -0.5), intensity=(9.0, 9.0, 5.0))],
         environment=Environment(image=sky, rotation_degrees=30.0),
         camera=Camera(position=(0.0, 2.0, 6.0), look_at=(0.0, 1.0, 0.0)),
         render=RenderSettings(size=(45, 33), spp=4, max_depth=6, seed=11))
@@ -64,6 +66,18 @@ def painted(scene: Scene) -> Scene:
     spheres = [*scene.spheres, Sphere(center=(2.0, 0.4, 2.0), radius=0.3,
                                       material=Diffuse(color=here, emission=there, normal_map=there, one_sided=True))]
     return replace(scene, meshes=meshes, spheres=spheres)
+
+
+def sights(scene: Scene) -> Iterator[tuple[str, Scene]]:
+    """It by each camera and each integrator without light."""
+    camera = scene.camera
+    yield "lens", replace(scene, camera=replace(camera, aperture_radius=0.1))
+    yield "orthographic", replace(scene, camera=replace(camera, projection="orthographic"))
+    round_about = Camera(position=camera.position, look_at=camera.look_at, projection="equirectangular")
+    yield "equirectangular", replace(scene, camera=round_about)
+    for integrator in get_args(Integrator):
+        if integrator not in ("path", "direct"):
+            yield integrator, replace(scene, render=replace(scene.render, integrator=integrator))
 
 
 @pytest.fixture(scope="module")
