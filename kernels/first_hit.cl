@@ -71,6 +71,7 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
     hit = meet(&scene, &ray, own.inside, &sampler, &surface, &primitive);
     SEEN_MIDDLE(ADD)
 #endif
+    if (loops_ended(2 + (launch.width == 0))) return;
 #define DIVIDE(name) name = scale(name, (real)(1.0f / (float)launch.sample_count));
     SEEN_MEANS(DIVIDE)
     for (int lane = 0; lane < LANES; ++lane) {

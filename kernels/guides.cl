@@ -71,8 +71,8 @@ kernel void guides(SCENE_PARAMETERS, global Guide *pixels, global const uint *ti
         sum.albedo = add(sum.albedo, seen.albedo);
         sum.normal = add(sum.normal, seen.normal);
     }
-    bool ended = loops_ended(2 + (launch.width == 0));   // then the pixel has no AOVs
-    real share = (real)(ended ? NAN : 1.0f / (float)launch.sample_count);
+    if (loops_ended(2 + (launch.width == 0))) return;
+    real share = (real)(1.0f / (float)launch.sample_count);
     real3 albedo = scale(sum.albedo, share), normal = scale(sum.normal, share);
     for (int lane = 0; lane < LANES; ++lane) {
         if (!LANE_INT(own.inside, lane)) continue;

@@ -45,9 +45,14 @@ def loop_turns(device: Device) -> int | None:
     return _known[device.info.id]
 
 
+def turns_source() -> str:
+    """The program that `measured_turns` runs."""
+    return compose("", "check/turns.cl", {})
+
+
 def measured_turns(device: Device) -> int | None:
     """How many of TURNS turns a loop takes; None if all, 0 if the loop went wrong in some other way."""
-    kernel = make_kernel(device, build(device, compose("", "check/turns.cl", {})), "turns")
+    kernel = make_kernel(device, build(device, turns_source()), "turns")
     number = np.full(1, 7, np.uint32)
     given, made = (cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=number)
                    for _ in range(2))

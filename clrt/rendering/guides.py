@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.loops import loop_turns
-from ..errors import DeviceError
 from .pixels import render_pixels
 from .records import GUIDE
 from .session import Session
@@ -25,8 +23,4 @@ def render_guides(session: Session, samples: int = SAMPLES) -> dict[str, NDArray
     and DeviceError where the device fails.
     """
     values = render_pixels(session, session.compiled.source_of("guides.cl"), "guides", GUIDE, samples)
-    device = session.device
-    if (turns := loop_turns(device)) is not None and np.isnan(values["albedo"]).any():
-        raise DeviceError(f"{device.info.name} ({device.info.platform}): the driver ends all loops of a work-item "
-                          f"after {turns} turns, and what some pixels show needs more; use another device")
     return {name: np.ascontiguousarray(values[name]) for name in GUIDE.names or () if not name.startswith("pad")}

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..device.arrays import empty_array, resident
 from ..device.launch import Launches
 from ..device.program import build, make_kernel
+from .loop_limit import check_pixels, mark_pixels
 from .session import FEWEST_TILES, FIRST_LAUNCH_SAMPLES, Session, block_bits
 from .tiles import TILE_PIXELS
 
@@ -23,6 +24,7 @@ def render_pixels(session: Session, source: str, name: str, record: np.dtype[Any
     device, (width, height) = session.device, session.size
     kernel = make_kernel(device, build(device, source), name)
     pixels = empty_array(device, record, width * height)
+    mark_pixels(device, pixels)
     tiles = resident(device, np.arange(session.tile_samples.size, dtype=np.uint32))
     launch, launches, done = session.launch.copy(), Launches(FIRST_LAUNCH_SAMPLES), 0
     launch["first_sample"], launch["sample_count"], launch["block_bits"] = 0, samples, block_bits(samples)
@@ -34,4 +36,6 @@ def render_pixels(session: Session, source: str, name: str, record: np.dtype[Any
         launches.add(session.enqueue(kernel, count * TILE_PIXELS), count * work)
         done += count
     launches.wait()
-    return pixels.read(device).reshape(height, width)
+    values = pixels.read(device).reshape(height, width)
+    check_pixels(device, values)
+    return values

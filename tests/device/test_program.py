@@ -19,6 +19,7 @@ from clrt.accel.device_builder import SHAPES, program_source
 from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS, HitTests
 from clrt.check import probe
 from clrt.device import cache, program
+from clrt.device.loops import turns_source
 from clrt.device.open import Device
 from clrt.device.program import build, compose, files_of
 from clrt.errors import KernelError
@@ -96,6 +97,7 @@ def test_every_kernel_file_is_used(device: Device) -> None:
         used |= set(files_of(query.source("closest_hit", traversal)))
     for layout in refit.RECIPES:
         used |= set(files_of(refit.program_source(layout)))
+    used |= set(files_of(turns_source()))
     for file in probe.FILES:
         used |= set(files_of(probe.source(file, device.lanes)))
     used |= set(files_of(compose("", "check/turns.cl", {})))

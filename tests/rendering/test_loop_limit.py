@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +17,10 @@ from clrt.errors import DeviceError
 from clrt.query import RayQuery
 from clrt.rendering import compile as compiling
 from clrt.rendering import loop_limit
+from clrt.rendering.first_hits import first_hits
+from clrt.rendering.guides import render_guides
 from clrt.rendering.renderer import Renderer
+from clrt.rendering.session import Session
 from clrt.rendering.work import Part, Work
 from clrt.scene.materials import Diffuse
 from clrt.scene.model import Camera, Mesh, Scene
@@ -120,3 +124,18 @@ def test_too_long_lists_are_refused(device: Device) -> None:
         for ask in (query.closest_hit, query.any_hit):
             with pytest.raises(DeviceError, match="rays need more in the layout list"):
                 ask(*rays)
+
+
+@pytest.mark.parametrize("entry", ["guides", "first_hit"])
+def test_pixels_that_were_ended_are_missed(device: Device, entry: str, tmp_path: Path,
+                                           monkeypatch: pytest.MonkeyPatch) -> None:
+    limit(monkeypatch, 50_000)
+    render: dict[str, Callable[[Session], dict[str, Any]]] = {
+        "guides": render_guides,
+        "first_hit": lambda session: first_hits(session, scene(), ["normal", "depth"])}
+    seen = render[entry](Renderer(scene(), device=device.info.id, size=SIZE).session)
+    assert all(np.isfinite(picture).all() for picture in seen.values())
+    folder = sabotaged(tmp_path / "kernels", r"return a != 31;", "return a != 31 || get_global_id(0) % 5 == 0;")
+    monkeypatch.setattr(program, "kernel_folder", lambda: folder)
+    with pytest.raises(DeviceError, match=r"after 50000 turns, and (77|8\d) of 384 pixels .* need more"):
+        render[entry](Renderer(scene(), device=device.info.id, size=SIZE).session)
