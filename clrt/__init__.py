@@ -28,7 +28,7 @@ if TYPE_CHECKING:
                                SpotLight as SpotLight)
     from .scene.materials import (Dielectric as Dielectric, Diffuse as Diffuse, MetallicRoughness as MetallicRoughness,
                                   Mirror as Mirror)
-    from .scene.model import (Camera as Camera, Environment as Environment, Mesh as Mesh,
+    from .scene.model import (Camera as Camera, Environment as Environment, Instance as Instance, Mesh as Mesh,
                               RenderSettings as RenderSettings, Scene as Scene, Sphere as Sphere)
     __version__: str
 
@@ -43,7 +43,7 @@ _HOME = {
     "rendering.renderer": ("Renderer", "State"),
     "scene.lights": ("DirectionalLight", "PointLight", "SpotLight"),
     "scene.materials": ("Dielectric", "Diffuse", "MetallicRoughness", "Mirror"),
-    "scene.model": ("Camera", "Environment", "Mesh", "RenderSettings", "Scene", "Sphere"),
+    "scene.model": ("Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
 }
 _MODULES = ("trimesh",)
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}

@@ -16,10 +16,9 @@ from .tree_query import TreeQuery
 from .scene.mesh_arrays import mesh_arrays
 from .scene.numbers import real_array, whole_array
 from .scene.scaling import Frame, frame_around, unit_for
+from .scene.transform import transform_faults
 
 Doubles = NDArray[np.float64]
-#: A transform is singular if it makes a unit of volume smaller than this, measured in its own longest column.
-SINGULAR = 1e-12
 
 
 class InstancedRayQuery(TreeQuery):
@@ -101,11 +100,7 @@ def _matrices(transforms: ArrayLike, instances: int) -> Doubles:
     if to_world.shape != (instances, 3, 4):
         rows = "; drop the last row: transforms[:, :3]" * (to_world.shape == (instances, 4, 4))
         raise SceneError(f"transforms {to_world.shape} must have the shape ({instances}, 3, 4), one an instance{rows}")
-    with np.errstate(all="ignore"):
-        length = np.linalg.norm(to_world[..., :3], axis=1).max(axis=1, initial=0)
-        volume = np.abs(np.linalg.det(to_world[..., :3] / np.maximum(length, 1e-300)[:, None, None]))
-    finite = np.isfinite(to_world).all(axis=(1, 2))
-    faults = {"is not finite": ~finite, "flattens the mesh": finite & ~(volume > SINGULAR)}
+    faults = transform_faults(to_world)
     firsts = {fault: (int(np.argmax(wrong)), int(wrong.sum())) for fault, wrong in faults.items() if wrong.any()}
     if firsts:
         raise SceneError([f"transforms[{first}] = {to_world[first].tolist()} {fault}; repair it"

@@ -27,13 +27,14 @@ static inline real3 seen_geometric_normal(const Scene *scene, const Surface *sur
 
 static inline real3 seen_position(const Scene *scene, const Surface *surface) { return surface->p; }
 
-// The surface that stops a ray, turned towards the camera; which lanes meet one, and the primitive.
+// The surface that stops a ray, turned towards the camera; which lanes meet one, and its primitive and instance.
 static inline ireal meet(const Scene *scene, const CameraRay *ray, ireal active, Sampler *sampler, Surface *surface,
-                         ireal *primitive) {
+                         ireal *primitive, ireal *instance) {
     real3 origin = ray->origin;
     Hits hits = first_surface(scene, &origin, ray->direction, active, sampler, surface);
     ireal hit = active & (hits.primitive >= 0);
     *primitive = hit ? hits.primitive : (ireal)(-1);
+    *instance = hit ? hits.instance : (ireal)(0);
 #if SEEN_MATERIALS && NORMAL_MAPS
     bend_normal(scene, surface);
 #endif
@@ -48,7 +49,7 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
     Scene scene = SCENE_ARGUMENTS;
     LanePixels own;
     if (!lane_pixels(&launch, tiles, &own)) return;
-    ireal primitive = (ireal)(-1);
+    ireal primitive = (ireal)(-1), instance = (ireal)(0);
 #define BEGIN(name) real3 name = splat(ZERO);
     SEEN_MEANS(BEGIN)
     SEEN_MIDDLE(BEGIN)
@@ -60,7 +61,7 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
     for (uint s = 0; s < launch.sample_count; ++s) {
         sampler = sampler_at(own.code, (ureal)(s), launch.seed, launch.block_bits);
         CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, next_2d(&sampler), &sampler);
-        hit = meet(&scene, &ray, own.inside, &sampler, &surface, &other);
+        hit = meet(&scene, &ray, own.inside, &sampler, &surface, &other, &other);
         SEEN_MEANS(ADD)
     }
     real2 middle = {(real)(0.5f), (real)(0.5f)};
@@ -68,7 +69,7 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
     pinhole.lens_radius = 0.0f;   // the ray through the middle of a lens, too
     sampler = sampler_at(own.code, (ureal)(0), launch.seed, launch.block_bits);
     CameraRay ray = camera_ray(&scene, &pinhole, own.x, own.y, middle, &sampler);
-    hit = meet(&scene, &ray, own.inside, &sampler, &surface, &primitive);
+    hit = meet(&scene, &ray, own.inside, &sampler, &surface, &primitive, &instance);
     SEEN_MIDDLE(ADD)
 #endif
     if (loops_ended(2 + (launch.width == 0))) return;
@@ -78,6 +79,7 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
         if (!LANE_INT(own.inside, lane)) continue;
         global FirstHit *pixel = pixels + LANE_UINT(own.index, lane);
         pixel->primitive = LANE_INT(primitive, lane);
+        pixel->instance = LANE_INT(instance, lane);
 #define STORE(name) store_rows(pixel->name, &name, lane);
         SEEN_MEANS(STORE)
         SEEN_MIDDLE(STORE)

@@ -2,7 +2,7 @@
 //
 // The position is rebuilt from the primitive, not (but for some spheres) from origin + t·direction: its error is a few
 // roundings of the primitive's own coordinates, however far the ray came (pbrt, 4th ed., 6.8). Where new rays start is
-// said in offset/.
+// said in offset/. A mesh that is shown by instances is stored once, in a frame of its own (placement.cl).
 #include "traverse/trace.cl"
 #include TEXTURE_FILES
 
@@ -24,6 +24,12 @@ typedef struct {
     real handedness;      // of the bitangent; 0 where there are no tangents
 #endif
 } Surface;
+
+#include PLACEMENT_FILE
+#if !INSTANCES
+#define PLACED_NORMAL(n) n
+#define PLACED_TANGENT(t) t
+#endif
 
 #if TRIANGLES
 // By how much points are drawn from a triangle's edges towards its middle, along its plane: more than they are then moved
@@ -47,16 +53,26 @@ static inline void triangle_surface(const Scene *scene, const Hits *hits, ireal 
     real3 size = mad3(absolute3(p0), inner0, mad3(absolute3(p1), inner1, scale(absolute3(p2), inner2)));
     surface->p_error = scale(size, (real)(GAMMA(9)));
     surface->ng = triangle_normal(sub(p1, p0), sub(p2, p0));
+#if INSTANCES
+    ireal instance = hits->primitive < 0 ? (ireal)(0) : hits->instance;
+    Place place = place_of(scene, instance);
+    place_surface(scene, instance, &place, surface);
+#endif
     surface->ns = surface->ng;
     surface->material = GATHER(ireal, scene->triangles, primitive, .material);
     surface->light = GATHER(ireal, scene->triangles, primitive, .light);
+#if INSTANCES
+    ireal material = GATHER(ireal, scene->placements, instance, .material);
+    surface->material = material < 0 ? surface->material : material;
+#endif
 #if SMOOTH_NORMALS
     ireal normals = GATHER(ireal, scene->triangles, primitive, .normals);
     ireal smooth = normals >= 0;
     if (ANY(smooth)) {
         normals = smooth ? normals : (ireal)(0);
-        real3 ns = mad3(GATHER3(scene->normals, normals, .n0), b0,
-                   mad3(GATHER3(scene->normals, normals, .n1), b1, scale(GATHER3(scene->normals, normals, .n2), b2)));
+        real3 ns = mad3(PLACED_NORMAL(GATHER3(scene->normals, normals, .n0)), b0,
+                   mad3(PLACED_NORMAL(GATHER3(scene->normals, normals, .n1)), b1,
+                        scale(PLACED_NORMAL(GATHER3(scene->normals, normals, .n2)), b2)));
         real norm2 = dot3(ns, ns);
         surface->ns = choose(smooth & (norm2 > 0.0f), scale(ns, rsqrt(norm2)), surface->ns);
     }
@@ -73,9 +89,13 @@ static inline void triangle_surface(const Scene *scene, const Hits *hits, ireal 
                           + b2 * GATHER(real, scene->colors, primitive, .c2[3]);
 #endif
 #if NORMAL_MAPS
-    surface->tangent = mad3(GATHER3(scene->tangents, primitive, .t0), b0,
-                       mad3(GATHER3(scene->tangents, primitive, .t1), b1, scale(GATHER3(scene->tangents, primitive, .t2), b2)));
+    surface->tangent = mad3(PLACED_TANGENT(GATHER3(scene->tangents, primitive, .t0)), b0,
+                       mad3(PLACED_TANGENT(GATHER3(scene->tangents, primitive, .t1)), b1,
+                            scale(PLACED_TANGENT(GATHER3(scene->tangents, primitive, .t2)), b2)));
     surface->handedness = GATHER(real, scene->tangents, primitive, .sign);
+#if INSTANCES
+    surface->handedness *= place.side;
+#endif
 #endif
 }
 #endif
@@ -116,6 +136,10 @@ static inline void sphere_surface(const Scene *scene, real3 origin, real3 direct
 static inline Surface surface_at(const Scene *scene, real3 origin, real3 direction, const Hits *hits) {
     Surface surface;
     ireal primitive = hits->primitive < 0 ? (ireal)(0) : hits->primitive;
+#if INSTANCES
+    ireal instance = hits->primitive < 0 ? (ireal)(0) : hits->instance;
+    primitive += hits->primitive < 0 ? (ireal)(0) : GATHER(ireal, scene->placements, instance, .first);
+#endif
 #if TRIANGLES && SPHERES
     ireal is_sphere = primitive >= scene->counts.triangles;
     triangle_surface(scene, hits, is_sphere ? (ireal)(0) : primitive, &surface);

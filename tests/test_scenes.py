@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from clrt.scene.fields import LATER
 from clrt.scene.file import load
+from clrt.scene.instance_reader import InstanceTable
 from clrt.scene.lights import LIGHTS
 from clrt.scene.materials import F0_PRESETS, SHARED, MATERIALS, Material, MetallicRoughness
 from clrt.scene.mesh_table import MeshTable
@@ -134,7 +135,8 @@ def test_the_manuals_example_loads_and_renders(tmp_path: Path, device: Device) -
 
 
 TABLES: dict[str, type] = {"[camera]": Camera, "[render]": RenderSettings, "[environment]": Environment,
-                           "[materials.NAME]": Material, "[[mesh]]": MeshTable, "[[sphere]]": Sphere,
+                           "[materials.NAME]": Material, "[[mesh]]": MeshTable, "[[instance]]": InstanceTable,
+                           "[[sphere]]": Sphere,
                            **{f'type = "{kind.kernel}"': kind for kind in (*MATERIALS, *LIGHTS)}}
 
 

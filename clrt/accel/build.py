@@ -25,10 +25,11 @@ FEW_SPHERES = 16
 FEW = 4 * PACK
 
 
-def fitting_layout(device: Device | None, triangles: int, spheres: int, triangle: str = "watertight") -> str:
+def fitting_layout(device: Device | None, triangles: int, spheres: int, triangle: str = "watertight",
+                   instances: bool = False) -> str:
     """The device's layout, or "packs" for vectors if what is to be in the tree, so many, is too little for one."""
     layout = device.layout if device else "bvh8"
-    few = 0 < triangles <= FEW and not spheres and triangle == "watertight"
+    few = 0 < triangles <= FEW and not (spheres or instances) and triangle == "watertight"
     return "packs" if layout == "bvh8" and few else layout
 
 

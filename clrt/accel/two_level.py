@@ -8,16 +8,17 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.arrays import DeviceArray, empty_array, on_host
+from ..device.arrays import DeviceArray, on_host, put, room_for
 from ..device.open import Device
 from ..device.records import record
 from ..errors import UsageError
 from .build import build_tree
-from .layouts import Layout
+from .layouts import Layout, sphere_boxes
 from .tree import FloatArray, IntArray
 from .upper_level import FORMS, upper_level
 
@@ -34,19 +35,24 @@ class TwoLevels:
     """Trees of meshes on a device, and above them the tree over instances, which can be made anew.
 
     meshes: triangles (m, 3, 3) each, all of sizes near 1. mesh: (k,) int32 indices of `meshes`, one an instance.
-    triangle: the test that the leaves are for.
+    triangle: the test that the leaves are for. spheres: (s, 4), which stand in the last mesh's frame and are found with
+    it, their primitives after its own. Without a device the trees stay in numpy.
     The upper level comes first in the array of nodes, in room for the largest one of so many instances.
     Raises UsageError for a layout that has no upper level.
     """
 
-    def __init__(self, device: Device, layout: str, builder: str | None, meshes: Sequence[FloatArray],
-                 mesh: IntArray, triangle: str = "watertight") -> None:
+    def __init__(self, device: Device | None, layout: str, builder: str | None, meshes: Sequence[FloatArray],
+                 mesh: IntArray, triangle: str = "watertight", spheres: FloatArray | None = None) -> None:
         if layout not in FORMS:
             raise UsageError(f"the layout {layout} has no instances: take one of {', '.join(FORMS)}")
         start = time.perf_counter()
         self._device, self._form, self._mesh = device, FORMS[layout], mesh
-        self._boxes = np.array([_box(triangles) for triangles in meshes]).reshape(-1, 2, 3)
-        trees = [build_tree(device, layout, builder, triangles, triangle=triangle) for triangles in meshes]
+        balls = [np.zeros((0, 4), np.float32)] * len(meshes)
+        if spheres is not None:
+            balls[-1] = spheres
+        self._boxes = np.array([_box(*each) for each in zip(meshes, balls)]).reshape(-1, 2, 3)
+        trees = [build_tree(device, layout, builder, *each, triangle) for each in zip(meshes, balls)]
+        self._builder = trees[0].builder if trees else ""
         self._stack = max((tree.stack for tree in trees), default=0)
         self._depth = max((tree.depth for tree in trees), default=0)
         self._nodes = sum(tree.nodes for tree in trees)
@@ -63,28 +69,29 @@ class TwoLevels:
         instances = np.zeros(len(order), INSTANCE)
         instances["to_object"], instances["index"] = inverse(to_world)[order], order
         instances["root"] = self._roots[self._mesh[order]]
-        self._buffers["nodes"].write(self._device, upper.buffers["nodes"])
-        self._buffers["instances"].write(self._device, instances)
+        put(self._device, self._buffers["nodes"], upper.buffers["nodes"])
+        put(self._device, self._buffers["instances"], instances)
         # On the stack: what waits in the upper level, LEAVE, and what waits in the lower one.
         return replace(upper, buffers=self._buffers, stack=upper.stack + 1 + self._stack,
-                       nodes=upper.nodes + self._nodes, depth=upper.depth + self._depth,
+                       nodes=upper.nodes + self._nodes, depth=upper.depth + self._depth, builder=self._builder,
                        build_seconds=self._seconds + time.perf_counter() - start)
 
-    def _joined(self, trees: Sequence[Layout]) -> tuple[dict[str, DeviceArray], NDArray[np.int64]]:
+    def _joined(self, trees: Sequence[Layout]) -> tuple[dict[str, DeviceArray | NDArray[Any]], NDArray[np.int64]]:
         """The buffers, with the trees' records one tree after another, and where their roots are, (m,)."""
         device, form = self._device, self._form
         first_node = form.room(len(self._mesh)) + _starts([len(tree.buffers["nodes"]) for tree in trees])
         first_leaf = _starts([len(tree.buffers.get(form.leaves, ())) for tree in trees])
-        buffers = {"nodes": empty_array(device, form.node, first_node[-1])}
+        buffers = {"nodes": room_for(device, form.node, first_node[-1])}
         if leaves := [tree.buffers[form.leaves] for tree in trees if form.leaves in tree.buffers]:
-            buffers[form.leaves] = empty_array(device, leaves[0].dtype, first_leaf[-1])
+            buffers[form.leaves] = room_for(device, leaves[0].dtype, first_leaf[-1])
         for tree, node, leaf in zip(trees, first_node, first_leaf):
-            nodes = on_host(device, tree.buffers["nodes"]).copy()
+            nodes = (on_host(device, tree.buffers["nodes"]) if device else tree.buffers["nodes"]).copy()
             form.shift(nodes, node, leaf)
-            buffers["nodes"].write(device, nodes, node)
+            put(device, buffers["nodes"], nodes, node)
             if form.leaves in tree.buffers:
-                buffers[form.leaves].write(device, tree.buffers[form.leaves], leaf)
-        buffers["instances"] = empty_array(device, INSTANCE, len(self._mesh))
+                put(device, buffers[form.leaves], tree.buffers[form.leaves], leaf)
+        buffers |= {"leaf_spheres": tree.buffers["leaf_spheres"] for tree in trees if "leaf_spheres" in tree.buffers}
+        buffers["instances"] = room_for(device, INSTANCE, len(self._mesh))
         return buffers, first_node[:-1]
 
 
@@ -106,9 +113,9 @@ def inverse(transforms: Doubles) -> Doubles:
     return np.concatenate([linear, -linear @ transforms[..., 3:]], axis=-1)
 
 
-def _box(triangles: FloatArray) -> FloatArray:
-    """The box of a mesh (2, 3); of an empty one a point, whose tree no ray gets into."""
-    points = triangles.reshape(-1, 3)
+def _box(triangles: FloatArray, spheres: FloatArray) -> FloatArray:
+    """The box of a mesh and spheres (2, 3); of neither a point, whose tree no ray gets into."""
+    points = np.concatenate([triangles.reshape(-1, 3), *sphere_boxes(spheres)])
     return np.stack([points.min(axis=0), points.max(axis=0)]) if len(points) else np.zeros((2, 3), np.float32)
 
 

@@ -12,7 +12,7 @@ from .builders import BUILDERS
 from .cwbvh import CWBVH_NODE, compress
 from .layouts import BVH2_NODE, BVH8_NODE, LANES, Layout, Records, bvh2_nodes, wide_nodes
 from .tree import FloatArray, IntArray, Tree
-from .wide import EMPTY, collapse
+from .wide import EMPTY, collapse, leaf_fields
 
 
 class Form(NamedTuple):
@@ -20,7 +20,8 @@ class Form(NamedTuple):
 
     node: its record. leaves: the buffer of leaves. room: the most nodes of a tree over so many instances.
     pack: the tree whose leaves hold an instance each, and which instance a leaf's number stands for, (k,).
-    shift: adds to all references to nodes and to leaf records, in place.
+    shift: adds to all references to nodes and to leaf records of triangles, in place; references to spheres count from
+    the first one, but in cwbvh from the first triangle, and so are to be shifted with the last tree's triangles.
     """
 
     node: np.dtype[np.void]
@@ -59,12 +60,13 @@ def _cwbvh(tree: Tree) -> tuple[Layout, IntArray]:
 
 
 def _shift_bvh2(nodes: Records, first_node: int, first_leaf: int) -> None:
-    nodes["left_first"] += np.where(nodes["count"] == 0, np.int32(first_node), np.int32(first_leaf))
+    nodes["left_first"] += np.where(nodes["count"] == 0, np.int32(first_node),
+                                    np.where(nodes["count"] > 0, np.int32(first_leaf), np.int32(0)))
 
 
 def _shift_bvh8(nodes: Records, first_node: int, first_leaf: int) -> None:
     child = nodes["child"]
-    leaf, interior = child < 0, (child >= 0) & (child != EMPTY)
+    leaf, interior = (child < 0) & ~leaf_fields(child)[1], (child >= 0) & (child != EMPTY)
     child[leaf] -= np.int32(first_leaf << 4)
     child[interior] += np.int32(first_node)
 

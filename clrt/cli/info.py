@@ -32,10 +32,13 @@ def command(scene: Path, as_json: bool, aovs: tuple[str, ...], lanes: int | None
     compiled = compile_scene(content, choices)
     tree = compiled.tree
     materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}
+    materials |= {instance.material or instance.mesh.material for instance in content.instances}
     report: dict[str, Any] = {
         "scene": content.name, "size": "x".join(map(str, content.render.size)), "spp": content.render.spp,
         "max_depth": content.render.max_depth,
         "meshes": len(content.meshes), "triangles": sum(len(mesh.faces) for mesh in content.meshes),
+        "instances": {"entries": len(content.instances), "in_tree": compiled.instances,
+                      "triangles": sum(len(instance.mesh.faces) for instance in content.instances)},
         "spheres": len(content.spheres),
         "cameras": list(content.cameras),
         "materials": dict(Counter(material.kernel for material in materials)),

@@ -67,3 +67,18 @@ def resident(device: Device, array: NDArray[Any] | DeviceArray) -> DeviceArray:
 def on_host(device: Device, array: NDArray[Any] | DeviceArray) -> NDArray[Any]:
     """A copy of a device array, or the numpy array itself."""
     return array.read(device) if isinstance(array, DeviceArray) else array
+
+
+def room_for(device: Device | None, dtype: DTypeLike, size: int) -> DeviceArray | NDArray[Any]:
+    """Elements to be written: on the device, or in numpy without one."""
+    return empty_array(device, dtype, size) if device else np.zeros(size, dtype)
+
+
+def put(device: Device | None, array: DeviceArray | NDArray[Any], values: DeviceArray | NDArray[Any],
+        first: int = 0) -> None:
+    """Puts `values` over the elements of `array` from `first` on, as `DeviceArray.write` does."""
+    if isinstance(array, DeviceArray):
+        assert device is not None
+        array.write(device, values, first)
+    else:
+        array[first:first + len(values)] = values

@@ -18,6 +18,7 @@ from ..device.loops import loop_turns
 from ..device.open import Device
 from ..device.preamble import Buffers, defines, scene_struct, type_list, typedefs
 from ..device.program import compose, files_of
+from ..scene.instancing import arranged
 from ..scene.materials import MATERIALS, Material
 from ..scene.model import Camera, Scene
 from ..scene.textures import Texture
@@ -29,6 +30,7 @@ from .emitters import SURFACES, TYPES, Emitters, pack_emitters
 from .environment import Sky, pack_sky
 from .filters import filter_quantiles
 from .materials import Materials, pack_materials
+from .placements import Objects, Placements
 from .records import COUNTS, GUIDE, LAUNCH, NORMALS, PIXEL, PIXEL_WITH_DIRECT, SPHERE, TRIANGLE
 from .textures import Textures
 from .tiles import TILE
@@ -67,7 +69,8 @@ class Choices:
 class CompiledScene:
     """What a device needs to render a scene. The buffers' order is the order of the kernel's arguments.
 
-    All points, the camera's too, are those of the scene in `frame` (see scene.scaling).
+    All points, the camera's too, are those of the scene in `frame` (see scene.scaling). instances: how many are in the
+    tree; others became meshes (see scene.instancing).
     """
 
     buffers: Buffers
@@ -80,6 +83,8 @@ class CompiledScene:
     choices: Choices
     camera: Camera
     frame: Frame
+    instances: int
+    objects: Objects
 
     @cached_property
     def source(self) -> str:
@@ -116,34 +121,45 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     entry: None for the scene's integrator; device: where large trees are built, if given.
     """
     validate(scene)
+    scene, *of_objects = arranged(scene)
     frame = frame_of(scene)
     scene = in_frame(scene, frame)
+    placements = Placements(scene.instances, rest=bool(scene.meshes or scene.spheres))
+    objects = Objects([len(mesh.faces) for mesh in scene.meshes], len(scene.spheres), *of_objects)
+    scene = replace(scene, meshes=placements.meshes + scene.meshes)
     triangles, normals = _geometry(scene)
     spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
     lone = 0 < len(spheres) <= FEW_SPHERES
     in_tree = spheres[:0] if lone else spheres
-    layout = choices.layout or fitting_layout(device, len(triangles), len(in_tree), choices.tests.triangle)
+    layout = choices.layout or fitting_layout(device, len(triangles), len(in_tree), choices.tests.triangle,
+                                              bool(scene.instances))
     with ThreadPoolExecutor(1) as beside:  # a sky takes as long as a tree, and neither needs all cores
         packing = beside.submit(pack_sky, scene.environment)
-        tree = build_tree(device, layout, choices.builder, triangles, in_tree, choices.tests.triangle)
+        builder = placements.tree if scene.instances else build_tree
+        tree = builder(device, layout, choices.builder, triangles, in_tree, choices.tests.triangle)
         sky = packing.result()
     textures = Textures()
     emitters = pack_emitters(scene, triangles, sky, textures)
     users = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
+    users += placements.materials
     materials = pack_materials(users, textures)
-    codes = materials.codes
+    of_meshes, of_spheres, of_instances = np.split(materials.codes,
+                                                   np.cumsum([len(scene.meshes), len(scene.spheres)]))
 
     buffers = tree_buffers(tree)
     if lone:
         every = np.arange(len(spheres), dtype=np.int32)
-        buffers["leaf_spheres"] = ("LeafSphere", leaf_spheres(spheres, every, len(triangles)))
+        buffers["leaf_spheres"] = ("LeafSphere", leaf_spheres(spheres, every, len(triangles) - placements.before))
     if len(triangles):
         per_mesh = np.repeat(np.arange(len(scene.meshes)), [len(mesh.faces) for mesh in scene.meshes])
-        buffers["triangles"] = ("Triangle", _triangle_records(triangles, codes[per_mesh], emitters.triangle, normals))
+        buffers["triangles"] = ("Triangle", _triangle_records(triangles, of_meshes[per_mesh], emitters.triangle,
+                                                              normals))
     if len(normals):
         buffers["normals"] = ("Normals", _normal_records(normals))
     if len(spheres):
-        buffers["spheres"] = ("Sphere", _sphere_records(spheres, codes[len(scene.meshes):], emitters.sphere))
+        buffers["spheres"] = ("Sphere", _sphere_records(spheres, of_spheres, emitters.sphere))
+    if scene.instances:
+        buffers["placements"] = ("Placement", placements.records(of_instances))
     buffers |= pack_corners(scene.meshes, textures.uv_sets, bool(materials.mapped("normal_map")))
     buffers |= materials.buffers | textures.buffers() | emitters.buffers | sky.buffers
     if scene.render.filter != "box":
@@ -163,7 +179,8 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     preamble = _preamble(buffers, features, materials, textures.uv_sets, emitters, choices, tree, unit)
     # A depth is that of what is in focus: the ray through the middle of a lens.
     camera = replace(scene.camera, aperture_radius=0.0) if integrator == "depth" else scene.camera
-    files = {**_files(materials.used, emitters, sky, choices, tree.name, len(triangles) > 0, len(spheres) > 0, lone),
+    files = {**_files(materials.used, emitters, sky, choices, tree.name, len(triangles) > 0, len(spheres) > 0, lone,
+                      bool(scene.instances)),
              "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
              "OPACITY_FILE": ["opacity.cl"] if "OPACITY" in features else [],
              "TEXTURE_FILES": ["texture.cl"] if textures.uv_sets else [],
@@ -171,7 +188,8 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
              "PICTURE": [f"picture/{integrator}.cl"],
              "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"]}
     entry = entry or ("path.cl" if integrator in WITH_LIGHT else "picture.cl")
-    return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame)
+    return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame,
+                         len(scene.instances), objects)
 
 
 def _geometry(scene: Scene) -> tuple[NDArray[np.float32], dict[int, NDArray[np.float32]]]:
@@ -224,6 +242,7 @@ def _features(scene: Scene, materials: Materials, uv_sets: int, users: list[Mate
            "TEXTURES": uv_sets > 0, "EMISSION_TEXTURES": any(isinstance(user.emission, Texture) for user in users),
            "OPACITY": bool(materials.with_value("opacity")), "NORMAL_MAPS": bool(materials.mapped("normal_map")),
            "VERTEX_COLORS": any(mesh.colors is not None for mesh in scene.meshes),
+           "INSTANCES": bool(scene.instances),
            "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes)}
     return features | {name for name, present in has.items() if present}
 
@@ -253,9 +272,10 @@ def _numbered(kinds: Iterable[type[Material]]) -> list[tuple[str, int]]:
 
 
 def _files(used: list[type[Material]], emitters: Emitters, sky: Sky, choices: Choices, layout: str,
-           triangles: bool, spheres: bool, lone: bool) -> dict[str, list[str]]:
+           triangles: bool, spheres: bool, lone: bool, instances: bool) -> dict[str, list[str]]:
     lights = [f"light/{t}.cl" for t in emitters.types if t != "sky"]
-    return {**tree_files(layout, choices.tests, triangles, spheres, lone), "OFFSET": [OFFSETS[choices.offset]],
+    return {**tree_files(layout, choices.tests, triangles, spheres, lone, instances),
+            "PLACEMENT_FILE": ["placement.cl"] if instances else [], "OFFSET": [OFFSETS[choices.offset]],
             "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in used],
             "LIGHT_CHOICE": emitters.choice.files, "LIGHT_TREE_FILE": ["light/tree.cl"] if emitters.choice.tree else [],
             "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else [])}

@@ -36,7 +36,7 @@ def first_hits(session: Session, scene: Scene, names: Collection[str]) -> dict[s
     missed = seen["primitive"] < 0
     if "position" in (kind.names or ()):
         pictures |= _places(session, seen["position"].astype(np.float64), missed)
-    ids = _ids(scene, seen["primitive"])
+    ids = _ids(session, scene, seen)
     pictures |= {name: np.where(missed, -1, numbers).astype(np.int32) for name, numbers in ids.items()}
     return {name: picture for name, picture in pictures.items() if name in names}
 
@@ -45,7 +45,7 @@ def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[
     """The program's text, with nothing that `names` does not need, and the record that it writes."""
     lists = {"SEEN_MEANS": [name for name in MEANS if name in names],
              "SEEN_MIDDLE": ["position"] if {"position", "depth"} & set(names) else []}
-    fields = {"primitive": "i4", "pad": "3i4"}
+    fields = {"primitive": "i4", "instance": "i4", "pad": "2i4"}
     for name in sum(lists.values(), []):
         fields |= {name: "3f4", f"pad_{name}": "i4"}
     kind = record(**fields)
@@ -69,15 +69,12 @@ def _places(session: Session, seen: NDArray[np.float64], missed: NDArray[np.bool
             "depth": np.where(missed, np.inf, depth).astype(np.float32)}
 
 
-def _ids(scene: Scene, primitive: NDArray[np.int32]) -> dict[str, NDArray[np.int64]]:
-    """For primitives of the compiled scene: which of their object they are, which object that is, and its material."""
-    sizes = [len(mesh.faces) for mesh in scene.meshes] + [1] * len(scene.spheres)
-    if not sizes:
-        nothing = np.zeros(primitive.shape, np.int64)
-        return {"primitive": nothing, "object": nothing, "material": nothing}
-    ends = np.cumsum(sizes)
-    which = np.searchsorted(ends, np.maximum(primitive, 0), side="right")
+def _ids(session: Session, scene: Scene, seen: NDArray[Any]) -> dict[str, NDArray[np.int64]]:
+    """What is met at first hits: which object of the scene, which primitive of that, and which material."""
+    which, primitive = session.compiled.objects.met(seen["primitive"], seen["instance"])
     distinct: dict[Material, int] = {}
-    users = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
-    materials = np.array([distinct.setdefault(material, len(distinct)) for material in users])
-    return {"primitive": primitive - (ends - sizes)[which], "object": which, "material": materials[which]}
+    users = [mesh.material for mesh in scene.meshes]
+    users += [instance.material or instance.mesh.material for instance in scene.instances]
+    users += [sphere.material for sphere in scene.spheres]
+    materials = np.array([*(distinct.setdefault(material, len(distinct)) for material in users), -1])
+    return {"primitive": primitive, "object": which, "material": materials[which]}

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from ..device.sources import kernel_digest
+from ..scene.instancing import prototypes
 from ..scene.model import Scene
 from .compile import Choices
 
-PARTS = ("camera", "meshes", "spheres", "lights", "environment")
+PARTS = ("camera", "meshes", "instances", "spheres", "lights", "environment")
 #: Of those in RenderSettings, beside the size.
 SETTINGS = ("max_depth", "seed", "integrator", "sampler", "filter", "adaptive")
 
@@ -30,12 +31,12 @@ def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:
     return {"version": version("clrt"), "kernels": kernel_digest(), "size": f"{width}x{height}",
             **{name: str(value) for name, value in settings.items()}, "offset": choices.offset,
             "direct_light": str(choices.direct_light),
-            **{part: _digest(getattr(scene, part)) for part in PARTS}}
+            **{part: _digest(_part(scene, part)) for part in PARTS}}
 
 
 def scene_hash(scene: Scene) -> str:
     """SHA-256 of all that shines, reflects or is seen in the scene."""
-    return _digest([getattr(scene, part) for part in PARTS])
+    return _digest([_part(scene, part) for part in PARTS])
 
 
 def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:
@@ -43,9 +44,17 @@ def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:
     told = []
     for name, value in wanted.items():
         if (other := found.get(name)) != value:
-            hidden = name in PARTS or name == "kernels"
+            hidden = name in (*PARTS, "kernels")
             told.append(f"other {name}" if hidden else f"{name} {other} instead of {value}")
     return told
+
+
+def _part(scene: Scene, name: str) -> object:
+    """A part of the scene; of instances their meshes once each, and where those stand."""
+    if name != "instances":
+        return getattr(scene, name)
+    meshes, which = prototypes(scene.instances)
+    return meshes, which, [(each.to_world, each.material or each.mesh.material) for each in scene.instances]
 
 
 def _digest(value: object) -> str:

@@ -16,6 +16,10 @@ COLORS = record(c0="4f4", c1="4f4", c2="4f4")
 #: sign: of the bitangent, or 0 where there is no tangent.
 TANGENTS = record(t0="3f4", sign="f4", t1="3f4", pad1="f4", t2="3f4", pad2="f4")
 SPHERE = record(center="3f4", radius="f4", material="i4", light="i4", pad="2i4")
+#: An instance (kernels/placement.cl). first: of its mesh's triangles; material: a code, or −1 for the triangles' own;
+#: unit: 1 over the greatest entry of the matrix, below 0 where it mirrors.
+PLACEMENT = record(to_world="(3,4)f4", rounding0="3f4", first="i4", rounding1="3f4", material="i4", rounding2="3f4",
+                   unit="f4")
 
 #: A light, lights together, or an infinite light (kernels/light/choice.cl, tree.cl).
 LIGHT_GROUP = record(center="3f4", radius="f4", axis="3f4", cos_cone="f4", intensity="f4", below="i4", above="i4",

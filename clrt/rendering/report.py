@@ -35,8 +35,9 @@ def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
 def tree_report(renderer: Renderer) -> dict[str, Any]:
     """The tree's part of the report."""
     tree, counts = renderer.compiled.tree, renderer.compiled.counts[0]
-    return {"triangles": int(counts["triangles"]), "spheres": int(counts["spheres"]), "instances": 0,
-            "nodes": tree.nodes, "bytes": tree.bytes, "build_seconds": tree.build_seconds, "sah_cost": tree.sah_cost,
+    return {"triangles": int(counts["triangles"]), "spheres": int(counts["spheres"]),
+            "instances": renderer.compiled.instances, "nodes": tree.nodes,
+            "bytes": tree.bytes, "build_seconds": tree.build_seconds, "sah_cost": tree.sah_cost,
             "layout": tree.name, "builder": tree.builder, "depth": tree.depth}
 
 

@@ -19,9 +19,9 @@ from annotated_types import Ge, Gt, Le, Lt
 from .textures import Texture
 
 #: Fields whose values are no plain data; whoever holds them checks them.
-ELSEWHERE = frozenset({"image", "material", "materials", "picture"})
+ELSEWHERE = frozenset({"image", "material", "materials", "mesh", "picture", "to_world"})
 #: Words of the scene format that this version knows but cannot draw yet.
-LATER = frozenset({"instance", "phong", "blinn_phong", "local", "raster"})
+LATER = frozenset({"phong", "blinn_phong", "local", "raster"})
 FLOAT32_MAX = float(np.finfo(np.float32).max)
 #: More mistakes than this in one object are counted, not listed.
 MOST = 12

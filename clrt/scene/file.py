@@ -39,9 +39,9 @@ def load(path: str | Path, camera: str | None = None) -> Scene:
 def _load_model(path: Path) -> Scene:
     """A bare model under the default sky, with its lights or the sun, and its first camera or one that frames it."""
     model = read_model(path)
-    camera = next(iter(model.cameras.values()), None) or frame(model.meshes)
-    return Scene(meshes=model.meshes, camera=camera, cameras=model.cameras, environment=default_sky(),
-                 lights=model.lights or [SUN], name=path.stem)
+    camera = next(iter(model.cameras.values()), None) or frame(model.meshes, model.instances)
+    return Scene(meshes=model.meshes, instances=model.instances, camera=camera, cameras=model.cameras,
+                 environment=default_sky(), lights=model.lights or [SUN], name=path.stem)
 
 
 def _load_toml(path: Path) -> tuple[Scene, list[str]]:

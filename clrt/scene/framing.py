@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .model import Camera, Mesh
+from .instancing import meshes_by_id
+from .model import Camera, Instance, Mesh
 
 #: From the model to the camera: in front (+Z), 28° to the right and 17° above.
 THREE_QUARTER = (0.53, 0.34, 1.0)
@@ -20,16 +22,16 @@ ROUNDS = 20
 Doubles = NDArray[np.float64]
 
 
-def frame(meshes: list[Mesh]) -> Camera:
+def frame(meshes: list[Mesh], instances: Sequence[Instance] = ()) -> Camera:
     """The nearest three-quarter view that keeps every vertex inside a square picture, the model in its middle.
 
-    Only vertices that a face uses count. The model fills FILL of the picture's width or height, and its left and right
-    margins are equal, as are those above and below.
+    Only vertices that a face uses count; of instances the corners of a box around their mesh. The model fills FILL of
+    the picture's width or height, and its left and right margins are equal, as are those above and below.
     """
     back = np.array(THREE_QUARTER) / np.linalg.norm(THREE_QUARTER)
     right = np.cross([0.0, 1.0, 0.0], back) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], back))
     axes = np.array([right, np.cross(back, right), back])
-    vertices = _used_vertices(meshes)
+    vertices = _extremes(meshes, instances)
     middle = vertices.min(axis=0) / 2 + vertices.max(axis=0) / 2
     x, y, z = axes @ (vertices - middle).T
     # From (cx, cy, d) a vertex is seen at |x - cx| <= slope (d - z): cx + slope d and slope d - cx have lower bounds,
@@ -41,10 +43,21 @@ def frame(meshes: list[Mesh]) -> Camera:
     return Camera(position=_vector(center + distance * back), look_at=_vector(center), fov_degrees=FOV_DEGREES)
 
 
-def bounds(meshes: list[Mesh]) -> tuple[Doubles, Doubles]:
-    """Lowest and highest coordinates, (3,) each, of the vertices that the faces use."""
-    vertices = _used_vertices(meshes)
+def bounds(meshes: list[Mesh], instances: Sequence[Instance] = ()) -> tuple[Doubles, Doubles]:
+    """Lowest and highest coordinates, (3,) each, of the vertices that the faces use, or of the boxes of instances."""
+    vertices = _extremes(meshes, instances)
     return vertices.min(axis=0), vertices.max(axis=0)
+
+
+def _extremes(meshes: list[Mesh], instances: Sequence[Instance]) -> Doubles:
+    """The vertices that faces use, and the corners of boxes where instances put them, (n, 3)."""
+    boxes = {}
+    for key, mesh in meshes_by_id(instances).items():
+        used = _used_vertices([mesh])
+        ends = np.stack([used.min(axis=0), used.max(axis=0)])
+        boxes[key] = np.array([ends[[x, y, z], [0, 1, 2]] for x, y, z in np.ndindex(2, 2, 2)])
+    corners = [boxes[id(each.mesh)] @ each.to_world[:, :3].T + each.to_world[:, 3] for each in instances]
+    return np.concatenate([*([_used_vertices(meshes)] if meshes else []), *corners])
 
 
 def _used_vertices(meshes: list[Mesh]) -> Doubles:

@@ -18,11 +18,13 @@ from .framing import bounds
 from .gltf_camera import read_cameras
 from .gltf_data import GltfData
 from .gltf_draco import decompress
+from .gltf_instancing import matrices, shown
 from .gltf_lights import read_lights
 from .gltf_material import Materials
+from .instancing import meshes_by_id
 from .model import Mesh, Model
 from .normals import Normals, choose_normals
-from .transform import Matrix, quaternion, scaling, transform_mesh, translation
+from .transform import Matrix, quaternion, scaling, translation
 from .validate import index_problems, mesh_problems
 
 log = logging.getLogger(__name__)
@@ -31,7 +33,7 @@ Placed = tuple[gltf.Node, Matrix]
 
 
 def read_gltf(path: Path, normals: Normals = "file") -> Model:
-    """The scene of a glTF file, one Mesh for each primitive of each node, in world coordinates.
+    """The scene of a glTF file, one Mesh for each primitive of each node, in world coordinates, or an Instance.
 
     Raises SceneError naming the file and the accessor, node or mesh that is wrong.
     """
@@ -45,13 +47,16 @@ def read_gltf(path: Path, normals: Normals = "file") -> Model:
 def _read(path: Path, normals: Normals) -> Model:
     data = GltfData(path)
     nodes = list(_nodes(data.document))
-    meshes = _place(data, nodes, normals)
-    problems = [problem for mesh in meshes for problem in mesh_problems(mesh, "mesh")]
+    meshes, instances = shown(_places(data, nodes, normals))
+    if not meshes and not instances:
+        raise SceneError("its scene holds no triangles; export a model with triangle meshes")
+    every = [*meshes, *meshes_by_id(instances).values()]
+    problems = [problem for mesh in every for problem in mesh_problems(mesh, "mesh")]
     if problems:
         raise SceneError(problems)
     _warn_of_left_out(path, data.document)
-    middle = np.mean(bounds(meshes), axis=0)
-    return Model(meshes=meshes, cameras=read_cameras(path, data.document, nodes, middle),
+    middle = np.mean(bounds(meshes, instances), axis=0)
+    return Model(meshes=meshes, instances=instances, cameras=read_cameras(path, data.document, nodes, middle),
                  lights=list(read_lights(data.document, nodes)))
 
 
@@ -87,19 +92,15 @@ def _local(node: gltf.Node, index: int) -> Matrix:
     return translation(node.translation) @ quaternion(*node.rotation) @ scaling(node.scale)
 
 
-def _place(data: GltfData, nodes: list[Placed], normals: Normals) -> list[Mesh]:
-    """The meshes of all nodes in world coordinates; each mesh is read once, however many nodes show it."""
+def _places(data: GltfData, nodes: list[Placed], normals: Normals) -> Iterator[tuple[Mesh, Matrix]]:
+    """The meshes of all nodes, and where they stand; each mesh is read once, however many nodes show it."""
     materials = Materials(data)
     read: dict[int, list[Mesh]] = {}
-    meshes = []
     for node, matrix in nodes:
         if node.mesh is not None:
             if node.mesh not in read:
                 read[node.mesh] = list(_primitives(data, materials, node.mesh, normals))
-            meshes += [transform_mesh(mesh, matrix) for mesh in read[node.mesh]]
-    if not meshes:
-        raise SceneError("its scene holds no triangles; export a model with triangle meshes")
-    return meshes
+            yield from ((mesh, place) for place in matrices(data, node, matrix) for mesh in read[node.mesh])
 
 
 def _primitives(data: GltfData, materials: Materials, index: int, normals: Normals) -> Iterator[Mesh]:

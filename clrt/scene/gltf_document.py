@@ -19,8 +19,9 @@ NonNegative = Annotated[float, Field(ge=0)]
 ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
 #: Extensions that this reader follows.
-EXTENSIONS = frozenset({"EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual",
-                        "KHR_materials_emissive_strength", "KHR_mesh_quantization", "KHR_texture_transform"})
+EXTENSIONS = frozenset({"EXT_mesh_gpu_instancing", "EXT_texture_webp", "KHR_draco_mesh_compression",
+                        "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_mesh_quantization",
+                        "KHR_texture_transform"})
 
 
 class Asset(Part):
@@ -125,7 +126,12 @@ class UsedLight(Part):
     light: Index
 
 
+class Instancing(Part):
+    attributes: dict[str, Index]
+
+
 class NodeExtensions(Part):
+    EXT_mesh_gpu_instancing: Instancing | None = None
     KHR_lights_punctual: UsedLight | None = None
 
 

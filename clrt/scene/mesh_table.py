@@ -11,22 +11,19 @@ import numpy as np
 from annotated_types import Ge, Lt
 
 from ..errors import SceneError
-from .fields import show
 from .materials import Diffuse
 from .meshes import read_model
-from .model import Mesh, Model, Vector
+from .model import Instance, Mesh, Model, Vector
 from .normals import Normals, choose_normals
-from .transform import Matrix, rotation, scaling, translation
+from .placing import Placing
 from .validate import mesh_problems
 
-Row = tuple[float, float, float, float]
 Vertex = Annotated[int, Ge(0), Lt(2**31)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeshTable:
-    """The keys of [[mesh]]. A point is scaled, then turned about the fixed x, y and z axes in this order, then moved;
-    or it goes by `matrix`, four rows."""
+class MeshTable(Placing):
+    """The keys of [[mesh]]."""
 
     name: str | None = None
     file: str | None = None
@@ -36,21 +33,7 @@ class MeshTable:
     material: str | None = None
     materials: Mapping[str, str] | None = None
     normals: Normals = "file"
-    translate: Vector = (0.0, 0.0, 0.0)
-    scale: Vector = (1.0, 1.0, 1.0)
-    rotate_degrees: Vector = (0.0, 0.0, 0.0)
-    matrix: tuple[Row, Row, Row, Row] | None = None
-
-    def to_world(self, where: str) -> Matrix:
-        """The table's transform. Raises SceneError if it is given twice or is not affine."""
-        if self.matrix is None:
-            return translation(self.translate) @ rotation(self.rotate_degrees) @ scaling(self.scale)
-        plain = MeshTable()
-        if any(getattr(self, key) != getattr(plain, key) for key in ("translate", "scale", "rotate_degrees")):
-            raise SceneError(f"{where}: has a matrix and translate, scale or rotate_degrees; keep one of them")
-        if self.matrix[3] != (0.0, 0.0, 0.0, 1.0):
-            raise SceneError(f"{where}.matrix[3]: {show(self.matrix[3])} is not affine; write [0, 0, 0, 1]")
-        return np.array(self.matrix, np.float64)
+    visible: bool = True
 
     def read(self, folder: Path, where: str) -> Model:
         """What is in its file, which is relative to `folder`, or in its vertices and faces, untransformed.
@@ -82,6 +65,7 @@ class MeshTable:
         except SceneError as error:
             raise SceneError([f"{where}.file: {problem}" for problem in error.problems]) from None
         if self.name is not None:
-            for mesh in model.meshes:
-                mesh.name = self.name if len(model.meshes) == 1 else f"{self.name} {mesh.name}"
+            parts: list[Mesh | Instance] = [*model.meshes, *model.instances]
+            for part in parts:
+                part.name = self.name if len(parts) == 1 else f"{self.name} {part.name}"
         return model

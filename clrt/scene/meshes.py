@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .materials import Diffuse
+from .instancing import baked
 from .model import Mesh, Model
 from .normals import Normals, choose_normals
 from .obj import parse_obj
@@ -28,8 +29,9 @@ SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 
 
 def read_mesh(path: Path, normals: Normals = "file") -> list[Mesh]:
-    """The meshes of a model file, as `read_model` reads them."""
-    return read_model(path, normals).meshes
+    """The meshes of a model file, as `read_model` reads them, with its instances as further ones."""
+    model = read_model(path, normals)
+    return model.meshes + [baked(each) for each in model.instances]
 
 
 def read_model(path: Path, normals: Normals = "file") -> Model:

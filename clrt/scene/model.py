@@ -79,11 +79,35 @@ class Mesh:
                     setattr(self, name, np.array(value, dtype))
 
 
+@dataclass(eq=False)
+class Instance:
+    """A mesh that stands in the world once more, in the memory of one. That mesh itself is drawn only where the scene's
+    `meshes` hold it, too.
+
+    to_world: (3, 4), or (4, 4) with the last row 0, 0, 0, 1: an affine matrix that acts on column vectors and takes the
+    mesh's points to the world; it may mirror, but must not flatten. material: instead of the mesh's own.
+    """
+
+    mesh: Mesh
+    to_world: NDArray[np.float64] = field(default_factory=lambda: np.eye(3, 4))
+    material: Material | None = None
+    name: str = "instance"
+
+    def __post_init__(self) -> None:
+        """Numbers become float64, four rows three; what is wrong with them is for `validate` to say."""
+        with suppress(ValueError, TypeError, OverflowError):
+            matrix = np.asarray(self.to_world, np.float64)
+            affine = matrix.shape == (4, 4) and np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0))
+            self.to_world = matrix[:3] if affine else matrix
+
+
 @dataclass(eq=False, kw_only=True)
 class Model:
-    """What a model file holds: at least one mesh, its cameras by name, the first one first, and its lights."""
+    """What a model file holds: meshes or instances, at least one, its cameras by name, the first one first, and its
+    lights."""
 
     meshes: list[Mesh]
+    instances: list[Instance] = field(default_factory=list)
     cameras: dict[str, Camera] = field(default_factory=dict)
     lights: list[Light] = field(default_factory=list)
 
@@ -138,6 +162,7 @@ class Scene:
     """Everything that one picture needs. `camera` takes it; `cameras`: those of the model files, by name."""
 
     meshes: list[Mesh] = field(default_factory=list)
+    instances: list[Instance] = field(default_factory=list)
     spheres: list[Sphere] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     camera: Camera = field(default_factory=Camera)

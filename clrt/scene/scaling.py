@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .instancing import meshes_by_id
 from .lights import DirectionalLight, Light
-from .model import Camera, Scene, Sphere, Vector
+from .model import Camera, Instance, Mesh, Scene, Sphere, Vector
 
 #: Scenes whose largest coordinate (the camera's aside) lies between 2^-20 and 2^20 are left as large as they are.
 COMFORTABLE = 20
@@ -63,21 +64,52 @@ def unit_for(largest: float) -> float:
 def frame_of(scene: Scene) -> Frame:
     """The frame for the scene's surfaces."""
     balls = [(np.array(sphere.center), sphere.radius) for sphere in scene.spheres]
-    points = [mesh.vertices for mesh in scene.meshes if mesh.vertices.size]
-    # Column by column: numpy's min(axis=0) of three columns takes twenty times as long.
-    low = [np.array([x.min() for x in each.T]) for each in points] + [center - radius for center, radius in balls]
-    high = [np.array([x.max() for x in each.T]) for each in points] + [center + radius for center, radius in balls]
+    boxes = [_box(mesh) for mesh in scene.meshes if mesh.vertices.size] + _instance_boxes(scene.instances)
+    low = [box[0] for box in boxes] + [center - radius for center, radius in balls]
+    high = [box[1] for box in boxes] + [center + radius for center, radius in balls]
     return frame_around(np.min(low, axis=0), np.max(high, axis=0)) if low else Frame()
 
 
+def _box(mesh: Mesh) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+    # Column by column: numpy's min(axis=0) of three columns takes twenty times as long.
+    return np.array([x.min() for x in mesh.vertices.T]), np.array([x.max() for x in mesh.vertices.T])
+
+
+def _instance_boxes(instances: list[Instance]) -> list[tuple[NDArray[np.floating], NDArray[np.floating]]]:
+    """Around the meshes' boxes where instances put them."""
+    own = {key: np.array(_box(mesh), np.float64) for key, mesh in meshes_by_id(instances).items()}
+    boxes = []
+    for each in instances:
+        low, high = own[id(each.mesh)]
+        middle, half = each.to_world @ [*(low + high) / 2, 1.0], np.abs(each.to_world[:, :3]) @ (high - low) / 2
+        boxes.append((middle - half, middle + half))
+    return boxes
+
+
 def in_frame(scene: Scene, frame: Frame) -> Scene:
-    """The scene in a frame, with point and spot lights such that the picture stays the same."""
+    """The scene in a frame, with point and spot lights such that the picture stays the same; instances' meshes are each
+    in one of their own."""
+    scene = replace(scene, instances=_instances(scene.instances, frame))
     if frame == Frame():
         return scene
     return replace(scene, meshes=[replace(mesh, vertices=frame.points(mesh.vertices)) for mesh in scene.meshes],
                    camera=_camera(scene.camera, frame),
                    spheres=[_sphere(sphere, frame) for sphere in scene.spheres],
                    lights=[_light(light, frame) for light in scene.lights])
+
+
+def _instances(instances: list[Instance], frame: Frame) -> list[Instance]:
+    """Their meshes each in the frame around it, from where they are taken to `frame`."""
+    meshes = meshes_by_id(instances)
+    own = {key: frame_around(*_box(mesh)) for key, mesh in meshes.items()}
+    framed = {key: replace(mesh, vertices=own[key].points(mesh.vertices)) for key, mesh in meshes.items()}
+    placed = []
+    for each in instances:
+        around = own[id(each.mesh)]
+        linear = each.to_world[:, :3] * (frame.unit / around.unit)
+        offset = (each.to_world @ [*around.center, 1.0] - frame.center) * frame.unit
+        placed.append(replace(each, mesh=framed[id(each.mesh)], to_world=np.column_stack([linear, offset])))
+    return placed
 
 
 def _camera(camera: Camera, frame: Frame) -> Camera:

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import SceneError
 from .fields import field_problems, show, unknown
+from .instance_reader import InstanceReader, InstanceTable, placed
+from .instancing import meshes_by_id
 from .lights import LIGHTS, Light
 from .materials import MATERIALS, Diffuse, Material
 from .mesh_table import MeshTable
-from .model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from .model import Camera, Environment, Instance, Model, RenderSettings, Scene, Sphere
 from .pictures import read_picture
 from .sky import SUN, default_sky
 from .texture_table import TextureReader
 from .textures import WHITE, Texture
-from .transform import transform_camera, transform_mesh
 
 Kind = TypeVar("Kind")
 Table = Mapping[str, Any]
-SECTIONS = ("camera", "render", "environment", "materials", "mesh", "sphere", "light")
+SECTIONS = ("camera", "render", "environment", "materials", "mesh", "instance", "sphere", "light")
 
 
 class SceneReader:
@@ -34,6 +34,7 @@ class SceneReader:
         self._materials: dict[str, Material] = {}
         self._textures = TextureReader(path.parent)
         self._cameras: dict[str, Camera] = {}
+        self._instances = InstanceReader()
         self.problems = [f'key "{key}" {unknown(key, SECTIONS)}' for key in document if key not in SECTIONS]
 
     def scene(self) -> Scene:
@@ -47,8 +48,12 @@ class SceneReader:
         spheres = [self._sphere(values, f"sphere[{i}]") for i, values in enumerate(self._tables("sphere"))]
         lights: list[Light] = [self._typed(LIGHTS, values, f"light[{i}]") or SUN  # keeps the later ones' numbers
                                for i, values in enumerate(self._tables("light"))]
-        meshes = [mesh for i, values in enumerate(self._tables("mesh")) for mesh in self._mesh(values, f"mesh[{i}]")]
-        return Scene(meshes=meshes, spheres=[sphere for sphere in spheres if sphere], lights=lights,
+        models = [self._mesh(values, f"mesh[{i}]") for i, values in enumerate(self._tables("mesh"))]
+        meshes = [mesh for model in models for mesh in model.meshes]
+        instances = [instance for model in models for instance in model.instances]
+        instances += [one for i, values in enumerate(self._tables("instance"))
+                      for one in self._instance(values, f"instance[{i}]")]
+        return Scene(meshes=meshes, instances=instances, lights=lights, spheres=[each for each in spheres if each],
                      camera=self._named_camera(lens) if "name" in lens else camera, cameras=self._cameras,
                      environment=environment or Environment(), render=render or RenderSettings(), name=self._path.stem)
 
@@ -147,28 +152,27 @@ class SceneReader:
         material = self._material(values, where) or Diffuse()
         return self._build(Sphere, {**values, "material": material}, where)
 
-    def _mesh(self, values: Any, where: str) -> list[Mesh]:
-        """The meshes of one table, in world coordinates."""
+    def _mesh(self, values: Any, where: str) -> Model:
+        """What one table draws, in world coordinates."""
         if not isinstance(values, dict):
             self.problems.append(f"{where}: {show(values)} is not a table; write [[mesh]]")
-            return []
-        if isinstance(scale := values.get("scale"), (int, float)):
-            values = {**values, "scale": (scale, scale, scale)}
+            return Model(meshes=[])
         material = self._material(values, where)
-        table = self._build(MeshTable, values, where)
+        table = self._build(MeshTable, _one_scale(values), where)
         geometry = {key: values[key] for key in ("file", "vertices", "faces") if key in values}
-        if table is None and field_problems(MeshTable, geometry, where):
-            return []
-        model = self._tried((table or MeshTable(**geometry)).read, self._path.parent, where)
-        matrix = self._tried((table or MeshTable()).to_world, where)
+        model, matrix = None, None
+        if table or not field_problems(MeshTable, geometry, where):
+            model = self._tried((table or MeshTable(**geometry)).read, self._path.parent, where)
+            matrix = self._tried((table or MeshTable()).to_world, where)
         if model is None or matrix is None:
-            return []
+            model = Model(meshes=[])
+        else:
+            own = {mesh.material_name for mesh in (*model.meshes, *meshes_by_id(model.instances).values())}
+            model = placed(model, matrix, material, self._others(values, own, where))
         for name, camera in model.cameras.items():
-            self._cameras.setdefault(name, transform_camera(camera, matrix))
-        others = self._others(values, {mesh.material_name for mesh in model.meshes}, where)
-        meshes = [replace(mesh, material=others.get(mesh.material_name, material or mesh.material))
-                  for mesh in model.meshes]
-        return [transform_mesh(mesh, matrix) for mesh in meshes]
+            self._cameras.setdefault(name, camera)
+        self._instances.add(str(values["name"]) if "name" in values else None, model)
+        return model if table is None or table.visible else Model(meshes=[])
 
     def _others(self, values: Table, own: set[str], where: str) -> dict[str, Material]:
         """What the table writes in the place of the file's `own` materials, by their names."""
@@ -182,6 +186,15 @@ class SceneReader:
         self.problems += [f'{where}.materials: "{name}" {unknown(name, own)}' for name in pairs if name not in own]
         return {name: self._material({"material": other}, f"{where}.materials") or Diffuse()
                 for name, other in pairs.items()}
+
+    def _instance(self, values: Any, where: str) -> list[Instance]:
+        if not isinstance(values, dict):
+            self.problems.append(f"{where}: {show(values)} is not a table; write [[instance]]")
+            return []
+        material = self._material(values, where)
+        table = self._build(InstanceTable, _one_scale(values), where)
+        self.problems += self._instances.problems(values["mesh"], where) if "mesh" in values else []
+        return table and self._tried(self._instances.read, table, material, where) or []
 
     def _tried(self, read: Callable[..., Kind], *arguments: Any) -> Kind | None:
         """read(*arguments), or None if it finds mistakes."""
@@ -198,6 +211,11 @@ def camera_problems(name: str, cameras: Mapping[str, Camera], where: str) -> lis
         return []
     remedy = unknown(name, cameras) if cameras else "is unknown, since no model file of the scene has a camera"
     return [f"{where}: {show(name)} {remedy}"]
+
+
+def _one_scale(values: Table) -> Table:
+    """The table with one number for `scale` as three."""
+    return {**values, "scale": (scale,) * 3} if isinstance(scale := values.get("scale"), (int, float)) else values
 
 
 def _frozen(value: Any) -> Any:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from .model import Camera, Mesh, Vector
 
 Matrix = NDArray[np.float64]
+#: A transform flattens if it makes a unit of volume smaller than this, measured in its own longest column.
+SINGULAR = 1e-12
 
 
 def translation(offset: Vector) -> Matrix:
@@ -83,6 +85,15 @@ def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
     focus, height = (length and length * stretch for length in (camera.focus_distance, camera.view_height))
     return replace(camera, position=position, look_at=look_at, up=up, focus_distance=focus, view_height=height,
                    aperture_radius=camera.aperture_radius * stretch)
+
+
+def transform_faults(to_world: NDArray[np.float64]) -> dict[str, NDArray[np.bool_]]:
+    """Which of affine transforms (k, 3, 4) cannot be inverted, (k,), by what is to be said of them."""
+    with np.errstate(all="ignore"):
+        length = np.linalg.norm(to_world[..., :3], axis=1).max(axis=1, initial=0)
+        volume = np.abs(np.linalg.det(to_world[..., :3] / np.maximum(length, 1e-300)[:, None, None]))
+    finite = np.isfinite(to_world).all(axis=(1, 2))
+    return {"is not finite": ~finite, "flattens the mesh": finite & ~(volume > SINGULAR)}
 
 
 def unit(vectors: NDArray[np.floating]) -> NDArray[np.float64]:

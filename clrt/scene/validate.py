@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .fields import field_problems, show
+from .instance_problems import matrix_problems
+from .instancing import painted
 from .lights import LIGHTS, PointLight, SpotLight
 from .materials import Diffuse, Material
-from .model import Camera, Environment, FloatArray, Mesh, RenderSettings, Scene, Sphere
+from .model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere
 
 #: What a mesh may have for each vertex, and of how many numbers.
 CORNERS = {"normals": (3,), "uv": (2,), "uv1": (2,), "colors": (3, 4), "tangents": (4,)}
@@ -20,8 +22,8 @@ CORNERS = {"normals": (3,), "uv": (2,), "uv1": (2,), "colors": (3, 4), "tangents
 def validate(scene: Scene) -> None:
     """Raise one SceneError with all problems of the scene; does nothing if there are none.
 
-    Checks the limits in the field types, the meshes' arrays (`mesh_problems`), the camera's frame, the environment's
-    image and the lights' directions.
+    Checks the limits in the field types, the meshes' arrays (`mesh_problems`), the instances' matrices, the camera's
+    frame, the environment's image and the lights' directions.
     """
     problems = scene_problems(scene)
     if problems:
@@ -32,13 +34,18 @@ def scene_problems(scene: Scene) -> list[str]:
     """One sentence a problem, empty if the scene can be rendered."""
     problems = _camera_problems(scene.camera) + _environment_problems(scene.environment)
     problems += _object_problems(scene.render, RenderSettings, "render")
-    users: list[tuple[str, Mesh | Sphere]] = []
+    users: list[tuple[str, Mesh | Sphere | Instance]] = []
+    of_mesh: dict[int, list[str]] = {}  # by its id
     for i, mesh in enumerate(scene.meshes):
-        problems += mesh_problems(mesh, f"mesh[{i}]") or texture_problems(mesh, f"mesh[{i}]")
+        where = f"mesh[{i}]"
+        problems += of_mesh.setdefault(id(mesh), mesh_problems(mesh, where)) or texture_problems(mesh, where)
         users.append((f"mesh[{i}].material", mesh))
     for i, sphere in enumerate(scene.spheres):
         problems += _object_problems(sphere, Sphere, f"sphere[{i}]")
         users.append((f"sphere[{i}].material", sphere))
+    problems += _instance_problems(scene.instances, of_mesh)
+    users += [(f"instance[{i}].material", instance) for i, instance in enumerate(scene.instances)
+              if getattr(instance, "material", None) is not None]
     problems += _material_problems(users)
     for i, light in enumerate(scene.lights):
         problems += _light_problems(light, f"light[{i}]")
@@ -141,7 +148,30 @@ def _object_problems(value: object, kind: type, where: str) -> list[str]:
     return field_problems(type(value), values, where)
 
 
-def _material_problems(users: list[tuple[str, Mesh | Sphere]]) -> list[str]:
+def _instance_problems(instances: list[Instance], of_mesh: dict[int, list[str]]) -> list[str]:
+    """Of instances and the meshes that only they show; of_mesh: the problems of the others, by id."""
+    problems: list[str] = []
+    placed: list[tuple[int, Instance]] = []
+    seen = set()  # meshes in materials
+    for i, instance in enumerate(instances):
+        where = f"instance[{i}]"
+        wrong = _object_problems(instance, Instance, where)
+        if not wrong and np.shape(instance.to_world) != (3, 4):
+            wrong = [f"{where} {show(instance.name)}: to_world has shape {np.shape(instance.to_world)}; write a numpy "
+                     "array of (3, 4), or of (4, 4) with the last row 0, 0, 0, 1"]
+        if isinstance(instance, Instance) and id(instance.mesh) not in of_mesh:
+            wrong += of_mesh.setdefault(id(instance.mesh), mesh_problems(instance.mesh, f"{where}.mesh"))
+        problems += wrong
+        if wrong or of_mesh[id(instance.mesh)]:
+            continue
+        placed.append((i, instance))
+        if (pair := (id(instance.mesh), id(instance.material))) not in seen:
+            seen.add(pair)
+            problems += texture_problems(painted(instance), where)
+    return problems + matrix_problems(placed)
+
+
+def _material_problems(users: list[tuple[str, Mesh | Sphere | Instance]]) -> list[str]:
     """The problems of each material, where it is first used."""
     first: dict[int, tuple[str, object]] = {}
     for where, user in users:

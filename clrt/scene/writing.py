@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .instancing import meshes_by_id
 from .materials import Material
 from .model import Scene
 from .sky import default_sky
@@ -60,7 +61,7 @@ def _has_default_sky(scene: Scene) -> bool:
 def _materials(scene: Scene) -> tuple[dict[str, Material], list[str]]:
     """By the file's names the materials that can be written, and the other names."""
     named: dict[str, set[Material]] = {}
-    for mesh in scene.meshes:
+    for mesh in (*scene.meshes, *meshes_by_id(scene.instances).values()):
         named.setdefault(mesh.material_name, set()).add(mesh.material)
     clear = {name: next(iter(same)) for name, same in named.items()
              if len(same) == 1 and all(map(_is_plain, same)) and not (name == UNNAMED and "" in named)}

@@ -17,6 +17,7 @@ from ..errors import UsageError
 from ..output.images import write_image
 from ..scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ..scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from ..scene.instancing import unfolded
 from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
 from ..scene.textures import untextured
 from .shapes import icosphere
@@ -31,7 +32,7 @@ POINT_WATT = 4 * np.pi
 
 def check_scene(scene: Scene) -> None:
     """UsageError names what has no counterpart in Cycles."""
-    owners: list[Mesh | Sphere] = [*scene.meshes, *scene.spheres]
+    owners: list[Mesh | Sphere] = [*unfolded(scene).meshes, *scene.spheres]
     for owner in owners:
         if type(owner.material) not in BSDFS:
             raise UsageError(f"{owner.name}: Cycles is not told of {owner.material.kernel} yet")
@@ -50,7 +51,7 @@ def blender_scene(data: Any, scene: Scene, folder: Path) -> Any:
     """A scene of `data` (bpy.data); pictures that Blender reads are written to `folder`."""
     made = data.scenes.new(scene.name)
     _set_up(made, scene)
-    for mesh in scene.meshes:
+    for mesh in unfolded(scene).meshes:
         _place(data, made, _mesh(data, mesh.vertices, mesh.faces, mesh.normals, mesh.material))
     for sphere in scene.spheres:
         _place(data, made, _mesh(data, *sphere_triangles(sphere), sphere.material))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 from ..scene.lights import Light, PointLight, SpotLight
 from ..scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from ..scene.instancing import unfolded
 from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
 from ..scene.textures import untextured
 
@@ -33,7 +34,7 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
     depth = scene.render.max_depth if scene.render.integrator == "path" else min(scene.render.max_depth, 2)
     plugins: Plugin = {"type": "scene", "integrator": {"type": "path", "max_depth": depth},
                        "sensor": _sensor(scene, sampler)}
-    plugins |= {f"mesh{i}": _surface(_mesh(mesh), mesh) for i, mesh in enumerate(scene.meshes)}
+    plugins |= {f"mesh{i}": _surface(_mesh(mesh), mesh) for i, mesh in enumerate(unfolded(scene).meshes)}
     plugins |= {f"sphere{i}": _surface({"type": "sphere", "center": list(sphere.center), "radius": sphere.radius},
                                        sphere) for i, sphere in enumerate(scene.spheres)}
     plugins |= {f"light{i}": _light(light) for i, light in enumerate(scene.lights)}

@@ -113,6 +113,34 @@ def test_one_number_scales_every_axis(folder: Path) -> None:
     np.testing.assert_array_equal(mesh.vertices, [[0, 0, 0], [3, 0, 0], [0, 3, 0]])
 
 
+def test_instances_start_from_where_their_mesh_stands(folder: Path) -> None:
+    """Each shows every mesh of its table, which itself may stay hidden; and it may be written in one line."""
+    (folder / "models" / "two.obj").write_text(
+        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nusemtl green\nf 1 3 2\n")
+    scene = load(write(folder, """
+instance = [{ mesh = "pair", translate = [0, 5, 0], scale = -2 }, { mesh = "one", material = "red", name = "other" }]
+[materials.red]
+type = "diffuse"
+color = [1, 0, 0]
+[[mesh]]
+name = "pair"
+file = "models/two.obj"
+translate = [3, 0, 0]
+visible = false
+[[mesh]]
+name = "one"
+file = "models/triangle.obj"
+"""))
+    one, = scene.meshes
+    *pair, other = scene.instances
+    assert other.mesh is one and other.material == Diffuse(color=(1, 0, 0)) and other.name == "other"
+    np.testing.assert_array_equal(other.to_world, np.eye(3, 4))
+    assert len(pair) == 2 and all(each.material is None and each.mesh.vertices.min() == 0 for each in pair)
+    assert {each.mesh.material for each in pair} == {Diffuse(), Diffuse(color=(0, 0.5, 0))}
+    assert {each.mesh.vertices[:, 0].min() for each in pair} == {3}
+    np.testing.assert_array_equal(pair[0].to_world, [[-2, 0, 0, 0], [0, -2, 0, 5], [0, 0, -2, 0]])
+
+
 def test_environment_picture_keeps_its_orientation(folder: Path) -> None:
     """Row 0 of the file is row 0 of the image, and the values are not touched."""
     import OpenImageIO as oiio

@@ -27,6 +27,7 @@ colour = [1, 1, 1]
 [materials.ring]
 type = "metalic_roughness"
 [[mesh]]
+name = "drgon"
 file = "lost.ply"
 material = "whit"
 normals = "smoth"
@@ -47,10 +48,11 @@ type = "directional"
 direction = [0, 0, 0]
 irradiance = [1, 1, 1]
 """
+MESH = '[[mesh]]\nname = "a"\nvertices = [[0, 0, 0], [9, 0, 0], [0, 9, 0]]\nfaces = [[0, 1, 2]]\n'
+ROWS = "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]"
 SENTENCES = [
     'key "mesch" is unknown; did you mean "mesh"?',
-    'key "instance" is not supported yet; this version knows camera, environment, light, materials, mesh, render, '
-    "sphere",
+    'instance[0].mesh: "dragon" is unknown; did you mean "drgon"?',
     "camera.position: [0, 1] has 2 entries; write 3",
     'camera: key "fov" is unknown; did you mean "fov_degrees"?',
     "render.size[1]: 0 is below 1; write at least 1",
@@ -114,6 +116,13 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
      "materials.m.multiple_scattering: 1 is neither true nor false; write one of them"),
     ('camera = 3', "camera: 3 is not a table; write [camera]"),
     ('[mesh]\nfile = "a.ply"', "mesh: is not a list of tables; write [[mesh]] in double brackets"),
+    ('instance = [3]', "instance[0]: 3 is not a table; write [[instance]]"),
+    ('[[instance]]\ntranslate = [1, 0, 0]', "instance[0]: mesh is missing; add it"),
+    (f'{MESH}[[instance]]\nmesh = "a"\nmaterial = "b"', 'instance[0].material: "b" is unknown; none is defined'),
+    (f'{MESH}[[instance]]\nmesh = "a"\nscale = 0', "instance[0]: its transform flattens the mesh; write a scale with"),
+    (f'{MESH}[[instance]]\nmesh = "a"\nscale = 2\nmatrix = {ROWS}', "instance[0]: has a matrix and translate, scale"),
+    (f'{MESH}{MESH}[[instance]]\nmesh = "a"', 'instance[0].mesh: "a" names 2 meshes; rename them'),
+    (f'{MESH}[[instance]]\nmesh = "a"\nscale = 1e38', " takes the mesh beyond the range of float32"),
     ('mesh = [3]', "mesh[0]: 3 is not a table; write [[mesh]]"),
     ('[[mesh]]\nname = "a"', "mesh[0]: file is missing; write a file, or vertices and faces"),
     ('[[mesh]]\nvertices = [[0, 0, 0]]', "mesh[0]: faces is missing; write a file, or vertices and faces"),

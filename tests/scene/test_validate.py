@@ -10,7 +10,7 @@ import pytest
 from clrt.errors import SceneError
 from clrt.scene.lights import DirectionalLight, PointLight
 from clrt.scene.materials import Diffuse, MetallicRoughness
-from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.validate import validate
 from .shapes import icosphere
 
@@ -43,6 +43,15 @@ def set_scene(**values: Any) -> Callable[[Scene], None]:
     return change
 
 
+TRIANGLE = Mesh(np.array([[0, 0, 0], [9, 0, 0], [0, 9, 0]], np.float32), np.array([[0, 1, 2]], np.int32))
+
+
+def place(*matrices: Any, **values: Any) -> Callable[[Scene], None]:
+    def change(scene: Scene) -> None:
+        scene.instances += [Instance(**{"mesh": scene.meshes[0], "to_world": matrix, **values}) for matrix in matrices]
+    return change
+
+
 def light(direction: Any) -> DirectionalLight:
     return DirectionalLight(direction=direction, irradiance=(1.0, 1.0, 1.0))
 
@@ -72,6 +81,18 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "emission": (set_mesh(material=Diffuse(emission=(0, -1, 0))), "mesh[0].material.emission[1]: -1 is below 0"),
     "radius": (set_scene(spheres=[Sphere(), Sphere(radius=0)]), "sphere[1].radius: 0 is not above 0"),
     "sphere type": (set_scene(spheres=[Sphere(radius="1")]), 'sphere[0].radius: "1" is not a number'),  # type: ignore
+    "instance": (place(np.diag([1, 2, 0]) @ np.eye(3, 4)), 'instance[0] "instance": to_world [[1.0, 0.0, 0.0, 0.0], ['),
+    "instance flat": (place(np.diag([1, 2, 1e-14]) @ np.eye(3, 4)), "flattens the mesh; repair it"),
+    "instances": (place(*[np.full((3, 4), np.nan)] * 3), "is not finite (and 2 more)"),
+    "instance shape": (place(np.eye(3)), 'instance[0] "instance": to_world has shape (3, 3); write a numpy array of'),
+    "instance affine": (place(np.ones((4, 4))), "to_world has shape (4, 4); write a numpy array of (3, 4), or of (4,"),
+    "instance text": (place("up"), "to_world has shape (); write a numpy array"),
+    "instance huge": (place(1e38 * np.eye(3, 4), mesh=TRIANGLE), "takes the mesh beyond the range of float32"),
+    "instance mesh": (place(np.eye(3, 4), mesh=Mesh(TRIANGLE.vertices, TRIANGLE.faces + 1)),
+                      'instance[0].mesh "mesh": faces[0] uses vertex 3'),
+    "instance no mesh": (place(np.eye(3, 4), mesh="ball"), 'instance[0].mesh: "ball" is no Mesh'),
+    "instance material": (place(np.eye(3, 4), material="gold"), 'instance[0].material: "gold" is no Material'),
+    "no instance": (set_scene(instances=["ball"]), 'instance[0]: "ball" is no Instance; write a clrt.Instance'),
     "light": (set_scene(lights=[light((0, 0, 0))]), "light[0].direction: [0, 0, 0] is no direction"),
     "light nan": (set_scene(lights=[light((0, NAN, 0))]), "light[0].direction[1]: nan is not a finite number"),
     "light text": (set_scene(lights=[light("up")]), 'light[0].direction: "up" is not a list; write the numbers'),

@@ -28,11 +28,11 @@ def measure_departures(subject: Subject, *, quick: bool) -> Iterator[Row]:
         place, where = 2 * factor * sizes * AWAY, words(sizes, factor)
         scenes = lit_scenes(place, factor, level_only=sizes > 1e6) | held_scenes(place, factor, level_only=sizes > 1e6)
         for name, scene in scenes.items():
-            yield Row("G9", f"{name}, {where}: dark", *_pixels(subject, scene, quick, lit=False))
-        yield Row("G9", f"closed box, {where}: lit", *_pixels(subject, dark_box(place, factor), quick, lit=True))
+            yield Row("G9", f"{name}, {where}: dark", *wrong_pixels(subject, scene, quick, lit=False))
+        yield Row("G9", f"closed box, {where}: lit", *wrong_pixels(subject, dark_box(place, factor), quick, lit=True))
 
 
-def _pixels(subject: Subject, scene: Scene, quick: bool, *, lit: bool) -> tuple[int, int]:
+def wrong_pixels(subject: Subject, scene: Scene, quick: bool, *, lit: bool) -> tuple[int, int]:
     """How many pixels of one sample were made, and how many of them are lit or dark."""
     side, found, seeds = (QUICK_SIDE, 0, 1) if quick else (SIDE, 0, SEEDS)
     for seed in range(seeds):

@@ -1,19 +1,25 @@
-"""G11: instances by hard transforms are hit like triangles that were transformed in float64."""
+"""G11: instances by hard transforms are hit like triangles that were transformed in float64, and shadow nothing."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from ...instances import InstancedRayQuery
+from ...scene.model import Instance, Mesh, Scene
+from ...scene.transform import transform_mesh
 from ..exact import closest_bounds
 from ..rays import scattered_rays
 from ..row import Row
-from ..workloads import Doubles, bumpy_ball
+from ..workloads import Doubles, bumpy_ball, subdivide
+from .departures import lit_scenes, wrong_pixels
 from .subject import Subject
 
 INSTANCES = 12
+#: A plane of 4^8 triangles, three of which are stored as one, is worth being instances (scene/instancing.py).
+SUBDIVISIONS, LOWER = 8, 50.0
 
 
 def measure_instances(subject: Subject, *, quick: bool) -> Iterator[Row]:
@@ -31,6 +37,30 @@ def measure_instances(subject: Subject, *, quick: bool) -> Iterator[Row]:
         hits["primitive"] += np.where(hits["primitive"] >= 0, len(faces) * hits["instance"], 0)
         wrong = closest_bounds(*world, rays).wrong(rays, hits)
         yield Row("G11", f"{INSTANCES} instances, {kind}", count, int(np.count_nonzero(wrong)))
+    for kind, transforms in transforms_of_kinds().items():
+        yield Row("G11", f"lit plane, {kind}: dark", *wrong_pixels(subject, lit_plane(transforms[0]), quick, lit=False))
+
+
+def lit_plane(to_world: Doubles) -> Scene:
+    """A tilted plane that fills the picture, as an instance by this transform, with nothing in the light's way: two
+    more lie below."""
+    scene = lit_scenes(to_world[:, 3], 1.0, level_only=False)["tilted plane"]
+    plane, matrix = scene.meshes[0], np.vstack([to_world, [0, 0, 0, 1]])
+    vertices, faces = plane.vertices, plane.faces
+    for _ in range(SUBDIVISIONS):
+        vertices, faces = subdivide(vertices, faces)
+    mesh = transform_mesh(Mesh(vertices, faces, plane.material), np.linalg.inv(matrix))
+    instances = [Instance(mesh, np.column_stack([to_world[:, :3], to_world[:, 3] - depth * np.cross(*_edges(plane))]))
+                 for depth in (0.0, LOWER, 2 * LOWER)]
+    return replace(scene, meshes=[], instances=instances)
+
+
+def _edges(plane: Mesh) -> Doubles:
+    """Two directions in a plane, (2, 3), whose cross product is its normal."""
+    corners = plane.vertices[plane.faces[0]].astype(np.float64)
+    first, second = corners[1] - corners[0], corners[2] - corners[0]
+    side = np.cross(np.cross(first, second), first)
+    return np.array([first / np.linalg.norm(first), side / np.linalg.norm(side)])
 
 
 def transforms_of_kinds() -> dict[str, Doubles]:
@@ -41,7 +71,7 @@ def transforms_of_kinds() -> dict[str, Doubles]:
     stretch = 10 ** rng.uniform(-1, 1, (INSTANCES, 1, 3))
     flat = np.where(np.arange(3) == 1, 1e-3, 1.0)
     kinds = {"turned": turns, "stretched": turns * stretch, "mirrored": turns * [-1, 1, 1],
-             "nearly flat": turns * flat, "far away": turns}
+             "nearly flat": turns * flat, "sheared": turns @ (stretch * turns[::-1]), "far away": turns}
     far = {"far away": 1e4 + moves}
     return {kind: np.concatenate([linear, far.get(kind, moves)], axis=2).astype(np.float32).astype(np.float64)
             for kind, linear in kinds.items()}

@@ -1,0 +1,69 @@
+"""Nodes of a glTF file that show a mesh more than once: those that share it, and EXT_mesh_gpu_instancing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from . import gltf_document as gltf
+from .gltf_data import GltfData
+from .instancing import baked, worth_it
+from .model import Instance, Mesh
+from .transform import Matrix, transform_faults
+
+#: More of one node are taken for damage.
+MOST = 2**20
+Doubles = NDArray[np.float64]
+
+
+def matrices(data: GltfData, node: gltf.Node, matrix: Matrix) -> list[Matrix]:
+    """Where a node shows its mesh: `matrix`, its own, or that times each of its instances'.
+
+    Raises SceneError for accessors of other types or lengths, and for what is not finite.
+    """
+    own = node.extensions.EXT_mesh_gpu_instancing
+    if own is None:
+        return [matrix]
+    name = f'node "{node.name or ""}" (EXT_mesh_gpu_instancing)'
+    kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
+    given = {key: data.array(own.attributes[key], kind, name).astype(np.float64)
+             for key, kind in kinds.items() if key in own.attributes}
+    counts = {len(values) for values in given.values()}
+    if len(counts) != 1 or max(counts) > MOST:
+        raise SceneError(f"{name}: has {' and '.join(map(str, sorted(counts))) or 'no'} transforms; write as many of "
+                         f"TRANSLATION, ROTATION and SCALE, at most {MOST}")
+    count = counts.pop()
+    local = np.tile(np.eye(4), (count, 1, 1))
+    local[:, :3, 3] = given.get("TRANSLATION", 0.0)
+    local[:, :3, :3] = turns(given["ROTATION"]) if "ROTATION" in given else np.eye(3)
+    local[:, :3, :3] *= given.get("SCALE", np.ones((count, 3)))[:, None]
+    if not np.isfinite(local).all():
+        raise SceneError(f"{name}: instance {int(np.argmin(np.isfinite(local).all(axis=(1, 2))))} has a transform that "
+                         "is not finite; export the file again")
+    return list(matrix @ local)
+
+
+def turns(quaternions: Doubles) -> Doubles:
+    """(k, 3, 3) rotations of quaternions (k, 4), x, y, z, w; NaN for those of length zero."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
+    v, w, axes = unit[:, None, :3], unit[:, None, 3:], np.eye(3)[None]
+    once = np.cross(v, axes)
+    return np.asarray((axes + 2 * (w * once + np.cross(v, once))).transpose(0, 2, 1))
+
+
+def shown(places: Iterable[tuple[Mesh, Matrix]]) -> tuple[list[Mesh], list[Instance]]:
+    """The same meshes and matrices as meshes in the world, and as instances where that saves memory.
+
+    A matrix may flatten, by which exporters hide things.
+    """
+    every = [Instance(mesh, matrix[:3], name=mesh.name) for mesh, matrix in places]
+    to_world = np.array([each.to_world for each in every]).reshape(-1, 3, 4)
+    flat = np.any([*transform_faults(to_world).values()], axis=0)
+    sound = [each for each, is_flat in zip(every, flat) if not is_flat]
+    kept = [each for each, keep in zip(sound, worth_it(sound)) if keep]
+    chosen = {id(each) for each in kept}
+    return [baked(each) for each in every if id(each) not in chosen], kept

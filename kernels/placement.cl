@@ -1,0 +1,58 @@
+// Where instances stand: what was found in a mesh's frame is taken to the world.
+//
+// Normals go by the cofactors of the matrix M, its inverse transposed but for a factor; a mirroring matrix turns them
+// round, so that a mesh keeps its front. A point is as wrong as it was in the mesh's frame, and further by the rounding of
+// the way there, where rays are met, and back: some units of |M|·|M^-1|·(|p| + |moved|) (pbrt, 4th ed., 6.8.6), much where
+// M shears. Instance 0 is what stands in the world as it is, if there is such; its matrix is the identity.
+
+typedef struct {
+    real3 x, y, z, moved;            // rows of M, and what comes last
+    real3 normal_x, normal_y, normal_z;
+    real unit, side;                 // of unit·M no entry exceeds 1; side: 1, or −1 where M mirrors
+} Place;
+
+static inline real3 placed_normal(const Place *place, real3 n) {
+    real3 world = vector(dot3(place->normal_x, n), dot3(place->normal_y, n), dot3(place->normal_z, n));
+    return scale(normalize3(world), place->side);
+}
+
+static inline Place place_of(const Scene *scene, ireal instance) {
+    Place place;
+    place.x = GATHER3(scene->placements, instance, .to_world[0]);
+    place.y = GATHER3(scene->placements, instance, .to_world[1]);
+    place.z = GATHER3(scene->placements, instance, .to_world[2]);
+    place.moved = vector(GATHER(real, scene->placements, instance, .to_world[0][3]),
+                         GATHER(real, scene->placements, instance, .to_world[1][3]),
+                         GATHER(real, scene->placements, instance, .to_world[2][3]));
+    real unit = GATHER(real, scene->placements, instance, .unit);
+    place.unit = absolute(unit);
+    // Products of M's own entries could leave the range of floats.
+    real3 x = scale(place.x, unit), y = scale(place.y, unit), z = scale(place.z, unit);
+    place.normal_x = cross3(y, z);
+    place.normal_y = cross3(z, x);
+    place.normal_z = cross3(x, y);
+    place.side = unit < 0.0f ? (real)(-1.0f) : ONE;
+    return place;
+}
+
+// A tangent of the mesh's in the world, of unit length; zero stays zero.
+static inline real3 placed_tangent(const Place *place, real3 t) {
+    real3 world = scale(vector(dot3(place->x, t), dot3(place->y, t), dot3(place->z, t)), place->unit);
+    real norm2 = dot3(world, world);
+    return scale(world, norm2 > 0.0f ? rsqrt(norm2) : ZERO);
+}
+
+// Takes a point and its error, and the geometric normal.
+static inline void place_surface(const Scene *scene, ireal instance, const Place *place, Surface *surface) {
+    real3 p = surface->p, error = surface->p_error;
+    surface->p = add(vector(dot3(place->x, p), dot3(place->y, p), dot3(place->z, p)), place->moved);
+    real3 reach = add(absolute3(surface->p), absolute3(place->moved));
+    surface->p_error = vector(
+        dot3(absolute3(place->x), error) + dot3(GATHER3(scene->placements, instance, .rounding0), reach),
+        dot3(absolute3(place->y), error) + dot3(GATHER3(scene->placements, instance, .rounding1), reach),
+        dot3(absolute3(place->z), error) + dot3(GATHER3(scene->placements, instance, .rounding2), reach));
+    surface->ng = placed_normal(place, surface->ng);
+}
+
+#define PLACED_NORMAL(n) placed_normal(&place, n)
+#define PLACED_TANGENT(t) placed_tangent(&place, t)
