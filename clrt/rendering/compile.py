@@ -29,9 +29,10 @@ from .corners import pack_corners
 from .emitters import SURFACES, TYPES, Emitters, pack_emitters
 from .environment import Sky, pack_sky
 from .filters import filter_quantiles
+from .geometry import corners_of, normal_records, sphere_records, triangle_records
 from .materials import Materials, pack_materials
 from .placements import Objects, Placements
-from .records import COUNTS, GUIDE, LAUNCH, NORMALS, PIXEL, PIXEL_WITH_DIRECT, SPHERE, TRIANGLE
+from .records import COUNTS, GUIDE, LAUNCH, PIXEL, PIXEL_WITH_DIRECT
 from .textures import Textures
 from .tiles import TILE
 
@@ -127,7 +128,7 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     placements = Placements(scene.instances, rest=bool(scene.meshes or scene.spheres))
     objects = Objects([len(mesh.faces) for mesh in scene.meshes], len(scene.spheres), *of_objects)
     scene = replace(scene, meshes=placements.meshes + scene.meshes)
-    triangles, normals = _geometry(scene)
+    triangles, normals = corners_of(scene.meshes)
     spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
     lone = 0 < len(spheres) <= FEW_SPHERES
     in_tree = spheres[:0] if lone else spheres
@@ -152,12 +153,12 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
         buffers["leaf_spheres"] = ("LeafSphere", leaf_spheres(spheres, every, len(triangles) - placements.before))
     if len(triangles):
         per_mesh = np.repeat(np.arange(len(scene.meshes)), [len(mesh.faces) for mesh in scene.meshes])
-        buffers["triangles"] = ("Triangle", _triangle_records(triangles, of_meshes[per_mesh], emitters.triangle,
-                                                              normals))
+        buffers["triangles"] = ("Triangle", triangle_records(triangles, of_meshes[per_mesh], emitters.triangle,
+                                                             normals))
     if len(normals):
-        buffers["normals"] = ("Normals", _normal_records(normals))
+        buffers["normals"] = ("Normals", normal_records(normals))
     if len(spheres):
-        buffers["spheres"] = ("Sphere", _sphere_records(spheres, of_spheres, emitters.sphere))
+        buffers["spheres"] = ("Sphere", sphere_records(spheres, of_spheres, emitters.sphere))
     if scene.instances:
         buffers["placements"] = ("Placement", placements.records(of_instances))
     buffers |= pack_corners(scene.meshes, textures.uv_sets, bool(materials.mapped("normal_map")))
@@ -190,44 +191,6 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     entry = entry or ("path.cl" if integrator in WITH_LIGHT else "picture.cl")
     return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame,
                          len(scene.instances), objects)
-
-
-def _geometry(scene: Scene) -> tuple[NDArray[np.float32], dict[int, NDArray[np.float32]]]:
-    """(m, 3, 3) corners of all meshes' triangles, and for smooth meshes by first triangle their (k, 3, 3) normals."""
-    corners, normals, first = [np.zeros((0, 3, 3), np.float32)], {}, 0
-    for mesh in scene.meshes:
-        corners.append(np.take(mesh.vertices, mesh.faces, axis=0))  # as vertices[faces], in a quarter of the time
-        if mesh.normals is not None:
-            normals[first] = np.take(mesh.normals, mesh.faces, axis=0)
-        first += len(mesh.faces)
-    return np.concatenate(corners), normals
-
-
-def _triangle_records(triangles: NDArray[np.float32], materials: NDArray[np.int32], lights: NDArray[np.int32],
-                      normals: dict[int, NDArray[np.float32]]) -> NDArray[Any]:
-    records = np.zeros(len(triangles), TRIANGLE)
-    records["p0"], records["p1"], records["p2"] = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    records["material"], records["light"], records["normals"] = materials, lights, -1
-    stored = 0
-    for first, smooth in normals.items():
-        records["normals"][first:first + len(smooth)] = np.arange(stored, stored + len(smooth))
-        stored += len(smooth)
-    return records
-
-
-def _normal_records(normals: dict[int, NDArray[np.float32]]) -> NDArray[Any]:
-    smooth = np.concatenate(list(normals.values()))
-    records = np.zeros(len(smooth), NORMALS)
-    records["n0"], records["n1"], records["n2"] = smooth[:, 0], smooth[:, 1], smooth[:, 2]
-    return records
-
-
-def _sphere_records(spheres: NDArray[np.float32], materials: NDArray[np.int32],
-                    lights: NDArray[np.int32]) -> NDArray[Any]:
-    records = np.zeros(len(spheres), SPHERE)
-    records["center"], records["radius"] = spheres[:, :3], spheres[:, 3]
-    records["material"], records["light"] = materials, lights
-    return records
 
 
 def _features(scene: Scene, materials: Materials, uv_sets: int, users: list[Material], emitters: Emitters, sky: Sky,
