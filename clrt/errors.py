@@ -5,6 +5,8 @@
     ├── SceneError    a scene, model or picture file, or its content  exit code 3
     ├── CheckpointError  a checkpoint to go on from                   exit code 3
     ├── DeviceError   no such device, or the device failed            exit code 4
+    │   ├── NoRoomError  not enough memory there                      exit code 4
+    │   └── HungError    it does not answer any more                  exit code 4
     ├── KernelError   the device's compiler refused the program       exit code 5
     └── OutputError   a picture or report could not be written        exit code 6
 
@@ -46,6 +48,14 @@ class DeviceError(ClrtError):
     """A device cannot be found, chosen or used."""
 
     exit_code = 4
+
+
+class NoRoomError(DeviceError):
+    """A device has not enough memory."""
+
+
+class HungError(DeviceError):
+    """A device does not answer: whoever waits for it, waits for ever."""
 
 
 class KernelError(ClrtError):

@@ -16,7 +16,7 @@ from .accel.kernels import HitTests, tree_buffers, tree_defines, tree_features, 
 from .accel.layouts import LANES, Layout
 from .accel.wide import EMPTY
 from .device.arrays import resident
-from .device.launch import wait_for
+from .device.launch import resized, run_seconds, wait_for
 from .device.loops import loop_turns
 from .device.open import Device
 from .device.preamble import defines, scene_struct, typedefs
@@ -31,6 +31,8 @@ INSTANCE_HIT = record(t="f4", primitive="i4", u="f4", v="f4", instance="i4", pad
 COUNTS = record(triangles="i4", spheres="i4", pad="2i4")
 #: Rays that are on the device at once: 44 bytes each.
 CHUNK = 1 << 20
+#: Rays of the first launch, and of any at least; the others are as many as take device.launch.TARGET_SECONDS.
+FIRST, FEWEST = 1 << 15, 1 << 12
 #: Ways through the layout bvh8: ray by ray, eight coherent ones together (kernels/traverse/packet.cl), many in turns.
 TRAVERSALS = ("single", "packet", "pool")
 #: Rays that a work-item has in its pool (kernels/traverse/pool.cl), and how many it answers in all.
@@ -49,7 +51,7 @@ class TreeQuery:
     had: on GPUs, and among spheres and instances) or "pool" (many rays in turns). None takes what was fastest for such
     rays: the pool, but packets where rays are coherent and the processor's cache holds the tree; single rays with other
     layouts and on GPUs, and on a CPU whose driver does not tell its cache.
-    kernel_seconds: the time of all kernels so far, without uploads and downloads.
+    kernel_seconds: the time of all kernels so far, without uploads and downloads; longest_launch: of one, at most.
 
     Of a ray, origins and directions are (n, 3), or (3,) for all; t_max is (n,) or one number, and t counts lengths of
     the direction. Of hits at the same t the lowest primitive comes first. A ray whose direction is zero, or that holds
@@ -61,7 +63,8 @@ class TreeQuery:
                  traversal: str | None) -> None:
         """Of a tree over so many triangles and spheres, whose points are those of the rays in `frame`."""
         self.device = device
-        self.kernel_seconds = 0.0
+        self.kernel_seconds = self.longest_launch = 0.0
+        self._sizes = dict.fromkeys(QUERIES, FIRST)
         self._hit = INSTANCE_HIT if "instances" in tree.buffers else HIT
         self._counts = np.zeros(1, COUNTS)
         self._counts["triangles"], self._counts["spheres"] = counts
@@ -127,7 +130,7 @@ class TreeQuery:
 
     def _ask(self, name: str, rays: Rays, answers: NDArray[Any]) -> NDArray[Any]:
         """`answers`, with what kernel query_`name` writes over it for the rays."""
-        for part in _chunks(len(answers)):
+        for part in self._parts(name, len(answers)):
             origins, directions, t_max = (array[part] for array in rays)
             if any(self.frame.center):
                 origins = origins - np.array(self.frame.center)
@@ -148,6 +151,14 @@ class TreeQuery:
                               f"work-item after {turns} turns, and {np.count_nonzero(ended)} of {len(answers)} rays "
                               f"need more in the layout {self.tree.name}; use another device or layout")
 
+    def _parts(self, name: str, n: int) -> Iterator[slice]:
+        """Parts of n rays, each for a launch."""
+        first = 0
+        while first < n:
+            size = min(CHUNK, max(FEWEST, self._sizes[name]))
+            yield slice(first, min(n, first + size))
+            first += size
+
     def _ask_chunk(self, name: str, inputs: list[NDArray[np.float32]], answers: NDArray[Any]) -> None:
         """Writes over `answers`; a CPU works on the arrays themselves."""
         n, context, queue, flags = len(answers), self.device.context, self.device.queue, cl.mem_flags
@@ -162,7 +173,10 @@ class TreeQuery:
             kernel.set_args(*self._scene, self._counts[0], *buffers, output, np.float32(self.frame.unit), np.uint32(n))
             launched = cl.enqueue_nd_range_kernel(queue, kernel, (groups * local,), (local,))
         wait_for(launched)
-        self.kernel_seconds += time.perf_counter() - start
+        seconds = time.perf_counter() - start
+        self.kernel_seconds += seconds
+        self.longest_launch = max(self.longest_launch, run_seconds(launched) or seconds)
+        self._sizes[name] = resized(self._sizes[name], n, run_seconds(launched) or seconds)
         wait_for(cl.enqueue_copy(queue, answers, output, is_blocking=False))
 
     def _way(self, name: str, directions: NDArray[np.float32]) -> str:
@@ -224,8 +238,3 @@ def _coherent(directions: NDArray[np.float32]) -> bool:
         one, other = directions[first].astype(np.float64), directions[first + 1].astype(np.float64)
         cosine = (one * other).sum(1) / (np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1))
     return bool(np.nanmean(cosine) > COHERENT) if np.isfinite(cosine).any() else False
-
-
-def _chunks(n: int) -> Iterator[slice]:
-    for first in range(0, n, CHUNK):
-        yield slice(first, min(n, first + CHUNK))

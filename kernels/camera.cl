@@ -18,7 +18,7 @@ typedef struct { real3 origin, direction; } CameraRay;   // direction: unit
 // counted tile by tile as `tiles` lists them, row by row in each. A lane past the picture's edge is given its first lane's
 // pixel and is not `inside`.
 typedef struct {
-    ureal index, x, y, code;   // index: of the pixel in the picture
+    ureal index, x, y, code;   // index: of the pixel in the film, which is the picture or, of FILM_WINDOWS, the launch's
     ireal inside;
 } LanePixels;
 
@@ -35,7 +35,11 @@ static inline bool lane_pixels(const Launch *launch, global const uint *tiles, L
     if (!ANY(p->inside)) return false;
     p->x = p->inside ? p->x : first_x;
     p->y = p->inside ? p->y : first_y;
+#if FILM_WINDOWS
+    p->index = first - launch->first_pixel + (p->inside ? LANE_INDEX : (ureal)(0));
+#else
     p->index = p->y * launch->width + p->x;
+#endif
     p->code = pixel_code(p->x, p->y);
     return true;
 }

@@ -52,7 +52,8 @@ static inline void accumulate_direct(Accumulator *a, real3 sample, ireal kept) {
 }
 #endif
 
-static inline Accumulator load_pixels(global const Pixel *film, ireal pixel) {
+static inline Accumulator load_pixels(global const Pixel *pixels, ireal pixel) {
+    WHOLE(Pixel, film, pixels);
     return (Accumulator){GATHER3(film, pixel, .sum), GATHER3(film, pixel, .sum_error), GATHER3(film, pixel, .square),
                          GATHER3(film, pixel, .square_error), GATHER(ureal, film, pixel, .count),
                          GATHER(ureal, film, pixel, .dropped), GATHER(ureal, film, pixel, .rays),

@@ -3,9 +3,10 @@
 // real, ireal, ureal   a float, int, uint of every path          real3   a vector of three reals
 // A mask is an ireal: a comparison's result. Scalars are 0/1 and vectors 0/-1, so a mask is only ever used in
 // `m ? a : b`, `a & b`, `a | b`, `!m` and ANY(m), which mean the same for both.
-// GATHER(type, array, index, .member) reads one record per lane; the index of an idle lane must be valid, too.
+// GATHER(type, array, index, .member) reads one record of an array per lane; the index of an idle lane must be valid, too.
 
 #include "mask.cl"
+#include "arrays.cl"
 
 #define PASTE_(a, b) a##b
 #define PASTE(a, b) PASTE_(a, b)
@@ -15,7 +16,7 @@ typedef float real;
 typedef int ireal;
 typedef uint ureal;
 #define ANY(mask) (mask)
-#define GATHER(type, array, index, member) ((type)((array)[index] member))
+#define GATHER(type, array, index, member) ((type)(RECORD(array, index)[0] member))
 #define TO_REAL(x) ((float)(x))
 #define TO_INT(x) ((int)(x))
 #define TO_UINT(x) ((uint)(x))
@@ -31,8 +32,8 @@ typedef PASTE(uint, LANES) ureal;
 #define TO_UINT(x) PASTE(convert_uint, LANES)(x)
 #define AS_INT(x) PASTE(as_int, LANES)(x)
 #define AS_REAL(x) PASTE(as_float, LANES)(x)
-#define GATHER8_(a, i, m) (a)[(i).s0] m, (a)[(i).s1] m, (a)[(i).s2] m, (a)[(i).s3] m, \
-                          (a)[(i).s4] m, (a)[(i).s5] m, (a)[(i).s6] m, (a)[(i).s7] m
+#define GATHER8_(a, i, m) RECORD(a, (i).s0)[0] m, RECORD(a, (i).s1)[0] m, RECORD(a, (i).s2)[0] m, RECORD(a, (i).s3)[0] m, \
+                          RECORD(a, (i).s4)[0] m, RECORD(a, (i).s5)[0] m, RECORD(a, (i).s6)[0] m, RECORD(a, (i).s7)[0] m
 #if LANES == 8
 #define ANY(mask) (mask_bits(mask) != 0)
 #define GATHER(type, array, index, member) ((type)(GATHER8_(array, index, member)))

@@ -44,3 +44,17 @@ __attribute__((always_inline)) static inline float second(Pair p,
 """
     assert list(changed_parameters(text, {"Pair"})) == [("first", "q"), ("second", "p")]
     assert {"real3", "Hit", "Flight", "Box"} <= STRUCTS
+
+
+DIRECT = re.compile(r"scene->(?!counts\b)(\w+)\s*(?:\[|->|\+)")
+
+
+@pytest.mark.parametrize("file", TEXTS)
+def test_arrays_of_the_scene_may_be_in_parts(file: str) -> None:
+    """So records are found by RECORD or GATHER alone (arrays.cl)."""
+    assert DIRECT.findall(re.sub(r"//.*", "", TEXTS[file])) == []
+
+
+def test_direct_access_is_found() -> None:
+    text = "scene->nodes[3].x + scene->counts.lights + scene->sky->width + RECORD(scene->packs, i)->p0 + (scene->a + 1)"
+    assert DIRECT.findall(text) == ["nodes", "sky", "a"]

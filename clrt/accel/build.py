@@ -54,7 +54,8 @@ def _over_corners(device: Device | None, layout: str, builder: str | None, trian
     if builder not in (None, *known):
         raise UsageError(f"there is no tree builder {builder!r}: take one of {', '.join(known)}")
     if builder is None:
-        builder = "ploc" if device and count >= LARGE and layout in device_builder.SHAPES else "sah"
+        device_can = layout in device_builder.SHAPES and device_builder.fits(device, count)
+        builder = "ploc" if device_can and count >= LARGE else "sah"
     if builder not in DEVICE_BUILDERS or device is None or count < 2:
         return pack(layout, "sah" if builder in DEVICE_BUILDERS else builder, triangles, spheres)
     if layout not in device_builder.SHAPES:

@@ -16,7 +16,7 @@ from ..device.open import Device
 from ..device.preamble import defines, typedefs
 from ..device.program import compose
 from ..device.records import record
-from ..errors import SceneError
+from ..errors import NoRoomError, SceneError
 from .cwbvh import CWBVH_NODE, MAX_LEAF, SLOTS
 from .layouts import BVH2_NODE, BVH8_NODE, LANES, LEAF_SIZES, LEAF_SPHERE, LEAF_TRIANGLE, TRIANGLE_PACK
 from .morton import Primitives, sort_primitives
@@ -49,6 +49,9 @@ class Shape:
 #: What makes shares of the scene's sides and area out of a box's: the factors, and what to add where it has none.
 WORLD = record(per_side="3f4", per_area="f4", no_side="3f4", no_area="f4")
 
+#: Bytes a primitive that the largest of all arrays takes at most, about: a pack for two triangles takes 160.
+LARGEST_ARRAY = 192
+
 SHAPES = {
     "bvh8": Shape("build/bvh8.cl", LANES, LANES, LANES, BVH8_NODE, TRIANGLE_PACK, "packs"),
     "bvh2": Shape("build/bvh2.cl", 2, LEAF_SIZES["sah"], 1, BVH2_NODE, LEAF_TRIANGLE, "leaf_triangles", (2, 2)),
@@ -73,14 +76,22 @@ class DeviceTree:
     peak_bytes: int
 
 
+def fits(device: Device | None, count: int) -> bool:
+    """Whether the arrays for so many primitives are not larger than the device's largest buffer."""
+    return device is not None and count * LARGEST_ARRAY <= device.info.max_alloc_bytes
+
+
 def build_tree(device: Device, shape: Shape, triangles: FloatArray, spheres: FloatArray,
                reinsertions: int = 0) -> DeviceTree:
     """The tree over at least two primitives: triangles (m, 3, 3), spheres (s, 4), coordinates finite, below 1e18.
 
-    reinsertions: passes that make it better. Raises SceneError for more than MAX_PRIMITIVES in all.
+    reinsertions: passes that make it better. Raises SceneError for more than MAX_PRIMITIVES in all, and NoRoomError.
     """
     if (count := len(triangles) + len(spheres)) > MAX_PRIMITIVES:
         raise SceneError(f"{count} primitives, but a device builds trees over {MAX_PRIMITIVES}: take the builder sah")
+    if not fits(device, count):
+        raise NoRoomError(f"{count} primitives need larger buffers than the {device.info.max_alloc_bytes} bytes that "
+                          f"{device.info.name} allows, to build a tree in: take the builder sah")
     work = Blocks(device, program_source(shape, len(triangles) > 0, len(spheres) > 0, reinsertions > 0))
     primitives = sort_primitives(work, triangles, spheres)
     tree = cluster(work, primitives)

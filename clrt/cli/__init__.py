@@ -7,12 +7,15 @@ import sys
 import time
 import traceback
 from importlib import import_module
+from typing import NoReturn
 
 import click
 
 from ..errors import ClrtError, DeviceError, KernelError
 
 STARTED = time.perf_counter()
+#: What commands find as their context's object where they have the process to themselves.
+PROGRAM = "clrt"
 COMMANDS = ("render", "info", "convert", "compare", "devices", "bench", "cache", "doctor")
 
 
@@ -40,9 +43,9 @@ def main(arguments: list[str] | None = None) -> None:
     # numpy's OpenBLAS starts a thread a core as it is loaded, and these spin for a while. No command has work for them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        commands.main(arguments, prog_name="clrt", standalone_mode=False)
+        commands.main(arguments, prog_name="clrt", standalone_mode=False, obj=PROGRAM)
     except click.exceptions.Exit as stop:
-        sys.exit(stop.exit_code)
+        _leave(stop.exit_code)
     except click.ClickException as error:
         error.show()
         sys.exit(2)
@@ -50,14 +53,16 @@ def main(arguments: list[str] | None = None) -> None:
         if isinstance(error, DeviceError | KernelError):
             _keep(str(error))
         print("\n".join(f"error: {line}" for line in getattr(error, "problems", [str(error)])), file=sys.stderr)
-        sys.exit(error.exit_code)
+        _leave(error.exit_code)
     except (KeyboardInterrupt, click.Abort):
         print("interrupted", file=sys.stderr)
-        sys.exit(130)
+        _leave(130)
+    except SystemExit as stop:
+        _leave(stop.code)
     except Exception:
         _keep(traceback.format_exc())
         raise
-    sys.exit(0)
+    _leave(0)
 
 
 def _keep(error: str) -> None:
@@ -65,3 +70,13 @@ def _keep(error: str) -> None:
     from ..device.cache import keep_log
 
     keep_log("error", error)
+
+
+def _leave(code: str | int | None) -> NoReturn:
+    """Exits; at once where a device has hung, as its driver might wait for it for ever."""
+    pulse = sys.modules.get("clrt.device.pulse")
+    if pulse is not None and pulse.has_hung() and isinstance(code, int):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)

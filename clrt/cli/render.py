@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import UsageError
+from ..errors import DeviceError, UsageError
+from . import PROGRAM
+from .guard import guarded
 from .interrupt import Interruptible
 from .logs import silence, verbose_option
 from .options import Size, tracing_options
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
 @click.option("--depth", type=click.IntRange(1, 1024), help="Path edges: 1 glow only, 2 direct light, 3 one bounce.")
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers.")
 @click.option("--device", "devices", multiple=True, metavar="SEL",
-              help="Number, id, part of a name, cpu or gpu; see `clrt devices`.")
+              help="Number, id, part of a name, cpu or gpu; see `clrt devices`. Given twice, both render.")
 @click.option("--integrator", type=click.Choice(["path", "direct", "normals", "albedo", "depth"]),
               help="What to compute.")
 @click.option("--sampler", type=click.Choice(["sobol", "stratified", "independent"]), help="Where samples come from.")
@@ -69,6 +71,12 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             checkpoint: Path | None, checkpoint_every: float, resume: bool, view: str, exposure: float,
             progress_kind: str | None, print_kernel: bool, quiet: bool, **tracing: Any) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
+    def advice() -> str:
+        kept = checkpoint is not None and checkpoint.exists()
+        return f"; {checkpoint} holds what was rendered before, and --resume goes on from it" if kept else ""
+
+    if click.get_current_context().obj == PROGRAM:
+        guarded(advice)
     from ..output.data import check_denoisable
     from ..output.denoise import Denoiser
     from ..rendering.aovs import chosen_aovs
@@ -77,8 +85,6 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     from ..scene.file import load
 
     atexit.register(gc.freeze)  # else Python, as it ends, searches all modules' objects for garbage, in 0.05 s
-    if len(devices) > 1:
-        raise UsageError(f"--device is given {len(devices)} times; this version renders on one device, so name one")
     if resume and checkpoint is None:
         raise UsageError("--resume goes on from a checkpoint; name its file with --checkpoint")
     beside = chosen_aovs(",".join(aovs)) if aovs else ()
@@ -90,7 +96,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         silence()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's end is Ctrl-C, too
     options: dict[str, Any] = {
-        "size": size, "max_depth": depth, "seed": seed, "device": devices[0] if devices else None,
+        "size": size, "max_depth": depth, "seed": seed, "device": devices or None,
         "integrator": integrator, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
         "checkpoint": None if print_kernel else checkpoint, "resume": resume and not print_kernel,
         "checkpoint_seconds": checkpoint_every, "aovs": beside, **tracing}
@@ -106,7 +112,10 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             click.echo(renderer.compiled.source)
             return
         with Interruptible(renderer.interrupt) as interruptible:
-            _render(renderer, results, Goal(planned, seconds, error), expected, denoiser, progress)
+            try:
+                _render(renderer, results, Goal(planned, seconds, error), expected, denoiser, progress)
+            except DeviceError as failure:
+                raise type(failure)(f"{failure}{advice()}") from failure
     if interruptible.asked:
         sys.exit(130)
 

@@ -19,6 +19,8 @@ WORK_ITEMS = {"cpu": 16, "gpu": 512}
 SMALLEST_BLOCK = {"cpu": 256, "gpu": 16}
 #: Turns that the loops of a kernel may take for one item.
 ITEM_TURNS = 1024
+#: Items that a launch takes on each compute unit, at most.
+LAUNCH_ITEMS = 1 << 17
 #: Work-items that scan together where that pays, as in build/scan.cl, and what they get at least.
 SCAN_ITEMS, SCAN_PART = 256, 8192
 
@@ -95,10 +97,14 @@ class Blocks:
         return -(-count // self.block(count))
 
     def run(self, name: str, count: int, *arguments: Any) -> None:
-        """Launches kernel `name` over `count` items. Python's ints are passed as uint, floats as float."""
-        values = np.uint32(count), np.uint32(self.block(count)), *map(_scalar, arguments)
-        groups = -(-self.number(count) // self.device.local_size)
-        self._launch(name, groups, self.device.local_size, values)
+        """Runs kernel `name` over `count` items, of which a launch takes so many that it is short. Python's ints are
+        passed as uint, floats as float. A kernel may ask for its global id alone."""
+        block, local = self.block(count), self.device.local_size
+        values = np.uint32(count), np.uint32(block), *map(_scalar, arguments)
+        groups = -(-self.number(count) // local)
+        most = max(1, LAUNCH_ITEMS * self.device.info.compute_units // (block * local))
+        for first in range(0, groups, most):
+            self._launch(name, min(most, groups - first), local, values, first)
 
     def scan(self, values: cl.Buffer, count: int, arrays: int = 1) -> None:
         """Turns each of `arrays` arrays of `count` numbers, one after another in `values`, into what stood before it.
@@ -122,13 +128,14 @@ class Blocks:
         local = 1 if self.device.local_size == 1 else SCAN_ITEMS
         self._launch("scan", arrays * parts, local, (values, np.uint32(count), np.uint32(parts), totals))
 
-    def _launch(self, name: str, groups: int, local: int, values: Sequence[Any]) -> None:
+    def _launch(self, name: str, groups: int, local: int, values: Sequence[Any], first: int = 0) -> None:
         if name not in self._kernels:
             self._kernels[name] = make_kernel(self.device, self.program, name)
             # Without types pyopencl finds out what each value is at every launch, by exceptions.
             self._kernels[name].set_arg_types([None if isinstance(v, cl.Buffer) else v.dtype for v in values])
         self._kernels[name].set_args(*values)
-        cl.enqueue_nd_range_kernel(self.device.queue, self._kernels[name], (groups * local,), (local,))
+        cl.enqueue_nd_range_kernel(self.device.queue, self._kernels[name], (groups * local,), (local,),
+                                   (first * local,))
 
     @property
     def totals(self) -> cl.Buffer:

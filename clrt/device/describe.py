@@ -10,6 +10,7 @@ import pyopencl as cl
 
 from .drivers import Driver
 from .hardware import hardware
+from .memory import largest_buffer
 from .pocl import lacks_linker
 from .speeds import Speed
 from .verdicts import Verdict
@@ -66,7 +67,8 @@ def describe(device: cl.Device, index: int = 0) -> DeviceInfo:
         index=index, id=_digest(identity), name=device.name.strip(), platform=platform.name.strip(),
         platform_version=platform.version.strip(), driver=device.driver_version.strip(), type=_type(device),
         compute_units=device.max_compute_units, global_bytes=device.global_mem_size,
-        max_alloc_bytes=device.max_mem_alloc_size, usable=not reason, why=reason, chosen=False, hardware=places)
+        max_alloc_bytes=largest_buffer(device.max_mem_alloc_size), usable=not reason,
+        why=reason, chosen=False, hardware=places)
 
 
 def size_of(device: cl.Device) -> int:

@@ -2,39 +2,64 @@
 
 A watchdog kills launches of 2 s on some systems, and a driver that waits inside a call cannot be interrupted. So a
 launch gets as much work as fills about TARGET_SECONDS, judged by the launches before it, few are in flight, and their
-events are polled.
+events are polled. One that has not ended after `patience` has hung.
 """
 
 from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pyopencl as cl
 
-from ..errors import DeviceError
+from ..errors import DeviceError, HungError, NoRoomError
 from .fork import check_process
 from .open import Device
+from .pulse import VARIABLE, counted_call, note_hang, patience
 
 TARGET_SECONDS = 0.08
 IN_FLIGHT = 2
+#: Waiting counts at most so much between two looks: a process that was stopped (Ctrl-Z) has not waited.
+LONGEST_LOOK = 0.1
 
 
 class Launches:
-    """Feeds a queue with launches of adapted size. Sizes are in units of work, whatever the caller counts."""
+    """Feeds a queue with launches of adapted size. Sizes are in units of work, whatever the caller counts.
+
+    longest: seconds that a launch took, at most. None grows to more than twice the one before.
+    """
 
     def __init__(self, first_size: int) -> None:
         self.size = first_size
-        self._running: deque[tuple[cl.Event, int]] = deque()
-        self._last = 0.0
+        self._running: deque[tuple[cl.Event, cl.Event, int]] = deque()
+        self._wait = Wait()
+        self._last = self.longest = 0.0
 
     def add(self, event: cl.Event, work: int) -> None:
         """Takes in a launch of `work` units that was just enqueued; waits while too many are in flight."""
-        if not self._running:
-            self._last = time.perf_counter()
-        self._running.append((event, work))
-        while len(self._running) >= IN_FLIGHT:
+        self.begin(event, event, work)
+        while self.full:
             self._finish_one()
+
+    def begin(self, event: cl.Event, last: cl.Event, work: int) -> None:
+        """Takes in a launch that was just enqueued, with the last of what belongs to it; waits for none."""
+        if not self._running:
+            self._last, self._wait = time.perf_counter(), Wait()
+        self._running.append((event, last, work))
+
+    @property
+    def full(self) -> bool:
+        """Whether as many are in flight as should be."""
+        return len(self._running) >= IN_FLIGHT
+
+    def poll(self) -> bool:
+        """Whether the first in flight had ended, which then no longer is; DeviceError where it failed or hangs."""
+        if not self._running or not self._wait.is_over(self._running[0][1]):
+            return False
+        self._finish_one()
+        return True
 
     def wait(self) -> None:
         """Waits for every launch."""
@@ -42,13 +67,28 @@ class Launches:
             self._finish_one()
 
     def _finish_one(self) -> None:
-        event, work = self._running[0]
-        wait_for(event)
+        event, last, work = self._running[0]
+        wait_for(last)
         self._running.popleft()
         now = time.perf_counter()
-        seconds, self._last = now - self._last, now
-        wanted = work * TARGET_SECONDS / max(seconds, 1e-6)
-        self.size = max(1, int(min(wanted, 2 * max(work, self.size))))
+        seconds = run_seconds(event) or now - self._last
+        self._last, self._wait = now, Wait()
+        self.longest = max(self.longest, seconds)
+        self.size = resized(self.size, work, seconds)
+
+
+def resized(size: int, work: int, seconds: float) -> int:
+    """The work of the next launch, where the last one's took so long: it was `work`, and should have been `size`."""
+    wanted = work * TARGET_SECONDS / max(seconds, 1e-6)
+    return max(1, int(min(wanted, 2 * max(work, size))))
+
+
+def run_seconds(event: cl.Event) -> float:
+    """How long a launch that has ended ran, by the device's own clock; 0 where it does not tell."""
+    try:
+        return 1e-9 * max(0, event.profile.end - event.profile.start)
+    except cl.Error:
+        return 0.0
 
 
 def run_kernel(device: Device, kernel: cl.Kernel, groups: int) -> None:
@@ -57,16 +97,48 @@ def run_kernel(device: Device, kernel: cl.Kernel, groups: int) -> None:
     wait_for(cl.enqueue_nd_range_kernel(device.queue, kernel, (groups * local,), (local,)))
 
 
+@contextmanager
+def calling() -> Iterator[None]:
+    """Around calls of a driver that should take no time, which are watched; its errors become DeviceErrors."""
+    try:
+        with counted_call():
+            yield
+    except cl.MemoryError as error:
+        raise NoRoomError(f"the device has not enough memory: {error}") from error
+    except cl.Error as error:
+        raise DeviceError(f"the device failed: {error}") from error
+
+
+class Wait:
+    """The wait for a launch, and how long it has taken so far."""
+
+    def __init__(self) -> None:
+        self._seconds, self._looked = 0.0, time.perf_counter()
+
+    def is_over(self, event: cl.Event) -> bool:
+        """Whether the event is complete; DeviceError where it failed, HungError once patience is exhausted."""
+        with calling():
+            status = event.command_execution_status
+        if status < 0:
+            raise DeviceError(f"the device stopped a launch with error {status}")
+        now = time.perf_counter()
+        self._seconds, self._looked = self._seconds + min(now - self._looked, LONGEST_LOOK), now
+        if status != cl.command_execution_status.COMPLETE and self._seconds > patience():
+            note_hang()
+            raise HungError(f"the device has not ended a launch in {patience():g} s: its driver hangs, or it is lost; "
+                            f"if launches may take that long there, set {VARIABLE} to more")
+        return bool(status == cl.command_execution_status.COMPLETE)
+
+
 def wait_for(event: cl.Event) -> None:
-    """Returns when the event is complete, letting signals through; DeviceError where it failed.
+    """Returns when the event is complete, letting signals through; DeviceError where it failed or hangs.
 
     Asking for an event's status starts nothing: a driver may hold commands back until their queue is flushed.
     """
     check_process()
-    event.command_queue.flush()
-    start, pause = time.perf_counter(), 1e-5
-    while (status := event.command_execution_status) > cl.command_execution_status.COMPLETE:
+    with calling():
+        event.command_queue.flush()
+    start, pause, wait = time.perf_counter(), 1e-5, Wait()
+    while not wait.is_over(event):
         time.sleep(pause)
         pause = max(1e-5, min(2e-3, (time.perf_counter() - start) / 50))
-    if status < 0:
-        raise DeviceError(f"the device stopped a launch with error {status}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import pyopencl as cl
@@ -11,6 +12,10 @@ from ..errors import DeviceError
 from . import pocl
 from .describe import DeviceInfo
 from .discover import choose
+from .pulse import take_any_time
+
+#: Launches tell how long they ran.
+TIMED = cl.command_queue_properties.PROFILING_ENABLE
 
 
 @dataclass(frozen=True)
@@ -43,13 +48,26 @@ class Device:
         return "bvh8" if self.vectors else "cwbvh"
 
 
+def open_devices(selectors: str | int | Sequence[str | int] | None) -> list[Device]:
+    """Opens the devices that are named (see `choose`), at least one; DeviceError where that fails."""
+    several = [selectors] if selectors is None or isinstance(selectors, str | int) else list(selectors)
+    return [open_device(selector) for selector in several or [None]]
+
+
+def name_of(devices: Sequence[Device]) -> str:
+    """Their names in one line, each once."""
+    return " + ".join(dict.fromkeys(device.info.name for device in devices))
+
+
 def open_device(selector: str | int | None = None) -> Device:
     """Opens the device that `selector` names (see `choose`); DeviceError where that fails."""
     info, device = choose(selector)
     if info.platform == "Portable Computing Language":
         pocl.name_processor(device)
+    if info.type == "simulator":
+        take_any_time()
     try:
         context = Context([device])
-        return Device(info, device, context, CommandQueue(context))
+        return Device(info, device, context, CommandQueue(context, properties=TIMED))
     except cl.Error as error:
         raise DeviceError(f"{info.name} ({info.platform}) cannot be opened: {error}") from error

@@ -7,25 +7,34 @@ from typing import Any
 
 import numpy as np
 
+from .memory import OVERLAP, part_count
 from .records import c_typedef
 
 #: C type and array by name; arrays are numpy's or `DeviceArray`s.
 Buffers = Mapping[str, tuple[str, Any]]
 
 
-def scene_struct(buffers: Buffers) -> str:
+def scene_struct(buffers: Buffers, part_bytes: int | None = None) -> str:
     """`Scene`, the kernel parameters that fill it (SCENE_PARAMETERS) and its initialiser (SCENE_ARGUMENTS).
 
-    The order of `buffers` is the order of the kernel's arguments; the counts come last.
+    The order of `buffers` is the order of the kernel's arguments; the counts come last. part_bytes: all are in parts of
+    at most so many bytes (kernels/arrays.cl).
     """
-    members = [f"global const {c_type} *{name}" for name, (c_type, _) in buffers.items()]
-    parameters = [f"global const {c_type} *{name}" for name, (c_type, _) in buffers.items()]
     typedefs = {c_type: c_typedef(c_type, array.dtype) for c_type, array in buffers.values()}
+    members = [f"global const {c_type} *{name}" for name, (c_type, _) in buffers.items()]
+    names, parameters, lines = list(buffers), members, [*typedefs.values()]
+    if part_bytes is not None:
+        counts = {name: part_count(array, part_bytes) for name, (_, array) in buffers.items()}
+        members = [f"{member}[{count}]" for member, count in zip(members, counts.values())]
+        parameters = [f"global const {c_type} *{name}_{i}" for name, (c_type, _) in buffers.items()
+                      for i in range(counts[name])]
+        names = [f"{{{', '.join(f'{name}_{i}' for i in range(count))}}}" for name, count in counts.items()]
+        lines.append(defines({"PART_BYTES": part_bytes, "PART_OVERLAP": OVERLAP}))
     return "\n".join([
-        *typedefs.values(),
+        *lines,
         f"typedef struct {{ {' '.join(member + ';' for member in [*members, 'Counts counts'])} }} Scene;",
         f"#define SCENE_PARAMETERS {', '.join([*parameters, 'const Counts counts'])}",
-        f"#define SCENE_ARGUMENTS {{{', '.join([*buffers, 'counts'])}}}"])
+        f"#define SCENE_ARGUMENTS {{{', '.join([*names, 'counts'])}}}"])
 
 
 def type_list(macro: str, types: Iterable[tuple[str, int]]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,6 +15,7 @@ from ..accel.build import FEW_SPHERES, build_tree, fitting_layout
 from ..accel.kernels import HitTests, tree_buffers, tree_defines, tree_features, tree_files
 from ..accel.layouts import Layout, leaf_spheres
 from ..device.loops import loop_turns
+from ..device.memory import array_bytes, needed_parts
 from ..device.open import Device
 from ..device.preamble import Buffers, defines, scene_struct, type_list, typedefs
 from ..device.program import compose, files_of
@@ -71,7 +72,8 @@ class CompiledScene:
     """What a device needs to render a scene. The buffers' order is the order of the kernel's arguments.
 
     All points, the camera's too, are those of the scene in `frame` (see scene.scaling). instances: how many are in the
-    tree; others became meshes (see scene.instancing).
+    tree; others became meshes (see scene.instancing). part_bytes: the arrays are in parts of at most so many bytes, as
+    the device has no larger buffers (kernels/arrays.cl).
     """
 
     buffers: Buffers
@@ -86,6 +88,7 @@ class CompiledScene:
     frame: Frame
     instances: int
     objects: Objects
+    part_bytes: int | None = None
 
     @cached_property
     def source(self) -> str:
@@ -112,7 +115,7 @@ class CompiledScene:
     @property
     def bytes(self) -> int:
         """Device memory of the scene."""
-        return sum(array.nbytes for _, array in self.buffers.values())
+        return sum(array_bytes(array, self.part_bytes) for _, array in self.buffers.values())
 
 
 def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
@@ -177,7 +180,8 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
         features.add("DIRECT_LIGHT")
     integrator = scene.render.integrator
     unit = frame.unit if choices.offset != "bound" or integrator == "depth" else None
-    preamble = _preamble(buffers, features, materials, textures.uv_sets, emitters, choices, tree, unit)
+    part_bytes = needed_parts((array for _, array in buffers.values()), device.info) if device else None
+    preamble = _preamble(buffers, features, materials, textures.uv_sets, emitters, choices, tree, unit, part_bytes)
     # A depth is that of what is in focus: the ray through the middle of a lens.
     camera = replace(scene.camera, aperture_radius=0.0) if integrator == "depth" else scene.camera
     files = {**_files(materials.used, emitters, sky, choices, tree.name, len(triangles) > 0, len(spheres) > 0, lone,
@@ -190,7 +194,18 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
              "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"]}
     entry = entry or ("path.cl" if integrator in WITH_LIGHT else "picture.cl")
     return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame,
-                         len(scene.instances), objects)
+                         len(scene.instances), objects, part_bytes)
+
+
+def compile_for_all(scene: Scene, choices: Sequence[Choices], devices: Sequence[Device]) -> list[CompiledScene]:
+    """The scene for each device with its choices: once for those that agree, unless trees were built on a device."""
+    compiled: list[CompiledScene] = []
+    for choice, device in zip(choices, devices):
+        alike = [done for done, other, chosen in zip(compiled, devices, choices) if chosen == choice
+                 and (other.layout, other.info.max_alloc_bytes) == (device.layout, device.info.max_alloc_bytes)
+                 and all(isinstance(array, np.ndarray) for _, array in done.buffers.values())]
+        compiled.append(alike[0] if alike else compile_scene(scene, choice, device=device))
+    return compiled
 
 
 def _features(scene: Scene, materials: Materials, uv_sets: int, users: list[Material], emitters: Emitters, sky: Sky,
@@ -211,7 +226,7 @@ def _features(scene: Scene, materials: Materials, uv_sets: int, users: list[Mate
 
 
 def _preamble(buffers: Buffers, features: set[str], materials: Materials, uv_sets: int, emitters: Emitters,
-              choices: Choices, tree: Layout, unit: float | None) -> str:
+              choices: Choices, tree: Layout, unit: float | None, part_bytes: int | None) -> str:
     # Only programs that know lengths of the scene's know its unit: others are shared whatever it is.
     lengths = {} if unit is None else {"SCENE_UNIT": min(unit, LARGEST_UNIT)}
     surfaces = [t for t in emitters.types if t in SURFACES]
@@ -220,7 +235,7 @@ def _preamble(buffers: Buffers, features: set[str], materials: Materials, uv_set
         defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
         defines({feature: 1 for feature in sorted(features)}),
         typedefs({"Counts": COUNTS, "Pixel": choices.pixel, "Guide": GUIDE, "Launch": LAUNCH}),
-        scene_struct(buffers),
+        scene_struct(buffers, part_bytes),
         type_list("MATERIAL_TYPES", _numbered(materials.used)),
         type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),
         type_list("NORMAL_MAPPED_TYPES", _numbered(materials.mapped("normal_map"))),

@@ -7,35 +7,41 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.arrays import empty_array, resident
+from ..device.arrays import DeviceArray, empty_array, resident
 from ..device.launch import Launches
 from ..device.program import build, make_kernel
 from .loop_limit import check_pixels, mark_pixels
-from .session import FEWEST_TILES, FIRST_LAUNCH_SAMPLES, Session, block_bits
-from .tiles import TILE_PIXELS
+from .on_device import WINDOW, WINDOWS
+from .picture import Picture
+from .session import FEWEST_TILES, FIRST_LAUNCH_SAMPLES, block_bits
+from .tiles import TILE_PIXELS, row_by_row, scattered
 
 
-def render_pixels(session: Session, source: str, name: str, record: np.dtype[Any], samples: int) -> NDArray[Any]:
+def render_pixels(session: Picture, source: str, name: str, record: np.dtype[Any], samples: int) -> NDArray[Any]:
     """(height, width) records of the session's picture that kernel `name` of a program writes, in bounded launches.
 
-    The kernel takes the scene, the records, the tiles and the launch, as `path` does. samples: what the launch says.
-    KernelError and DeviceError where the device fails.
+    The kernel takes the scene, the records of a launch, the tiles and the launch, as `path` does. samples: what the
+    launch says. KernelError and DeviceError where the device fails.
     """
-    device, (width, height) = session.device, session.size
-    kernel = make_kernel(device, build(device, source), name)
-    pixels = empty_array(device, record, width * height)
-    mark_pixels(device, pixels)
-    tiles = resident(device, np.arange(session.tile_samples.size, dtype=np.uint32))
+    device = session.device
+    kernel = make_kernel(device, build(device, WINDOWS + source), name)
+    order = scattered(session.tile_samples.size).astype(np.uint32)
+    most = max(1, min(len(order), min(WINDOW, device.info.max_alloc_bytes) // (TILE_PIXELS * record.itemsize)))
+    tiles, window = resident(device, order), empty_array(device, record, most * TILE_PIXELS)
+    pixels = np.zeros((len(order), TILE_PIXELS), record)
     launch, launches, done = session.launch.copy(), Launches(FIRST_LAUNCH_SAMPLES), 0
     launch["first_sample"], launch["sample_count"], launch["block_bits"] = 0, samples, block_bits(samples)
     work = TILE_PIXELS * max(samples, 1)
-    while done < tiles.size:
-        count = min(tiles.size - done, max(FEWEST_TILES, launches.size // work))
+    while done < len(order):
+        count = min(len(order) - done, most, max(FEWEST_TILES, launches.size // work))
         launch["first_pixel"], launch["pixel_count"] = done * TILE_PIXELS, count * TILE_PIXELS
-        kernel.set_args(*session.scene_arguments, pixels.buffer, tiles.buffer, launch[0])
+        mark_pixels(device, window)
+        kernel.set_args(*session.scene_arguments, window.buffer, tiles.buffer, launch[0])
         launches.add(session.enqueue(kernel, count * TILE_PIXELS), count * work)
+        launches.wait()
+        found = DeviceArray(window.buffer, record, count * TILE_PIXELS).read(device)
+        pixels[order[done:done + count]] = found.reshape(count, TILE_PIXELS)
         done += count
-    launches.wait()
-    values = pixels.read(device).reshape(height, width)
+    values = row_by_row(pixels, session.size)
     check_pixels(device, values)
     return values

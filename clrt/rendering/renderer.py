@@ -14,18 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accel.kernels import BUILDER_NAMES, TREES, HitTests
-from ..device.open import open_device
+from ..device.open import name_of, open_devices
 from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
 from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
 from .aovs import LIGHT, chosen_aovs, film_aovs, needs_direct_light, seen_first
 from .checkpoint import open_checkpoints
-from .compile import OFFSETS, WITH_LIGHT, Choices, compile_scene
+from .compile import OFFSETS, WITH_LIGHT, Choices, compile_for_all
+from .crew import make_picture
 from .film import RELATIVE_FLOOR, Film
 from .first_hits import first_hits
 from .kept import Kept
 from .noise import NoiseEstimate
-from .session import Session
 from .stops import check_step, check_stops, low_enough, planned_spp
 from .tiles import tile_pixels, tile_sums
 
@@ -56,10 +56,10 @@ class State:
 class Renderer:
     """A scene on a device, ready to render. Everything not given is taken from `scene.render`.
 
-    device: see `clrt devices`; size: (width, height); triangle, box, sphere: see `HitTests`; offset, builder, layout,
-    lanes: see `compile.Choices`. spp: how many samples a pixel are planned, if that is known: the sampler then makes
-    neighbouring pixels' errors differ for that many, and later ones begin anew (kernels/sampler). adaptive: whether
-    tiles get samples by their error, from the pictures so far.
+    device: see `clrt devices`; several render one picture together. size: (width, height); triangle, box, sphere: see
+    `HitTests`; offset, builder, layout, lanes: see `compile.Choices`. spp: how many samples a pixel are planned, if
+    that is known: the sampler then makes neighbouring pixels' errors differ for that many, and later ones begin anew
+    (kernels/sampler). adaptive: whether tiles get samples by their error, from the pictures so far.
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
     checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the end; resume:
     go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
@@ -67,8 +67,9 @@ class Renderer:
     Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
 
-    def __init__(self, scene: Scene, *, device: str | int | None = None, size: tuple[int, int] | None = None,
-                 spp: int | None = None, max_depth: int | None = None, seed: int | None = None,
+    def __init__(self, scene: Scene, *, device: str | int | Sequence[str | int] | None = None,
+                 size: tuple[int, int] | None = None, spp: int | None = None,
+                 max_depth: int | None = None, seed: int | None = None,
                  integrator: str | None = None, sampler: str | None = None, filter: str | None = None,
                  adaptive: bool | None = None, triangle: str = "watertight", box: str = "robust",
                  sphere: str = "robust", offset: str = "bound", builder: str | None = None, layout: str | None = None,
@@ -80,24 +81,26 @@ class Renderer:
                                  "sampler": sampler, "filter": filter, "adaptive": adaptive}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
-        self.device = open_device(device)
+        self.devices = open_devices(device)
+        self.device = self.devices[0]
         if needs_direct_light(self._aovs) and settings.integrator not in WITH_LIGHT:
             raise UsageError(f"the AOVs {' and '.join(LIGHT)} are of light, and the integrator is "
                              f"{settings.integrator}; choose {' or '.join(WITH_LIGHT)}")
-        choices = Choices(lanes or self.device.lanes, layout, builder,
-                          HitTests(triangle, box, sphere), offset, needs_direct_light(self._aovs))
-        _check(choices)
+        choices = [Choices(lanes or each.lanes, layout, builder, HitTests(triangle, box, sphere), offset,
+                           needs_direct_light(self._aovs)) for each in self.devices]
+        _check(choices[0])
         on_phase("build")
-        self.compiled = compile_scene(self.scene, choices, device=self.device)
+        compiled = compile_for_all(self.scene, choices, self.devices)
+        self.compiled = compiled[0]
         if settings.integrator in WITH_LIGHT and not {"LIGHTS", "SKY"} & set(self.compiled.features):
             logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
         self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene,
-                                                   self.compiled.choices, self.device.info.name)
+                                                   self.compiled.choices, name_of(self.devices))
         on_phase("compile")
         depth = settings.max_depth if settings.integrator == "path" else min(settings.max_depth, 2)
         planned = None if spp is None else int(spp) * (MOST_TIMES_PLANNED if settings.adaptive else 1)
         self._planned_spp = kept.planned_spp if kept else planned
-        self.session = Session(self.device, self.compiled, settings.size, depth, settings.seed, self._planned_spp)
+        self.session = make_picture(self.devices, compiled, settings.size, depth, settings.seed, self._planned_spp)
         self._noise = kept.noise if kept else NoiseEstimate(self._planned_spp)
         self._first_hits = self._seen_first()
         self.history: list[dict[str, Any]] = kept.history if kept else []

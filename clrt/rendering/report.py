@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..device.open import name_of
 from .identity import scene_hash
 from .renderer import Renderer, State
 
 
 def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
     """The report's fields, as listed in docs/report.md. `state` is the last one."""
-    info, compiled, session = renderer.device.info, renderer.compiled, renderer.session
+    compiled, session = renderer.compiled, renderer.session
+    infos = [device.info for device in renderer.devices]
     (width, height), settings = session.size, renderer.settings
     samples = state.film.samples
     seconds = renderer.seconds or float("nan")
     return {
         "scene": renderer.scene.name, "scene_hash": scene_hash(renderer.scene), "version": _version(),
-        "device": info.name, "platform": info.platform, "driver": info.driver,
+        "device": name_of(renderer.devices), "platform": " + ".join(dict.fromkeys(info.platform for info in infos)),
+        "driver": " + ".join(dict.fromkeys(info.driver for info in infos)),
         "width": width, "height": height, "spp": state.spp,
         "max_depth": settings.max_depth, "seed": settings.seed, "integrator": settings.integrator,
         "sampler": settings.sampler, "filter": settings.filter, "adaptive": settings.adaptive,
@@ -25,9 +28,10 @@ def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
         "rays": state.film.rays, "rays_per_second": state.film.rays / seconds,
         "stop_reason": renderer.stop_reason, "noise": state.noise, "nonfinite_samples": state.film.nonfinite_samples,
         "bvh": tree_report(renderer),
-        "kernel": {"build_seconds": session.build_seconds, "cached": session.program.cached,
-                   "features": compiled.features},
+        "kernel": {"build_seconds": session.build_seconds, "cached": session.cached,
+                   "features": compiled.features, "longest_launch_seconds": session.longest_launch},
         "peak_device_bytes": session.device_bytes, "history": renderer.history,
+        **({"devices": session.shares()} if len(infos) > 1 else {}),
         **({} if state.relmse is None else {"relmse": state.relmse}),
     }
 

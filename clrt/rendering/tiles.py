@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import gcd
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,32 @@ def tile_sums(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     rows = np.add.reduceat(values, np.arange(0, height, TILE), axis=0, dtype=np.float64)
     sums = np.add.reduceat(rows, np.arange(0, width, TILE), axis=1)
     return np.asarray(sums if values.ndim == 2 else sums.sum(axis=2))
+
+
+def scattered(count: int) -> NDArray[np.intp]:
+    """The numbers 0 … count − 1 in an order of which every stretch is spread evenly over them all.
+
+    They follow each other by the golden ratio of `count` (the three-distance theorem bounds the gaps of a stretch).
+    """
+    step = max(1, round(count * (5**0.5 - 1) / 2))
+    while gcd(step, count) > 1:
+        step += 1
+    return np.arange(count) * step % count
+
+
+def tile_by_tile(values: NDArray[Any]) -> NDArray[Any]:
+    """(tiles, TILE_PIXELS): the pixels of each tile row by row, of values (height, width); zeros beyond the picture."""
+    (height, width), (rows, columns) = values.shape, tiles_of(values.shape[::-1])
+    whole = np.zeros((rows * TILE, columns * TILE), values.dtype)
+    whole[:height, :width] = values
+    return whole.reshape(rows, TILE, columns, TILE).swapaxes(1, 2).reshape(-1, TILE_PIXELS)
+
+
+def row_by_row(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+    """(height, width), of what `tile_by_tile` gave."""
+    (width, height), (rows, columns) = size, tiles_of(size)
+    whole = values.reshape(rows, columns, TILE, TILE).swapaxes(1, 2).reshape(rows * TILE, columns * TILE)
+    return np.ascontiguousarray(whole[:height, :width])
 
 
 def over_pixels(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from .tiles import scattered
 
 
 class Part(NamedTuple):
@@ -17,6 +19,10 @@ class Part(NamedTuple):
     end: int
     samples: int
     more: int
+
+    def meets(self, other: Part) -> bool:
+        """Whether a tile is in both."""
+        return self.first < other.end and other.first < self.end
 
 
 class Work:
@@ -39,19 +45,51 @@ class Work:
         for part in self.parts:
             self.then.ravel()[tiles[part.first:part.end]] += part.more
 
-    def shorten(self, most: int) -> None:
-        """Leaves the first part at most so many samples; the rest of them are another part, behind it."""
-        part = self.parts[0]
-        if part.more > most:
-            self.parts[0] = part._replace(samples=part.samples + most, more=part.more - most)
-            self.parts.appendleft(part._replace(more=most))
+    def add_to_all(self, samples: int) -> None:
+        """Takes it in hand that every tile gets so many more; all must have as many."""
+        every = scattered(self.samples.size)
+        self.take(every, [Part(0, len(every), int(self.samples[0, 0]), samples)])
 
-    def cut(self, tiles: int) -> Part:
-        """Takes at most so many tiles out of hand, of the first part. With the last of them all have their samples."""
-        part = self.parts.popleft()
-        share = part._replace(end=min(part.end, part.first + tiles))
-        if share.end < part.end:
-            self.parts.appendleft(part._replace(first=share.end))
+    def double(self, tiles: NDArray[np.intp]) -> None:
+        """Takes it in hand that these tiles get as many samples as they have, by their number in `samples`."""
+        samples, places = self.samples.ravel()[tiles], np.argsort(scattered(self.samples.size))
+        order = np.lexsort((places[tiles], samples))
+        levels, firsts = (found.tolist() for found in np.unique(samples[order], return_index=True))
+        self.take(tiles[order], [Part(first, end, level, level) for first, end, level
+                                 in zip(firsts, [*firsts[1:], len(tiles)], levels)])
+
+    def cut(self, most: int, least_tiles: int, most_tiles: int | None = None, most_samples: int | None = None,
+            busy: Sequence[Part] = ()) -> Part | None:
+        """Takes out of hand what is next, about `most` samples of a tile's pixels: of `least_tiles` tiles at least, of
+        `most_tiles` and `most_samples` a pixel at most, and of none that are among the `busy`. None where there is
+        nothing left for now.
+
+        What few tiles of many samples leave comes next.
+        """
+        place = next((i for i, part in enumerate(self.parts) if not any(map(part.meets, busy))), None)
+        if place is None:
+            return None
+        part = self.parts[place]
+        more = min(part.more, most_samples or part.more)
+        end = min(part.end, part.first + min(max(least_tiles, most // more), most_tiles or part.end))
+        share = Part(part.first, end, part.samples, min(more, max(1, most // (end - part.first))))
+        del self.parts[place]
+        if end < part.end:
+            self.parts.insert(place, part._replace(first=end))
+        if share.more < part.more:
+            self.parts.insert(place, Part(part.first, end, part.samples + share.more, part.more - share.more))
+        return share
+
+    def give_back(self, share: Part) -> None:
+        """Takes a share in hand again, which was not rendered."""
+        self.parts.appendleft(share)
+
+    def settle(self) -> None:
+        """Once all that was cut is rendered: where nothing is left in hand, all tiles have their samples."""
         if not self.parts:
             self.samples = self.then
-        return share
+
+    @property
+    def left(self) -> int:
+        """Samples of a tile's pixels that are in hand."""
+        return sum((part.end - part.first) * part.more for part in self.parts)

@@ -4,6 +4,6 @@
 
 static inline real3 sky_radiance(const Scene *scene, real3 wi, real *pdf) {
     *pdf = ZERO;
-    return (real3){(real)(scene->environment->color[0]), (real)(scene->environment->color[1]),
-                   (real)(scene->environment->color[2])};
+    return (real3){(real)(RECORD(scene->environment, 0)->color[0]), (real)(RECORD(scene->environment, 0)->color[1]),
+                   (real)(RECORD(scene->environment, 0)->color[2])};
 }

@@ -6,7 +6,7 @@
 #include "light/interface.cl"
 
 static inline real2 sky_uv(const Scene *scene, real3 wi) {
-    real c = (real)(scene->environment->rotation_cos), s = (real)(scene->environment->rotation_sin);
+    real c = (real)(RECORD(scene->environment, 0)->rotation_cos), s = (real)(RECORD(scene->environment, 0)->rotation_sin);
     real x = c * wi.x - s * wi.z, z = s * wi.x + c * wi.z;
     real u = atan2(x, -z) * (0.5f / PI);
     // Near a pole acos(y) loses half its digits and the arc's sine does not.
@@ -17,16 +17,16 @@ static inline real2 sky_uv(const Scene *scene, real3 wi) {
 static inline ireal clamp_index(ireal i, int size) { return i < 0 ? (ireal)(0) : i >= size ? (ireal)(size - 1) : i; }
 
 static inline ireal sky_texel(const Scene *scene, real2 uv) {
-    int width = scene->environment->width, height = scene->environment->height;
+    int width = RECORD(scene->environment, 0)->width, height = RECORD(scene->environment, 0)->height;
     return clamp_index(TO_INT(uv.y * (float)height), height) * width + clamp_index(TO_INT(uv.x * (float)width), width);
 }
 
 static inline float4 sky_texel_at(const Scene *scene, int texel) {
-    return vload4(0, (global const float *)(scene->sky_texels + texel));
+    return vload4(0, (global const float *)RECORD(scene->sky_texels, texel));
 }
 
 static inline real3 sky_radiance_uv(const Scene *scene, real2 uv) {
-    int width = scene->environment->width, height = scene->environment->height;
+    int width = RECORD(scene->environment, 0)->width, height = RECORD(scene->environment, 0)->height;
     real x = uv.x * (float)width - 0.5f, y = uv.y * (float)height - 0.5f;
     ireal column = TO_INT(floor(x)), row = TO_INT(floor(y));
     real fx = x - TO_REAL(column), fy = y - TO_REAL(row);
@@ -55,7 +55,7 @@ static inline real sky_pdf(const Scene *scene, ireal texel, real sin_theta) {
 
 // The one of n steps, each as high as its probability, that u falls into; u becomes the place inside it. `first`: of the
 // table. A search from where the table says that this n-th of [0, 1) begins (Chen and Asau 1974).
-static inline ireal pick_step(global const SkyStep *table, ireal first, int n, real *u) {
+static inline ireal pick_step(ARRAY(SkyStep) table, ireal first, int n, real *u) {
     ireal step = first + GATHER(ireal, table, first + TO_INT(*u * (float)n), .start);
     real top = GATHER(real, table, step, .top);
     for (ireal beyond = *u >= top; ANY(beyond); beyond = *u >= top) {
@@ -68,16 +68,16 @@ static inline ireal pick_step(global const SkyStep *table, ireal first, int n, r
 }
 
 static inline LightSample sky_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
-    int width = scene->environment->width, height = scene->environment->height;
+    int width = RECORD(scene->environment, 0)->width, height = RECORD(scene->environment, 0)->height;
     real x = u.x, y = u.y;
-    ireal row = pick_step(scene->sky_steps + width * height, (ireal)(0), height, &y);
+    ireal row = pick_step(scene->sky_steps, (ireal)(width * height), height, &y);
     ireal column = pick_step(scene->sky_steps, row * width, width, &x), texel = row * width + column;
     real2 uv = {(TO_REAL(column) + x) / (float)width, (TO_REAL(row) + y) / (float)height};
     real sin_phi, cos_phi, sin_theta, cos_theta;
     sincos_turns(uv.x, &sin_phi, &cos_phi);
     sincos_turns(0.5f * uv.y, &sin_theta, &cos_theta);
     real east = sin_theta * sin_phi, south = -sin_theta * cos_phi;
-    real c = (real)(scene->environment->rotation_cos), s = (real)(scene->environment->rotation_sin);
+    real c = (real)(RECORD(scene->environment, 0)->rotation_cos), s = (real)(RECORD(scene->environment, 0)->rotation_sin);
     LightSample sample;
     sample.wi = vector(c * east + s * south, cos_theta, c * south - s * east);
     sample.radiance = sky_radiance_uv(scene, uv);

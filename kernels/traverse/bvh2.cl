@@ -23,14 +23,14 @@ static inline float enter_box(const SlabRay *ray, global const Node *node, float
 static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int first, int count, const bool stop_at_first, Hit *hit) {
 #if LEAF_SPHERES
     if (count < 0) {
-        hit_spheres(ray, scene->leaf_spheres + first, -count, hit);
+        hit_spheres(ray, RECORD(scene->leaf_spheres, first), -count, hit);
         return;
     }
 #endif
 #if TRIANGLES
     for (int i = first; i < first + count; ++i) {
         VISIT(tests);
-        hit_triangles(ray, scene->leaf_triangles + i, stop_at_first, hit);
+        hit_triangles(ray, RECORD(scene->leaf_triangles, i), stop_at_first, hit);
     }
 #endif
 }
@@ -49,13 +49,13 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     int waiting[STACK_SIZE];
     float distance[STACK_SIZE];
     int top = 0, node = 0;
-    if (enter_box(&slabs, scene->nodes, hit.t) == INFINITY) return hit;
+    if (enter_box(&slabs, RECORD(scene->nodes, 0), hit.t) == INFINITY) return hit;
     for (;;) {
-        int count = scene->nodes[node].count, first = scene->nodes[node].left_first;
+        int count = RECORD(scene->nodes, node)->count, first = RECORD(scene->nodes, node)->left_first;
         if (count == 0) {
             VISIT(nodes);
-            float left = enter_box(&slabs, scene->nodes + first, hit.t);
-            float right = enter_box(&slabs, scene->nodes + first + 1, hit.t);
+            float left = enter_box(&slabs, RECORD(scene->nodes, first), hit.t);
+            float right = enter_box(&slabs, RECORD(scene->nodes, first + 1), hit.t);
             bool left_first = left <= right;
             float near = left_first ? left : right, far = left_first ? right : left;
             if (far < INFINITY) {

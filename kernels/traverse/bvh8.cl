@@ -15,13 +15,13 @@ static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int referenc
     if (leaf & 8)
 #endif
     {
-        hit_spheres(ray, scene->leaf_spheres + (leaf >> 4), (leaf & 7) + 1, hit);
+        hit_spheres(ray, RECORD(scene->leaf_spheres, leaf >> 4), (leaf & 7) + 1, hit);
         return;
     }
 #endif
 #if TRIANGLES
     VISIT(tests);
-    hit_triangles(ray, scene->packs + (leaf >> 4), stop_at_first, hit);
+    hit_triangles(ray, RECORD(scene->packs, leaf >> 4), stop_at_first, hit);
 #endif
 }
 
@@ -64,7 +64,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     for (;;) {
         if (reference >= 0) {
             VISIT(nodes);
-            global const Node *node = scene->nodes + reference;
+            global const Node *node = RECORD(scene->nodes, reference);
             float entry[8];
             uint entered = enter_boxes(&slabs, node, hit.t, entry);
             if (entered) {
@@ -91,7 +91,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
                 slabs = slab_ray(&object_rays.slabs, &object, 0);
                 waiting[top] = LEAVE;
                 distance[top++] = -INFINITY;
-                reference = scene->instances[object.instance].root;
+                reference = RECORD(scene->instances, object.instance)->root;
                 continue;
             }
 #endif

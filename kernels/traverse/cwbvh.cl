@@ -70,13 +70,13 @@ static inline void hit_primitive(const Scene *scene, const LeafRay *ray, int i, 
     if (sphere >= 0)
 #endif
     {
-        hit_spheres(ray, scene->leaf_spheres + sphere, 1, hit);
+        hit_spheres(ray, RECORD(scene->leaf_spheres, sphere), 1, hit);
         return;
     }
 #endif
 #if TRIANGLES
     VISIT(tests);
-    hit_triangles(ray, scene->leaf_triangles + i, stop_at_first, hit);
+    hit_triangles(ray, RECORD(scene->leaf_triangles, i), stop_at_first, hit);
 #endif
 }
 
@@ -102,7 +102,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
         uint slot = (highest - 24) ^ order;
         uint node = nodes.first + popcount(nodes.bits & ((1u << slot) - 1));
         VISIT(nodes);
-        enter_node(&slabs, scene->nodes + node, order, hit.t, &nodes, &primitives);
+        enter_node(&slabs, RECORD(scene->nodes, node), order, hit.t, &nodes, &primitives);
 #if INSTANCES
         if (in_world(&leaf) && primitives.bits) {
             if (nodes.bits > 0x00ffffff) waiting[top++] = nodes;

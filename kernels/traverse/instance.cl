@@ -8,8 +8,8 @@
 #define IN_WORLD -1
 
 // With explicit fma there is nothing left to contract: all layouts and devices see the same ray.
-static inline Ray object_ray(const Ray *world, global const Instance *instances, int place) {
-    global const Instance *instance = instances + place;
+static inline Ray object_ray(const Ray *world, ARRAY(Instance) instances, int place) {
+    global const Instance *instance = RECORD(instances, place);
     const float *d = world->direction, *o = world->origin;
     Ray ray = *world;
     for (int k = 0; k < 3; ++k) {

@@ -11,11 +11,12 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
 #if TRIANGLES
     for (int i = 0; i < scene->counts.triangles && !(stop_at_first && hit.primitive >= 0); ++i) {
         VISIT(tests);
-        hit_triangles(&leaf, scene->leaf_triangles + i, stop_at_first, &hit);
+        hit_triangles(&leaf, RECORD(scene->leaf_triangles, i), stop_at_first, &hit);
     }
 #endif
 #if LEAF_SPHERES
-    if (!(stop_at_first && hit.primitive >= 0)) hit_spheres(&leaf, scene->leaf_spheres, scene->counts.spheres, &hit);
+    for (int i = 0; i < scene->counts.spheres && !(stop_at_first && hit.primitive >= 0); ++i)
+        hit_spheres(&leaf, RECORD(scene->leaf_spheres, i), 1, &hit);
 #endif
     return hit;
 }

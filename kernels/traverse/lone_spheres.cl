@@ -10,7 +10,7 @@ static inline Hits meet_spheres(const Scene *scene, real3 origin, real3 directio
     Hits hits = {t_max, ZERO, ZERO, (ireal)(-1), (ireal)(0)};
     const real o[3] = {origin.x, origin.y, origin.z}, d[3] = {direction.x, direction.y, direction.z};
     for (int i = 0; i < scene->counts.spheres; ++i) {
-        global const LeafSphere *sphere = scene->leaf_spheres + i;
+        global const LeafSphere *sphere = RECORD(scene->leaf_spheres, i);
         const real f[3] = {o[0] - sphere->center[0], o[1] - sphere->center[1], o[2] - sphere->center[2]};
         ireal meets = enabled ? lone_may_meet(f, d, sphere->radius) : NO_LANES;   // idle lanes hold no rays
         if (!ANY(meets)) continue;

@@ -118,9 +118,9 @@ static inline Hits trace_packet(const Scene *scene, Packet *packet, real t_max, 
         int reference = waiting[--top];
         if (!ANY((entries[top] <= hits.t) & packet->active)) continue;
         if (reference >= 0) {
-            top = push_children(packet, scene->nodes + reference, hits.t, waiting, entries, top);
+            top = push_children(packet, RECORD(scene->nodes, reference), hits.t, waiting, entries, top);
         } else {
-            hit_pack(packet, scene->packs + (~reference >> 4), &hits);
+            hit_pack(packet, RECORD(scene->packs, ~reference >> 4), &hits);
             if (stop_at_first) packet->active = packet->active & (hits.primitive < 0);
         }
     }

@@ -23,14 +23,15 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     int packs = (scene->counts.triangles + WIDTH - 1) / WIDTH;
     for (int i = 0; i < packs; ++i) VISIT(tests);
 #if NEXT_HIT
-    meet_packs_exactly(&leaf, scene->packs, packs, stop_at_first, &hit);
+    meet_packs_exactly(&leaf, RECORD(scene->packs, 0), packs, stop_at_first, &hit);
 #else
-    if (!meet_packs(&leaf.triangle_ray, scene->packs, packs, stop_at_first, &hit))
-        meet_packs_exactly(&leaf, scene->packs, packs, stop_at_first, &hit);
+    if (!meet_packs(&leaf.triangle_ray, RECORD(scene->packs, 0), packs, stop_at_first, &hit))
+        meet_packs_exactly(&leaf, RECORD(scene->packs, 0), packs, stop_at_first, &hit);
 #endif
 #endif
 #if LEAF_SPHERES
-    if (!(stop_at_first && hit.primitive >= 0)) hit_spheres(&leaf, scene->leaf_spheres, scene->counts.spheres, &hit);
+    for (int i = 0; i < scene->counts.spheres && !(stop_at_first && hit.primitive >= 0); ++i)
+        hit_spheres(&leaf, RECORD(scene->leaf_spheres, i), 1, &hit);
 #endif
     return hit;
 }

@@ -20,12 +20,12 @@ static inline FlightRay flight_ray(const FlightRays *rays, const Ray *ray, int l
 }
 
 static inline void fetch(const Scene *scene, int reference) {
-    global const void *node = scene->nodes + reference;
+    global const void *node = RECORD(scene->nodes, reference);
 #if TRIANGLES
-    node = reference < 0 ? (global const void *)(scene->packs + (~reference >> 4)) : node;
+    node = reference < 0 ? (global const void *)RECORD(scene->packs, ~reference >> 4) : node;
 #endif
 #if LEAF_SPHERES
-    node = reference < 0 && (~reference & 8) ? (global const void *)(scene->leaf_spheres + (~reference >> 4)) : node;
+    node = reference < 0 && (~reference & 8) ? (global const void *)RECORD(scene->leaf_spheres, ~reference >> 4) : node;
 #endif
     PREFETCH(node, FETCH_LINES * 64)
 }
@@ -75,7 +75,7 @@ static inline int next_waiting(Flight *f, const bool stop_at_first) {
 
 static inline int visit_node(const Scene *scene, Flight *f, const bool stop_at_first) {
     VISIT(nodes);
-    global const Node *node = scene->nodes + f->reference;
+    global const Node *node = RECORD(scene->nodes, f->reference);
     float8 entry;
     int8 mask = enter_eight(&f->ray.boxes, node->lo[0], f->hit.t, &entry);
     uint entered = mask_bits(mask);
@@ -102,7 +102,7 @@ static inline int visit_leaf(const Scene *scene, Flight *f, const bool stop_at_f
         f->ray = flight_ray(&rays, &object, 0);
         f->waiting[f->top] = LEAVE;
         f->distance[f->top++] = -INFINITY;
-        return scene->instances[object.instance].root;
+        return RECORD(scene->instances, object.instance)->root;
     }
 #endif
     hit_leaf(scene, &f->ray.leaf, f->reference, stop_at_first, &f->hit);

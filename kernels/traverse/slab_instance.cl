@@ -13,5 +13,5 @@ static inline int enter_instance(const Scene *scene, const Ray *world, int place
     SlabRays all = slab_rays(direction);
     *leaf = leaf_ray(&leaves, &ray, 0);
     *slabs = slab_ray(&all, &ray, 0);
-    return scene->instances[place].root;
+    return RECORD(scene->instances, place)->root;
 }

@@ -2,7 +2,7 @@
 // nodes whose children's boxes are met, and tests of what is in leaves, be it a triangle or a pack of eight.
 
 #if COUNT_VISITS
-#define VISIT(what) atomic_inc((volatile global uint *)&scene->visits->what)
+#define VISIT(what) atomic_inc((volatile global uint *)&RECORD(scene->visits, 0)->what)
 #else
 #define VISIT(what)
 #endif

@@ -67,6 +67,16 @@ def started(*options: str, cwd: Path) -> subprocess.Popen[str]:
     return process
 
 
+def worker_of(process: subprocess.Popen[bytes] | subprocess.Popen[str]) -> int:
+    """The process that renders."""
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    for _ in range(500):
+        if found := children.read_text().split():
+            return int(found[0])
+        time.sleep(0.01)
+    raise AssertionError("nobody renders")
+
+
 def arrays(path: Path) -> dict[str, bytes]:
     """All that a checkpoint holds but the history, which knows the time."""
     return {name: array.tobytes() for name, array in read_checkpoint(path, KINDS)[1].items() if name != "history"}
@@ -123,7 +133,7 @@ def test_a_full_disk_ends_no_render(folder: Path) -> None:
     options, limit = ("--size", "512x384", "--spp", "40", "-o", "a.png", "--report", "r.json"), 1_000_000
     assert clrt(*RENDER, "--size", "512x384", "--spp", "1", cwd=folder).returncode == 0
     process = started(*options, cwd=folder)
-    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (limit, limit))
+    resource.prlimit(worker_of(process), resource.RLIMIT_FSIZE, (limit, limit))
     output, messages = process.communicate(timeout=60)
     assert messages.count("checkpoint cannot be written") == 1 and "Traceback" not in messages
     film = read_checkpoint(folder / "a.ck", KINDS)[1]["film"]

@@ -147,7 +147,7 @@ file = "nowhere.ply"
     (("render", "ball.toml", "--spp", "0"), 2, ["--spp"]),
     (("render", "ball.toml", "--time", "-1"), 2, ["time", "-1"]),
     (("render", "ball.toml", "-o", "r.exr", "--reference", "r.exr"), 2, ["r.exr", "reference"]),
-    (("render", "ball.toml", "--size", "60000x60000"), 4, ["60000x60000", "bytes", "--size"]),
+    (("render", "ball.toml", "--size", "60000x60000"), 4, ["60000x60000", "GiB", "--size"]),
     (("compare", "ball.toml", "ball.toml"), 3, ["ball.toml"]),
 ])
 def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], code: int, words: list[str]) -> None:

@@ -35,7 +35,7 @@ def test_interrupted_again_and_again(device: Device, tmp_path: Path, small_launc
     hops, running = 0, at_once
     for launches in _counts():
         running = renderer(device, adaptive=adaptive, checkpoint=tmp_path / "a.ck", resume=True)
-        _interrupt_after(running, launches)
+        interrupt_after(running, launches)
         run(running, **stops)
         if running.stop_reason != "interrupted":
             break
@@ -51,16 +51,17 @@ def _counts() -> Iterator[int]:
         yield int(rng.integers(1, 12))
 
 
-def _interrupt_after(running: Renderer, launches: int) -> None:
-    launch, left = running.session._launch, [launches]
+def interrupt_after(running: Renderer, launches: int) -> None:
+    """Has it interrupted as so much work was cut for launches."""
+    cut, left = running.session.work.cut, [launches]
 
-    def counted() -> Any:
+    def counted(*arguments: Any) -> Any:
         left[0] -= 1
         if left[0] == 0:
             running.interrupt()
-        return launch()
+        return cut(*arguments)
 
-    running.session._launch = counted  # type: ignore[method-assign]
+    setattr(running.session.work, "cut", counted)
 
 
 @pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])

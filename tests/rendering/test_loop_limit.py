@@ -20,7 +20,7 @@ from clrt.rendering import loop_limit
 from clrt.rendering.first_hits import first_hits
 from clrt.rendering.guides import render_guides
 from clrt.rendering.renderer import Renderer
-from clrt.rendering.session import Session
+from clrt.rendering.picture import Picture
 from clrt.rendering.work import Part, Work
 from clrt.scene.materials import Diffuse
 from clrt.scene.model import Camera, Mesh, Scene
@@ -70,9 +70,10 @@ def test_short_launches_change_nothing(device: Device, turns: int, monkeypatch: 
     limit(monkeypatch, turns)
     launched = list[Part]()
 
-    def cut(work: Work, tiles: int, original: Callable[[Work, int], Part] = Work.cut) -> Part:
-        launched.append(original(work, tiles))
-        return launched[-1]
+    def cut(*arguments: Any, original: Callable[..., Part | None] = Work.cut, **limits: Any) -> Part | None:
+        part = original(*arguments, **limits)
+        launched.extend([part] if part else [])
+        return part
 
     monkeypatch.setattr(Work, "cut", cut)
     assert np.array_equal(picture(device), whole)
@@ -86,9 +87,9 @@ def test_work_is_shortened_in_order() -> None:
     work.take(np.arange(3), [Part(0, 3, 0, 7)])
     done = []
     while work.parts:
-        work.shorten(3)
-        done.append(work.cut(2))
-    assert done == [Part(0, 2, 0, 3), Part(2, 3, 0, 3), Part(0, 2, 3, 3), Part(2, 3, 3, 3), Part(0, 2, 6, 1),
+        done.append(work.cut(100, 2, most_tiles=2, most_samples=3))
+    work.settle()
+    assert done == [Part(0, 2, 0, 3), Part(0, 2, 3, 3), Part(0, 2, 6, 1), Part(2, 3, 0, 3), Part(2, 3, 3, 3),
                     Part(2, 3, 6, 1)]
     assert work.samples.tolist() == [[7, 7, 7]]
 
@@ -130,7 +131,7 @@ def test_too_long_lists_are_refused(device: Device) -> None:
 def test_pixels_that_were_ended_are_missed(device: Device, entry: str, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     limit(monkeypatch, 50_000)
-    render: dict[str, Callable[[Session], dict[str, Any]]] = {
+    render: dict[str, Callable[[Picture], dict[str, Any]]] = {
         "guides": render_guides,
         "first_hit": lambda session: first_hits(session, scene(), ["normal", "depth"])}
     seen = render[entry](Renderer(scene(), device=device.info.id, size=SIZE).session)

@@ -1,0 +1,109 @@
+"""A compiled scene on a device: its program built, its buffers uploaded, ready to take pixels."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pyopencl as cl
+from numpy.typing import NDArray
+
+from ..device.arrays import on_device, on_host
+from ..device.background import in_background
+from ..device.launch import calling, wait_for
+from ..device.memory import array_bytes, check_memory, part_count, part_records, parts, size
+from ..device.open import Device
+from ..device.program import BuiltProgram, build, make_kernel
+from ..device.pulse import taking_any_time
+from ..errors import NoRoomError
+from .compile import CompiledScene
+from .loop_limit import most_samples
+
+#: Defined in programs whose film is the pixels of a launch.
+WINDOWS = "#define FILM_WINDOWS 1\n"
+#: Bytes of their pixels on the device, at most.
+WINDOW = 64 << 20
+#: Bytes of a kernel's parameters beside pointers to the scene's arrays and its counts: two pointers.
+OTHER_PARAMETERS = 16
+
+
+def largest_film(device: Device, compiled: CompiledScene) -> int:
+    """Bytes that a film may take there."""
+    pixel = compiled.choices.pixel.itemsize
+    if compiled.part_bytes is None:
+        return device.info.max_alloc_bytes
+    return part_records(pixel, compiled.part_bytes) * pixel
+
+
+class SceneOnDevice:
+    """launch: the LAUNCH record, whose ranges are for its user to set; film_bytes: what the film will take there;
+    windows: whether that is for the pixels of a launch, not the picture's.
+
+    Raises DeviceError, with the numbers, where scene and film do not fit, and KernelError.
+    """
+
+    def __init__(self, device: Device, compiled: CompiledScene, launch: NDArray[Any], film_bytes: int,
+                 windows: bool = False) -> None:
+        self.device, self.compiled, self.launch, self.film_bytes = device, compiled, launch, film_bytes
+        self._check_memory()
+        primitives = int(compiled.counts["triangles"][0] + compiled.counts["spheres"][0])
+        #: Of a pixel, in one launch; None where it does not matter.
+        self.most_samples = most_samples(device, compiled.tree, primitives, int(launch["max_depth"][0]))
+        self.program: BuiltProgram = build(device, WINDOWS * windows + compiled.source)
+        with self.allocating():
+            scene = [self._uploaded(array) for _, array in compiled.buffers.values()]
+        self._kernel = make_kernel(device, self.program, compiled.kernel)
+        #: What every kernel of the scene takes first (SCENE_PARAMETERS).
+        self.scene_arguments = [*sum(scene, []), compiled.counts[0]]
+        self.build_seconds = self.program.build_seconds
+
+    def _uploaded(self, array: Any) -> list[cl.Buffer]:
+        if self.compiled.part_bytes is None:
+            return [on_device(self.device, array)]
+        values = on_host(self.device, array)
+        return [on_device(self.device, part) for part in parts(values, self.compiled.part_bytes)]
+
+    @property
+    def device_bytes(self) -> int:
+        """Memory of all buffers on the device."""
+        return self.compiled.bytes + self.film_bytes
+
+    def _check_memory(self) -> None:
+        compiled, part_bytes = self.compiled, self.compiled.part_bytes
+        needs = {name: array_bytes(array, part_bytes) for name, (_, array) in compiled.buffers.items()}
+        pointers = sum(part_count(array, part_bytes) for _, array in compiled.buffers.values())
+        check_memory(self.device.info, {**needs, "film": self.film_bytes},
+                     8 * pointers + compiled.counts.itemsize + self.launch.itemsize + OTHER_PARAMETERS,
+                     self.device.cl.max_parameter_size)
+
+    @contextmanager
+    def allocating(self) -> Iterator[None]:
+        """Around what takes memory there: NoRoomError where the device has not enough."""
+        try:
+            yield
+        except cl.MemoryError as error:
+            raise NoRoomError(f"{self.device.info.name}: {size(self.device_bytes)} do not fit: {error}") from error
+
+    def warm_up(self, film: cl.Buffer, tiles: cl.Buffer) -> None:
+        """Launches no work: some drivers compile, or take memory, at the first launch. It belongs to the build."""
+        start = time.perf_counter()
+        self.launch["pixel_count"] = 0
+        with taking_any_time():
+            wait_for(in_background(self.device.info.name, lambda: self.enqueue_pixels(film, tiles)))
+        self.build_seconds += time.perf_counter() - start
+
+    def enqueue_pixels(self, film: cl.Buffer, tiles: cl.Buffer) -> cl.Event:
+        """Enqueues the integrator for the range in the launch record, of the picture's tiles in `tiles`."""
+        self._kernel.set_args(*self.scene_arguments, film, tiles, self.launch[0])
+        return self.enqueue(self._kernel, int(self.launch["pixel_count"][0]))
+
+    def enqueue(self, kernel: cl.Kernel, pixel_count: int) -> cl.Event:
+        """Enqueues a kernel of the scene, whose arguments are set, for as many pixels."""
+        local = self.device.local_size
+        groups = max(1, -(-pixel_count // (self.compiled.choices.lanes * local)))
+        with calling():
+            event = cl.enqueue_nd_range_kernel(self.device.queue, kernel, (groups * local,), (local,))
+            self.device.queue.flush()
+        return event

@@ -1,0 +1,140 @@
+"""A picture in the making, whoever renders it: which samples it has, and how it gets more."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import NDArray
+
+from ..device.open import Device
+from .compile import CompiledScene
+from .film import Film
+from .on_device import SceneOnDevice
+from .tiles import tile_pixels, tiles_of
+from .work import Work
+
+
+class Picture(ABC):
+    """The samples of one compiled scene at one size. Nothing depends on how the work is cut, or on who does it."""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self.size = size
+        self.work = Work(np.zeros(tiles_of(size), np.int64))
+
+    @property
+    def tile_samples(self) -> NDArray[np.int64]:
+        """(rows, columns) samples that the pixels of each tile have, or had before the work in hand."""
+        return self.work.samples
+
+    @property
+    def samples_done(self) -> int:
+        """Samples a pixel, the mean over all, rounded."""
+        width, height = self.size
+        return round(int(np.sum(self.tile_samples * tile_pixels(self.size))) / (width * height))
+
+    def render(self, samples: int) -> Iterator[None]:
+        """Adds the next `samples` samples to every pixel, in bounded launches; yields after each.
+
+        All tiles must have as many. If it is left before its end, the next call, of `double` too, first ends that.
+        """
+        if not self._busy:
+            self.work.add_to_all(samples)
+            self._begin_work()
+        yield from self._work()
+
+    def double(self, tiles: NDArray[np.intp]) -> Iterator[None]:
+        """Doubles the samples of these tiles, by their number in `tile_samples`; otherwise like `render`."""
+        if not self._busy:
+            self.work.double(tiles)
+            self._begin_work()
+        yield from self._work()
+
+    @property
+    def _busy(self) -> bool:
+        """Whether there is work in hand."""
+        return bool(self.work.parts)
+
+    def _begin_work(self) -> None:
+        """Hears that other work is in hand."""
+
+    @abstractmethod
+    def _work(self) -> Iterator[None]:
+        """Launches what is in hand."""
+
+    @abstractmethod
+    def wait(self) -> None:
+        """Waits for the launches in flight."""
+
+    @abstractmethod
+    def pass_limit(self) -> int:
+        """The most samples a pixel that one pass should add, so that ending inside a pass leaves an even picture."""
+
+    @abstractmethod
+    def film(self) -> Film:
+        """The film so far; waits for the launches in flight."""
+
+    @abstractmethod
+    def restore(self, film: Film, work: Work) -> None:
+        """Goes on from a film of this size and the work that it was rendered by."""
+
+    @property
+    @abstractmethod
+    def scene(self) -> SceneOnDevice:
+        """The scene where other kernels can be run on it."""
+
+    @property
+    @abstractmethod
+    def longest_launch(self) -> float:
+        """Seconds of the launch that took longest."""
+
+    @property
+    def scenes(self) -> list[SceneOnDevice]:
+        """The scene on every device that is still there."""
+        return [self.scene]
+
+    @property
+    def build_seconds(self) -> float:
+        """What building its programs took."""
+        return sum(scene.build_seconds for scene in self.scenes)
+
+    @property
+    def cached(self) -> bool:
+        """Whether all programs had been built before."""
+        return all(scene.program.cached for scene in self.scenes)
+
+    @property
+    def device_bytes(self) -> int:
+        """Memory of all buffers, on the device that has most."""
+        return max(scene.device_bytes for scene in self.scenes)
+
+    def shares(self) -> list[dict[str, Any]]:
+        """What each of several devices did, for the report."""
+        return []
+
+    @property
+    def device(self) -> Device:
+        """The scene's."""
+        return self.scene.device
+
+    @property
+    def compiled(self) -> CompiledScene:
+        """The scene's."""
+        return self.scene.compiled
+
+    @property
+    def launch(self) -> NDArray[Any]:
+        """The scene's LAUNCH record."""
+        return self.scene.launch
+
+    @property
+    def scene_arguments(self) -> list[Any]:
+        """What every kernel of the scene takes first."""
+        return self.scene.scene_arguments
+
+    def enqueue(self, kernel: cl.Kernel, pixel_count: int) -> cl.Event:
+        """See `SceneOnDevice.enqueue`."""
+        return self.scene.enqueue(kernel, pixel_count)

@@ -1,0 +1,106 @@
+"""Several devices and one picture: it is the one of a device alone, whoever does what, and whoever fails."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clrt.device.open import Device
+from clrt.errors import DeviceError
+from clrt.rendering.crew import Crew
+from clrt.rendering.renderer import Renderer
+from clrt.rendering.session import Session
+from clrt.rendering.worker import Worker
+
+from .checkpoints import SIZE, renderer, run, same
+from .test_checkpoint import interrupt_after
+from .test_noise import room
+
+
+def crew(device: Device, count: int = 2, **options: Any) -> Renderer:
+    """The same device several times, which is several devices to OpenCL: contexts, queues and programs of their own."""
+    given = {"size": SIZE, "seed": 1, "spp": 24, "checkpoint_seconds": 0.0, **options}
+    return Renderer(room(), device=[device.info.index] * count, **given)
+
+
+@pytest.fixture
+def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that a pass is many of them."""
+    monkeypatch.setattr("clrt.rendering.crew.FEWEST_TILES", 5)
+    monkeypatch.setattr("clrt.rendering.session.FEWEST_TILES", 5)
+    monkeypatch.setattr("clrt.device.launch.TARGET_SECONDS", 1e-9)
+
+
+@pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
+@pytest.mark.parametrize("stops", [{"spp": 40}, {"error": 0.1}], ids=str)
+@pytest.mark.parametrize("count", [2, 3])
+def test_same_picture(device: Device, adaptive: bool, stops: dict[str, float], count: int) -> None:
+    """Bit for bit, with its estimates, and where an error ends it; all of them took part."""
+    alone, together = renderer(device, adaptive=adaptive), crew(device, count, adaptive=adaptive)
+    run(alone, **stops)
+    run(together, **stops)
+    assert isinstance(alone.session, Session) and isinstance(together.session, Crew) and same(alone, together)
+    assert sum(worker.samples > 0 for worker in together.session.workers) >= 2
+
+
+@pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
+def test_interrupted_it_goes_on_alone_and_together(device: Device, tmp_path: Path, small_launches: None,
+                                                   adaptive: bool) -> None:
+    """Checkpoints of one device, of two and of three: each goes on with the other's, inside a pass, too."""
+    at_once = renderer(device, adaptive=adaptive)
+    run(at_once, spp=24)
+    rng, hops, in_hand = np.random.default_rng(5), 0, 0
+    while True:
+        running = crew(device, 1 + hops % 3, adaptive=adaptive, checkpoint=tmp_path / "a.ck", resume=True)
+        interrupt_after(running, int(rng.integers(3, 20)))
+        run(running, spp=24)
+        if running.stop_reason != "interrupted":
+            break
+        in_hand += bool(running.session.work.parts)
+        hops += 1
+    assert hops > 4 and in_hand > 2 and same(at_once, running)
+
+
+@pytest.mark.parametrize("when", [2, 5, 9, 14])
+@pytest.mark.parametrize("where", ["begin", "ended"])
+def test_one_that_fails_is_left_out(device: Device, small_launches: None, caplog: pytest.LogCaptureFixture,
+                                    monkeypatch: pytest.MonkeyPatch, when: int, where: str) -> None:
+    """At any moment: its shares are done again, also what it had begun."""
+    at_once = renderer(device)
+    run(at_once, spp=24)
+    running = crew(device, 3)
+    assert isinstance(running.session, Crew)
+    _fail_after(running.session.workers[1], where, when, monkeypatch)
+    run(running, spp=24)
+    assert len(running.session.workers) == 2
+    assert same(at_once, running) and caplog.text.count("is left out: out of order") == 1
+    assert [entry["lost"] for entry in running.session.shares()] == [False, False, True]
+
+
+def test_none_left(device: Device, small_launches: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It ends as the last one did, and the checkpoint leads to the same picture."""
+    at_once, running = renderer(device), crew(device, 2, checkpoint=tmp_path / "a.ck")
+    run(at_once, spp=24)
+    assert isinstance(running.session, Crew)
+    for when, worker in zip((12, 20), list(running.session.workers)):
+        _fail_after(worker, "ended", when, monkeypatch)
+    with pytest.raises(DeviceError, match="out of order"):
+        run(running, spp=24)
+    again = crew(device, 2, checkpoint=tmp_path / "a.ck", resume=True)
+    run(again, spp=24)
+    assert same(at_once, again)
+
+
+def _fail_after(worker: Worker, where: str, calls: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    method, left = getattr(worker, where), [calls]
+
+    def fails(*arguments: Any) -> Any:
+        left[0] -= 1
+        if left[0] < 0:
+            raise DeviceError("out of order")
+        return method(*arguments)
+
+    monkeypatch.setattr(worker, where, fails)

@@ -1,0 +1,122 @@
+"""Devices whose buffers are small: arrays in parts, the film on the host, and the same picture."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+from clrt.device.memory import OVERLAP, VARIABLE, largest_buffer, part_count, part_records, parts
+from clrt.device.open import Device
+from clrt.errors import NoRoomError, UsageError
+from clrt.rendering.guides import render_guides
+from clrt.rendering.crew import Crew
+from clrt.rendering.renderer import Renderer
+from clrt.rendering.session import Session
+from clrt.scene.materials import Diffuse
+from clrt.scene.model import Mesh, Scene, Sphere
+
+from .rays import icosphere
+from .test_variants import everything, painted
+
+
+def scene() -> Scene:
+    """With textures and so many spheres that they are in the tree."""
+    centers = np.random.default_rng(1).uniform(-3, 3, (400, 3))
+    more = [Sphere(center=(float(x), float(y), float(z)), radius=0.05) for x, y, z in centers]
+    full = painted(everything())
+    return replace(full, spheres=[*full.spheres, *more])
+
+
+def film(device: Device, layout: str) -> tuple[Renderer, bytes]:
+    running = Renderer(scene(), device=device.info.index, layout=layout, spp=4)
+    return running, list(running.passes(spp=4))[-1].film.pixels.tobytes()
+
+
+@pytest.mark.parametrize(("layout", "limit"), [("bvh8", 8), ("bvh8", 24), ("bvh2", 8), ("cwbvh", 8), ("list", 8)])
+def test_in_parts_it_is_the_same_picture(device: Device, monkeypatch: pytest.MonkeyPatch, layout: str,
+                                         limit: int) -> None:
+    """Bit for bit; no buffer is larger than allowed, and of 8 KiB most arrays fill several."""
+    whole, expected = film(device, layout)
+    assert isinstance(whole.session, Session) and whole.compiled.part_bytes is None
+    monkeypatch.setenv(VARIABLE, f"{limit}K")
+    running, found = film(device, layout)
+    buffers = [each for each in running.session.scene_arguments if isinstance(each, cl.Buffer)]
+    assert isinstance(running.session, Crew) and found == expected
+    assert max(buffer.size for buffer in buffers) <= limit << 10
+    assert len(buffers) > len(running.compiled.buffers) + (0 if limit > 8 else 6)
+
+
+def test_only_the_film_is_too_large(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Then the program is the one of large buffers, but for where the film's pixels are."""
+    whole, expected = film(device, "bvh8")
+    monkeypatch.setenv(VARIABLE, "80K")
+    running, found = film(device, "bvh8")
+    assert isinstance(running.session, Crew) and found == expected
+    assert running.compiled.part_bytes is None and running.compiled.source == whole.compiled.source
+
+
+def test_other_kernels_see_the_parts(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = render_guides(film(device, "bvh8")[0].session, 2)
+    monkeypatch.setenv(VARIABLE, "8K")
+    found = render_guides(film(device, "bvh8")[0].session, 2)
+    assert all(found[name].tobytes() == expected[name].tobytes() for name in expected)
+
+
+@pytest.mark.parametrize(("limit", "words"), [("4K", [f"{VARIABLE} must be 5440", "4096"]),
+                                              ("5440", ["5.312 KiB at most", "MiB would be in more", VARIABLE])])
+def test_too_small_is_told_with_numbers(device: Device, monkeypatch: pytest.MonkeyPatch, limit: str,
+                                        words: list[str]) -> None:
+    """A pack of triangles takes 320 bytes, and 17 must fit."""
+    monkeypatch.setenv(VARIABLE, limit)
+    vertices, faces = icosphere(4)
+    with pytest.raises(NoRoomError) as raised:
+        Renderer(Scene(meshes=[Mesh(vertices, faces, Diffuse())]), device=device.info.index, layout="bvh8")
+    assert all(word in str(raised.value) for word in words), raised.value
+
+
+@pytest.mark.parametrize("size", [1, 16, 100, 112, 113, 500])
+def test_parts_hold_all_and_end_with_the_next(size: int) -> None:
+    """16-byte records in parts of 2 KiB: 112 of their own."""
+    values = np.arange(4 * size, dtype=np.int32).view([("x", "i4", 4)])
+    found, own = list(parts(values, 2048)), part_records(16, 2048)
+    assert own == 112 and len(found) == part_count(values, 2048) and max(part.nbytes for part in found) <= 2048
+    for i in range(size):
+        assert found[i // own][i % own] == values[i]
+        run = values[i:i + OVERLAP + 1]
+        assert np.array_equal(found[i // own][i % own:i % own + len(run)], run)
+
+
+@pytest.mark.parametrize(("text", "expected"), [("", 1 << 40), ("65536", 1 << 16), ("1M", 1 << 20), ("9999G", 1 << 40)])
+def test_the_variable(monkeypatch: pytest.MonkeyPatch, text: str, expected: int) -> None:
+    monkeypatch.setenv(VARIABLE, text)
+    assert largest_buffer(1 << 40) == expected
+
+
+@pytest.mark.parametrize("text", ["0", "1T", "much", "-1", "1.5M"])
+def test_what_the_variable_cannot_be(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    monkeypatch.setenv(VARIABLE, text)
+    with pytest.raises(UsageError, match=VARIABLE):
+        largest_buffer(1 << 40)
+
+
+def test_where_there_is_no_room_windows_are_halved(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A driver that gives no buffer of more than 100 KiB, though it promised more."""
+    make = cl.Buffer
+
+    def stingy(context: cl.Context, flags: int, size: int = 0, hostbuf: Any = None) -> cl.Buffer:
+        if max(size, getattr(hostbuf, "nbytes", 0)) > 100_000:
+            raise cl.MemoryError("clCreateBuffer", -4, "none left")
+        return make(context, flags, size, hostbuf)
+
+    monkeypatch.setattr(cl, "Buffer", stingy)
+    monkeypatch.setattr("clrt.rendering.worker.FEWEST_TILES", 4)
+    running = Renderer(scene(), device=device.info.index, layout="bvh8", spp=4, size=(90, 66))
+    state = list(running.passes(spp=4))[-1]
+    assert isinstance(running.session, Crew) and running.session.workers[0].window_tiles == 13
+    monkeypatch.undo()
+    again = Renderer(scene(), device=device.info.index, layout="bvh8", spp=4, size=(90, 66))
+    assert state.film.pixels.tobytes() == list(again.passes(spp=4))[-1].film.pixels.tobytes()

@@ -1,0 +1,73 @@
+"""How the work in hand is cut: whoever takes the shares, each tile's samples come once, in their order."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clrt.rendering.tiles import row_by_row, scattered, tile_by_tile
+from clrt.rendering.work import Part, Work
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_samples_come_once_and_in_their_order(seed: int) -> None:
+    """Shares of all sizes are in flight together, end in any order, and some fail and are given back."""
+    rng = np.random.default_rng(seed)
+    work, done = Work(np.zeros((5, 7), np.int64)), np.zeros(35, np.int64)
+    in_flight: list[Part] = []
+    for step in range(4):
+        if step % 2:
+            work.double(rng.permutation(35)[:rng.integers(1, 36)])
+        else:
+            work.samples = work.then = np.full((5, 7), done.max())
+            done[:] = done.max()
+            work.add_to_all(int(rng.integers(1, 40)))
+        while work.parts or in_flight:
+            share = work.cut(int(rng.integers(0, 200)), int(rng.integers(1, 9)), int(rng.integers(9, 40)),
+                             int(rng.integers(1, 60)), in_flight)
+            assert share is not None or in_flight
+            in_flight += [share] if share else []
+            if not share or rng.random() < 0.5:
+                ended = in_flight.pop(int(rng.integers(len(in_flight))))
+                if rng.random() < 0.2:
+                    work.give_back(ended)
+                    continue
+                tiles = work.tiles[ended.first:ended.end]
+                assert np.all(done[tiles] == ended.samples)
+                done[tiles] += ended.more
+        work.settle()
+        assert np.array_equal(done, work.samples.ravel())
+
+
+@pytest.mark.parametrize("most, least, expected", [
+    (100, 1, Part(0, 10, 3, 8)), (16, 1, Part(0, 2, 3, 8)), (4, 1, Part(0, 1, 3, 4)), (4, 4, Part(0, 4, 3, 1)),
+    (0, 5, Part(0, 5, 3, 1)), (40, 10, Part(0, 10, 3, 4))])
+def test_a_share_is_no_larger_than_asked(most: int, least: int, expected: Part) -> None:
+    """Of tiles times samples, down to a sample of the fewest tiles; what few tiles leave comes before other tiles."""
+    work = Work(np.full((2, 5), 3))
+    work.add_to_all(8)
+    assert work.cut(most, least) == expected and work.left == 80 - (expected.end - expected.first) * expected.more
+    if expected.more < 8:
+        assert work.parts[0] == Part(0, expected.end, 3 + expected.more, 8 - expected.more)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7, 64, 100, 1023, 4096])
+def test_every_stretch_is_spread(count: int) -> None:
+    """Of k numbers in a row the gaps are at most (1 + golden ratio) times what they would be at best, and a bit."""
+    order = scattered(count)
+    assert sorted(order) == list(range(count))
+    for k in (k for k in (2, 5, 13, 40) if k < count):
+        for first in range(0, count - k, max(1, count // 7)):
+            places = np.sort(order[first:first + k])
+            gaps = np.diff([*places, places[0] + count])
+            assert gaps.max() <= 2.7 * count / k + 3
+
+
+@pytest.mark.parametrize("size", [(8, 8), (1, 1), (61, 44), (64, 7)])
+def test_tile_by_tile_and_back(size: tuple[int, int]) -> None:
+    """A tile is eight rows of eight."""
+    values = np.arange(size[0] * size[1]).reshape(size[1], size[0])
+    tiles = tile_by_tile(values)
+    assert np.array_equal(row_by_row(tiles, size), values)
+    inside = np.pad(values, ((0, -size[1] % 8), (0, -size[0] % 8)))[:8, :8]
+    assert np.array_equal(tiles[0], inside.ravel())
