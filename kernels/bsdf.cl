@@ -99,11 +99,43 @@ static inline real3 bsdf_albedo(const Bsdf *bsdf) {
     return albedo;
 }
 
-// Whether a sample leaves to the side of the geometric normal that its direction names; cos_ng: that direction's with it.
-static inline ireal keeps_its_side(const BsdfSample *sample, real cos_ng) {
+// Whether a direction is on the same side of the geometric normal as of the shading normal, given its cosines with them.
+static inline ireal same_side(real cos_ns, real cos_ng) {
 #if TRANSMISSION
-    return ((sample->wi.z > 0.0f) & (cos_ng > 0.0f)) | ((sample->wi.z < 0.0f) & (cos_ng < 0.0f));
+    return ((cos_ns > 0.0f) & (cos_ng > 0.0f)) | ((cos_ns < 0.0f) & (cos_ng < 0.0f));
 #else
     return cos_ng > 0.0f;
 #endif
 }
+
+// Whether a sample leaves to the side of the geometric normal that its direction names; cos_ng: that direction's with it.
+static inline ireal keeps_its_side(const BsdfSample *sample, real cos_ng) { return same_side(sample->wi.z, cos_ng); }
+
+#if TRANSMISSION_LOBES
+// The normal by which lights are chosen: none where the material spreads light from behind the surface, too.
+static inline real3 choosing_normal(const Bsdf *bsdf, real3 n) {
+    real3 chosen = n;
+#define SPREADING(name, number) chosen = choose(bsdf->type == number, splat(ZERO), chosen);
+    SPREADING_TYPES(SPREADING)
+    return chosen;
+}
+#else
+#define choosing_normal(bsdf, n) (n)
+#endif
+
+#if ATTENUATION
+// What is absorbed of light beyond the surface, per unit of length.
+static inline real3 absorption_beyond(const Bsdf *bsdf) {
+    real3 absorption = splat(ZERO);
+#define ABSORBING(name, number) absorption = choose(bsdf->type == number, bsdf->name.absorption, absorption);
+    ABSORBING_TYPES(ABSORBING)
+    return absorption;
+}
+
+// What is left of light after a distance (Beer and Lambert); all of it where nothing absorbs, however far.
+static inline real3 attenuated(real3 absorption, real distance) {
+    return vector(absorption.x > 0.0f ? exp(-absorption.x * distance) : ONE,
+                  absorption.y > 0.0f ? exp(-absorption.y * distance) : ONE,
+                  absorption.z > 0.0f ? exp(-absorption.z * distance) : ONE);
+}
+#endif

@@ -18,6 +18,9 @@ typedef struct {
 #if TRANSMISSION
     real spread;   // radiance at the eye over that here, by the media between (bsdf/interface.cl)
 #endif
+#if ATTENUATION
+    real3 absorption;   // along wi, per unit of length
+#endif
 } Step;
 
 #if TRANSMISSION
@@ -50,16 +53,21 @@ static inline real3 found_light(const Scene *scene, const Step *step, const Surf
 
 #if LIGHTS
 // 2. Light that arrives by a shadow ray towards a sampled point of a light.
-static inline real3 sampled_light(const Scene *scene, const Surface *surface, const Bsdf *bsdf, Frame shading, real3 wo,
-                                  ireal active, Sampler *sampler, ureal *rays) {
-    LightSample light = light_sample(scene, surface->p, surface->ns, sampler);
+static inline real3 sampled_light(const Scene *scene, const Step *step, const Surface *surface, const Bsdf *bsdf,
+                                  Frame shading, real3 wo, ireal active, Sampler *sampler, ureal *rays) {
+    LightSample light = light_sample(scene, surface->p, choosing_normal(bsdf, surface->ns), sampler);
     real3 wi = to_local(shading, light.wi);
-    ireal above = dot3(light.wi, surface->ng) > 0.0f;
+    ireal reachable = same_side(wi.z, dot3(light.wi, surface->ng));
     real3 f = bsdf_eval(bsdf, wo, wi);
     real3 contribution = mul(f, light.radiance);
-    ireal useful = active & above & (light.pdf > 0.0f) & is_positive3(contribution);
+    ireal useful = active & reachable & (light.pdf > 0.0f) & is_positive3(contribution);
     if (!ANY(useful)) return splat(ZERO);
     real3 origin = offset_origin(surface->p, surface->p_error, surface->ng, light.wi);
+#if ATTENUATION
+    real3 absorption = choose(wi.z > 0.0f, step->absorption, absorption_beyond(bsdf));
+    real distance = light.infinite ? (real)(INFINITY) : length3(sub(light.target, origin));
+    contribution = mul(contribution, attenuated(absorption, distance));
+#endif
     *rays += useful ? (ureal)(1) : (ureal)(0);
     real visible = transmittance(scene, origin, light.target, light.wi, light.infinite, useful);
     real pdf = bsdf_pdf(bsdf, wo, wi);
@@ -80,11 +88,17 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
 #if TRANSMISSION
     step.spread = ONE;
 #endif
+#if ATTENUATION
+    step.absorption = splat(ZERO);
+#endif
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
         Surface surface;
         Hits hits = first_surface(scene, &origin, step.wi, active, sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
+#if ATTENUATION
+        beta = mul(beta, attenuated(step.absorption, hit ? hits.t : (real)(INFINITY)));
+#endif
         real3 found = found_light(scene, &step, &surface, hits.t, hit, active & !hit);
         L = add(L, choose(active, mul(beta, AT_EYE(found)), splat(ZERO)));
 #if DIRECT_LIGHT
@@ -104,14 +118,14 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
         Bsdf bsdf;
         bsdf_at(scene, &surface, &bsdf);
 #if LIGHTS
-        real3 sampled = sampled_light(scene, &surface, &bsdf, shading, wo, active, sampler, rays);
+        real3 sampled = sampled_light(scene, &step, &surface, &bsdf, shading, wo, active, sampler, rays);
         L = add(L, mul(beta, AT_EYE(sampled)));
 #endif
         // 3. Go on in a direction drawn from the material.
         real2 u = next_2d(sampler), choice = next_2d(sampler);
         BsdfSample sample = bsdf_sample(&bsdf, wo, u, choice.x);
         step.p = surface.p;
-        step.n = surface.ns;
+        step.n = choosing_normal(&bsdf, surface.ns);
         step.wi = to_world(shading, sample.wi);
         step.pdf = sample.pdf;
         step.specular = sample.specular;
@@ -120,6 +134,9 @@ static inline real3 radiance(const Scene *scene, real3 eye, real3 direction, ire
         beta = choose(active, mul(beta, sample.weight), beta);
 #if TRANSMISSION
         step.spread *= sample.spread;
+#endif
+#if ATTENUATION
+        step.absorption = choose(sample.wi.z < 0.0f, absorption_beyond(&bsdf), step.absorption);
 #endif
         origin = offset_origin(surface.p, surface.p_error, surface.ng, step.wi);
 

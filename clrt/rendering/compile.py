@@ -184,7 +184,9 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     preamble = _preamble(buffers, features, materials, textures.uv_sets, emitters, choices, tree, unit, part_bytes)
     # A depth is that of what is in focus: the ray through the middle of a lens.
     camera = replace(scene.camera, aperture_radius=0.0) if integrator == "depth" else scene.camera
-    files = {**_files(materials.used, emitters, sky, choices, tree.name, len(triangles) > 0, len(spheres) > 0, lone,
+    parts = {part for kind in materials.used for part in kind.parts}
+    files = {**{f"{part}_FILE": [f"bsdf/{part.lower()}.cl"] if part in features else [] for part in sorted(parts)},
+             **_files(materials.used, emitters, sky, choices, tree.name, len(triangles) > 0, len(spheres) > 0, lone,
                       bool(scene.instances)),
              "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
              "OPACITY_FILE": ["opacity.cl"] if "OPACITY" in features else [],
@@ -239,6 +241,8 @@ def _preamble(buffers: Buffers, features: set[str], materials: Materials, uv_set
         type_list("MATERIAL_TYPES", _numbered(materials.used)),
         type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),
         type_list("NORMAL_MAPPED_TYPES", _numbered(materials.mapped("normal_map"))),
+        type_list("SPREADING_TYPES", _numbered(materials.featured("TRANSMISSION_LOBES"))),
+        type_list("ABSORBING_TYPES", _numbered(materials.featured("ATTENUATION"))),
         defines({"UV_SETS": uv_sets}),
         *(f"#define READ_{name} {'TEXTURED' if reads else 'CONSTANT'}" for name, reads in materials.reads.items()),
         type_list("LIGHT_TYPES", [(t, TYPES.index(t)) for t in emitters.types]),

@@ -21,13 +21,18 @@ Number = float | tuple[float, ...] | int
 class Materials:
     """codes: (users,) int32, each user's type | index << 4. buffers: the records of each type in use, by its kernel.
 
-    reads: by `kernel_parameter`, whether some material of the type reads that from a texture.
+    reads: by `kernel_parameter`, whether some material of the type reads that from a texture. features: of each type's.
     """
 
     codes: NDArray[np.int32]
     buffers: dict[str, tuple[str, NDArray[Any]]]
     reads: dict[str, bool]
     used: list[type[Material]]
+    features: dict[type[Material], frozenset[str]]
+
+    def featured(self, feature: str) -> list[type[Material]]:
+        """The types in use of which some material has the feature."""
+        return [kind for kind in self.used if feature in self.features[kind]]
 
     def with_value(self, parameter: str) -> list[type[Material]]:
         """The types in use that have the parameter."""
@@ -61,7 +66,8 @@ def pack_materials(users: Iterable[Material], textures: Textures) -> Materials:
         names = {name for named in values for name in named}
         reads |= {f"{kind.kernel}_{name}": f"{name}_texture" in names for name in sorted(names)
                   if not name.endswith("_texture")}
-    return Materials(np.array(codes, np.int32), buffers, reads, used)
+    features = {kind: frozenset[str]().union(*(material.features() for material in distinct[kind])) for kind in used}
+    return Materials(np.array(codes, np.int32), buffers, reads, used, features)
 
 
 def _values(material: Material, textures: Textures) -> dict[str, Number]:

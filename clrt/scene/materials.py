@@ -8,10 +8,10 @@ the packing and the tests of every BSDF find it in that list. Field types carry 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from math import log1p
+from math import log, log1p
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 
-from annotated_types import Ge, Le
+from annotated_types import Ge, Gt, Le
 
 from .microfacets import fitted_loss, multiple_scattering
 from .textures import NonNegative, Texture
@@ -42,6 +42,8 @@ Smith = Literal["height_correlated", "separable", "schlick", "schlick_ibl"]
 
 #: GGX below this alpha is beyond float32 (D ~ 1/(pi alpha²)), in the kernel too; use `Mirror` for a perfect one.
 ALPHA_MIN = 1e-4
+#: What counts as black where a logarithm is taken.
+BLACK = 1e-30
 
 
 def tuples_for_lists(record: Any) -> None:
@@ -65,6 +67,8 @@ class Material:
     """
 
     kernel: ClassVar[str]
+    #: Those of its features that have a kernel file of their own, bsdf/<name>.cl: `#include <NAME>_FILE`.
+    parts: ClassVar[tuple[str, ...]] = ()
     emission: Radiance | Texture = (0.0, 0.0, 0.0)
     normal_map: Texture | None = None
     opacity: Unit | Texture = 1.0
@@ -111,6 +115,15 @@ class Material:
         """All that it reads."""
         values = (getattr(self, field.name) for field in fields(self))
         return [value for value in values if isinstance(value, Texture)]
+
+    @property
+    def is_specular(self) -> bool:
+        """Whether it has single directions alone, which no light sample finds."""
+        return False
+
+    def in_unit(self, unit: float) -> Material:
+        """The same where all lengths are multiplied by `unit`."""
+        return self
 
     def features(self) -> frozenset[str]:
         """Names to define while compiling, for parts of the kernel that only some materials of this type need."""
@@ -202,20 +215,62 @@ class Mirror(Material):
     kernel: ClassVar[str] = "mirror"
     color: Albedo | Texture = (1.0, 1.0, 1.0)
 
+    @property
+    def is_specular(self) -> bool:
+        return True
+
 
 @dataclass(frozen=True, kw_only=True)
 class Dielectric(Material):
-    """Smooth glass or water: Fresnel's equations decide between reflection and refraction.
+    """Glass or water: Fresnel's equations decide between reflection and refraction.
 
     ior: index of refraction inside over that outside; color: what part of the light that is refracted passes.
+    roughness: of the surface, alpha = roughness² of GGX's microfacets; 0 is smooth. thin: a sheet without an inside,
+    which bends nothing and passes `color` from face to face. Inside of others light becomes attenuation_color after the
+    attenuation_distance, in units of the scene, and so on (glTF's KHR_materials_volume; None: never).
     """
 
     kernel: ClassVar[str] = "dielectric"
+    parts: ClassVar[tuple[str, ...]] = ("ROUGH_DIELECTRIC",)
     color: Albedo | Texture = (1.0, 1.0, 1.0)
     ior: Annotated[float, Ge(0.25), Le(4)] = 1.5
+    roughness: Unit | Texture = 0.0
+    thin: bool = False
+    attenuation_color: Albedo = (1.0, 1.0, 1.0)
+    attenuation_distance: Annotated[float, Gt(0)] | None = None
+
+    def parameters(self) -> dict[str, Parameter]:
+        values: dict[str, Parameter] = {"color": self.color, "ior": self.ior}
+        if self.rough:
+            values["roughness"] = self.roughness
+        if self.thin:
+            values["thin"] = 1.0
+        if (distance := self.attenuation_distance) is not None:
+            values["absorption"] = tuple(min(-log(max(part, BLACK)) / distance, 1 / BLACK)
+                                         for part in self.attenuation_color)
+        return values
+
+    @property
+    def rough(self) -> bool:
+        """Whether some of it is."""
+        return isinstance(self.roughness, Texture) or self.roughness > 0
+
+    @property
+    def is_specular(self) -> bool:
+        return not self.rough or (self.ior == 1 and not self.thin)
+
+    def conflicts(self) -> list[str]:
+        fault = "attenuation_distance: a thin sheet has no inside; leave it out, or thin"
+        return [fault] if self.thin and self.attenuation_distance is not None else []
+
+    def in_unit(self, unit: float) -> Dielectric:
+        distance = self.attenuation_distance
+        return self if distance is None else replace(self, attenuation_distance=distance * unit)
 
     def features(self) -> frozenset[str]:
-        return frozenset({"TRANSMISSION"})
+        has = {"TRANSMISSION": True, "ROUGH_DIELECTRIC": self.rough, "TRANSMISSION_LOBES": self.rough,
+               "THIN_DIELECTRIC": self.thin, "ATTENUATION": self.attenuation_distance is not None}
+        return frozenset(name for name, present in has.items() if present)
 
 
 MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror, Dielectric)

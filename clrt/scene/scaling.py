@@ -92,7 +92,8 @@ def in_frame(scene: Scene, frame: Frame) -> Scene:
     scene = replace(scene, instances=_instances(scene.instances, frame))
     if frame == Frame():
         return scene
-    return replace(scene, meshes=[replace(mesh, vertices=frame.points(mesh.vertices)) for mesh in scene.meshes],
+    return replace(scene, meshes=[replace(mesh, vertices=frame.points(mesh.vertices),
+                                          material=mesh.material.in_unit(frame.unit)) for mesh in scene.meshes],
                    camera=_camera(scene.camera, frame),
                    spheres=[_sphere(sphere, frame) for sphere in scene.spheres],
                    lights=[_light(light, frame) for light in scene.lights])
@@ -119,7 +120,8 @@ def _camera(camera: Camera, frame: Frame) -> Camera:
 
 
 def _sphere(sphere: Sphere, frame: Frame) -> Sphere:
-    return replace(sphere, center=frame.point(sphere.center), radius=sphere.radius * frame.unit)
+    return replace(sphere, center=frame.point(sphere.center), radius=sphere.radius * frame.unit,
+                   material=sphere.material.in_unit(frame.unit))
 
 
 def _light(light: Light, frame: Frame) -> Light:

@@ -15,8 +15,8 @@ from ..scene.materials import ALPHA_MIN, MATERIALS, SHARED, Material
 from ..scene.model import Scene, Sphere
 from .probe import Doubles, Probe
 
-#: What is tried of fields that want more than the ends and the middle of their range.
-NUMBERS: dict[str, tuple[Any, ...]] = {"roughness": (0.0, 0.05, 0.1, 0.3, 0.6, 1.0)}
+#: What is tried of fields that want other numbers than the ends and the middle of their range.
+NUMBERS: dict[str, tuple[Any, ...]] = {"roughness": (0.0, 0.05, 0.1, 0.3, 0.6, 1.0), "ior": (0.25, 1.5)}
 COLOR = (1.0, 0.5, 0.2)
 #: cos θ of wo, down to grazing; these sines are float32 numbers or round to 1.
 COSINES = (1.0, 0.6, 0.1, 2.0**-7, 2.0**-10, 2.0**-13)
@@ -48,7 +48,7 @@ def worded_variants(kind: type[Material]) -> list[Material]:
 
 def views(material: Material) -> list[float]:
     """Of COSINES those from which the material's lobes are wide enough for float32."""
-    alpha = max(getattr(material, "roughness", 1.0)**2, ALPHA_MIN)
+    alpha = 1.0 if material.is_specular else max(getattr(material, "roughness", 1.0)**2, ALPHA_MIN)
     return [cosine for cosine in COSINES if 2 * alpha * cosine >= NARROWEST]
 
 
@@ -77,15 +77,25 @@ class Bsdfs:
     def sample(self, which: int, wo: Doubles, numbers: Doubles,
                front: bool = True) -> tuple[Doubles, Doubles, Doubles, Doubles]:
         """wi (n, 3), weight (n, 3), pdf (n,), specular (n,) for one wo (3,) or (n, 3) and numbers (n, 3) in [0, 1)."""
-        n = len(numbers)
-        out = self.probe("bsdf_sample", 8, np.full(n, self.code[which]), np.broadcast_to(wo, (n, 3)), numbers,
-                         front=front)
+        out = self._sample(which, wo, numbers, front)
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7]
 
-    def value(self, which: NDArray[np.intp] | int, wo: Doubles, wi: Doubles) -> tuple[Doubles, Doubles]:
+    def spread(self, which: int, front: bool = True) -> float:
+        """Radiance on one side of the surface over that beyond it: 1 unless light is refracted."""
+        out = self._sample(which, np.array([0.0, 0.0, 1.0]), uniform(1 << 10, which), front)
+        through = out[:, 8][(out[:, 6] > 0) & (out[:, 2] < 0)]
+        return float(through[0]) if len(through) else 1.0
+
+    def _sample(self, which: int, wo: Doubles, numbers: Doubles, front: bool) -> Doubles:
+        n = len(numbers)
+        return self.probe("bsdf_sample", 9, np.full(n, self.code[which]), np.broadcast_to(wo, (n, 3)), numbers,
+                          front=front)
+
+    def value(self, which: NDArray[np.intp] | int, wo: Doubles, wi: Doubles,
+              front: bool = True) -> tuple[Doubles, Doubles]:
         """f·|cos| (n, 3) and pdf (n,) for wi (n, 3); which (n,) or one, wo (n, 3) or (3,)."""
         codes = np.broadcast_to(self.code[which], len(wi))
-        out = self.probe("bsdf_value", 4, codes, np.broadcast_to(wo, wi.shape), wi)
+        out = self.probe("bsdf_value", 4, codes, np.broadcast_to(wo, wi.shape), wi, front=front)
         return out[:, :3], out[:, 3]
 
 

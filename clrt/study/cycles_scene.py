@@ -39,6 +39,8 @@ def check_scene(scene: Scene) -> None:
         if isinstance(owner.material, MetallicRoughness) and not _is_metal(owner.material):
             raise UsageError(f"{owner.name}: Cycles can draw metallic_roughness that is all metal, with single "
                              'scattering and smith = "height_correlated"')
+        if isinstance(owner.material, Dielectric) and owner.material.features() != {"TRANSMISSION"}:
+            raise UsageError(f"{owner.name}: Cycles can draw dielectric that is smooth, not thin, and absorbs nothing")
     if any(isinstance(light, SpotLight) for light in scene.lights):
         raise UsageError(f"{scene.name}: Cycles is not told of spot lights, which fall off otherwise there")
     if scene.camera.projection != "perspective" or scene.camera.aperture_radius:

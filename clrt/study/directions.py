@@ -1,7 +1,9 @@
-"""Cells of the upper hemisphere in which every lobe is smooth, and the integral of a density over them.
+"""Cells of the sphere in which every lobe is smooth, and the integral of a density over them.
 
-A direction wi is charted by its half vector with wo, h = (wo + wi)/|wo + wi|: the logarithm of h's slope r = tan θ and
-its azimuth from wo. A mirror-like lobe, around slope 0, and a wide one then both spread over many cells.
+A direction wi above the surface is charted by its half vector with wo, h = (wo + wi)/|wo + wi|: the logarithm of h's
+slope r = tan θ and its azimuth from wo. A mirror-like lobe, around slope 0, and a wide one then both spread over many
+cells. One below the surface is charted likewise, mirrored, or by the logarithm of its angle to a center where its lobe
+gathers, and the azimuth around that from upwards.
 """
 
 from __future__ import annotations
@@ -18,6 +20,8 @@ ROWS, COLUMNS = 52, 12
 LOWEST, HIGHEST = np.log(1e-7), np.log(1e4)
 #: Gauss–Legendre points inside a cell at which a density is summed, in log r and in azimuth.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
+#: As many for densities with edges inside, where all is reflected or a microfacet is no more seen.
+MANY = np.polynomial.legendre.leggauss(12)
 TURNS, TURN_WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
@@ -34,23 +38,64 @@ def count(wo: Doubles, wi: Doubles) -> NDArray[np.int64]:
     return np.bincount(row * COLUMNS + column, minlength=ROWS * COLUMNS)
 
 
-def integrate(density: Callable[[Doubles], Doubles], wo: Doubles) -> Doubles:
+def integrate(density: Callable[[Doubles], Doubles], wo: Doubles, edged: bool = False) -> Doubles:
     """(ROWS·COLUMNS,) integrals over solid angle of density(wi (n, 3)) -> (n,) above the horizon."""
+    nodes, weights = MANY if edged else (NODES, WEIGHTS)
     # At grazing wo the horizon bends within that angle of an azimuth of 90°, which is an edge of a column.
     inside, weight = (2 + TURNS * (3 - TURNS**2)) / 4, 0.75 * (1 - TURNS**2) * TURN_WEIGHTS
     phi = np.add.outer(np.arange(COLUMNS), inside).ravel() * 2 * np.pi / COLUMNS
     edges = np.minimum(np.linspace(LOWEST, HIGHEST, ROWS + 1)[:, None], _log_horizon(wo, phi))
     low, width = edges[:-1, None], (edges[1:] - edges[:-1])[:, None]
-    r = np.exp(low + width * (NODES[:, None] + 1) / 2).ravel()
-    azimuth = np.tile(phi, ROWS * len(NODES)) + np.arctan2(wo[1], wo[0])
+    r = np.exp(low + width * (nodes[:, None] + 1) / 2).ravel()
+    azimuth = np.tile(phi, ROWS * len(nodes)) + np.arctan2(wo[1], wo[0])
     h = np.column_stack([r * np.cos(azimuth), r * np.sin(azimuth), np.ones(len(r))]) / np.sqrt(1 + r * r)[:, None]
     cosine = h @ wo
     # dωi = 4 (wo·h) dωh, and dωh = cos³θ times the area r dr dphi = r² d(log r) dphi of slopes.
     jacobian = 4 * cosine * h[:, 2]**3 * r * r
     values = density(2 * cosine[:, None] * h - wo) * jacobian
-    parts = values.reshape(ROWS, len(NODES), COLUMNS * len(TURNS)) * width * WEIGHTS[:, None] / 2
+    parts = values.reshape(ROWS, len(nodes), COLUMNS * len(TURNS)) * width * weights[:, None] / 2
     sums = parts.sum(axis=1).reshape(ROWS, COLUMNS, len(TURNS)) @ weight
     return np.asarray(sums.ravel() * 2 * np.pi / COLUMNS)
+
+
+#: Of the chart below: rows in the logarithm of the angle; what is nearer than the lowest row counts to it.
+ROWS_BELOW = 48
+NEAREST, FARTHEST = np.log(1e-6), np.log(np.pi)
+
+
+def count_below(center: Doubles, wi: Doubles) -> NDArray[np.int64]:
+    """(ROWS_BELOW·COLUMNS,) how many of the unit vectors wi (n, 3) below the surface lie in each cell of a center."""
+    up, side = _around(center)
+    angle = 2 * np.arcsin(np.minimum(np.linalg.norm(wi - center, axis=1) / 2, 1))
+    turn = np.arctan2(wi @ side, wi @ up) / (2 * np.pi)
+    row = (np.log(np.maximum(angle, 1e-30)) - NEAREST) / (FARTHEST - NEAREST) * ROWS_BELOW
+    column = np.minimum(turn % 1 * COLUMNS, COLUMNS - 1).astype(np.intp)
+    cells = np.clip(row, 0, ROWS_BELOW - 1).astype(np.intp) * COLUMNS + column
+    return np.bincount(cells, minlength=ROWS_BELOW * COLUMNS)
+
+
+def integrate_below(density: Callable[[Doubles], Doubles], center: Doubles) -> Doubles:
+    """(ROWS_BELOW·COLUMNS,) integrals over solid angle of density(wi (n, 3)) -> (n,) below the horizon."""
+    nodes, weights = MANY
+    up, side = _around(center)
+    phi = np.add.outer(np.arange(COLUMNS), (TURNS + 1) / 2).ravel() * 2 * np.pi / COLUMNS
+    outwards = np.cos(phi)[:, None] * up + np.sin(phi)[:, None] * side
+    horizon = np.log(np.arctan2(-center[2], outwards[:, 2]))
+    edges = np.minimum(np.linspace(NEAREST, FARTHEST, ROWS_BELOW + 1)[:, None], horizon)
+    edges[0] = -30
+    low, width = edges[:-1, None], (edges[1:] - edges[:-1])[:, None]
+    angle = np.exp(low + width * (nodes[:, None] + 1) / 2)[..., None]
+    wi = (np.cos(angle) * center + np.sin(angle) * outwards).reshape(-1, 3)
+    values = density(wi).reshape(angle.shape[:3]) * (np.sin(angle) * angle)[..., 0]
+    sums = (values * width * weights[:, None] / 2).sum(axis=1).reshape(ROWS_BELOW, COLUMNS, len(TURNS))
+    return np.asarray((sums @ (TURN_WEIGHTS / 2)).ravel() * 2 * np.pi / COLUMNS)
+
+
+def _around(center: Doubles) -> tuple[Doubles, Doubles]:
+    """Unit vectors that make a right-handed frame with a center below: upwards, and level."""
+    level = np.hypot(center[0], center[1])
+    side = np.array([center[1], -center[0], 0.0]) / level if level > 0 else np.array([0.0, 1.0, 0.0])
+    return np.cross(side, center), side
 
 
 def _log_horizon(wo: Doubles, azimuth: Doubles) -> Doubles:

@@ -17,12 +17,14 @@ STEP = 2.0**-6
 #: f' ≈ Σ WEIGHTS[k]·(f(x + (k + 1)·step) − f(x − (k + 1)·step))/step. With twice the step the error is 64 times larger;
 #: an eighth of the difference between the two is thus more than the error of the finer one.
 WEIGHTS = np.array([45, -9, 1]) / 60
+#: To all places that the differences take.
+MOVES = STEP * np.array([k * np.eye(2)[axis] for k in (-6, -4, -3, -2, -1, 1, 2, 3, 4, 6) for axis in (0, 1)])
 #: Rounding of unit vectors, a few units in the last place, as it comes out of the differences.
 NOISE = 3 * 2.0**-24 * 2 * np.abs(WEIGHTS).sum() / STEP
 #: Samples whose area is not known better than this tell nothing.
 LEAST_KNOWN = 0.05
 #: Random numbers that choose the lobe: as many are tried.
-LOBES = 1 << 10
+LOBES = 1 << 8
 
 
 class Areas(NamedTuple):
@@ -82,16 +84,26 @@ def check_density(bsdfs: Bsdfs, which: int, cosine: float) -> Checked:
         wi, _, pdf, _ = bsdfs.sample(which, wo, np.column_stack([at, np.broadcast_to(lobe, len(at))]))
         return wi, pdf
 
-    lobes = (np.arange(LOBES) + 0.5) / LOBES
-    _, first, counts = np.unique(draw(np.tile(u[:1], (LOBES, 1)), lobes)[0], axis=0, return_index=True,
-                                 return_counts=True)
-    known, error = 0, 0.0
-    for lobe, count in zip(lobes[first], counts):
+    known, error, single = 0, 0.0, False
+    tried = (np.arange(LOBES) + 0.5) / LOBES
+    every = draw(np.repeat(u, LOBES, axis=0), np.tile(tried, len(u)))[0].reshape(len(u), LOBES, 3)
+    lobes = _numbers_of_lobes(every[0], tried)
+    for lobe in lobes:
         (wi, pdf), area = draw(u, lobe), areas(lambda at: draw(at, lobe)[0], u)
-        told = (pdf > 0) & (wi[:, 2] > 0) & (area.error < LEAST_KNOWN)
-        part = count / LOBES if len(counts) == 1 else (count - 1) / LOBES
-        lacks = 1 - pdf[told] * area.scale[told] / part if part else np.zeros(told.sum())
-        off = np.abs(lacks) if len(counts) == 1 else lacks
+        single = bool((every == every[:, :1]).all())
+        told = (pdf > 0) & (wi[:, 2] != 0) & (area.error < LEAST_KNOWN)
+        moved = draw((u[:, None] + MOVES).reshape(-1, 2), lobe)[0].reshape(len(u), -1, 3)
+        told &= (moved[..., 2] * wi[:, 2:] > 0).all(axis=1)    # where a lobe ends in between, slopes mean nothing
+        same = np.all(every == wi[:, None], axis=2).sum(axis=1)[told]
+        part = np.ones(len(same)) if single else np.maximum(same - 1, 0) / LOBES
+        lacks = np.where(part > 0, 1 - pdf[told] * area.scale[told] / np.maximum(part, 1 / LOBES), 0)
+        off = np.abs(lacks) if single else lacks
         known += int(told.sum())
         error = max(error, float(np.max(off - area.error[told], initial=0.0)))
-    return Checked(known, len(counts), error)
+    return Checked(known, len(lobes), error)
+
+
+def _numbers_of_lobes(wi: Doubles, tried: Doubles) -> list[float]:
+    """One of the numbers tried (n,) for each of the lobes, from its middle; wi (n, 3): what the numbers choose."""
+    _, lobe, counts = np.unique(wi, axis=0, return_inverse=True, return_counts=True)
+    return [float(tried[np.flatnonzero(lobe.ravel() == i)[count // 2]]) for i, count in enumerate(counts)]

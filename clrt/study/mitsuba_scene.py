@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..scene.lights import Light, PointLight, SpotLight
-from ..scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ..scene.instancing import unfolded
+from ..scene.materials import ALPHA_MIN, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
 from ..scene.textures import untextured
 
@@ -107,8 +107,15 @@ def _metal(material: MetallicRoughness) -> Plugin:
 
 
 def _dielectric(material: Dielectric) -> Plugin:
-    return {"type": "dielectric", "int_ior": material.ior, "ext_ior": 1.0,
-            "specular_transmittance": _rgb(untextured(material.color))}
+    if material.attenuation_distance is not None or (material.thin and material.rough):
+        raise ValueError("glass that absorbs, or is thin and rough")
+    plugin = {"type": "thindielectric" if material.thin else "dielectric", "int_ior": material.ior, "ext_ior": 1.0}
+    if material.thin and untextured(material.color) != (1.0, 1.0, 1.0):
+        raise ValueError("thin glass in color: its own is not crossed again by what bounces inside")
+    if material.rough:    # whose G is the separable one
+        plugin |= {"type": "roughdielectric", "distribution": "ggx",
+                   "alpha": max(untextured(material.roughness)**2, ALPHA_MIN)}
+    return plugin | {"specular_transmittance": _rgb(untextured(material.color))}
 
 
 BSDFS: dict[type[Material], Callable[[Any], Plugin]] = {

@@ -99,7 +99,7 @@ def scattering_rows(found: list[Scattered], samples: int) -> Iterator[Row]:
     weight = float(max(s.weight for s in found))
     yield Row("L2", "weights are value over density", len(found), sum(not s.weight <= ROUNDING for s in found), weight,
               "largest relative error")
-    yield Row("L2", "directions have length 1, and fail exactly below the horizon", count, sum(s.wrong for s in found))
+    yield Row("L2", "directions have length 1, and fail exactly on the wrong side", count, sum(s.wrong for s in found))
 
 
 def _areas(subject: Bsdfs, chosen: list[tuple[Material, float]], found: list[Scattered]) -> Row:

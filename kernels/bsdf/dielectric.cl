@@ -1,39 +1,128 @@
-// Smooth glass or water: light is reflected with the probability F that Fresnel's equations give, and else refracted by
-// Snell's law (pbrt, 4th ed., 9.3 and 9.5). `ior` inside, 1 outside; what is refracted is multiplied by `color`.
+// Glass or water: light is reflected with the probability F that Fresnel's equations give, and else refracted by Snell's
+// law (pbrt, 4th ed., 9.3 and 9.5). `ior` inside, 1 outside; what is refracted is multiplied by `color`.
+//
+// ROUGH_DIELECTRIC: the same at microfacets (rough_dielectric.cl).
+// THIN_DIELECTRIC: a sheet whose two faces lie together. Of a wave that bounces between them
+//   F + (1 − F)²·c²F/(1 − c²F²) is reflected, 2F/(1 + F) for c = 1, and (1 − F)²·c/(1 − c²F²) passes without being bent,
+// c = color being what is left of light from face to face. A rough one spreads both ways alike (as glTF's transmission).
+// ATTENUATION: light is absorbed inside, as Beer and Lambert say (path.cl).
 #include "bsdf/interface.cl"
+
+static inline real fresnel_of_cosines(real cos_o, real cos_t, real eta) {
+    real parallel = (eta * cos_o - cos_t) / (eta * cos_o + cos_t);
+    real perpendicular = (cos_o - eta * cos_t) / (cos_o + eta * cos_t);
+    return 0.5f * (parallel * parallel + perpendicular * perpendicular);
+}
 
 // F for unpolarised light that comes at cos_o > 0 to a medium eta times as dense; cos_t of what is refracted, 0 if nothing.
 static inline real fresnel_dielectric(real cos_o, real eta, real *cos_t) {
     real cos2_t = ((eta - 1.0f) * (eta + 1.0f) + cos_o * cos_o) / (eta * eta);   // 1 − sin²/eta² without cancellation
     *cos_t = safe_sqrt(cos2_t);
-    real parallel = (eta * cos_o - *cos_t) / (eta * cos_o + *cos_t);
-    real perpendicular = (cos_o - eta * *cos_t) / (cos_o + eta * *cos_t);
-    real reflected = 0.5f * (parallel * parallel + perpendicular * perpendicular);
+    real reflected = fresnel_of_cosines(cos_o, *cos_t, eta);
     return cos2_t > 0.0f ? reflected : ONE;
 }
 
-struct dielectric { real3 color; real eta; };   // eta: index of refraction beyond the surface over that on wo's side
+struct dielectric {
+    real3 color;
+    real eta;           // index of refraction beyond the surface over that on wo's side
+#if ROUGH_DIELECTRIC
+    real alpha;         // 0 where it is smooth
+#endif
+#if THIN_DIELECTRIC
+    ireal thin;
+#endif
+#if ATTENUATION
+    real3 absorption;   // beyond the surface, per unit of length
+#endif
+};
 
-static inline struct dielectric dielectric_at(const Scene *scene, ireal index, const Surface *surface) {
-    real ior = PARAMETER(dielectric, ior);
-    return (struct dielectric){COLOR(dielectric), surface->front ? ior : 1.0f / ior};
-}
-
-static inline real3 dielectric_eval(const struct dielectric *m, real3 wo, real3 wi) { return splat(ZERO); }
-
-static inline real dielectric_pdf(const struct dielectric *m, real3 wo, real3 wi) { return ZERO; }
+#if THIN_DIELECTRIC
+#define IS_THIN(m) ((m)->thin)
+#else
+#define IS_THIN(m) NO_LANES
+#endif
 
 static inline real3 dielectric_albedo(const struct dielectric *m) { return m->color; }
 
-static inline BsdfSample dielectric_sample(const struct dielectric *m, real3 wo, real2 u, real lobe) {
+// How light divides where Fresnel's equations give F: the probability of following what is reflected, and what each then
+// weighs.
+typedef struct { real reflected; real3 reflection, transmission; } Division;
+
+static inline real thin_reflection(real f, real c) {
+    return 0.5f * (1.0f + f) * (1.0f + square((1.0f - f) * c) / maximum(1.0f - square(c * f), (real)(UNIT_ROUNDOFF)));
+}
+static inline real thin_transmission(real f, real c) {
+    return c * (1.0f - f * f) / maximum(1.0f - square(c * f), (real)(UNIT_ROUNDOFF));
+}
+
+static inline Division divide_light(const struct dielectric *m, real f) {
+    Division d = {f, splat(ONE), m->color};
+#if THIN_DIELECTRIC
+    real3 c = m->color;
+    real3 back = vector(thin_reflection(f, c.x), thin_reflection(f, c.y), thin_reflection(f, c.z));
+    real3 on = vector(thin_transmission(f, c.x), thin_transmission(f, c.y), thin_transmission(f, c.z));
+    d.reflected = m->thin ? 2.0f * f / (1.0f + f) : f;
+    d.reflection = choose(m->thin, back, d.reflection);
+    d.transmission = choose(m->thin, on, d.transmission);
+#endif
+    return d;
+}
+
+// Radiance on wo's side over that beyond the surface.
+static inline real dielectric_spread(const struct dielectric *m) { return IS_THIN(m) ? ONE : 1.0f / (m->eta * m->eta); }
+
+static inline BsdfSample smooth_dielectric_sample(const struct dielectric *m, real3 wo, real lobe) {
     real cos_t;
-    ireal reflected = lobe < fresnel_dielectric(wo.z, m->eta, &cos_t);
-    real to_inside = 1.0f / m->eta;
+    Division d = divide_light(m, fresnel_dielectric(wo.z, m->eta, &cos_t));
+    ireal reflected = lobe < d.reflected;
+    real to_inside = IS_THIN(m) ? ONE : 1.0f / m->eta;
+    cos_t = IS_THIN(m) ? wo.z : cos_t;
     BsdfSample sample = no_sample();
     sample.wi = choose(reflected, vector(-wo.x, -wo.y, wo.z), vector(-wo.x * to_inside, -wo.y * to_inside, -cos_t));
-    sample.weight = choose(reflected, splat(ONE), m->color);
+    sample.weight = choose(reflected, d.reflection, d.transmission);
     sample.pdf = ONE;
     sample.spread = reflected ? ONE : to_inside * to_inside;
     sample.specular = ALL_LANES;
+    return sample;
+}
+
+#include ROUGH_DIELECTRIC_FILE
+#if !ROUGH_DIELECTRIC
+static inline real3 dielectric_eval(const struct dielectric *m, real3 wo, real3 wi) { return splat(ZERO); }
+
+static inline real dielectric_pdf(const struct dielectric *m, real3 wo, real3 wi) { return ZERO; }
+#endif
+
+static inline struct dielectric dielectric_at(const Scene *scene, ireal index, const Surface *surface) {
+    struct dielectric m;
+    real ior = PARAMETER(dielectric, ior);
+    m.color = COLOR(dielectric);
+    m.eta = surface->front ? ior : 1.0f / ior;
+#if THIN_DIELECTRIC
+    m.thin = PARAMETER(dielectric, thin) > 0.0f;
+    m.eta = m.thin ? ior : m.eta;
+#endif
+#if ROUGH_DIELECTRIC
+    real roughness = PARAMETER(dielectric, roughness);
+    ireal rough = (roughness > 0.0f) & ((ior != 1.0f) | IS_THIN(&m));    // where nothing is bent, nothing is spread
+    m.alpha = rough ? maximum(roughness * roughness, (real)(ALPHA_MIN)) : ZERO;
+#endif
+#if ATTENUATION
+    m.absorption = choose(surface->front, PARAMETER3(dielectric, absorption), splat(ZERO));
+#endif
+    return m;
+}
+
+static inline BsdfSample dielectric_sample(const struct dielectric *m, real3 wo, real2 u, real lobe) {
+    BsdfSample sample = smooth_dielectric_sample(m, wo, lobe);
+#if ROUGH_DIELECTRIC
+    ireal rough = m->alpha > 0.0f;
+    BsdfSample spread = rough_dielectric_sample(m, wo, u, lobe);
+    sample.wi = choose(rough, spread.wi, sample.wi);
+    sample.weight = choose(rough, spread.weight, sample.weight);
+    sample.pdf = rough ? spread.pdf : sample.pdf;
+    sample.spread = rough ? spread.spread : sample.spread;
+    sample.specular = sample.specular & !rough;
+#endif
     return sample;
 }

@@ -3,15 +3,16 @@
 //   struct NAME                              its parameters where it was hit, of every lane
 //   NAME_at(scene, index, surface)           reads them: PARAMETER(NAME, x), PARAMETER3(NAME, x) for its
 //                                            dataclass's x, and COLOR(NAME) for its color
-//   NAME_eval(m, wo, wi)                     f·|cos wi|
+//   NAME_eval(m, wo, wi)                     f·|cos wi|, the spread included
 //   NAME_pdf(m, wo, wi)                      density per solid angle with which NAME_sample chooses wi
 //   NAME_sample(m, wo, u, lobe)              a direction with its weight f·|cos|/pdf; u in [0,1)², lobe in [0,1)
 //   NAME_albedo(m)                           what part of white light from straight above it reflects or lets through,
 //                                            in [0, 1]
 //
 // m: const struct NAME *. wo, wi: unit, local frame, both pointing away from the surface, +z the shading normal on the
-// side of wo; surface->front: whether that is the outside. wi.z < 0 goes through it: then the material is among
-// TRANSMISSION's.
+// side of wo; surface->front: whether that is the outside. wi.z < 0 goes through it: then the material has the feature
+// TRANSMISSION; TRANSMISSION_LOBES, too, where eval and pdf know directions beyond the surface; and ATTENUATION with a
+// real3 `absorption` in its struct, where light is absorbed there.
 #include "surface.cl"
 
 // The preamble says of each parameter whether some material of its type reads it from a texture: READ_kind_name is

@@ -6,16 +6,15 @@
 // 1.7 times what it gets at grazing angles. Light that reaches the body crosses the surface twice, which the two
 // factors stand for; they are reciprocal and never sum to more than 1 with the specular part, further bounces included.
 //
-// D is GGX (Walter et al. 2007, eq. 33). The microfacet lobe draws normals visible from wo (Dupuy and Benyoub 2023,
-// "Sampling Visible GGX Normals with Spherical Caps"); it and the cosine lobe are chosen by the Fresnel term at wo.
+// D is GGX, and the microfacet lobe draws normals visible from wo (ggx.cl); it and the cosine lobe are chosen by the Fresnel
+// term at wo.
 //
 // MULTIPLE_SCATTERING adds what further bounces between microfacets reflect, as clrt/scene/microfacets.py says:
 //   multiple·loss(cos wi)·loss(cos wo)/pi
 // The loss is near 0.1 at cos ≈ alpha and falls with 1/cos² behind; a lobe of its own is drawn with about that density.
-#include "sampling.cl"
+#include "bsdf/ggx.cl"
 #include "bsdf/interface.cl"
 
-#define ALPHA_MIN 1e-4f   // below, D(h) leaves float32's range
 #define LOSS_COEFFICIENTS ((int)(sizeof(((MetallicRoughness *)0)->loss) / sizeof(float)))
 
 struct metallic_roughness {
@@ -76,19 +75,6 @@ static inline real3 fresnel_schlick(real3 f0, real cos_theta) {
 // 1 − F, with 1 − (1 − c)^5 multiplied out so that it keeps its digits at grazing angles.
 static inline real3 transmitted(real3 f0, real c) {
     return scale(sub(splat(ONE), f0), c * (5.0f - c * (10.0f - c * (10.0f - c * (5.0f - c)))));
-}
-
-// Walter's D(h), with the denominator summed so that a tiny alpha keeps its digits at the lobe's centre.
-static inline real ggx_d(real3 h, real alpha) {
-    real a2 = alpha * alpha;
-    real s = (h.x * h.x + h.y * h.y) + a2 * h.z * h.z;
-    return a2 / (PI * s * s);
-}
-
-// Smith's Lambda of GGX; G1 = 1/(1 + Lambda).
-static inline real ggx_lambda(real3 w, real alpha) {
-    real t = alpha * alpha * (w.x * w.x + w.y * w.y) / (w.z * w.z);
-    return 0.5f * t / (1.0f + sqrt(1.0f + t));   // (sqrt(1 + t) − 1)/2 without cancellation
 }
 
 // G2 by the forms that the scene's materials use.
@@ -156,17 +142,6 @@ static inline real metallic_roughness_pdf(const struct metallic_roughness *m, re
 static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m) {
     real3 in = sub(splat(ONE), m->f0);
     return mad3(mul(mul(in, in), m->albedo), (real)(20.0f / 21.0f), m->f0);
-}
-
-// A normal visible from wo: stretch, draw a point of the cap of directions, unstretch.
-static inline real3 sample_visible_normal(real3 wo, real alpha, real2 u) {
-    real3 stretched = normalize3(vector(wo.x * alpha, wo.y * alpha, wo.z));
-    real s, c;
-    sincos_turns(u.x, &s, &c);
-    real z = 1.0f - u.y * (1.0f + stretched.z);
-    real radius = safe_sqrt(1.0f - z * z);
-    real3 h = add(vector(radius * c, radius * s, z), stretched);
-    return normalize3(vector(h.x * alpha, h.y * alpha, maximum(h.z, (real)(1e-30f))));
 }
 
 static inline BsdfSample metallic_roughness_sample(const struct metallic_roughness *m, real3 wo, real2 u, real lobe) {

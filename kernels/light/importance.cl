@@ -28,13 +28,16 @@ static inline ireal is_reached(real along, real distance, real r, real cos_reach
 }
 #endif
 
-// Of scene->light_groups[group] at p. n: unit, on the side of the surface that is lit. Inlined, or it costs half as much
-// again.
+// Of scene->light_groups[group] at p. n: unit, on the side of the surface that is lit, or 0 where light from either side
+// counts. Inlined, or it costs half as much again.
 __attribute__((always_inline)) static inline real importance(const Scene *scene, ireal group, real3 p, real3 n) {
     real3 d = sub(GATHER3(scene->light_groups, group, .center), p), axis = GATHER3(scene->light_groups, group, .axis);
     real r = GATHER(real, scene->light_groups, group, .radius);
     real d2 = maximum(dot3(d, d), (real)(1e-30f)), distance = sqrt(d2);
     real lit = best_cosine(dot3(n, d), distance, r);
+#if TRANSMISSION_LOBES
+    lit = dot3(n, n) > 0.0f ? lit : ONE;
+#endif
     real along = along_cone(-dot3(axis, d), distance, GATHER(real, scene->light_groups, group, .cos_cone));
     real shining = best_cosine(along, distance, r);
     real brought = GATHER(real, scene->light_groups, group, .intensity) * lit * shining / maximum(d2, r * r);

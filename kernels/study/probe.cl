@@ -84,7 +84,7 @@ static Bsdf material_at(const Scene *scene, real code, ireal front) {
     return bsdf;
 }
 
-// in: material, wo (3), u (2), lobe -> out: wi (3), weight (3), pdf, specular; seen from the front if `front`
+// in: material, wo (3), u (2), lobe -> out: wi (3), weight (3), pdf, specular, spread; seen from the front if `front`
 kernel void probe_bsdf_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint front) {
     ELEMENTS
     real2 u = {ROW(in, 4), ROW(in, 5)};
@@ -94,12 +94,17 @@ kernel void probe_bsdf_sample(SCENE_PARAMETERS, uint n, global const float *in, 
     put3(out, n, 3, sample.weight);
     put(out, n, 6, sample.pdf);
     put(out, n, 7, FLAG(sample.specular));
+#if TRANSMISSION
+    put(out, n, 8, sample.spread);
+#else
+    put(out, n, 8, ONE);
+#endif
 }
 
-// in: material, wo (3), wi (3) -> out: f·|cos| (3), pdf
-kernel void probe_bsdf_value(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+// in: material, wo (3), wi (3) -> out: f·|cos| (3), pdf; seen from the front if `front`
+kernel void probe_bsdf_value(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint front) {
     ELEMENTS
-    Bsdf bsdf = material_at(&scene, ROW(in, 0), ALL_LANES);
+    Bsdf bsdf = material_at(&scene, ROW(in, 0), front ? ALL_LANES : NO_LANES);
     put3(out, n, 0, bsdf_eval(&bsdf, ROW3(in, 1), ROW3(in, 4)));
     put(out, n, 3, bsdf_pdf(&bsdf, ROW3(in, 1), ROW3(in, 4)));
 }

@@ -117,7 +117,8 @@ def test_only_those_who_ask_pay(device: Device) -> None:
     alone, both = (compile_scene(Scene(spheres=[Sphere(material=material) for material in materials]),
                                  Choices(device.lanes, device.layout)) for materials in ([plain], [plain, full]))
     assert "MULTIPLE_SCATTERING" not in alone.features and "MULTIPLE_SCATTERING" in both.features
-    assert alone.buffers["metallic_roughness"][1].dtype.names == ("albedo", "alpha", "f0", "smith")
+    assert alone.buffers["metallic_roughness"][1].dtype.names == (
+        "color", "metallic", "specular", "roughness", "smith", "rest0", "rest1", "rest2")
     assert "loss" in (both.buffers["metallic_roughness"][1].dtype.names or ())
     wo, wi = above(4000, 1), above(4000, 2)
     values = [bsdfs(device, [*materials]).value(0, wo, wi) for materials in ([plain], [plain, full])]

@@ -19,7 +19,7 @@ class Glass(Material):
 
     kernel: ClassVar[str] = "glass"
     tint: Albedo = (1.0, 1.0, 1.0)
-    ior: Annotated[float, Ge(1), Le(3)] = 1.5
+    weight: Annotated[float, Ge(1), Le(3)] = 1.5
     thin: bool = False
     form: Literal["smith", "schlick"] | None = None
 
@@ -27,8 +27,8 @@ class Glass(Material):
 def test_a_new_material_is_tried_with_all_its_numbers_flags_and_words() -> None:
     plain, worded = plain_variants(Glass), worded_variants(Glass)
     assert all(isinstance(material, Glass) for material in plain + worded)
-    assert {(glass.ior, glass.thin) for glass in plain if isinstance(glass, Glass)} == {
-        (ior, thin) for ior in (1, 2, 3) for thin in (False, True)}
+    assert {(glass.weight, glass.thin) for glass in plain if isinstance(glass, Glass)} == {
+        (weight, thin) for weight in (1, 2, 3) for thin in (False, True)}
     assert {(glass.form, glass.thin) for glass in worded if isinstance(glass, Glass)} == {
         (form, thin) for form in ("smith", "schlick") for thin in (False, True)}
 
