@@ -18,6 +18,7 @@ from clrt.scene.instance_reader import InstanceTable
 from clrt.scene.lights import LIGHTS
 from clrt.scene.materials import F0_PRESETS, SHARED, MATERIALS, Material, MetallicRoughness
 from clrt.scene.mesh_table import MeshTable
+from clrt.scene.presets import CONDUCTORS
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 from clrt.scene.pictures import read_picture
 from clrt.study.significance import mean_test, sidak
@@ -166,6 +167,8 @@ def test_the_manual_has_the_presets_and_the_words_to_come() -> None:
     assert {name: (_value(f0), float(metal == "metal")) for name, (f0, metal) in rows.items()} == F0_PRESETS
     not_yet = MANUAL.split("## Not drawn yet")[1].split("##")[0]
     assert set(re.findall(r"`(\w+)`", not_yet)) == LATER
+    conductors = _rows('type = "conductor"', "preset")
+    assert {name: (_value(eta), _value(k)) for name, (eta, k) in conductors.items()} == CONDUCTORS
     assert replace(MetallicRoughness(), preset="gold").lobes.f0 == F0_PRESETS["gold"][0]
 
 

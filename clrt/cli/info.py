@@ -13,13 +13,22 @@ from .options import tracing_options
 
 
 @click.command()
-@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("scene", type=click.Path(path_type=Path), required=False)
+@click.option("--materials", "list_materials", is_flag=True, help="List all types of material and presets instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @click.option("--aov", "aovs", multiple=True, metavar="NAME,...", help="With what these pictures beside it need.")
 @tracing_options
-def command(scene: Path, as_json: bool, aovs: tuple[str, ...], lanes: int | None, triangle: str, box: str, sphere: str,
-            offset: str, builder: str | None, layout: str | None) -> None:
+def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple[str, ...], lanes: int | None,
+            triangle: str, box: str, sphere: str, offset: str, builder: str | None, layout: str | None) -> None:
     """Show what SCENE contains and what is compiled for it; renders nothing and needs no device."""
+    if list_materials:
+        from .material_list import material_lines
+
+        for line in material_lines(as_json):
+            click.echo(line)
+        return
+    if scene is None:
+        raise click.UsageError("Missing argument 'SCENE'; write a scene file or a model, or --materials")
     from ..accel.kernels import HitTests
     from ..rendering.aovs import chosen_aovs, needs_direct_light, seen_first
     from ..rendering.compile import Choices, compile_scene

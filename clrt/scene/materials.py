@@ -14,30 +14,16 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, get_args
 from annotated_types import Ge, Gt, Le
 
 from .microfacets import fitted_loss, multiple_scattering
+from .presets import CONDUCTORS, F0_PRESETS as F0_PRESETS, ConductorPreset, Preset
 from .textures import NonNegative, Texture
 
 Unit = Annotated[float, Ge(0), Le(1)]
 Albedo = tuple[Unit, Unit, Unit]
+Index = Annotated[float, Ge(0.01), Le(100)]
+Extinction = Annotated[float, Ge(0), Le(100)]
 Radiance = tuple[NonNegative, NonNegative, NonNegative]
 Parameter = float | tuple[float, ...] | Texture
 
-#: Specular reflectance at normal incidence, linear: (F0, metallic). Suchiński 2022, table 6.1.
-F0_PRESETS: dict[str, tuple[tuple[float, float, float], float]] = {
-    "water": ((0.02, 0.02, 0.02), 0.0),
-    "plastic_low": ((0.03, 0.03, 0.03), 0.0),
-    "plastic_high": ((0.05, 0.05, 0.05), 0.0),
-    "glass_low": ((0.03, 0.03, 0.03), 0.0),
-    "glass_high": ((0.08, 0.08, 0.08), 0.0),
-    "ruby": ((0.08, 0.08, 0.08), 0.0),
-    "diamond": ((0.17, 0.17, 0.17), 0.0),
-    "iron": ((0.56, 0.57, 0.58), 1.0),
-    "copper": ((0.95, 0.64, 0.54), 1.0),
-    "gold": ((1.00, 0.71, 0.29), 1.0),
-    "aluminium": ((0.91, 0.92, 0.92), 1.0),
-    "silver": ((0.95, 0.93, 0.88), 1.0),
-}
-Preset = Literal["water", "plastic_low", "plastic_high", "glass_low", "glass_high", "ruby", "diamond",
-                 "iron", "copper", "gold", "aluminium", "silver"]
 Smith = Literal["height_correlated", "separable", "schlick", "schlick_ibl"]
 
 #: GGX below this alpha is beyond float32 (D ~ 1/(pi alpha²)), in the kernel too; use `Mirror` for a perfect one.
@@ -209,6 +195,29 @@ class MetallicRoughness(Material):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Conductor(Material):
+    """A metal by its measured complex index of refraction eta + i·k in each channel, with GGX's microfacets.
+
+    `preset` takes both from a table (scene.presets), unless they are given. alpha = roughness². One bounce between
+    microfacets counts.
+    """
+
+    kernel: ClassVar[str] = "conductor"
+    preset: ConductorPreset = "gold"
+    eta: tuple[Index, Index, Index] | None = None
+    k: tuple[Extinction, Extinction, Extinction] | None = None
+    roughness: Unit | Texture = 0.3
+
+    def parameters(self) -> dict[str, Parameter]:
+        eta, k = CONDUCTORS[self.preset]
+        return {"eta": self.eta or eta, "k": self.k or k, "roughness": self.roughness}
+
+    def conflicts(self) -> list[str]:
+        alone = (self.eta is None) != (self.k is None)
+        return ["eta: and k belong together; write both, or a preset alone"] if alone else []
+
+
+@dataclass(frozen=True, kw_only=True)
 class Mirror(Material):
     """A perfect mirror that reflects `color` of the light at every angle."""
 
@@ -273,4 +282,4 @@ class Dielectric(Material):
         return frozenset(name for name, present in has.items() if present)
 
 
-MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror, Dielectric)
+MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror, Dielectric, Conductor)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 from ..scene.lights import Light, PointLight, SpotLight
 from ..scene.instancing import unfolded
-from ..scene.materials import ALPHA_MIN, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from ..scene.materials import ALPHA_MIN, Conductor, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
 from ..scene.textures import untextured
 
@@ -25,6 +25,8 @@ Plugin = dict[str, Any]
 
 #: How near and far the camera sees, of the distance to where it looks.
 NEAR, FAR = 1e-4, 1e6
+#: An alpha up to which the separable Smith term takes less than 4e-4 of even light that the height-correlated one leaves.
+NEARLY_SMOOTH = 0.09
 
 
 def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
@@ -109,17 +111,27 @@ def _metal(material: MetallicRoughness) -> Plugin:
 def _dielectric(material: Dielectric) -> Plugin:
     if material.attenuation_distance is not None or (material.thin and material.rough):
         raise ValueError("glass that absorbs, or is thin and rough")
+    if untextured(material.roughness)**2 > NEARLY_SMOOTH:
+        raise ValueError("glass rougher than 0.3: its own has the separable Smith term")
     plugin = {"type": "thindielectric" if material.thin else "dielectric", "int_ior": material.ior, "ext_ior": 1.0}
     if material.thin and untextured(material.color) != (1.0, 1.0, 1.0):
         raise ValueError("thin glass in color: its own is not crossed again by what bounces inside")
-    if material.rough:    # whose G is the separable one
+    if material.rough:
         plugin |= {"type": "roughdielectric", "distribution": "ggx",
                    "alpha": max(untextured(material.roughness)**2, ALPHA_MIN)}
     return plugin | {"specular_transmittance": _rgb(untextured(material.color))}
 
 
+def _conductor(material: Conductor) -> Plugin:
+    values = material.parameters()
+    if untextured(material.roughness)**2 > NEARLY_SMOOTH:
+        raise ValueError("conductor rougher than 0.3: its own has the separable Smith term")
+    return _two_sided({"type": "roughconductor", "distribution": "ggx", "eta": _rgb(values["eta"]),
+                       "k": _rgb(values["k"]), "alpha": max(untextured(material.roughness)**2, ALPHA_MIN)})
+
+
 BSDFS: dict[type[Material], Callable[[Any], Plugin]] = {
-    Diffuse: _diffuse, Mirror: _mirror, MetallicRoughness: _metal, Dielectric: _dielectric}
+    Diffuse: _diffuse, Mirror: _mirror, MetallicRoughness: _metal, Dielectric: _dielectric, Conductor: _conductor}
 
 
 def _two_sided(bsdf: Plugin) -> Plugin:

@@ -169,6 +169,18 @@ def test_info_lists_what_is_compiled_and_uploaded(scene: Path) -> None:
     assert sum(info["buffers"].values()) == info["bytes"]
 
 
+def test_info_lists_materials_and_presets(scene: Path) -> None:
+    found = json.loads(clrt("info", "--materials", "--json", cwd=scene.parent).stdout)
+    types = {kind["type"]: {field["name"]: field for field in kind["fields"]} for kind in found["types"]}
+    assert types["dielectric"]["ior"] == {"name": "ior", "values": "a number 0.25 to 4", "default": 1.5}
+    assert types["diffuse"]["color"]["values"] == "3 numbers, each 0 to 1 or a texture"
+    assert found["presets"]["metallic_roughness"]["ruby"]["f0"] == [0.08] * 3
+    assert found["presets"]["conductor"]["gold"]["eta"] == [0.223, 0.428, 1.335]
+    text = clrt("info", "--materials", cwd=scene.parent).stdout
+    assert all(name in text for name in [*types, "chromium", "emission", "height_correlated"])
+    assert clrt("info", cwd=scene.parent).returncode == 2
+
+
 def test_devices_lists_the_one_in_use(scene: Path) -> None:
     devices = json.loads(clrt("devices", "--json", cwd=scene.parent).stdout)
     fields = {"index", "id", "name", "platform", "platform_version", "driver", "type", "compute_units", "global_bytes",

@@ -1,0 +1,85 @@
+"""`clrt info --materials`: every type of material with its fields and limits, and every preset."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import fields
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+from annotated_types import Ge, Gt, Le, Lt
+
+from ..scene.fields import show
+from ..scene.materials import F0_PRESETS, MATERIALS, SHARED, Material
+from ..scene.presets import CONDUCTORS
+from ..scene.textures import Texture
+
+#: What a limit of a number is called.
+LIMITS = {Ge: "at least", Gt: "above", Le: "at most", Lt: "below"}
+
+
+def material_list() -> dict[str, Any]:
+    """The types, with what all of them have first, and the presets of those that have some."""
+    shared = _described(Material, SHARED)
+    types = [{"type": kind.kernel, "about": (kind.__doc__ or "").split("\n")[0],
+              "fields": _described(kind, {field.name for field in fields(kind)} - SHARED)} for kind in MATERIALS]
+    f0 = {name: {"f0": color, "kind": "metal" if metallic else "not a metal"}
+          for name, (color, metallic) in F0_PRESETS.items()}
+    conductors = {name: {"eta": eta, "k": k, "f0": tuple(map(_normal_reflectance, eta, k))}
+                  for name, (eta, k) in CONDUCTORS.items()}
+    return {"every_type": shared, "types": types, "presets": {"metallic_roughness": f0, "conductor": conductors}}
+
+
+def material_lines(as_json: bool) -> Iterator[str]:
+    """`material_list` as lines of text, or as one of JSON."""
+    found = material_list()
+    if as_json:
+        yield json.dumps(found)
+        return
+    yield from ("Every type has", *map(_field_line, found["every_type"]))
+    for kind in found["types"]:
+        yield from ("", f'type = "{kind["type"]}": {kind["about"]}', *map(_field_line, kind["fields"]))
+    for kind_name, presets in found["presets"].items():
+        yield from ("", f"Presets of {kind_name}")
+        for name, values in presets.items():
+            yield f"  {name:14}" + "  ".join(f"{key} {_short(value)}" for key, value in values.items())
+
+
+def _normal_reflectance(eta: float, k: float) -> float:
+    return round(((eta - 1)**2 + k * k) / ((eta + 1)**2 + k * k), 3)
+
+
+def _described(kind: type[Material], names: set[str] | frozenset[str]) -> list[dict[str, Any]]:
+    hints = get_type_hints(kind, include_extras=True)
+    return [{"name": field.name, "values": " or ".join(_values(hints[field.name])), "default": field.default}
+            for field in fields(kind) if field.name in names]
+
+
+def _values(hint: Any) -> Iterator[str]:
+    """What a field of this type may be, in words."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        for part in parts:
+            yield from () if part is NoneType else _values(part)
+    elif origin is Literal:
+        yield ", ".join(parts)
+    elif origin is tuple:
+        number = next(_values(parts[0])).removeprefix("a number")
+        yield f"{len(parts)} numbers{', each' * bool(number)}{number}"
+    elif origin is Annotated:
+        words = {type(limit): f"{getattr(limit, type(limit).__name__.lower()):g}" for limit in parts[1:]}
+        limits = f"{words[Ge]} to {words[Le]}" if {Ge, Le} <= set(words) else " and ".join(
+            f"{LIMITS[limit]} {bound}" for limit, bound in words.items())
+        yield f"a number {limits}"
+    else:
+        yield {bool: "true or false", Texture: "a texture", float: "a number"}[hint]
+
+
+def _field_line(field: dict[str, Any]) -> str:
+    default = "none" if field["default"] is None else show(field["default"])
+    return f'  {field["name"]:22}{default:20}{field["values"]}'
+
+
+def _short(value: Any) -> str:
+    return value if isinstance(value, str) else " ".join(f"{part:g}" for part in value)

@@ -1,0 +1,63 @@
+// A metal by its complex index of refraction eta + i·k: Fresnel's equations at GGX's microfacets, which are drawn among those
+// visible from wo. f = F(wi·h)·G·D/(4·cos wi·cos wo), the height-correlated G; one bounce. Local frame.
+//
+// Measurements are published as eta and k, and with them Fresnel's equations are exact in each channel. F0 with a tint at
+// 82° (Hoffman 2019; Kutz et al. 2021) would fit these curves, and need a fit of its own for every metal.
+#include "bsdf/ggx.cl"
+#include "bsdf/interface.cl"
+
+struct conductor {
+    real3 eta, k;
+    real alpha;
+};
+
+static inline struct conductor conductor_at(const Scene *scene, ireal index, const Surface *surface) {
+    real roughness = PARAMETER(conductor, roughness);
+    return (struct conductor){PARAMETER3(conductor, eta), PARAMETER3(conductor, k),
+                              maximum(roughness * roughness, (real)(ALPHA_MIN))};
+}
+
+// F for unpolarised light from vacuum (Born and Wolf, 14.2), with a² + b² = |n² − sin²| for n = eta + i·k; of 2a² the smaller
+// term is divided, not subtracted.
+static inline real fresnel_conductor(real cos_o, real eta, real k) {
+    real cos2 = cos_o * cos_o, sin2 = maximum(1.0f - cos2, ZERO);
+    real real_part = eta * eta - k * k - sin2, imaginary = 2.0f * eta * k;
+    real size = sqrt(real_part * real_part + imaginary * imaginary);
+    real twice_a2 = real_part > 0.0f ? size + real_part : imaginary * imaginary / maximum(size - real_part, (real)(1e-30f));
+    real along = cos_o * sqrt(2.0f * twice_a2);    // 2a·cos
+    real perpendicular = (size + cos2 - along) / (size + cos2 + along);
+    real crossing = along * sin2, both = cos2 * size + sin2 * sin2;
+    return 0.5f * perpendicular * (1.0f + (both - crossing) / (both + crossing));
+}
+
+static inline real3 conductor_fresnel(const struct conductor *m, real cos_o) {
+    return vector(fresnel_conductor(cos_o, m->eta.x, m->k.x), fresnel_conductor(cos_o, m->eta.y, m->k.y),
+                  fresnel_conductor(cos_o, m->eta.z, m->k.z));
+}
+
+static inline real3 conductor_eval(const struct conductor *m, real3 wo, real3 wi) {
+    real3 sum = add(wo, wi);
+    real length = length3(sum);
+    real3 f = conductor_fresnel(m, 0.5f * length);     // of wi·h = wo·h
+    real g = 1.0f / (1.0f + ggx_lambda(wo, m->alpha) + ggx_lambda(wi, m->alpha));
+    real value = ggx_d(scale(sum, 1.0f / length), m->alpha) * g / (4.0f * wo.z);
+    return choose((wo.z > 0.0f) & (wi.z > 0.0f), scale(f, value), splat(ZERO));
+}
+
+static inline real conductor_pdf(const struct conductor *m, real3 wo, real3 wi) {
+    real visible = ggx_d(normalize3(add(wo, wi)), m->alpha) / (4.0f * wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
+    return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? visible : ZERO;
+}
+
+static inline real3 conductor_albedo(const struct conductor *m) { return conductor_fresnel(m, ONE); }
+
+static inline BsdfSample conductor_sample(const struct conductor *m, real3 wo, real2 u, real lobe) {
+    real3 h = sample_visible_normal(wo, m->alpha, u);
+    BsdfSample sample = no_sample();
+    sample.wi = sub(scale(h, 2.0f * dot3(wo, h)), wo);
+    sample.pdf = conductor_pdf(m, wo, sample.wi);
+    real lambda_o = ggx_lambda(wo, m->alpha), lambda_i = ggx_lambda(sample.wi, m->alpha);
+    real3 f = scale(conductor_fresnel(m, 0.5f * length3(add(wo, sample.wi))), (1.0f + lambda_o) / (1.0f + lambda_o + lambda_i));
+    sample.weight = choose(sample.pdf > 0.0f, f, splat(ZERO));
+    return sample;
+}

@@ -1,0 +1,49 @@
+"""Metals by their measured indices: Fresnel's equations in complex float64, and what the presets reflect."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clrt.device.open import Device
+from clrt.scene.materials import F0_PRESETS, Conductor
+from clrt.scene.presets import CONDUCTORS
+from clrt.study.bsdfs import bsdfs
+from clrt.study.probe import Doubles
+from clrt.study.scattering import above
+
+from .ggx import masking
+
+
+def fresnel(cos_o: Doubles, n: complex) -> Doubles:
+    """Reflectance of unpolarised light by the complex cosine of what is refracted (Born and Wolf, 1.5.2 and 14.2)."""
+    cos_t = np.sqrt(1 - (1 - cos_o**2) / n**2)
+    r_s = (cos_o - n * cos_t) / (cos_o + n * cos_t)
+    r_p = (n * cos_o - cos_t) / (n * cos_o + cos_t)
+    return np.asarray((abs(r_s)**2 + abs(r_p)**2) / 2)
+
+
+EXTREMES = [((0.01, 1.0, 100.0), (5.0, 0.0, 100.0)), ((1.5, 0.01, 0.05), (0.0, 0.01, 20.0))]
+
+
+@pytest.mark.parametrize("eta, k", [*CONDUCTORS.values(), *EXTREMES])
+def test_it_is_fresnels_with_a_complex_index(device: Device, eta: tuple[float, ...], k: tuple[float, ...]) -> None:
+    """eval = F·G·D/(4 cos wo) against the formulas as printed."""
+    alpha = 0.6**2
+    metal = bsdfs(device, [Conductor(eta=(eta[0], eta[1], eta[2]), k=(k[0], k[1], k[2]), roughness=0.6)])
+    wo, wi = above(5000, 5), above(5000, 6)
+    h = (wo + wi) / np.linalg.norm(wo + wi, axis=1, keepdims=True)
+    tan2 = (1 - h[:, 2]**2) / h[:, 2]**2
+    d = alpha**2 / (np.pi * h[:, 2]**4 * (alpha**2 + tan2)**2)
+    f = np.column_stack([fresnel(np.sum(wo * h, axis=1), complex(*index)) for index in zip(eta, k)])
+    expected = f * (d * masking("height_correlated", alpha, wo[:, 2], wi[:, 2]) / (4 * wo[:, 2]))[:, None]
+    off = np.abs(metal.value(0, wo, wi)[0] - expected)
+    roundings = 1e-5 / np.linalg.norm(wo + wi, axis=1, keepdims=True)
+    assert np.all(off <= roundings * expected + 1e-6 * (d / wo[:, 2])[:, None])
+
+
+@pytest.mark.parametrize("name", sorted(set(CONDUCTORS) & set(F0_PRESETS)))
+def test_presets_reflect_about_what_the_table_of_f0_says(name: str) -> None:
+    """Suchiński's table 6.1 has what sRGB's primaries make of spectra; one wavelength each comes within 0.12 of it."""
+    found = [float(fresnel(np.array([1.0]), complex(*index))[0]) for index in zip(*CONDUCTORS[name])]
+    assert np.abs(np.subtract(found, F0_PRESETS[name][0])).max() < 0.12
