@@ -8,10 +8,8 @@
 #include LIGHT_CHOICE
 
 #if LIGHTS
-static inline LightSample light_sample(const Scene *scene, real3 p, real3 n, Sampler *sampler) {
-    real probability;
-    real2 u = next_2d(sampler);
-    ireal light = pick_light(scene, p, n, sampler, &u.x, &probability);
+// A direction towards each lane's own light, by u.
+static inline LightSample sample_of_light(const Scene *scene, ireal light, real3 p, real2 u) {
     LightSample sample = {splat(ZERO), splat(ZERO), ONE, splat(ZERO), NO_LANES, NO_LANES};
     int first = 0;
 #define SAMPLE_LIGHT(name, type) { \
@@ -29,6 +27,14 @@ static inline LightSample light_sample(const Scene *scene, real3 p, real3 n, Sam
         first += scene->counts.name##_lights; \
     }
     LIGHT_TYPES(SAMPLE_LIGHT)
+    return sample;
+}
+
+static inline LightSample light_sample(const Scene *scene, real3 p, real3 n, Sampler *sampler) {
+    real probability;
+    real2 u = next_2d(sampler);
+    ireal light = pick_light(scene, p, n, sampler, &u.x, &probability);
+    LightSample sample = sample_of_light(scene, light, p, u);
     sample.pdf *= probability;
     return sample;
 }

@@ -139,6 +139,8 @@ TABLES: dict[str, type] = {"[camera]": Camera, "[render]": RenderSettings, "[env
                            "[materials.NAME]": Material, "[[mesh]]": MeshTable, "[[instance]]": InstanceTable,
                            "[[sphere]]": Sphere,
                            **{f'type = "{kind.kernel}"': kind for kind in (*MATERIALS, *LIGHTS)}}
+TABLES['type = "phong"` and `type = "blinn_phong"'] = TABLES.pop('type = "phong"')
+del TABLES['type = "blinn_phong"']    # one table for both
 
 
 @pytest.mark.parametrize("heading", TABLES)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers.")
 @click.option("--device", "devices", multiple=True, metavar="SEL",
               help="Number, id, part of a name, cpu or gpu; see `clrt devices`. Given twice, both render.")
-@click.option("--integrator", type=click.Choice(["path", "direct", "normals", "albedo", "depth"]),
+@click.option("--integrator", type=click.Choice(["path", "direct", "local", "normals", "albedo", "depth"]),
               help="What to compute.")
 @click.option("--sampler", type=click.Choice(["sobol", "stratified", "independent"]), help="Where samples come from.")
 @click.option("--filter", "pixel_filter", type=click.Choice(["box", "tent", "blackman_harris"]), help="Pixel filter.")

@@ -42,8 +42,10 @@ from .tiles import TILE
 LARGEST_UNIT = 2.0**127
 #: Where rays leave a surface.
 OFFSETS = {"bound": "offset/bound.cl", "ulp": "offset/ulp.cl", "fixed": "offset/fixed.cl"}
-#: Integrators that follow paths (kernels/path.cl); others show what is seen first (kernels/picture.cl).
+#: Integrators that follow paths.
 WITH_LIGHT = ("path", "direct")
+#: The kernel files of the integrators of light; others show what is seen first (kernels/picture.cl).
+ENTRIES = {"path": "path.cl", "direct": "path.cl", "local": "whitted.cl"}
 
 
 @dataclass(frozen=True)
@@ -194,7 +196,7 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
              "SAMPLER": [f"sampler/{scene.render.sampler}.cl"], "CAMERA": [camera_file(camera)],
              "PICTURE": [f"picture/{integrator}.cl"],
              "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"]}
-    entry = entry or ("path.cl" if integrator in WITH_LIGHT else "picture.cl")
+    entry = entry or ENTRIES.get(integrator, "picture.cl")
     return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame,
                          len(scene.instances), objects, part_bytes)
 
@@ -221,6 +223,7 @@ def _features(scene: Scene, materials: Materials, uv_sets: int, users: list[Mate
            "EMITTERS": any(t in SURFACES for t in emitters.types),
            "TEXTURES": uv_sets > 0, "EMISSION_TEXTURES": any(isinstance(user.emission, Texture) for user in users),
            "OPACITY": bool(materials.with_value("opacity")), "NORMAL_MAPS": bool(materials.mapped("normal_map")),
+           "LOCAL": scene.render.integrator == "local",
            "VERTEX_COLORS": any(mesh.colors is not None for mesh in scene.meshes),
            "INSTANCES": bool(scene.instances),
            "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes)}

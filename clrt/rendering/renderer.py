@@ -20,7 +20,7 @@ from ..scene.model import RenderSettings, Scene
 from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
 from .aovs import LIGHT, chosen_aovs, film_aovs, needs_direct_light, seen_first
 from .checkpoint import open_checkpoints
-from .compile import OFFSETS, WITH_LIGHT, Choices, compile_for_all
+from .compile import ENTRIES, OFFSETS, WITH_LIGHT, Choices, compile_for_all
 from .crew import make_picture
 from .film import RELATIVE_FLOOR, Film
 from .first_hits import first_hits
@@ -92,12 +92,12 @@ class Renderer:
         on_phase("build")
         compiled = compile_for_all(self.scene, choices, self.devices)
         self.compiled = compiled[0]
-        if settings.integrator in WITH_LIGHT and not {"LIGHTS", "SKY"} & set(self.compiled.features):
+        if settings.integrator in ENTRIES and not {"LIGHTS", "SKY"} & set(self.compiled.features):
             logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
         self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene,
                                                    self.compiled.choices, name_of(self.devices))
         on_phase("compile")
-        depth = settings.max_depth if settings.integrator == "path" else min(settings.max_depth, 2)
+        depth = min(settings.max_depth, 2) if settings.integrator == "direct" else settings.max_depth
         planned = None if spp is None else int(spp) * (MOST_TIMES_PLANNED if settings.adaptive else 1)
         self._planned_spp = kept.planned_spp if kept else planned
         self.session = make_picture(self.devices, compiled, settings.size, depth, settings.seed, self._planned_spp)

@@ -21,7 +21,7 @@ from .textures import Texture
 #: Fields whose values are no plain data; whoever holds them checks them.
 ELSEWHERE = frozenset({"image", "material", "materials", "mesh", "picture", "to_world"})
 #: Words of the scene format that this version knows but cannot draw yet.
-LATER = frozenset({"phong", "blinn_phong", "local", "raster"})
+LATER = frozenset({"raster"})
 FLOAT32_MAX = float(np.finfo(np.float32).max)
 #: More mistakes than this in one object are counted, not listed.
 MOST = 12

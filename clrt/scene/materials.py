@@ -282,4 +282,28 @@ class Dielectric(Material):
         return frozenset(name for name, present in has.items() if present)
 
 
-MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror, Dielectric, Conductor)
+@dataclass(frozen=True, kw_only=True)
+class Phong(Material):
+    """Phong's model: Lambert and a gloss around the mirrored direction (Nadolny 3.1–3.3).
+
+    specular: of the gloss, the more narrow the larger `shininess` is. ambient: what part of `color` the local
+    integrator gives to the sky's light. In the path integrators the body has at most what the gloss leaves,
+    1 − specular, and the gloss reflects `specular` of light from straight above (Lafortune and Willems 1994).
+    """
+
+    kernel: ClassVar[str] = "phong"
+    color: Albedo | Texture = (0.8, 0.8, 0.8)
+    specular: Albedo | Texture = (0.2, 0.2, 0.2)
+    shininess: Annotated[float, Ge(0), Le(10000)] = 32.0
+    ambient: Unit = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlinnPhong(Phong):
+    """Blinn's model: Phong's by the half vector, about as wide with four times its shininess."""
+
+    kernel: ClassVar[str] = "blinn_phong"
+
+
+MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror, Dielectric, Conductor, Phong,
+                                         BlinnPhong)

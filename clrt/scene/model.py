@@ -20,7 +20,7 @@ IntArray = NDArray[np.int32]
 Positive = Annotated[float, Gt(0)]
 Pixels = Annotated[int, Ge(1), Le(65536)]
 Projection = Literal["perspective", "orthographic", "equirectangular"]
-Integrator = Literal["path", "direct", "normals", "albedo", "depth"]
+Integrator = Literal["path", "direct", "local", "normals", "albedo", "depth"]
 Sampler = Literal["sobol", "stratified", "independent"]
 Filter = Literal["box", "tent", "blackman_harris"]
 

@@ -16,7 +16,9 @@ from ..scene.model import Scene, Sphere
 from .probe import Doubles, Probe
 
 #: What is tried of fields that want other numbers than the ends and the middle of their range.
-NUMBERS: dict[str, tuple[Any, ...]] = {"roughness": (0.0, 0.05, 0.1, 0.3, 0.6, 1.0), "ior": (0.25, 1.5)}
+NUMBERS: dict[str, tuple[Any, ...]] = {
+    "roughness": (0.0, 0.05, 0.1, 0.3, 0.6, 1.0), "ior": (0.25, 1.5), "shininess": (0.0, 3.0, 30.0, 1000.0),
+    "ambient": (1.0,)}
 COLOR = (1.0, 0.5, 0.2)
 #: cos θ of wo, down to grazing; these sines are float32 numbers or round to 1.
 COSINES = (1.0, 0.6, 0.1, 2.0**-7, 2.0**-10, 2.0**-13)

@@ -45,6 +45,8 @@ def check_scene(scene: Scene) -> None:
         raise UsageError(f"{scene.name}: Cycles is not told of spot lights, which fall off otherwise there")
     if scene.camera.projection != "perspective" or scene.camera.aperture_radius:
         raise UsageError(f"{scene.name}: Cycles is told of pinholes only")
+    if scene.render.integrator == "local":
+        raise UsageError(f'{scene.name}: Cycles has no integrator "local"')
     if scene.render.filter != "box" or scene.render.max_depth < 2:
         raise UsageError(f'{scene.name}: Cycles is compared with filter = "box", and two path edges or more')
 

@@ -25,7 +25,7 @@ Plugin = dict[str, Any]
 
 #: How near and far the camera sees, of the distance to where it looks.
 NEAR, FAR = 1e-4, 1e6
-#: An alpha up to which the separable Smith term takes less than 4e-4 of even light that the height-correlated one leaves.
+#: An alpha up to which the separable Smith term takes less than 4e-4 of even light that the height-correlated leaves.
 NEARLY_SMOOTH = 0.09
 
 
@@ -33,6 +33,8 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
     """The plugins of `scene` with its own settings. UsageError names what has no counterpart in Mitsuba."""
     if scene.render.filter != "box":
         raise UsageError(f'{scene.name}: Mitsuba is compared with filter = "box"')
+    if scene.render.integrator == "local":
+        raise UsageError(f'{scene.name}: Mitsuba has no integrator "local"')
     depth = scene.render.max_depth if scene.render.integrator == "path" else min(scene.render.max_depth, 2)
     plugins: Plugin = {"type": "scene", "integrator": {"type": "path", "max_depth": depth},
                        "sensor": _sensor(scene, sampler)}

@@ -94,7 +94,10 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
 
 @pytest.mark.parametrize("text, sentence", [
     ('[materials.a]\ncolor = [1, 1, 1]', "materials.a: type is missing; write one of"),
-    ('[materials.a]\ntype = "phong"', 'materials.a.type: "phong" is not supported yet; this version knows'),
+    ('[materials.a]\ntype = "phnog"', 'materials.a.type: "phnog" is unknown; did you mean "phong"?'),
+    ('[materials.a]\ntype = "dielectric"\nthin = true\nattenuation_distance = 1\n[[sphere]]\nmaterial = "a"',
+     "attenuation_distance: a thin sheet has no inside; leave it out, or thin"),
+    ('[materials.a]\ntype = "conductor"\nk = [1, 2, 3]\n[[sphere]]\nmaterial = "a"', "eta: and k belong together"),
     ('[materials.a]\ntype = "diffuse"\ncolor = { image = "a.png" }', "a.png: no such picture file"),
     ('[materials.a]\ntype = "diffuse"\ncolor = { image = "a.png", scal = 2 }', 'color: key "scal" is unknown; did you'),
     ('[materials.a]\ntype = "diffuse"\nnormal_map = 3', "normal_map: 3 is no texture; write { image = "),
