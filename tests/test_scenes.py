@@ -16,11 +16,12 @@ from clrt.scene.fields import LATER
 from clrt.scene.file import load
 from clrt.scene.instance_reader import InstanceTable
 from clrt.scene.lights import LIGHTS
-from clrt.scene.materials import F0_PRESETS, SHARED, MATERIALS, Material, MetallicRoughness
+from clrt.scene.material import SHARED
+from clrt.scene.materials import MATERIALS, Material, MetallicRoughness
 from clrt.scene.mesh_table import MeshTable
-from clrt.scene.presets import CONDUCTORS
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 from clrt.scene.pictures import read_picture
+from clrt.scene.presets import CONDUCTORS, F0_PRESETS
 from clrt.study.significance import mean_test, sidak
 from .rendering.ggx import albedo
 

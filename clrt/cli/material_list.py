@@ -11,7 +11,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 from annotated_types import Ge, Gt, Le, Lt
 
 from ..scene.fields import show
-from ..scene.materials import F0_PRESETS, MATERIALS, SHARED, Material
+from ..scene.material import SHARED
+from ..scene.materials import MATERIALS, Material
+from ..scene.presets import F0_PRESETS
 from ..scene.presets import CONDUCTORS
 from ..scene.textures import Texture
 

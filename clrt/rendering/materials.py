@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene.materials import MATERIALS, Material, as_color
+from ..scene.material import as_color
+from ..scene.materials import MATERIALS, Material
 from ..scene.textures import Texture
 from .records import material_record
 from .textures import Textures

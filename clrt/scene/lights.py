@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from .materials import Radiance, tuples_for_lists
+from .material import Radiance, tuples_for_lists
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,8 @@ from annotated_types import Ge, Gt, Le, Lt
 from numpy.typing import NDArray
 
 from .lights import Light
-from .materials import Diffuse, Material, tuples_for_lists
+from .material import tuples_for_lists
+from .materials import Diffuse, Material
 from .textures import NonNegative
 
 Vector = tuple[float, float, float]

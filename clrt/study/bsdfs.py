@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..device.open import Device
-from ..scene.materials import ALPHA_MIN, MATERIALS, SHARED, Material
+from ..scene.material import ALPHA_MIN, SHARED
+from ..scene.materials import MATERIALS, Material
 from ..scene.model import Scene, Sphere
 from .probe import Doubles, Probe
 

@@ -8,7 +8,8 @@ from typing import NamedTuple, get_args
 import numpy as np
 
 from ..device.open import Device
-from ..scene.materials import Diffuse, MetallicRoughness, Mirror, Smith
+from ..scene.materials import Diffuse, MetallicRoughness, Mirror
+from ..scene.metallic_roughness import Smith
 from ..scene.microfacets import albedo
 from .bsdfs import Bsdfs, bsdfs
 from .probe import Doubles

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 from ..scene.lights import Light, PointLight, SpotLight
 from ..scene.instancing import unfolded
-from ..scene.materials import ALPHA_MIN, Conductor, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from ..scene.material import ALPHA_MIN
+from ..scene.materials import Conductor, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
 from ..scene.textures import untextured
 

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ..device.open import Device
-from ..scene.materials import ALPHA_MIN, MetallicRoughness
+from ..scene.material import ALPHA_MIN
+from ..scene.materials import MetallicRoughness
 from ..scene.model import Scene, Sphere
 from .bsdfs import uniform, view
 from .jacobians import grid, missed

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.scene.materials import F0_PRESETS, MetallicRoughness
+from clrt.scene.materials import MetallicRoughness
+from clrt.scene.presets import F0_PRESETS
 from clrt.scene.textures import untextured
 
 Doubles = NDArray[np.float64]

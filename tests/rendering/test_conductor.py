@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from clrt.device.open import Device
-from clrt.scene.materials import F0_PRESETS, Conductor
+from clrt.scene.materials import Conductor
+from clrt.scene.presets import F0_PRESETS
 from clrt.scene.presets import CONDUCTORS
 from clrt.study.bsdfs import bsdfs
 from clrt.study.probe import Doubles

@@ -12,7 +12,8 @@ from clrt.device.open import Device
 from clrt.rendering.compile import Choices, compile_scene
 from clrt.scene import microfacets
 from clrt.scene.file import load
-from clrt.scene.materials import MetallicRoughness, Smith
+from clrt.scene.materials import MetallicRoughness
+from clrt.scene.metallic_roughness import Smith
 from clrt.scene.model import Scene, Sphere
 from clrt.study.bsdfs import bsdfs
 from clrt.study.furnace import SMITHS, Reflected, evenly, inexact, measure_metals

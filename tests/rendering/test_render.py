@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from clrt.device.open import Device
 from clrt.scene.lights import DirectionalLight, PointLight
-from clrt.scene.materials import Diffuse, Material, MetallicRoughness, Mirror, Smith
+from clrt.scene.materials import Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.metallic_roughness import Smith
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 from clrt.study.significance import mean_test, sidak
 

@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from clrt.errors import SceneError
 from clrt.scene.file import load
 from clrt.scene.gltf import read_gltf
-from clrt.scene.materials import MetallicRoughness, as_color
+from clrt.scene.material import as_color
+from clrt.scene.materials import MetallicRoughness
 from clrt.scene.textures import Texture
 from clrt.scene.model import Model
 from .glb import Gltf, ball

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from clrt.errors import SceneError
-from clrt.scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror, as_color
+from clrt.scene.material import as_color
+from clrt.scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror
 from clrt.scene.meshes import read_mesh
 from clrt.scene.mtl import material, read_library
 from clrt.scene.mtl_maps import Maps
