@@ -15,7 +15,8 @@ import pyopencl as cl
 
 from clrt.device import blocks, program
 from clrt.device.open import Device, open_device
-from clrt.rendering import session
+from clrt.rendering import on_device
+from clrt.scene import instancing
 
 from .small_work import work
 
@@ -68,9 +69,10 @@ def compiled_files() -> list[str]:
 def main(form: str, path: str) -> None:
     """Works with the device as with a `form` of DEVICES; writes the answers to `path`, an .npz file."""
     workarounds = {"Buffer": KeptBuffer, "enqueue_copy": copy_whole}
+    instancing.FEW_TRIANGLES = 0   # instances of small meshes, too
     alone = {"in_background": at_once}
     for owner, values in ((Device, DEVICES[form]), (blocks, SHARES), (cl, workarounds), (program, alone),
-                          (session, alone)):
+                          (on_device, alone)):
         for name, value in values.items():
             setattr(owner, name, value)
     answers = {f"{way}/{name}": array for way, found in work(open_device()) for name, array in found.items()}

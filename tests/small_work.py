@@ -28,7 +28,7 @@ from clrt.tree_query import TRAVERSALS
 from .accel.cases import soup, spheres
 from .rendering.lamps import lamps
 from .rendering.rays import icosphere
-from .rendering.test_variants import everything, painted, sights
+from .rendering.test_variants import everything, painted, planted, shelf, sights
 
 SETTINGS = RenderSettings(size=(6, 4), spp=2, max_depth=5, seed=11)
 TRIANGLES = soup(60, 0.5)
@@ -113,6 +113,9 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     yield "guides of it", {**render_guides(started(device, painting), 2)}
     for name, sight in sights(painting):
         yield name, picture(device, sight)
+    yield "shelf", picture(device, replace(shelf(), render=SETTINGS))
+    for layout in UPPER_LEVELS:
+        yield f"planted {layout}", picture(device, planted(painting), layout=layout)
     apart = started(device, scene(), direct_light=True)
     light = film(apart, SETTINGS.spp)
     every = first_hits(apart, scene(), AOVS) | film_aovs(light, AOVS)

@@ -26,12 +26,13 @@ from clrt.errors import KernelError
 from clrt.rendering.aovs import AOVS
 from clrt.rendering.compile import OFFSETS, Choices, compile_scene
 from clrt.rendering.first_hits import first_hit_program
+from clrt.scene import instancing
 from clrt.scene.materials import MATERIALS
 from clrt.scene.model import Environment, Filter, Sampler
 from clrt.study.bsdfs import variants
 
 from ..rendering.lamps import lamps
-from ..rendering.test_variants import everything, painted, sights
+from ..rendering.test_variants import everything, painted, planted, shelf, sights
 
 KERNELS = Path(str(files("clrt.kernels")))
 FILES = sorted(str(path.relative_to(KERNELS)) for path in KERNELS.rglob("*.cl"))
@@ -87,9 +88,10 @@ def test_a_kernel_file_opens_with_what_it_is(name: str) -> None:
     assert re.match(r"// \S", (KERNELS / name).read_text(encoding="utf-8"))
 
 
-def test_every_kernel_file_is_used(device: Device) -> None:
+def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """By some scene, with some choice, by ray queries, the builder, to refit, to check a device, or to study it."""
     corners = np.zeros((3, 3), np.float32)
+    monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
     used: set[str] = set()
     for layout, traversal in (("bvh8", "pool"), ("bvh8", "packet"), ("bvh2", "single")):
         query = clrt.InstancedRayQuery([(corners, [[0, 1, 2]])], [0], [np.eye(3, 4)], device=device.info.index,
@@ -118,7 +120,7 @@ def test_every_kernel_file_is_used(device: Device) -> None:
         used |= set(compile_scene(scene, Choices()).files)
     for count in (1, 40):
         used |= set(compile_scene(lamps(count), Choices()).files)
-    for scene in (painted(everything()), *(sight for _, sight in sights(everything()))):
+    for scene in (painted(everything()), planted(everything()), shelf(), *(sight for _, sight in sights(everything()))):
         used |= set(compile_scene(scene, Choices()).files)
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
     for entry in ("guides.cl", "study/probe.cl"):

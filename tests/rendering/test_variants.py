@@ -16,9 +16,10 @@ from clrt.rendering import compile as compile_module
 from clrt.rendering import session as session_module
 from clrt.rendering.compile import OFFSETS, compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
-from clrt.scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror
-from clrt.scene.model import Camera, Environment, Integrator, Mesh, RenderSettings, Sampler, Scene, Sphere
+from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, MetallicRoughness, Mirror
+from clrt.scene.model import Camera, Environment, Instance, Integrator, Mesh, RenderSettings, Sampler, Scene, Sphere
 from clrt.scene.textures import Picture, Texture
+from clrt.study.bsdfs import variants
 from clrt.study.probe import choices
 
 from . import rays
@@ -66,6 +67,22 @@ def painted(scene: Scene) -> Scene:
     spheres = [*scene.spheres, Sphere(center=(2.0, 0.4, 2.0), radius=0.3,
                                       material=Diffuse(color=here, emission=there, normal_map=there, one_sided=True))]
     return replace(scene, meshes=meshes, spheres=spheres)
+
+
+def shelf() -> Scene:
+    """A small sphere of each material in each of its variants, in rows."""
+    materials = [material for kind in MATERIALS for material in variants(kind)]
+    across = int(np.ceil(np.sqrt(len(materials))))
+    spheres = [Sphere(center=(i % across - across / 2, i // across - across / 2, 0.0), radius=0.45, material=material)
+               for i, material in enumerate(materials)]
+    return replace(everything(), meshes=[], spheres=spheres,
+                   camera=Camera(position=(0, 0, 3.0 * across), look_at=(0, 0, 0), fov_degrees=20))
+
+
+def planted(scene: Scene) -> Scene:
+    """With two instances of its last mesh beside it."""
+    places = np.array([np.column_stack([np.diag(scale), [x, 0, 0]]) for scale, x in (((1, 2, 1), -3), ((-1, 1, 1), 6))])
+    return replace(scene, instances=[Instance(scene.meshes[-1], place) for place in places])
 
 
 def sights(scene: Scene) -> Iterator[tuple[str, Scene]]:
