@@ -55,11 +55,11 @@ def interrupt_after(running: Renderer, launches: int) -> None:
     """Has it interrupted as so much work was cut for launches."""
     cut, left = running.session.work.cut, [launches]
 
-    def counted(*arguments: Any) -> Any:
+    def counted(*arguments: Any, **limits: Any) -> Any:
         left[0] -= 1
         if left[0] == 0:
             running.interrupt()
-        return cut(*arguments)
+        return cut(*arguments, **limits)
 
     setattr(running.session.work, "cut", counted)
 
