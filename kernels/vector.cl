@@ -3,6 +3,7 @@
 #include "lanes.cl"
 
 #define PI 3.14159265358979f
+#define BELOW_ONE ((real)(0.99999994f))                                     // the largest float that is
 #define UNIT_ROUNDOFF 5.9604645e-8f                                        // 2^-24
 #define GAMMA(n) ((n) * UNIT_ROUNDOFF / (1.0f - (n) * UNIT_ROUNDOFF))      // Higham 2002, lemma 3.1
 

@@ -53,7 +53,7 @@ class Material:
     def parameters(self) -> dict[str, Parameter]:
         """The values its kernel reads: numbers, triples, rows of a multiple of four, or a texture for a field of these.
 
-        What only some materials of a type have is 0 for the others.
+        What only some materials of a type have is what their field says for the others, or 0 where there is none.
         """
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in SHARED}
 

@@ -21,6 +21,14 @@ NUMBERS: dict[str, tuple[Any, ...]] = {
     "roughness": (0.0, 0.05, 0.1, 0.3, 0.6, 1.0), "ior": (0.25, 1.5), "shininess": (0.0, 3.0, 30.0, 1000.0),
     "ambient": (1.0,)}
 COLOR = (1.0, 0.5, 0.2)
+#: Of a type: sets of fields that are tried with each other alone, and left at their defaults everywhere else.
+LAYERS: dict[str, tuple[dict[str, Any], ...]] = {"metallic_roughness": (
+    {"ior": 2.0}, {"specular": 0.0}, {"specular": 0.5, "specular_color": COLOR},
+    {"clearcoat": 1.0}, {"clearcoat": 0.5, "clearcoat_roughness": 0.6}, {"clearcoat": 1.0, "clearcoat_roughness": 1.0},
+    {"sheen_color": COLOR}, {"sheen_color": (1.0, 1.0, 1.0), "sheen_roughness": 0.5},
+    {"sheen_color": (0.2, 0.3, 0.4), "sheen_roughness": 1.0}, {"transmission": 1.0},
+    {"transmission": 0.5, "specular": 0.5, "clearcoat": 0.7, "clearcoat_roughness": 0.2, "sheen_color": (0.5, 0.5, 0.5),
+     "sheen_roughness": 0.3})}
 #: cos θ of wo, down to grazing; these sines are float32 numbers or round to 1.
 COSINES = (1.0, 0.6, 0.1, 2.0**-7, 2.0**-10, 2.0**-13)
 #: Of wo that does not graze.
@@ -31,8 +39,8 @@ NARROWEST = 16 * 2.0**-24
 
 
 def variants(kind: type[Material]) -> list[Material]:
-    """All combinations of the numbers and flags above, and each word that a field may be, one at a time."""
-    return plain_variants(kind) + worded_variants(kind)
+    """All combinations of the numbers and flags above, each word that a field may be, one at a time, and LAYERS."""
+    return plain_variants(kind) + worded_variants(kind) + layered_variants(kind)
 
 
 def plain_variants(kind: type[Material]) -> list[Material]:
@@ -112,11 +120,18 @@ def bsdfs(device: Device, materials: list[Material] | None = None, changes: Mapp
 def _values(kind: type[Material]) -> tuple[dict[str, tuple[Any, ...]], ...]:
     """What is tried of the fields that are numbers, of those that are flags, and of those that are words."""
     hints = get_type_hints(kind)
-    names = [field.name for field in fields(kind) if field.name not in SHARED]
+    apart = {name for layer in LAYERS.get(kind.kernel, ()) for name in layer}
+    names = [field.name for field in fields(kind) if field.name not in SHARED | apart]
     words = {name: tuple(found) for name in names if (found := _words(hints[name]))}
     flags = {name: (False, True) for name in names if hints[name] is bool}
     numbers = {name: NUMBERS.get(name) or _numbers(kind, name) for name in names if name not in words | flags}
     return numbers, flags, words
+
+
+def layered_variants(kind: type[Material]) -> list[Material]:
+    """Each of its LAYERS with combinations of numbers, every second one of them."""
+    some = {name: values[::2] for name, values in _values(kind)[0].items()}
+    return [kind(**values, **layer) for layer in LAYERS.get(kind.kernel, ()) for values in _product(some)]
 
 
 def _product(values: Mapping[str, tuple[Any, ...]]) -> list[dict[str, Any]]:

@@ -130,7 +130,7 @@ BSDFS: dict[type[Material], Callable[[Nodes, Any], Any]] = {
 
 def _is_metal(material: MetallicRoughness) -> bool:
     return (not np.any(material.lobes.albedo) and material.smith == "height_correlated"
-            and not material.multiple_scattering)
+            and not material.features() & {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR"})
 
 
 def _material(data: Any, material: Material) -> Any:

@@ -105,6 +105,8 @@ def _metal(material: MetallicRoughness) -> Plugin:
     lobes = material.lobes
     if np.any(lobes.albedo):
         raise ValueError("metallic_roughness that is not all metal: its own has another diffuse part")
+    if material.features() & {"LAYERS", "SPECULAR"}:
+        raise ValueError("metals with layers")
     if material.smith != "separable" or material.multiple_scattering:
         raise ValueError('metals but with smith = "separable" and single scattering')
     return _two_sided({"type": "principled", "metallic": 1.0, "roughness": sqrt(lobes.alpha),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..scene.materials import MATERIALS, Material
 from . import directions
-from .bsdfs import Bsdfs, plain_variants, uniform, view, views, worded_variants
+from .bsdfs import Bsdfs, layered_variants, plain_variants, uniform, view, views, worded_variants
 from .probe import Doubles
 from .significance import chi2_test, mean_test
 
@@ -52,7 +52,8 @@ def cases(kinds: Iterable[type[Material]] = MATERIALS) -> list[tuple[Material, f
     found: list[tuple[Material, float]] = []
     for kind in kinds:
         found += [(material, cosine) for material in plain_variants(kind) for cosine in views(material)]
-        found += [(material, cosine) for material in worded_variants(kind) for cosine in FEW]
+        few = worded_variants(kind) + layered_variants(kind)
+        found += [(material, cosine) for material in few for cosine in FEW]
     return list(dict.fromkeys(found))
 
 
@@ -137,15 +138,23 @@ def reciprocity(bsdfs: Bsdfs, which: int, count: int, seed: int) -> Doubles:
     """(count,) |f(wo, wi) − f(wi, wo)| over their sum, at pairs all over the sphere, half of them grazing.
 
     Through the surface: of f(wo, wi) and of f(wi, wo) as seen from behind, times the spread, since it is radiance over
-    the square of the index of refraction that takes the same way back.
+    the square of the index of refraction that takes the same way back. There the difference is in units of the smaller
+    cosine at the microfacet, to which float32 knows both of them.
     """
     wo, wi = above(count, seed), above(count, seed + 1)
     there, back = bsdfs.value(which, wo, wi)[0] / wi[:, 2:], bsdfs.value(which, wi, wo)[0] / wo[:, 2:]
-    if "TRANSMISSION" in bsdfs.materials[which].features():
+    through = "TRANSMISSION" in bsdfs.materials[which].features()
+    if through:
         half, spread = count // 2, bsdfs.spread(which)
         there[:half] = bsdfs.value(which, wo[:half], wi[:half] * FLIP)[0] / wi[:half, 2:]
         back[:half] = spread * bsdfs.value(which, wi[:half], wo[:half] * FLIP, front=False)[0] / wo[:half, 2:]
-    return np.asarray(np.max(np.abs(there - back) / np.maximum(there + back, 1e-3), axis=1))
+    relative = np.abs(there - back) / np.maximum(there + back, 1e-3)
+    if through and spread != 1:
+        h = wo[:half] + wi[:half] * FLIP / np.sqrt(spread)
+        h /= np.linalg.norm(h, axis=1, keepdims=True)
+        cosines = np.minimum(np.abs(np.sum(wo[:half] * h, axis=1)), np.abs(np.sum(wi[:half] * FLIP * h, axis=1)))
+        relative[:half] *= cosines[:, None]
+    return np.asarray(np.max(relative, axis=1))
 
 
 def above(count: int, seed: int) -> Doubles:

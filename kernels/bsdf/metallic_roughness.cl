@@ -12,9 +12,18 @@
 // MULTIPLE_SCATTERING adds what further bounces between microfacets reflect, as clrt/scene/microfacets.py says:
 //   multiple·loss(cos wi)·loss(cos wo)/pi
 // The loss is near 0.1 at cos ≈ alpha and falls with 1/cos² behind; a lobe of its own is drawn with about that density.
+//
+// SPECULAR: f0 of what is no metal times specular·specular_color, and F ends at `specular` (glTF's KHR_materials_specular).
+// LAYERS: what lies on it and passes through it (layers.cl).
 #include "bsdf/ggx.cl"
 #include "bsdf/interface.cl"
 
+#if LAYERS
+#define BASE(name) base_##name
+#else
+#define BASE(name) metallic_roughness_##name
+#endif
+#define SHEEN_COEFFICIENTS ((int)(sizeof(((MetallicRoughness *)0)->sheen_albedo) / sizeof(float)))
 #define LOSS_COEFFICIENTS ((int)(sizeof(((MetallicRoughness *)0)->loss) / sizeof(float)))
 
 struct metallic_roughness {
@@ -26,12 +35,31 @@ struct metallic_roughness {
     real mean_loss, width, spread;
     real loss[LOSS_COEFFICIENTS];
 #endif
+#if SPECULAR
+    real f90;
+#endif
+#if CLEARCOAT
+    real coat, coat_alpha;
+#endif
+#if SHEEN
+    real3 sheen;
+    real sheen_power, sheen_albedo[SHEEN_COEFFICIENTS];
+#endif
+#if THROUGH
+    real3 through;
+#endif
 };
 
 static inline struct metallic_roughness metallic_roughness_at(const Scene *scene, ireal index, const Surface *surface) {
     struct metallic_roughness m;
-    real3 color = COLOR(metallic_roughness), specular = PARAMETER3(metallic_roughness, specular);
+    real3 color = COLOR(metallic_roughness), specular = PARAMETER3(metallic_roughness, f0);
     real metallic = PARAMETER(metallic_roughness, metallic), roughness = PARAMETER(metallic_roughness, roughness);
+#if SPECULAR
+    real factor = PARAMETER(metallic_roughness, specular);
+    specular = mul(specular, PARAMETER3(metallic_roughness, specular_color));
+    specular = scale(vector(minimum(specular.x, ONE), minimum(specular.y, ONE), minimum(specular.z, ONE)), factor);
+    m.f90 = factor + (1.0f - factor) * metallic;
+#endif
     m.f0 = mad3(sub(color, specular), metallic, specular);
     m.albedo = scale(color, 1.0f - metallic);
     m.alpha = maximum(roughness * roughness, (real)(ALPHA_MIN));
@@ -42,6 +70,21 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     m.width = PARAMETER(metallic_roughness, width);
     m.spread = PARAMETER(metallic_roughness, spread);
     for (int k = 0; k < LOSS_COEFFICIENTS; ++k) m.loss[k] = GATHER(real, scene->metallic_roughness, index, .loss[k]);
+#endif
+#if CLEARCOAT
+    m.coat = PARAMETER(metallic_roughness, clearcoat);
+    m.coat_alpha = maximum(square(PARAMETER(metallic_roughness, clearcoat_roughness)), (real)(ALPHA_MIN));
+#endif
+#if SHEEN
+    m.sheen = PARAMETER3(metallic_roughness, sheen_color);
+    m.sheen_power = PARAMETER(metallic_roughness, sheen_power);
+    for (int k = 0; k < SHEEN_COEFFICIENTS; ++k)
+        m.sheen_albedo[k] = GATHER(real, scene->metallic_roughness, index, .sheen_albedo[k]);
+#endif
+#if THROUGH
+    real transmission = PARAMETER(metallic_roughness, transmission);
+    m.through = scale(m.albedo, transmission);
+    m.albedo = scale(m.albedo, 1.0f - transmission);
 #endif
     return m;
 }
@@ -67,14 +110,22 @@ static inline real multiple_pdf(const struct metallic_roughness *m, real cos_the
 }
 #endif
 
-static inline real3 fresnel_schlick(real3 f0, real cos_theta) {
+#if SPECULAR
+#define F90(m) ((m)->f90)
+#else
+#define F90(m) ONE
+#endif
+
+// Schlick's F, which ends at F90.
+static inline real3 base_fresnel(const struct metallic_roughness *m, real cos_theta) {
     real c = maximum(1.0f - cos_theta, ZERO), c2 = c * c;
-    return mad3(sub(splat(ONE), f0), c2 * c2 * c, f0);
+    return mad3(sub(splat(F90(m)), m->f0), c2 * c2 * c, m->f0);
 }
 
 // 1 − F, with 1 − (1 − c)^5 multiplied out so that it keeps its digits at grazing angles.
-static inline real3 transmitted(real3 f0, real c) {
-    return scale(sub(splat(ONE), f0), c * (5.0f - c * (10.0f - c * (10.0f - c * (5.0f - c)))));
+static inline real3 transmitted(const struct metallic_roughness *m, real c) {
+    real rest = c * (5.0f - c * (10.0f - c * (10.0f - c * (5.0f - c))));
+    return mad3(sub(splat(F90(m)), m->f0), rest, splat(1.0f - F90(m)));
 }
 
 // G2 by the forms that the scene's materials use.
@@ -100,7 +151,7 @@ static inline real shadowing(const struct metallic_roughness *m, real3 wo, real3
 typedef struct { real specular, multiple, diffuse; } LobeShares;
 
 static inline LobeShares lobe_shares(const struct metallic_roughness *m, real3 wo) {
-    real3 f = fresnel_schlick(m->f0, wo.z);
+    real3 f = base_fresnel(m, wo.z);
     LobeShares share = {luminance(f), ZERO, luminance(mul(sub(splat(ONE), f), m->albedo))};
 #if MULTIPLE_SCATTERING
     share.multiple = luminance(m->multiple) * m->mean_loss * microfacet_loss(m, wo.z);
@@ -111,13 +162,13 @@ static inline LobeShares lobe_shares(const struct metallic_roughness *m, real3 w
                         some ? share.diffuse / sum : ZERO};
 }
 
-static inline real3 metallic_roughness_eval(const struct metallic_roughness *m, real3 wo, real3 wi) {
+static inline real3 BASE(eval)(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 sum = add(wo, wi);
     real length = length3(sum);
     real3 h = scale(sum, 1.0f / length);
-    real3 f = fresnel_schlick(m->f0, 0.5f * length);     // wi·h = wo·h, which as products differ near wi = −wo
+    real3 f = base_fresnel(m, 0.5f * length);     // wi·h = wo·h, which as products differ near wi = −wo
     real specular = ggx_d(h, m->alpha) * shadowing(m, wo, wi) / (4.0f * wo.z);
-    real3 crossing = mul(transmitted(m->f0, wi.z), transmitted(m->f0, wo.z));
+    real3 crossing = mul(transmitted(m, wi.z), transmitted(m, wo.z));
     real3 body = mul(crossing, m->albedo);
 #if MULTIPLE_SCATTERING
     body = mad3(m->multiple, microfacet_loss(m, wo.z) * microfacet_loss(m, wi.z), body);
@@ -126,7 +177,7 @@ static inline real3 metallic_roughness_eval(const struct metallic_roughness *m, 
     return choose((wo.z > 0.0f) & (wi.z > 0.0f), mad3(f, specular, diffuse), splat(ZERO));
 }
 
-static inline real metallic_roughness_pdf(const struct metallic_roughness *m, real3 wo, real3 wi) {
+static inline real BASE(pdf)(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 h = normalize3(add(wo, wi));
     real visible = ggx_d(h, m->alpha) / (4.0f * wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
     LobeShares share = lobe_shares(m, wo);
@@ -139,12 +190,12 @@ static inline real metallic_roughness_pdf(const struct metallic_roughness *m, re
 
 // As if no light were lost between microfacets: f0, and what goes through the surface twice: (1 − f0) of it straight in,
 // and (1 − f0)·20/21, the cosine-weighted mean of 1 − F, out again.
-static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m) {
+static inline real3 BASE(albedo)(const struct metallic_roughness *m) {
     real3 in = sub(splat(ONE), m->f0);
     return mad3(mul(mul(in, in), m->albedo), (real)(20.0f / 21.0f), m->f0);
 }
 
-static inline BsdfSample metallic_roughness_sample(const struct metallic_roughness *m, real3 wo, real2 u, real lobe) {
+static inline BsdfSample BASE(sample)(const struct metallic_roughness *m, real3 wo, real2 u, real lobe) {
     real3 h = sample_visible_normal(wo, m->alpha, u);
     real3 reflected = sub(scale(h, 2.0f * dot3(wo, h)), wo);
     BsdfSample sample = no_sample();
@@ -153,8 +204,10 @@ static inline BsdfSample metallic_roughness_sample(const struct metallic_roughne
 #if MULTIPLE_SCATTERING
     sample.wi = choose(lobe >= 1.0f - share.multiple, sample_multiple(m, u), sample.wi);
 #endif
-    sample.pdf = metallic_roughness_pdf(m, wo, sample.wi);
+    sample.pdf = BASE(pdf)(m, wo, sample.wi);
     real inverse = sample.pdf > 0.0f ? 1.0f / sample.pdf : ZERO;
-    sample.weight = scale(metallic_roughness_eval(m, wo, sample.wi), inverse);
+    sample.weight = scale(BASE(eval)(m, wo, sample.wi), inverse);
     return sample;
 }
+
+#include LAYERS_FILE

@@ -6,8 +6,6 @@
 // World frame.
 #include "vector.cl"
 
-#define BELOW_ONE ((real)(0.99999994f))     // the largest float that is
-
 // The best cosine towards a sphere of radius r; `along` is distance·cos for its middle. Not quite that of the angle less
 // the sphere's own, but easier, 0 for the same spheres, and as good to choose by.
 static inline real best_cosine(real along, real distance, real r) { return (along + r) / (distance + r); }

@@ -17,7 +17,7 @@ def cook_torrance(material: MetallicRoughness, wo: Doubles, wi: Doubles) -> Doub
 
     F of Schlick, D of Walter 2007 (eq. 33).
     """
-    color, f0 = np.array(untextured(material.color)), np.full(3, 0.04)
+    color, f0 = np.array(untextured(material.color)), np.full(3, ((material.ior - 1) / (material.ior + 1))**2)
     metallic, roughness = untextured(material.metallic), untextured(material.roughness)
     if material.preset is not None:
         f0, metallic = np.array(F0_PRESETS[material.preset][0]), F0_PRESETS[material.preset][1]

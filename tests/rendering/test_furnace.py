@@ -119,7 +119,7 @@ def test_only_those_who_ask_pay(device: Device) -> None:
                                  Choices(device.lanes, device.layout)) for materials in ([plain], [plain, full]))
     assert "MULTIPLE_SCATTERING" not in alone.features and "MULTIPLE_SCATTERING" in both.features
     assert alone.buffers["metallic_roughness"][1].dtype.names == (
-        "color", "metallic", "specular", "roughness", "smith", "rest0", "rest1", "rest2")
+        "color", "metallic", "f0", "roughness", "smith", "rest0", "rest1", "rest2")
     assert "loss" in (both.buffers["metallic_roughness"][1].dtype.names or ())
     wo, wi = above(4000, 1), above(4000, 2)
     values = [bsdfs(device, [*materials]).value(0, wo, wi) for materials in ([plain], [plain, full])]

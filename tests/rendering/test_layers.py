@@ -1,0 +1,125 @@
+"""glTF's extensions of metallic_roughness: formulas in float64, furnaces, and that others do not pay for them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clrt.device.open import Device
+from clrt.rendering.compile import Choices, compile_scene
+from clrt.scene import sheen
+from clrt.scene.materials import MetallicRoughness
+from clrt.scene.model import Scene, Sphere
+from clrt.study.bsdfs import bsdfs, uniform
+from clrt.study.probe import Doubles
+from clrt.study.scattering import FLIP, above
+
+from .ggx import masking
+
+COLOR = (0.8, 0.5, 0.2)
+WO, WI = above(5000, 1), above(5000, 2)
+H = (WO + WI) / np.linalg.norm(WO + WI, axis=1, keepdims=True)
+COS_H, COS_O, COS_I = np.sum(WO * H, axis=1), WO[:, 2], WI[:, 2]
+
+
+def schlick(f0: float, cosine: Doubles, f90: float = 1.0) -> Doubles:
+    return np.asarray(f0 + (f90 - f0) * (1 - cosine)**5)
+
+
+def ggx(alpha: float) -> Doubles:
+    """(n,) D·G/(4·cos wo)."""
+    tan2 = (1 - H[:, 2]**2) / H[:, 2]**2
+    d = alpha**2 / (np.pi * H[:, 2]**4 * (alpha**2 + tan2)**2)
+    return np.asarray(d * masking("height_correlated", alpha, COS_O, COS_I) / (4 * COS_O))
+
+
+def check(found: Doubles, expected: Doubles) -> None:
+    """Equal but for what float32 half vectors leave."""
+    roundings = 2e-5 / np.linalg.norm(WO + WI, axis=1, keepdims=True)
+    assert np.all(np.abs(found - expected) <= roundings * np.abs(expected) + 2e-5)
+
+
+def test_coat_lies_over_what_was_there(device: Device) -> None:
+    """coat·F·D·G/(4 cos wo) + (1 − coat·F(wo))(1 − coat·F(wi))·f."""
+    bare, coated = MetallicRoughness(color=COLOR, roughness=0.7, metallic=0.5), MetallicRoughness(
+        color=COLOR, roughness=0.7, metallic=0.5, clearcoat=0.8, clearcoat_roughness=0.5)
+    both = bsdfs(device, [bare, coated])
+    left = (1 - 0.8 * schlick(0.04, COS_O)) * (1 - 0.8 * schlick(0.04, COS_I))
+    expected = left[:, None] * both.value(0, WO, WI)[0] + (0.8 * schlick(0.04, COS_H) * ggx(0.25))[:, None]
+    check(both.value(1, WO, WI)[0], expected)
+
+
+@pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
+def test_sheen_is_charlies(device: Device, roughness: float) -> None:
+    """color·(2 + n)·sin^n/(2 pi)·cos wi/(4 (o + i − o·i)), over E where that exceeds 1; 1 − max·E of the rest."""
+    bare = MetallicRoughness(color=COLOR)
+    woolly = MetallicRoughness(color=COLOR, sheen_color=(0.9, 0.6, 0.3), sheen_roughness=roughness)
+    both, n = bsdfs(device, [bare, woolly]), roughness**-2
+    e_o, e_i = (sheen.albedo(cosine, n) for cosine in (COS_O, COS_I))
+    d = (2 + n) / (2 * np.pi) * (1 - H[:, 2]**2)**(n / 2)
+    fibres = d * COS_I / (4 * (COS_O + COS_I - COS_O * COS_I)) / np.maximum(e_o, 1) / np.maximum(e_i, 1)
+    left = 1 - 0.9 * np.minimum(np.maximum(e_o, e_i), 1)
+    expected = fibres[:, None] * (0.9, 0.6, 0.3) + left[:, None] * both.value(0, WO, WI)[0]
+    np.testing.assert_allclose(both.value(1, WO, WI)[0], expected, rtol=3e-3, atol=3e-3)
+
+
+@pytest.mark.parametrize("roughness", [0.15, 0.4, 1.0])
+def test_fibres_reflect_what_was_fitted(device: Device, roughness: float) -> None:
+    """White fibres on black: E by brute force over the hemisphere, where it is below 1."""
+    woolly = bsdfs(device, [MetallicRoughness(color=(0.0,) * 3, specular=0.0, sheen_color=(1.0,) * 3,
+                                              sheen_roughness=roughness)])
+    for cosine in (1.0, 0.7, 0.4):
+        wo = np.array([np.sqrt(1 - cosine**2), 0, cosine])
+        found = woolly.sample(0, wo, uniform(1 << 16, 1))[1][:, 0].mean()
+        z, phi = np.meshgrid((np.arange(800) + 0.5) / 800, 2 * np.pi * (np.arange(400) + 0.5) / 400, indexing="ij")
+        wi = np.stack([np.sqrt(1 - z * z) * np.cos(phi), np.sqrt(1 - z * z) * np.sin(phi), z], axis=-1)
+        h = (wo + wi) / np.linalg.norm(wo + wi, axis=-1, keepdims=True)
+        n = roughness**-2
+        f = (2 + n) / (2 * np.pi) * (1 - h[..., 2]**2)**(n / 2) / (4 * (cosine + z - cosine * z))
+        bound = np.maximum(sheen.albedo(z[:, 0], n), 1)[:, None] * max(float(sheen.albedo(np.array([cosine]), n)[0]), 1)
+        assert found == pytest.approx(float((f * z / bound).mean() * 2 * np.pi), abs=6e-3)
+
+
+def test_transmission_passes_the_bodys_part_straight_on(device: Device) -> None:
+    """(1 − F(wo·h))·color·transmission·D·G/(4 cos wo) below; above the body has the rest."""
+    solid, sheet = MetallicRoughness(color=COLOR, roughness=0.6), MetallicRoughness(
+        color=COLOR, roughness=0.6, transmission=0.7)
+    both = bsdfs(device, [solid, sheet, MetallicRoughness(color=(0.0,) * 3, roughness=0.6)])
+    below = ((1 - schlick(0.04, COS_H)) * ggx(0.36))[:, None] * np.multiply(COLOR, 0.7)
+    check(both.value(1, WO, WI * FLIP)[0], below)
+    upper = [both.value(which, WO, WI)[0] for which in (0, 1, 2)]
+    check(upper[1], 0.3 * upper[0] + 0.7 * upper[2])
+    assert not both.value(0, WO, WI * FLIP)[0].any()
+
+
+def test_specular_scales_f0_and_where_it_ends(device: Device) -> None:
+    """F from min(f0·specular_color, 1)·specular to specular; f0 by ior. Metal keeps its own."""
+    f0, f90 = (np.array([0.6, 1.0, 2.0]) / 9).clip(0, 1) * 0.4, 0.4    # ((2 − 1)/(2 + 1))² = 1/9
+    black = bsdfs(device, [MetallicRoughness(color=(0.0,) * 3, roughness=0.6, ior=2.0, specular=0.4,
+                                             specular_color=(0.6, 1.0, 2.0))])
+    fresnel = np.column_stack([schlick(f, COS_H, f90) for f in f0])
+    check(black.value(0, WO, WI)[0], fresnel * ggx(0.36)[:, None])
+    metals = bsdfs(device, [MetallicRoughness(color=COLOR, metallic=1.0), MetallicRoughness(
+        color=COLOR, metallic=1.0, specular=0.1, specular_color=(0.0,) * 3)])
+    check(metals.value(1, WO, WI)[0], metals.value(0, WO, WI)[0])
+
+
+def test_beside_others_a_material_stays_as_it_was(device: Device) -> None:
+    """What it lacks is neutral for it, where others of its type have it."""
+    plain = MetallicRoughness(color=COLOR, roughness=0.6)
+    others = [MetallicRoughness(specular=0.1, specular_color=(0.2,) * 3), MetallicRoughness(
+        clearcoat=1.0, sheen_color=(0.5,) * 3, transmission=0.5)]
+    alone, among = (bsdfs(device, [*materials]) for materials in ([plain], [plain, *others]))
+    np.testing.assert_allclose(among.value(0, WO, WI)[0], alone.value(0, WO, WI)[0], rtol=1e-5, atol=1e-7)
+    assert not among.value(0, WO, WI * FLIP)[0].any()
+
+
+def test_who_has_no_layers_compiles_none(device: Device) -> None:
+    def program(**fields: float) -> str:
+        ball = Sphere(material=MetallicRoughness(**fields))  # type: ignore[arg-type]
+        return compile_scene(Scene(spheres=[ball]), Choices(device.lanes)).source
+
+    plain = program()
+    assert "bsdf/layers.cl" not in plain and "clearcoat;" not in plain and "sheen_power;" not in plain
+    assert "bsdf/layers.cl" in program(clearcoat=1.0) and "bsdf/layers.cl" not in program(specular=0.5, ior=2.0)
+    assert MetallicRoughness(ior=2.0).features() == MetallicRoughness().features()
