@@ -103,13 +103,15 @@ def _instances(instances: list[Instance], frame: Frame) -> list[Instance]:
     """Their meshes each in the frame around it, from where they are taken to `frame`."""
     meshes = meshes_by_id(instances)
     own = {key: frame_around(*_box(mesh)) for key, mesh in meshes.items()}
-    framed = {key: replace(mesh, vertices=own[key].points(mesh.vertices)) for key, mesh in meshes.items()}
+    framed = {key: replace(mesh, vertices=own[key].points(mesh.vertices), material=mesh.material.in_unit(frame.unit))
+              for key, mesh in meshes.items()}
     placed = []
     for each in instances:
         around = own[id(each.mesh)]
         linear = each.to_world[:, :3] * (frame.unit / around.unit)
         offset = (each.to_world @ [*around.center, 1.0] - frame.center) * frame.unit
-        placed.append(replace(each, mesh=framed[id(each.mesh)], to_world=np.column_stack([linear, offset])))
+        placed.append(replace(each, mesh=framed[id(each.mesh)], to_world=np.column_stack([linear, offset]),
+                              material=each.material and each.material.in_unit(frame.unit)))
     return placed
 
 

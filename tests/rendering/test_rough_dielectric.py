@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from clrt.device.open import Device
 from clrt.rendering.compile import Choices, compile_scene
 from clrt.scene.lights import Light, PointLight
 from clrt.scene.materials import Dielectric, Diffuse
-from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 from clrt.study.bsdfs import bsdfs, uniform, view
 from clrt.study.probe import Doubles
 from clrt.study.scattering import above
@@ -152,13 +153,16 @@ def test_glass_absorbs_by_the_way_inside(device: Device) -> None:
     assert np.allclose(picture.mean.mean(axis=(0, 1)), expected, rtol=1e-6, atol=noise)
 
 
+@pytest.mark.parametrize("placed", [False, True])
 @pytest.mark.parametrize("scale", [1.0, 2.0**30])
-def test_light_inside_is_absorbed_on_its_way_too(device: Device, scale: float) -> None:
+def test_light_inside_is_absorbed_on_its_way_too(device: Device, scale: float, placed: bool) -> None:
     """A point in a box that bends nothing lights its floor: albedo·I/(pi·d²)·color^((d + way to the eye)/distance)."""
     box = Dielectric(ior=1.0, attenuation_color=COLOR, attenuation_distance=scale)
     floor = _plane(-scale, Diffuse(color=(0.5, 0.5, 0.5)), 2 * scale)
     light = PointLight(position=(0.0, 0.0, -scale / 2), intensity=(7.0 * scale**2,) * 3)
-    picture = film(device, Scene(meshes=[_plane(0.0, box, 9 * scale), floor], lights=[light],
+    lid = _plane(0.0, box, 9 * scale)
+    parts: dict[str, Any] = {"meshes": [floor], "instances": [Instance(lid)]} if placed else {"meshes": [lid, floor]}
+    picture = film(device, Scene(**parts, lights=[light],
                                  camera=replace(DOWN, position=(0.0, 0.0, 4.0 * scale)),
                                  render=RenderSettings(size=(8, 8), spp=4, max_depth=3)))
     expected = 0.5 / np.pi * 7 / 0.25 * np.array(COLOR)**1.5
