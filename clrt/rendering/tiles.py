@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 #: Pixels along the side of a square. All lanes of a work-item are of one.
 TILE = 8
 TILE_PIXELS = TILE * TILE
+#: Tiles in a row that are rendered one after another, since their rays meet the same parts of a tree: by single ones a
+#: large mesh takes a tenth longer.
+RUN = 128
 
 
 def tiles_of(size: tuple[int, int]) -> tuple[int, int]:
@@ -34,14 +37,17 @@ def tile_sums(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
 
 
 def scattered(count: int) -> NDArray[np.intp]:
-    """The numbers 0 … count − 1 in an order of which every stretch is spread evenly over them all.
+    """The numbers 0 … count − 1 in an order of which every long stretch is spread evenly over them all.
 
-    They follow each other by the golden ratio of `count` (the three-distance theorem bounds the gaps of a stretch).
+    Runs of RUN stay together; they follow each other by the golden ratio of their count (the three-distance theorem
+    bounds the gaps of a stretch).
     """
-    step = max(1, round(count * (5**0.5 - 1) / 2))
-    while gcd(step, count) > 1:
+    runs = -(-count // RUN)
+    step = max(1, round(runs * (5**0.5 - 1) / 2))
+    while gcd(step, runs) > 1:
         step += 1
-    return np.arange(count) * step % count
+    order = (np.arange(runs) * step % runs)[:, None] * RUN + np.arange(RUN)
+    return order[order < count]
 
 
 def tile_by_tile(values: NDArray[Any]) -> NDArray[Any]:

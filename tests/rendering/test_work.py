@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clrt.rendering.tiles import row_by_row, scattered, tile_by_tile
+from clrt.rendering.tiles import RUN, row_by_row, scattered, tile_by_tile
 from clrt.rendering.work import Part, Work
 
 
@@ -53,12 +53,15 @@ def test_a_share_is_no_larger_than_asked(most: int, least: int, expected: Part) 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 64, 100, 1023, 4096])
 def test_every_stretch_is_spread(count: int) -> None:
-    """Of k numbers in a row the gaps are at most (1 + golden ratio) times what they would be at best, and a bit."""
-    order = scattered(count)
-    assert sorted(order) == list(range(count))
+    """Of k runs in a row the gaps are at most (1 + golden ratio) times what they would be at best, and a bit."""
+    order = scattered(count * RUN)
+    assert sorted(order) == list(range(count * RUN))
+    assert sorted(scattered(count)) == list(range(count))
+    runs = order.reshape(count, RUN)
+    assert np.all(np.diff(runs, axis=1) == 1)
     for k in (k for k in (2, 5, 13, 40) if k < count):
         for first in range(0, count - k, max(1, count // 7)):
-            places = np.sort(order[first:first + k])
+            places = np.sort(runs[first:first + k, 0]) // RUN
             gaps = np.diff([*places, places[0] + count])
             assert gaps.max() <= 2.7 * count / k + 3
 
