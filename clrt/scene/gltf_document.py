@@ -19,9 +19,10 @@ NonNegative = Annotated[float, Field(ge=0)]
 ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
 #: Extensions that this reader follows.
-EXTENSIONS = frozenset({"EXT_mesh_gpu_instancing", "EXT_texture_webp", "KHR_draco_mesh_compression",
-                        "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_mesh_quantization",
-                        "KHR_texture_transform"})
+EXTENSIONS = frozenset(f"KHR_materials_{name}" for name in (
+    "clearcoat", "emissive_strength", "ior", "sheen", "specular", "transmission", "volume")) | frozenset({
+        "EXT_mesh_gpu_instancing", "EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual",
+        "KHR_mesh_quantization", "KHR_texture_transform"})
 
 
 class Asset(Part):

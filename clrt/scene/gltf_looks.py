@@ -77,8 +77,49 @@ class EmissiveStrength(Part):
     emissiveStrength: float = 1.0
 
 
+class Clearcoat(Part):
+    clearcoatFactor: float = 0.0
+    clearcoatTexture: TextureInfo | None = None
+    clearcoatRoughnessFactor: float = 0.0
+    clearcoatRoughnessTexture: TextureInfo | None = None
+
+
+class Ior(Part):
+    ior: float = 1.5
+
+
+class Sheen(Part):
+    sheenColorFactor: Vec3 = (0.0, 0.0, 0.0)
+    sheenColorTexture: TextureInfo | None = None
+    sheenRoughnessFactor: float = 0.0
+
+
+class Specular(Part):
+    specularFactor: float = 1.0
+    specularTexture: TextureInfo | None = None
+    specularColorFactor: Vec3 = (1.0, 1.0, 1.0)
+    specularColorTexture: TextureInfo | None = None
+
+
+class Transmission(Part):
+    transmissionFactor: float = 0.0
+    transmissionTexture: TextureInfo | None = None
+
+
+class Volume(Part):
+    thicknessFactor: float = 0.0
+    attenuationDistance: float | None = None
+    attenuationColor: Vec3 = (1.0, 1.0, 1.0)
+
+
 class MaterialExtensions(Part):
+    KHR_materials_clearcoat: Clearcoat = Clearcoat()
     KHR_materials_emissive_strength: EmissiveStrength = EmissiveStrength()
+    KHR_materials_ior: Ior = Ior()
+    KHR_materials_sheen: Sheen = Sheen()
+    KHR_materials_specular: Specular = Specular()
+    KHR_materials_transmission: Transmission = Transmission()
+    KHR_materials_volume: Volume = Volume()
 
 
 class Material(Part):

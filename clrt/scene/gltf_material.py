@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from ..errors import SceneError
 from . import gltf_document as gltf
 from . import gltf_looks as looks
 from .gltf_data import GltfData
-from .materials import Material, MetallicRoughness
+from .materials import Dielectric, Material, MetallicRoughness
 from .pictures import read_texels
 from .textures import Channel, Picture, Texture, Wrap
 
@@ -20,6 +21,8 @@ log = logging.getLogger(__name__)
 
 WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 NEAREST = 9728
+#: Of what is no metal; glTF's 0 stands for infinity.
+MOST_IOR = 4.0
 #: A base colour texture that cannot be read counts by this.
 GREY = 0.8
 
@@ -48,7 +51,10 @@ class Materials:
             color=_colored(_cut(pbr.baseColorFactor[:3]), base, pbr.baseColorTexture, GREY),
             metallic=_numbered(_unit(pbr.metallicFactor), gloss, "blue"),
             roughness=_numbered(_unit(pbr.roughnessFactor), gloss, "green"),
-            emission=self._emission(source, primitive, user))
+            emission=self._emission(source, primitive, user), **self._layers(source.extensions, primitive, user))
+        glass = _glass(source.extensions, made)
+        if glass is not None:
+            return glass
         bend = self._texture(source.normalTexture, primitive, user)
         if bend is not None and source.normalTexture is not None:
             made = replace(made, normal_map=replace(bend, factor=max(source.normalTexture.scale, 0.0)))
@@ -58,6 +64,27 @@ class Materials:
         if source.alphaMode == "BLEND":
             return replace(made, opacity=opacity)
         return replace(made, opacity=opacity, alpha_cutoff=_unit(source.alphaCutoff))
+
+    def _layers(self, extensions: looks.MaterialExtensions, primitive: gltf.Primitive, user: str) -> dict[str, Any]:
+        """The fields for the extensions in use."""
+        coat, sheen = extensions.KHR_materials_clearcoat, extensions.KHR_materials_sheen
+        specular, transmission = extensions.KHR_materials_specular, extensions.KHR_materials_transmission
+
+        def number(factor: float, info: looks.TextureInfo | None, channel: Channel) -> float | Texture:
+            return _numbered(_unit(factor), self._texture(info, primitive, user) if factor > 0 else None, channel)
+
+        def color(factor: tuple[float, float, float], info: looks.TextureInfo | None) -> Any:
+            return _colored(factor, self._texture(info, primitive, user) if max(factor) > 0 else None, info, 1.0)
+
+        return {
+            "ior": float(np.clip(extensions.KHR_materials_ior.ior or MOST_IOR, 1, MOST_IOR)),
+            "clearcoat": number(coat.clearcoatFactor, coat.clearcoatTexture, "red"),
+            "clearcoat_roughness": number(coat.clearcoatRoughnessFactor, coat.clearcoatRoughnessTexture, "green"),
+            "sheen_color": color(_cut(sheen.sheenColorFactor), sheen.sheenColorTexture),
+            "sheen_roughness": _unit(sheen.sheenRoughnessFactor),
+            "specular": number(specular.specularFactor, specular.specularTexture, "alpha"),
+            "specular_color": color(_positive(specular.specularColorFactor), specular.specularColorTexture),
+            "transmission": number(transmission.transmissionFactor, transmission.transmissionTexture, "red")}
 
     def _emission(self, source: looks.Material, primitive: gltf.Primitive,
                   user: str) -> tuple[float, float, float] | Texture:
@@ -114,6 +141,22 @@ def _colored(factor: tuple[float, float, float], texture: Texture | None, info: 
 
 def _numbered(factor: float, texture: Texture | None, channel: Channel) -> float | Texture:
     return factor if texture is None else replace(texture, factor=factor, channel=channel)
+
+
+def _glass(extensions: looks.MaterialExtensions, made: MetallicRoughness) -> Dielectric | None:
+    """The material as a solid that light passes through, if it has a volume and nothing else than its surface."""
+    volume = extensions.KHR_materials_volume
+    if volume.thicknessFactor <= 0 or made.transmission != 1 or made.metallic != 0:
+        return None
+    distance = volume.attenuationDistance
+    return Dielectric(color=made.color, ior=made.ior, roughness=made.roughness, emission=made.emission,
+                      attenuation_color=_cut(volume.attenuationColor),
+                      attenuation_distance=distance if distance is not None and distance > 0 else None)
+
+
+def _positive(color: tuple[float, float, float]) -> tuple[float, float, float]:
+    red, green, blue = (max(value, 0.0) for value in color)
+    return red, green, blue
 
 
 def _unit(value: float) -> float:

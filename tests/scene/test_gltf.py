@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import logging
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from clrt.errors import SceneError
 from clrt.scene.file import load
 from clrt.scene.gltf import read_gltf
 from clrt.scene.material import as_color
-from clrt.scene.materials import MetallicRoughness
+from clrt.scene.materials import Dielectric, MetallicRoughness
 from clrt.scene.textures import Texture
 from clrt.scene.model import Model
 from .glb import Gltf, ball
@@ -184,6 +185,31 @@ def test_textures_of_every_parameter(tmp_path: Path) -> None:
     assert (metallic.channel, metallic.factor, roughness.channel, roughness.factor) == ("blue", 0.5, "green", 1)
     assert (opacity.channel, opacity.factor, opacity.scale, material.alpha_cutoff) == ("alpha", 0.75, (2, 3), 0.25)
     assert as_color(material.emission.factor) == pytest.approx((4, 2, 4)) and material.normal_map.factor == 0.5
+
+
+def test_layers_and_glass(tmp_path: Path) -> None:
+    """Extensions by their names; a volume behind a surface that passes all light is glass."""
+    texture = {"index": 0}
+    layered = textured((255, 255, 255), tmp_path, extensions={
+        "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25,
+                                    "clearcoatRoughnessTexture": texture},
+        "KHR_materials_sheen": {"sheenColorFactor": [0.1, 0.2, 0.3], "sheenRoughnessFactor": 0.4},
+        "KHR_materials_specular": {"specularTexture": texture, "specularColorFactor": [2, 1, 0.5]},
+        "KHR_materials_ior": {"ior": 1.33}, "KHR_materials_transmission": {"transmissionFactor": 0.75}})
+    coat, specular = layered.clearcoat_roughness, layered.specular
+    assert isinstance(coat, Texture) and (coat.factor, coat.channel) == (0.25, "green")
+    assert layered == replace(layered, sheen_color=(0.1, 0.2, 0.3), sheen_roughness=0.4)
+    assert isinstance(specular, Texture) and specular.channel == "alpha"
+    assert layered == replace(layered, specular_color=(2, 1, 0.5), ior=1.33, transmission=0.75, clearcoat=0.5)
+    gltf = ball()
+    gltf.document["materials"] = [{
+        "pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 1, 1], "metallicFactor": 0, "roughnessFactor": 0.5},
+        "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_ior": {"ior": 1.4},
+                       "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 2,
+                                                "attenuationColor": [0.5, 1, 1]}}}]
+    gltf.document["meshes"][0]["primitives"][0]["material"] = 0
+    assert read(gltf, tmp_path).meshes[0].material == Dielectric(
+        color=(1, 0.5, 1), ior=1.4, roughness=0.5, attenuation_color=(0.5, 1, 1), attenuation_distance=2)
 
 
 def test_corners(tmp_path: Path) -> None:
