@@ -33,6 +33,31 @@ static inline void store_lanes(int8 lanes, uint bits, int *target) {
 }
 #endif
 
+// The same for many values by one mask: store_in_order(lanes, lane_order(bits), target).
+#if defined(__AVX512VL__) && !PORTABLE_MASK
+static inline uint lane_order(uint bits) { return bits; }
+static inline void store_in_order(int8 lanes, uint order, int *target) { store_lanes(lanes, order, target); }
+#else
+// The numbers of the lanes whose bits are set, four bits each.
+static inline uint lane_order(uint bits) {
+    uint order = 0;
+    for (uint shift = 0; bits; bits &= bits - 1, shift += 4) order |= (uint)first_bit(bits) << shift;
+    return order;
+}
+#if defined(__AVX2__) && !PORTABLE_MASK
+static inline void store_in_order(int8 lanes, uint order, int *target) {
+    int8 from = (int8)((int)order) >> (int8)(0, 4, 8, 12, 16, 20, 24, 28);
+    vstore8(__builtin_ia32_permvarsi256(lanes, from), 0, target);
+}
+#else
+static inline void store_in_order(int8 lanes, uint order, int *target) {
+    int all[8];
+    vstore8(lanes, 0, all);
+    for (int k = 0; k < 8; ++k) target[k] = all[order >> 4 * k & 7];
+}
+#endif
+#endif
+
 // The lane, of those in the mask, with the least number; all are >= 0. Numbers that differ in their last three bits only
 // count as equal. 7 where the mask is empty.
 static inline int least_lane(float8 numbers, int8 mask) {

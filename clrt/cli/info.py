@@ -19,7 +19,8 @@ from .options import tracing_options
 @click.option("--aov", "aovs", multiple=True, metavar="NAME,...", help="With what these pictures beside it need.")
 @tracing_options
 def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple[str, ...], lanes: int | None,
-            triangle: str, box: str, sphere: str, offset: str, builder: str | None, layout: str | None) -> None:
+            paths: str | None, triangle: str, box: str, sphere: str, offset: str, builder: str | None,
+            layout: str | None) -> None:
     """Show what SCENE contains and what is compiled for it; renders nothing and needs no device."""
     if list_materials:
         from .material_list import material_lines
@@ -37,7 +38,8 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
 
     names = chosen_aovs(",".join(aovs)) if aovs else ()
     content = load(scene)
-    choices = Choices(lanes or 8, layout, builder, HitTests(triangle, box, sphere), offset, needs_direct_light(names))
+    choices = Choices(lanes or 8, layout, builder, HitTests(triangle, box, sphere), offset, needs_direct_light(names),
+                      paths)
     compiled = compile_scene(content, choices)
     tree = compiled.tree
     materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}

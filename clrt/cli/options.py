@@ -35,6 +35,8 @@ def tracing_options(command: F) -> F:
     for option in [
         click.option("--lanes", type=click.Choice(["1", "8", "16"]), help="Paths a work-item.",
                      callback=lambda context, parameter, value: int(value) if value else None),
+        click.option("--paths", type=click.Choice(["lanes", "waves"]),
+                     help="How paths are followed: each in its lane, or many together edge by edge (with 8 lanes)."),
         triangle_option,
         box_option,
         click.option("--sphere", type=click.Choice(["robust", "textbook"]), default="robust", show_default=True,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import platform
 from dataclasses import dataclass
 
 import pyopencl as cl
@@ -36,6 +37,12 @@ class Device:
     def lanes(self) -> int:
         """Paths a work-item follows: one on a GPU, whose hardware joins work-items; a vector of them on a CPU."""
         return 8 if self.vectors else 1
+
+    @property
+    def packs(self) -> bool:
+        """Whether lanes are put side by side by one instruction (kernels/mask.cl), which waves of paths need."""
+        return (self.vectors and self.info.platform == "Portable Computing Language"
+                and platform.machine().lower() in ("x86_64", "amd64"))
 
     @property
     def local_size(self) -> int:

@@ -19,6 +19,7 @@ from ..device.memory import array_bytes, needed_parts
 from ..device.open import Device
 from ..device.preamble import Buffers, defines, scene_struct, type_list, typedefs
 from ..device.program import compose, files_of
+from ..errors import UsageError
 from ..scene.instancing import arranged
 from ..scene.materials import MATERIALS, Material
 from ..scene.model import Camera, Scene
@@ -35,13 +36,15 @@ from .materials import Materials, pack_materials
 from .placements import Objects, Placements
 from .records import COUNTS, GUIDE, LAUNCH, PIXEL, PIXEL_WITH_DIRECT
 from .textures import Textures
-from .tiles import TILE
+from .tiles import TILE, TILE_PIXELS
 
 
 #: Of a scene's unit, what float32 holds.
 LARGEST_UNIT = 2.0**127
 #: Where rays leave a surface.
 OFFSETS = {"bound": "offset/bound.cl", "ulp": "offset/ulp.cl", "fixed": "offset/fixed.cl"}
+#: How paths are followed, and with how many lanes in waves.
+PATHS, WAVE_LANES = ("lanes", "waves"), 8
 #: Integrators that follow paths.
 WITH_LIGHT = ("path", "direct")
 #: The kernel files of the integrators of light; others show what is seen first (kernels/picture.cl).
@@ -53,6 +56,8 @@ class Choices:
     """What a device or a user chooses about the program. lanes: paths a work-item (1, 8 or 16); offset: see OFFSETS;
     direct_light: whether the film keeps it apart.
 
+    paths: how they are followed: "lanes", each in its lane (kernels/path.cl), or "waves", many together edge by edge
+    (kernels/wave.cl); None for waves where there are 8 lanes, as they need.
     layout: a name in LAYOUTS, or None for the one that fits the device and the scene.
     """
 
@@ -62,6 +67,16 @@ class Choices:
     tests: HitTests = HitTests()
     offset: str = "bound"
     direct_light: bool = False
+    paths: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.paths == "waves" and self.lanes != WAVE_LANES:
+            raise UsageError(f"paths in waves need {WAVE_LANES} lanes, not {self.lanes}; leave out one of the choices")
+
+    @property
+    def waves(self) -> bool:
+        """Whether paths are followed in waves."""
+        return self.lanes == WAVE_LANES and self.paths != "lanes"
 
     @property
     def pixel(self) -> np.dtype[Any]:
@@ -108,6 +123,11 @@ class CompiledScene:
     def kernel(self) -> str:
         """The name of the entry's kernel."""
         return self.entry.removesuffix(".cl")
+
+    @property
+    def pixels(self) -> int:
+        """How many a work-item of the entry takes."""
+        return TILE_PIXELS if self.entry == "wave.cl" else self.choices.lanes
 
     @property
     def files(self) -> list[str]:
@@ -197,6 +217,8 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
              "PICTURE": [f"picture/{integrator}.cl"],
              "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"]}
     entry = entry or ENTRIES.get(integrator, "picture.cl")
+    if entry == "path.cl" and choices.waves and "LOOP_LIMIT" not in features:
+        entry = "wave.cl"
     return CompiledScene(buffers, counts, sorted(features), preamble, files, entry, tree, choices, scene.camera, frame,
                          len(scene.instances), objects, part_bytes)
 

@@ -88,5 +88,6 @@ class Film:
 
     @property
     def rays(self) -> int:
-        """Rays traced; each pixel's counter wraps at 2³², long after its picture has converged."""
+        """Rays traced; each counter wraps at 2³², long after its picture has converged. A tile's may all be
+        counted with its first pixel (kernels/wave.cl)."""
         return int(self.pixels["rays"].sum(dtype=np.int64))

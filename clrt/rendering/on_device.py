@@ -97,12 +97,15 @@ class SceneOnDevice:
     def enqueue_pixels(self, film: cl.Buffer, tiles: cl.Buffer) -> cl.Event:
         """Enqueues the integrator for the range in the launch record, of the picture's tiles in `tiles`."""
         self._kernel.set_args(*self.scene_arguments, film, tiles, self.launch[0])
-        return self.enqueue(self._kernel, int(self.launch["pixel_count"][0]))
+        return self.enqueue(self._kernel, int(self.launch["pixel_count"][0]), self.compiled.pixels)
 
-    def enqueue(self, kernel: cl.Kernel, pixel_count: int) -> cl.Event:
-        """Enqueues a kernel of the scene, whose arguments are set, for as many pixels."""
+    def enqueue(self, kernel: cl.Kernel, pixel_count: int, share: int | None = None) -> cl.Event:
+        """Enqueues a kernel of the scene, whose arguments are set, for as many pixels.
+
+        share: how many a work-item takes; None for one a lane.
+        """
         local = self.device.local_size
-        groups = max(1, -(-pixel_count // (self.compiled.choices.lanes * local)))
+        groups = max(1, -(-pixel_count // ((share or self.compiled.choices.lanes) * local)))
         with calling():
             event = cl.enqueue_nd_range_kernel(self.device.queue, kernel, (groups * local,), (local,))
             self.device.queue.flush()

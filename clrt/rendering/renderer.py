@@ -20,7 +20,7 @@ from ..scene.model import RenderSettings, Scene
 from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
 from .aovs import LIGHT, chosen_aovs, film_aovs, needs_direct_light, seen_first
 from .checkpoint import open_checkpoints
-from .compile import ENTRIES, OFFSETS, WITH_LIGHT, Choices, compile_for_all
+from .compile import ENTRIES, OFFSETS, PATHS, WITH_LIGHT, Choices, compile_for_all
 from .crew import make_picture
 from .film import RELATIVE_FLOOR, Film
 from .first_hits import first_hits
@@ -57,9 +57,9 @@ class Renderer:
     """A scene on a device, ready to render. Everything not given is taken from `scene.render`.
 
     device: see `clrt devices`; several render one picture together. size: (width, height); triangle, box, sphere: see
-    `HitTests`; offset, builder, layout, lanes: see `compile.Choices`. spp: how many samples a pixel are planned, if
-    that is known: the sampler then makes neighbouring pixels' errors differ for that many, and later ones begin anew
-    (kernels/sampler). adaptive: whether tiles get samples by their error, from the pictures so far.
+    `HitTests`; offset, builder, layout, lanes, paths: see `compile.Choices`. spp: how many samples a pixel are
+    planned, if that is known: the sampler then makes neighbouring pixels' errors differ for that many, and later ones
+    begin anew (kernels/sampler). adaptive: whether tiles get samples by their error, from the pictures so far.
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
     checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the end; resume:
     go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
@@ -73,9 +73,9 @@ class Renderer:
                  integrator: str | None = None, sampler: str | None = None, filter: str | None = None,
                  adaptive: bool | None = None, triangle: str = "watertight", box: str = "robust",
                  sphere: str = "robust", offset: str = "bound", builder: str | None = None, layout: str | None = None,
-                 lanes: int | None = None, on_phase: Callable[[str], None] = lambda phase: None,
-                 checkpoint: str | Path | None = None, resume: bool = False,
-                 checkpoint_seconds: float = 30.0, aovs: str | Iterable[str] = ()) -> None:
+                 lanes: int | None = None, paths: str | None = None,
+                 on_phase: Callable[[str], None] = lambda phase: None, checkpoint: str | Path | None = None,
+                 resume: bool = False, checkpoint_seconds: float = 30.0, aovs: str | Iterable[str] = ()) -> None:
         self._aovs = chosen_aovs(aovs)
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
                                  "sampler": sampler, "filter": filter, "adaptive": adaptive}
@@ -87,7 +87,8 @@ class Renderer:
             raise UsageError(f"the AOVs {' and '.join(LIGHT)} are of light, and the integrator is "
                              f"{settings.integrator}; choose {' or '.join(WITH_LIGHT)}")
         choices = [Choices(lanes or each.lanes, layout, builder, HitTests(triangle, box, sphere), offset,
-                           needs_direct_light(self._aovs)) for each in self.devices]
+                           needs_direct_light(self._aovs), paths or (None if each.packs else "lanes"))
+                   for each in self.devices]
         _check(choices[0])
         on_phase("build")
         compiled = compile_for_all(self.scene, choices, self.devices)
@@ -251,7 +252,7 @@ class Renderer:
 
 def _check(choices: Choices) -> None:
     known: dict[str, Sequence[object]] = {"layout": [None, *TREES], "builder": [None, *BUILDER_NAMES],
-                                          "lanes": (1, 8, 16), "offset": list(OFFSETS)}
+                                          "lanes": (1, 8, 16), "paths": (None, *PATHS), "offset": list(OFFSETS)}
     for name, values in known.items():
         if (value := getattr(choices, name)) not in values:
             named = ", ".join(str(known_value) for known_value in values if known_value is not None)

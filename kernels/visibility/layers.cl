@@ -13,10 +13,11 @@ static inline real3 behind(const Surface *surface, real3 direction) {
 }
 
 // The first surfaces that stop the rays; lanes that meet none get any. The origin ends on the last surface that let its ray
-// through; t is what the ray has gone from where it began.
-static inline Hits first_surface(const Scene *scene, real3 *origin, real3 direction, ireal active, Sampler *sampler,
-                                 Surface *surface) {
-    real gone = ZERO, u = next_1d(sampler);
+// through, and `gone` is what the ray has gone from where it began to there.
+static inline Hits first_stop(const Scene *scene, real3 *origin, real3 direction, ireal active, Sampler *sampler,
+                              Surface *surface, real *gone) {
+    real u = next_1d(sampler);
+    *gone = ZERO;
     Hits hits = closest_hit(scene, *origin, direction, (real)(INFINITY), active);
     for (int layer = 0; layer < MOST_LAYERS; ++layer) {
         *surface = surface_at(scene, *origin, direction, &hits);
@@ -24,7 +25,7 @@ static inline Hits first_surface(const Scene *scene, real3 *origin, real3 direct
         ireal passes = active & (hits.primitive >= 0) & (u >= opacity);
         if (!ANY(passes)) break;
         u = passes ? (u - opacity) / (1.0f - opacity) : u;     // as random as it was
-        gone = passes ? gone + hits.t : gone;
+        *gone = passes ? *gone + hits.t : *gone;
         *origin = choose(passes, behind(surface, direction), *origin);
         Hits next = closest_hit(scene, *origin, direction, (real)(INFINITY), passes);
         hits.t = passes ? next.t : hits.t;
@@ -33,6 +34,14 @@ static inline Hits first_surface(const Scene *scene, real3 *origin, real3 direct
         hits.primitive = passes ? next.primitive : hits.primitive;
         hits.instance = passes ? next.instance : hits.instance;
     }
+    return hits;
+}
+
+// The same; t is from where the ray began.
+static inline Hits first_surface(const Scene *scene, real3 *origin, real3 direction, ireal active, Sampler *sampler,
+                                 Surface *surface) {
+    real gone;
+    Hits hits = first_stop(scene, origin, direction, active, sampler, surface, &gone);
     hits.t += gone;
     return hits;
 }

@@ -114,6 +114,7 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
                 scene.environment = environment
                 used |= set(compile_scene(scene, choices).files)
     used |= set(compile_scene(everything(), Choices(layout="packs")).files)
+    used |= set(compile_scene(everything(), Choices(paths="lanes")).files)
     for sampler, name in zip(get_args(Sampler), get_args(Filter)):
         scene = everything()
         scene.render = replace(scene.render, sampler=sampler, filter=name)

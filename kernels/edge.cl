@@ -1,0 +1,172 @@
+// Path tracing with light samples and multiple importance sampling (Kajiya 1986; Veach 1997, ch. 9 and 10): what happens
+// along an edge of a path. path.cl and wave.cl put these stages together; each is for the edges in all lanes.
+//
+// World frame; light in W·sr⁻¹·m⁻². Light is returned as what reaches the eye, 0 in lanes that are not asked for.
+#include "bsdf.cl"
+#include "light.cl"
+#include VISIBILITY
+
+#define ROULETTE_DEPTH 4   // edges before Russian roulette may end a path
+
+// A path that sets out on its next edge, from `origin` along `wi`.
+typedef struct {
+    real3 origin, wi;
+    real3 p, n;            // the point that it leaves, and the normal there
+    real pdf;              // density of wi
+    ireal specular;        // whether wi alone could have found what lies there
+    real3 beta;            // throughput
+#if TRANSMISSION
+    real spread;           // radiance at the eye over that here, by the media between (bsdf/interface.cl)
+#endif
+#if ATTENUATION
+    real3 absorption;      // along wi, per unit of length
+#endif
+} Path;
+
+static inline Path path_along(real3 eye, real3 direction) {
+    Path path;
+    path.origin = path.p = eye;
+    path.wi = path.n = direction;
+    path.pdf = ONE;
+    path.specular = ALL_LANES;
+    path.beta = splat(ONE);
+#if TRANSMISSION
+    path.spread = ONE;
+#endif
+#if ATTENUATION
+    path.absorption = splat(ZERO);
+#endif
+    return path;
+}
+
+static inline real3 at_eye(const Path *path, real3 L) {
+#if TRANSMISSION
+    return mul(path->beta, scale(L, path->spread));
+#else
+    return mul(path->beta, L);
+#endif
+}
+
+// What is absorbed on the way to where the ray ended.
+static inline void absorb(Path *path, real distance) {
+#if ATTENUATION
+    path->beta = mul(path->beta, attenuated(path->absorption, distance));
+#endif
+}
+
+// 1. What glows where the rays ended, weighted against the light sample that could have found it: surfaces …
+static inline real3 emitted_light(const Scene *scene, const Path *path, const Surface *surface, real t, ireal hit) {
+#if EMITTERS
+    real pdf;
+    real3 emitted = emitter_radiance(scene, path->p, path->n, path->wi, t, surface, hit, &pdf);
+    real weight = path->specular ? ONE : power_heuristic(path->pdf, pdf);
+    return choose(hit, at_eye(path, scale(emitted, weight)), splat(ZERO));
+#else
+    return splat(ZERO);
+#endif
+}
+
+// … and the sky.
+static inline real3 sky_light(const Scene *scene, const Path *path, ireal escaped) {
+#if SKY
+    if (!ANY(escaped)) return splat(ZERO);
+    real3 wi = choose(escaped, path->wi, vector(ZERO, ONE, ZERO));   // an idle lane's may be NaN, and so its texel
+    real pdf;
+    real3 radiance = escaped_radiance(scene, path->p, path->n, wi, &pdf);
+    real weight = path->specular ? ONE : power_heuristic(path->pdf, pdf);
+    return choose(escaped, at_eye(path, scale(radiance, weight)), splat(ZERO));
+#else
+    return splat(ZERO);
+#endif
+}
+
+#if PRIMITIVES
+// What the material of a surface is, in the frame of its shading normal.
+typedef struct {
+    Frame frame;
+    real3 wo;
+    Bsdf bsdf;
+} Shading;
+
+static inline Shading shading_at(const Scene *scene, const Path *path, Surface *surface) {
+    Shading shading;
+    real3 towards = negate(path->wi);
+#if NORMAL_MAPS
+    bend_normal(scene, surface);
+#endif
+    turn_towards(surface, towards);
+    shading.frame = frame_around(surface->ns);
+    shading.wo = to_local(shading.frame, towards);
+    bsdf_at(scene, surface, &shading.bsdf);
+    return shading;
+}
+
+#if LIGHTS
+// A ray towards a sampled point of a light, and what comes along it if nothing is in between.
+typedef struct {
+    real3 origin, target, wi;
+    ireal infinite;
+    real3 light;
+} ShadowRay;
+
+// 2. Light by shadow rays: which lanes send one.
+static inline ireal aim_at_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
+                                 ireal active, Sampler *sampler, ShadowRay *ray) {
+    LightSample light = light_sample(scene, surface->p, choosing_normal(&shading->bsdf, surface->ns), sampler);
+    real3 wi = to_local(shading->frame, light.wi);
+    ireal reachable = same_side(wi.z, dot3(light.wi, surface->ng));
+    real3 contribution = mul(bsdf_eval(&shading->bsdf, shading->wo, wi), light.radiance);
+    ireal useful = active & reachable & (light.pdf > 0.0f) & is_positive3(contribution);
+    if (!ANY(useful)) return useful;
+    ray->origin = offset_origin(surface->p, surface->p_error, surface->ng, light.wi);
+    ray->target = light.target;
+    ray->wi = light.wi;
+    ray->infinite = light.infinite;
+#if ATTENUATION
+    real3 absorption = choose(wi.z > 0.0f, path->absorption, absorption_beyond(&shading->bsdf));
+    real distance = light.infinite ? (real)(INFINITY) : length3(sub(light.target, ray->origin));
+    contribution = mul(contribution, attenuated(absorption, distance));
+#endif
+    real pdf = bsdf_pdf(&shading->bsdf, shading->wo, wi);
+    real weight = (light.delta ? ONE : power_heuristic(light.pdf, pdf)) / light.pdf;
+    ray->light = at_eye(path, scale(contribution, weight));
+    return useful;
+}
+
+static inline real3 light_along(const Scene *scene, const ShadowRay *ray, ireal sent) {
+    real visible = transmittance(scene, ray->origin, ray->target, ray->wi, ray->infinite, sent);
+    return choose(visible > 0.0f, scale(ray->light, visible), splat(ZERO));
+}
+#endif
+
+// 3. On in a direction drawn from the material: which paths do go on.
+static inline ireal go_on(Path *path, const Surface *surface, const Shading *shading, ireal active, int depth,
+                          Sampler *sampler) {
+    real2 u = next_2d(sampler), choice = next_2d(sampler);
+    BsdfSample sample = bsdf_sample(&shading->bsdf, shading->wo, u, choice.x);
+    path->wi = to_world(shading->frame, sample.wi);
+    path->p = surface->p;
+    path->n = choosing_normal(&shading->bsdf, surface->ns);
+    path->pdf = sample.pdf;
+    path->specular = sample.specular;
+    active = active & (sample.pdf > 0.0f) & is_positive3(sample.weight)
+           & keeps_its_side(&sample, dot3(path->wi, surface->ng));
+    path->beta = choose(active, mul(path->beta, sample.weight), path->beta);
+#if TRANSMISSION
+    path->spread *= sample.spread;
+#endif
+#if ATTENUATION
+    path->absorption = choose(sample.wi.z < 0.0f, absorption_beyond(&shading->bsdf), path->absorption);
+#endif
+    path->origin = offset_origin(surface->p, surface->p_error, surface->ng, path->wi);
+
+    // 4. Russian roulette: end weak paths, keep the mean (Arvo and Kirk 1990). By the root of the throughput: fewer
+    // are ended than by the throughput itself, and in rooms the error falls by more than the time grows.
+    if (depth >= ROULETTE_DEPTH) {
+        real survival = minimum(sqrt(largest(path->beta)), ONE);
+        active = active & (choice.y < survival);
+        path->beta = choose(active, scale(path->beta, 1.0f / survival), path->beta);
+    }
+    return active;
+}
+#endif

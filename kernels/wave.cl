@@ -1,0 +1,252 @@
+// Many paths a lane: a work-item follows those of a tile, WAVE_SAMPLES samples of each pixel at a time, all edge by edge.
+//
+// Each stage of an edge is done for all paths before the next stage begins, and those that go on to it are packed, so that
+// lanes are full whatever becomes of a path. Loops that do one thing also suit a processor better than one that does all.
+#include "camera.cl"
+#include "edge.cl"
+#include "film.cl"
+#include "packing.cl"
+
+#define WAVE_SAMPLES 4
+#define TILE_PIXELS (TILE * TILE)
+#define WAVE (TILE_PIXELS * WAVE_SAMPLES)
+#define SHADOWS (PRIMITIVES && LIGHTS)
+#define ROW (WAVE + LANES)   // packing may write LANES further; and powers of two do not suit caches
+
+// What is kept of paths between stages. slot: the number of the sample in the wave, pixel by pixel and then by sample.
+typedef struct {
+    Path path;
+    ureal slot;
+#if OPACITY
+    real gone;               // to where path.origin now is, behind the layers that let it through
+#endif
+} Travel;
+
+typedef struct { Travel travel; Hits hits; } Arrival;
+
+#if SHADOWS
+typedef struct { ShadowRay ray; ureal slot; } Shadow;
+#endif
+
+// Some 70 KiB of private memory, packed in rows.
+typedef struct {
+    int arrivals[WORDS(Arrival)][ROW];   // first the travels: an arrival's hits are added where its travel is
+    int escapes[WORDS(Travel)][ROW];
+#if SHADOWS
+    int shadows[WORDS(Shadow)][ROW];
+#endif
+    float light[3][WAVE];                // of each slot
+#if DIRECT_LIGHT
+    float direct[3][WAVE];               // what of it came with two edges at most
+#endif
+    const Launch *launch;
+    uint x, y, sample;                   // of the first slot
+    uint dimension, rays;
+} Wave;
+
+static inline ureal slot_x(const Wave *w, ureal slot) { return w->x + slot % TILE; }
+static inline ureal slot_y(const Wave *w, ureal slot) { return w->y + slot / TILE % TILE; }
+static inline ireal in_picture(const Wave *w, ureal slot) {
+    return (slot_x(w, slot) < w->launch->width) & (slot_y(w, slot) < w->launch->height);
+}
+
+static inline Sampler slot_sampler(const Wave *w, ureal slot) {
+    Sampler sampler = sampler_at(pixel_code(slot_x(w, slot), slot_y(w, slot)), w->sample + slot / TILE_PIXELS,
+                                 w->launch->seed, w->launch->block_bits);
+    sampler.dimension = w->dimension;
+    return sampler;
+}
+
+static inline void add_light(Wave *w, ureal slot, real3 light) {
+    ireal some = (light.x != 0.0f) | (light.y != 0.0f) | (light.z != 0.0f);   // a NaN, too, for the film to drop
+    for (uint bits = mask_bits(some); bits; bits &= bits - 1) {
+        int lane = first_bit(bits);
+        uint to = LANE_UINT(slot, lane);
+        w->light[0][to] += LANE(light.x, lane);
+        w->light[1][to] += LANE(light.y, lane);
+        w->light[2][to] += LANE(light.z, lane);
+    }
+}
+
+// Each stage returns how many paths, or rays, the next one has.
+__attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int slots) {
+    int count = 0;
+    uint dimension = 0;
+    w->dimension = 0;
+    for (int i = 0; i < slots; i += LANES) {
+        Travel travel;
+        travel.slot = (uint)i + LANE_INDEX;
+        Sampler sampler = slot_sampler(w, travel.slot);
+        CameraRay ray = camera_ray(scene, w->launch, slot_x(w, travel.slot), slot_y(w, travel.slot), next_2d(&sampler),
+                                   &sampler);
+        travel.path = path_along(ray.origin, ray.direction);
+        PACK(travel, in_picture(w, travel.slot), w->arrivals, count)
+        for (int c = 0; c < 3; ++c) vstore8(ZERO, 0, w->light[c] + i);
+        dimension = sampler.dimension;
+    }
+    FILL_UP(Travel, w->arrivals, count)
+    w->dimension = dimension;
+    return count;
+}
+
+__attribute__((noinline)) static void trace(const Scene *scene, Wave *w, int count) {
+    uint dimension = w->dimension;
+    for (int i = 0; i < count; i += LANES) {
+        Travel travel;
+        LOAD(travel, w->arrivals, i)
+#if OPACITY
+        Sampler sampler = slot_sampler(w, travel.slot);
+        Surface surface;
+        Hits hits = first_stop(scene, &travel.path.origin, travel.path.wi, lanes_of(i, count), &sampler, &surface,
+                               &travel.gone);
+        STORE(travel, w->arrivals, i)
+        dimension = sampler.dimension;
+#else
+        Hits hits = closest_hit(scene, travel.path.origin, travel.path.wi, (real)(INFINITY), lanes_of(i, count));
+#endif
+        STORE(hits, w->arrivals + WORDS(travel), i)
+    }
+    w->dimension = dimension;
+    w->rays += count;
+}
+
+// Packs those that hit something, and has the others see the sky.
+__attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int count) {
+    int arrived = 0, escaped = 0;
+    for (int i = 0; i < count; i += LANES) {
+        Arrival a;
+        LOAD(a, w->arrivals, i)
+        ireal active = lanes_of(i, count), hit = active & (a.hits.primitive >= 0), missed = active & !hit;
+#if SKY
+        if (ANY(missed)) PACK(a.travel, missed, w->escapes, escaped)
+#endif
+        if (ANY(missed) || arrived < i) PACK(a, hit, w->arrivals, arrived)
+        else arrived += (int)popcount(mask_bits(hit));
+    }
+    FILL_UP(Travel, w->escapes, escaped)
+    for (int i = 0; i < escaped; i += LANES) {
+        Travel travel;
+        LOAD(travel, w->escapes, i)
+        absorb(&travel.path, (real)(INFINITY));
+        add_light(w, travel.slot, sky_light(scene, &travel.path, lanes_of(i, escaped)));
+    }
+    return arrived;
+}
+
+#if PRIMITIVES
+__attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int count, int depth, int *sent) {
+    int going = 0;
+    uint dimension = w->dimension;
+    *sent = 0;
+    for (int i = 0; i < count; i += LANES) {
+        Arrival a;
+        LOAD(a, w->arrivals, i)
+        Path *path = &a.travel.path;
+        ireal active = lanes_of(i, count);
+        a.hits.primitive = active ? a.hits.primitive : (ireal)(-1);
+        Surface surface = surface_at(scene, path->origin, path->wi, &a.hits);
+#if OPACITY
+        a.hits.t += a.travel.gone;
+#endif
+        absorb(path, a.hits.t);
+        add_light(w, a.travel.slot, emitted_light(scene, path, &surface, a.hits.t, active));
+        if (depth >= w->launch->max_depth) continue;
+        Shading shading = shading_at(scene, path, &surface);
+        Sampler sampler = slot_sampler(w, a.travel.slot);
+#if SHADOWS
+        Shadow shadow;
+        shadow.slot = a.travel.slot;
+        ireal sends = aim_at_light(scene, path, &surface, &shading, active, &sampler, &shadow.ray);
+        if (ANY(sends)) PACK(shadow, sends, w->shadows, *sent)
+#endif
+        ireal goes = go_on(path, &surface, &shading, active, depth, &sampler);
+        if (ANY(goes)) PACK(a.travel, goes, w->arrivals, going)
+        dimension = sampler.dimension;
+    }
+#if SHADOWS
+    FILL_UP(Shadow, w->shadows, *sent)
+#endif
+    w->dimension = dimension;
+    return going;
+}
+#endif
+
+#if SHADOWS
+__attribute__((noinline)) static void trace_shadows(const Scene *scene, Wave *w, int count) {
+    for (int i = 0; i < count; i += LANES) {
+        Shadow shadow;
+        LOAD(shadow, w->shadows, i)
+        add_light(w, shadow.slot, light_along(scene, &shadow.ray, lanes_of(i, count)));
+    }
+    w->rays += count;
+}
+#endif
+
+#if DIRECT_LIGHT
+static inline void keep_direct(Wave *w) {
+    for (int c = 0; c < 3; ++c) for (int i = 0; i < WAVE; ++i) w->direct[c][i] = w->light[c][i];
+}
+#endif
+
+static inline real3 slots_light(const float rows[3][WAVE], int first) {
+    return vector(vload8(0, rows[0] + first), vload8(0, rows[1] + first), vload8(0, rows[2] + first));
+}
+
+// first_pixel: of the tile in the launch. Adds the samples of each pixel in their order, so that no sum depends on how they were cut into waves. All rays of a tile
+// are counted with its first pixel.
+static inline void add_samples(const Wave *w, global Pixel *film, uint first_pixel, int slots) {
+    for (int i = 0; i < TILE_PIXELS; i += LANES) {
+        ureal slot = (uint)i + LANE_INDEX;
+        ireal inside = in_picture(w, slot);
+#if FILM_WINDOWS
+        ureal index = first_pixel + (inside ? slot : (ureal)(0));
+#else
+        ureal index = inside ? slot_y(w, slot) * w->launch->width + slot_x(w, slot) : w->y * w->launch->width + w->x;
+#endif
+        Accumulator pixels = load_pixels(film, AS_INT(index));
+        pixels.rays += slot == 0 ? (ureal)(w->rays) : (ureal)(0);
+        for (int first = i; first < slots; first += TILE_PIXELS) {
+            ireal kept = accumulate(&pixels, slots_light(w->light, first), inside);
+#if DIRECT_LIGHT
+            accumulate_direct(&pixels, slots_light(w->direct, first), kept);
+#endif
+        }
+        store_pixels(film, index, inside, &pixels);
+    }
+}
+
+__attribute__((vec_type_hint(real)))
+kernel void wave(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles, const Launch launch) {
+    Scene scene = SCENE_ARGUMENTS;
+    uint first = (uint)get_global_id(0) * TILE_PIXELS;
+    if (first >= launch.pixel_count) return;
+    uint across = (launch.width + TILE - 1) / TILE, tile = tiles[(first + launch.first_pixel) / TILE_PIXELS];
+    Wave w;
+    w.launch = &launch;
+    w.x = tile % across * TILE;
+    w.y = tile / across * TILE;
+    for (uint s = 0; s < launch.sample_count; s += WAVE_SAMPLES) {
+        uint samples = launch.sample_count - s < WAVE_SAMPLES ? launch.sample_count - s : WAVE_SAMPLES;
+        int slots = (int)(samples * TILE_PIXELS), sent = 0;
+        w.sample = launch.first_sample + s;
+        w.rays = 0;
+        int count = set_out(&scene, &w, slots);
+        for (int depth = 1; count > 0; ++depth) {
+            trace(&scene, &w, count);
+            count = sort_out(&scene, &w, count);
+#if PRIMITIVES
+            count = shade(&scene, &w, count, depth, &sent);
+#endif
+#if DIRECT_LIGHT
+            if (depth == 2) keep_direct(&w);
+#endif
+#if SHADOWS
+            trace_shadows(&scene, &w, sent);
+#endif
+#if DIRECT_LIGHT
+            if (depth == 1) keep_direct(&w);   // of paths that end here, all
+#endif
+        }
+        add_samples(&w, film, first, slots);
+    }
+}

@@ -1,0 +1,89 @@
+"""Paths in waves: the film of paths that are followed one by one, but that a tile's rays are counted together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clrt.device.open import Device
+from clrt.errors import UsageError
+from clrt.rendering.compile import Choices
+from clrt.rendering.film import Film
+from clrt.rendering.renderer import Renderer
+from clrt.rendering.tiles import tile_sums
+from clrt.scene.model import Environment, Scene
+
+from .pictures import session
+from .test_variants import everything, painted, sights
+
+SPP = 7   # no multiple of a wave's
+
+SCENES = {"everything": everything(), "painted": painted(everything()),
+          "lens": dict(sights(everything()))["lens"],
+          "too bright": replace(everything(), environment=Environment(color=(3e38, 3e38, 3e38))),
+          "sky": replace(everything(), meshes=[], spheres=[], lights=everything().lights),
+          "two edges": replace(everything(), render=replace(everything().render, max_depth=2)),
+          "one edge": replace(everything(), render=replace(everything().render, max_depth=1)),
+          "a pixel": replace(everything(), render=replace(everything().render, size=(1, 1)))}
+
+
+def followed(device: Device, paths: str, scene: Scene, *parts: int, **chosen: Any) -> Film:
+    """The film after as many samples a pixel as `parts` have together, one after another."""
+    running = session(device, scene, lanes=8, paths=paths, **chosen)
+    for samples in parts or [SPP]:
+        for _ in running.render(samples):
+            pass
+    assert running.compiled.entry == {"lanes": "path.cl", "waves": "wave.cl"}[paths]
+    return running.film()
+
+
+def assert_same(waves: Film, lanes: Film) -> None:
+    """To rounding, as the lanes in test_variants; on pip's PoCL it is to the last bit."""
+    for name in {"sum", "square", "direct"} & set(lanes.pixels.dtype.names or ()):
+        one, other = (film.pixels[name].astype(np.float64) + film.pixels[f"{name}_error"] for film in (waves, lanes))
+        assert np.mean(np.abs(one - other) > 1e-5 * (np.abs(other) + 0.1)) < 4e-3
+    for name in ("count", "dropped"):
+        np.testing.assert_array_equal(waves.pixels[name], lanes.pixels[name])
+    one, other = (tile_sums(film.pixels["rays"]) for film in (waves, lanes))
+    assert np.mean(one != other) < 0.1 and one.sum() == pytest.approx(other.sum(), rel=1e-4)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_waves_are_the_same_paths(device: Device, name: str) -> None:
+    scene = SCENES[name]
+    lanes, waves = (followed(device, paths, scene) for paths in ("lanes", "waves"))
+    assert (lanes.mean.mean() > 0.1) == (lanes.nonfinite_samples == 0) == (name != "too bright")
+    assert_same(waves, lanes)
+
+
+@pytest.mark.parametrize("chosen", [{"sampler": "sobol", "layout": "bvh8"}, {"sampler": "stratified"},
+                                    {"direct_light": True}], ids=str)
+def test_waves_with_every_choice(device: Device, chosen: dict[str, Any]) -> None:
+    lanes, waves = (followed(device, paths, everything(), **chosen) for paths in ("lanes", "waves"))
+    assert ("direct" in (waves.pixels.dtype.names or ())) == ("direct_light" in chosen)
+    assert_same(waves, lanes)
+
+
+@pytest.mark.parametrize("max_depth", [1, 2, 3])
+def test_direct_light_of_short_paths(device: Device, max_depth: int) -> None:
+    """What came with two edges at most is all of paths that have no more."""
+    scene = replace(everything(), render=replace(everything().render, max_depth=max_depth))
+    found = followed(device, "waves", scene, direct_light=True).pixels
+    assert np.array_equal(found["direct"], found["sum"]) == (max_depth <= 2)
+
+
+def test_sums_do_not_depend_on_the_cut(device: Device) -> None:
+    """Samples are added pixel by pixel in their order, to the last bit, however many a wave has."""
+    whole, parts = (followed(device, "waves", everything(), *cut).pixels for cut in ((9,), (1, 2, 6)))
+    np.testing.assert_array_equal(whole, parts)
+
+
+def test_waves_need_eight_lanes(device: Device) -> None:
+    with pytest.raises(UsageError, match="waves need 8 lanes, not 1"):
+        Renderer(everything(), device=device.info.index, lanes=1, paths="waves")
+    with pytest.raises(UsageError, match="paths 'rows' is unknown; choose from lanes, waves"):
+        Renderer(everything(), device=device.info.index, paths="rows")
+    assert [Choices(lanes).waves for lanes in (1, 8, 16)] == [False, True, False]
