@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from ..study.converge import Effort
 
 #: Those of contestants.py, there after "clrt, ".
-NAMES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "lanes 8", "lanes 16", "unplanned"]
+NAMES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "lanes 8", "lanes 16", "paths in lanes",
+         "unplanned"]
 
 
 @click.command("converge")

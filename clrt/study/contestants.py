@@ -22,7 +22,7 @@ CHOICES: dict[str, dict[str, Any]] = {
 #: Those that are compared only if asked for; unplanned: as with --time or --error, when no `spp` is known.
 MORE_CHOICES: dict[str, dict[str, Any]] = {
     "clrt, adaptive": {"adaptive": True}, "clrt, lanes 8": {"lanes": 8}, "clrt, lanes 16": {"lanes": 16},
-    "clrt, unplanned": {"spp": None}}
+    "clrt, paths in lanes": {"paths": "lanes"}, "clrt, unplanned": {"spp": None}}
 #: Other renderers: what pip calls them, and the module beside this one whose `contestants(scene)` they are.
 PEERS = {"mitsuba": "mitsuba_renderer", "bpy": "cycles_renderer"}
 
