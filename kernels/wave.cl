@@ -192,8 +192,8 @@ static inline real3 slots_light(const float rows[3][WAVE], int first) {
     return vector(vload8(0, rows[0] + first), vload8(0, rows[1] + first), vload8(0, rows[2] + first));
 }
 
-// first_pixel: of the tile in the launch. Adds the samples of each pixel in their order, so that no sum depends on how they were cut into waves. All rays of a tile
-// are counted with its first pixel.
+// Adds the samples of each pixel in their order, so that no sum depends on how they were cut into waves. All rays of a
+// tile are counted with its first pixel. first_pixel: of the tile in the launch.
 static inline void add_samples(const Wave *w, global Pixel *film, uint first_pixel, int slots) {
     for (int i = 0; i < TILE_PIXELS; i += LANES) {
         ureal slot = (uint)i + LANE_INDEX;
