@@ -233,5 +233,5 @@ def test_settings_do_not_change_the_program(device: Device) -> None:
     scene = everything()
     other = replace(scene, camera=Camera(position=(1.0, 1.0, 9.0), fov_degrees=70.0),
                     render=RenderSettings(size=(7, 5), spp=3, max_depth=2, seed=99),
-                    lights=[PointLight(position=(0.0, 9.0, 0.0), intensity=(1.0, 2.0, 3.0)), scene.lights[1]])
+                    lights=[PointLight(position=(0.0, 9.0, 0.0), intensity=(1.0, 2.0, 3.0)), *scene.lights[1:]])
     assert session(device, scene).compiled.source == session(device, other).compiled.source
