@@ -11,9 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clrt.scene.gltf import read_gltf
+from clrt.scene.model import Model
 from .shapes import icosphere
 
 TYPES = {"<i1": 5120, "<u1": 5121, "<i2": 5122, "<u2": 5123, "<u4": 5125, "<f4": 5126}
+TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
 SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
@@ -84,3 +87,8 @@ def ball() -> Gltf:
     gltf = Gltf()
     gltf.mesh(attributes={"POSITION": gltf.accessor(vertices)}, indices=gltf.accessor(faces.ravel(), "<u2"))
     return gltf
+
+
+def read(gltf: Gltf, folder: Path, name: str = "a.glb") -> Model:
+    """What the file is read as."""
+    return read_gltf(gltf.write(folder / name))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from clrt.errors import SceneError
-from clrt.rendering.compile import Choices
+from clrt.rendering.choices import Choices
 from clrt.rendering.identity import facts_of
 from clrt.scene.file import load
 from clrt.scene.materials import Diffuse

@@ -1,0 +1,104 @@
+"""What glTF's materials, with their textures and extensions, become."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clrt.scene.material import as_color
+from clrt.scene.materials import Dielectric, MetallicRoughness
+from clrt.scene.textures import Texture
+from .glb import TRIANGLE, Gltf, ball, read
+from .shapes import icosphere
+
+
+def textured(color: tuple[int, int, int], folder: Path, **material: Any) -> MetallicRoughness:
+    """The material of a triangle whose three corners address the right one of a texture's two texels."""
+    import imageio.v3 as imageio
+    gltf = Gltf()
+    picture = imageio.imwrite("<bytes>", np.array([[[9, 99, 199], color]], np.uint8), extension=".png")
+    gltf.document["images"] = [{"bufferView": gltf.view(picture), "mimeType": "image/png"}]
+    gltf.document["samplers"] = [{"magFilter": 9728, "wrapS": 33648, "wrapT": 33071}]
+    gltf.document["textures"] = [{"source": 0, "sampler": 0}]
+    gltf.document["materials"] = [material]
+    uv = gltf.accessor(np.array([[0.6, 0.5], [0.99, 0.1], [-0.25, 1.0]]))
+    gltf.mesh(attributes={"POSITION": gltf.accessor(TRIANGLE), "TEXCOORD_0": uv}, material=0)
+    found = read(gltf, folder).meshes[0].material
+    assert isinstance(found, MetallicRoughness)
+    return found
+
+
+def test_material_factors_are_cut_to_their_limits(tmp_path: Path) -> None:
+    gltf = ball()
+    gltf.document["materials"] = [{
+        "pbrMetallicRoughness": {"baseColorFactor": [1.5, 0.25, -1, 1], "metallicFactor": 0.5, "roughnessFactor": 2},
+        "emissiveFactor": [1, 0.5, 0], "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8}}}]
+    gltf.document["meshes"][0]["primitives"][0]["material"] = 0
+    assert read(gltf, tmp_path).meshes[0].material == MetallicRoughness(
+        color=(1, 0.25, 0), metallic=0.5, roughness=1, emission=(8, 4, 0))
+
+
+def test_textures_of_every_parameter(tmp_path: Path) -> None:
+    """One picture, with its factors, channels, transform and sampler; materials of one file share it."""
+    placed = {"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0.5, 0.25], "rotation": np.pi / 2,
+                                                                   "scale": [2, 3]}}}
+    factors = {"baseColorTexture": placed, "metallicRoughnessTexture": {"index": 0}, "metallicFactor": 0.5,
+               "baseColorFactor": [1, 0.5, 1, 0.75]}
+    material = textured((188, 188, 0), tmp_path, pbrMetallicRoughness=factors, emissiveFactor=[1, 0.5, 1],
+                        emissiveTexture={"index": 0}, normalTexture={"index": 0, "scale": 0.5}, alphaMode="MASK",
+                        alphaCutoff=0.25, extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 4}})
+    color, metallic, roughness, opacity = material.color, material.metallic, material.roughness, material.opacity
+    assert isinstance(color, Texture) and isinstance(metallic, Texture) and isinstance(roughness, Texture)
+    assert isinstance(opacity, Texture) and isinstance(material.emission, Texture) and material.normal_map is not None
+    assert color.picture.texels.tolist() == [[[9, 99, 199, 255], [188, 188, 0, 255]]]
+    assert all(texture.picture is color.picture for texture in material.textures()) and len(material.textures()) == 6
+    assert as_color(color.factor) == pytest.approx((1, 0.5, 1))
+    assert (color.offset, color.scale) == ((0.5, 0.25), (2, 3))
+    assert color.rotation_degrees == pytest.approx(90)
+    assert (color.wrap, color.filter) == (("mirror", "clamp"), "nearest")
+    assert (metallic.channel, metallic.factor, roughness.channel, roughness.factor) == ("blue", 0.5, "green", 1)
+    assert (opacity.channel, opacity.factor, opacity.scale, material.alpha_cutoff) == ("alpha", 0.75, (2, 3), 0.25)
+    assert as_color(material.emission.factor) == pytest.approx((4, 2, 4)) and material.normal_map.factor == 0.5
+
+
+def test_layers_and_glass(tmp_path: Path) -> None:
+    """Extensions by their names; a volume behind a surface that passes all light is glass."""
+    texture = {"index": 0}
+    layered = textured((255, 255, 255), tmp_path, extensions={
+        "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25,
+                                    "clearcoatRoughnessTexture": texture},
+        "KHR_materials_sheen": {"sheenColorFactor": [0.1, 0.2, 0.3], "sheenRoughnessFactor": 0.4},
+        "KHR_materials_specular": {"specularTexture": texture, "specularColorFactor": [2, 1, 0.5]},
+        "KHR_materials_ior": {"ior": 1.33}, "KHR_materials_transmission": {"transmissionFactor": 0.75}})
+    coat, specular = layered.clearcoat_roughness, layered.specular
+    assert isinstance(coat, Texture) and (coat.factor, coat.channel) == (0.25, "green")
+    assert layered == replace(layered, sheen_color=(0.1, 0.2, 0.3), sheen_roughness=0.4)
+    assert isinstance(specular, Texture) and specular.channel == "alpha"
+    assert layered == replace(layered, specular_color=(2, 1, 0.5), ior=1.33, transmission=0.75, clearcoat=0.5)
+    gltf = ball()
+    gltf.document["materials"] = [{
+        "pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 1, 1], "metallicFactor": 0, "roughnessFactor": 0.5},
+        "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_ior": {"ior": 1.4},
+                       "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 2,
+                                                "attenuationColor": [0.5, 1, 1]}}}]
+    gltf.document["meshes"][0]["primitives"][0]["material"] = 0
+    assert read(gltf, tmp_path).meshes[0].material == Dielectric(
+        color=(1, 0.5, 1), ior=1.4, roughness=0.5, attenuation_color=(0.5, 1, 1), attenuation_distance=2)
+
+
+def test_missing_texture_is_grey_with_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    gltf = ball()
+    gltf.document |= {"images": [{"uri": "lost.png"}], "textures": [{"source": 0}],
+                      "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}, "alphaMode": "BLEND"}]}
+    primitive = gltf.document["meshes"][0]["primitives"][0]
+    primitive["material"] = 0
+    primitive["attributes"]["TEXCOORD_0"] = gltf.accessor(icosphere(0)[0][:, :2])
+    with caplog.at_level(logging.WARNING):
+        material = read(gltf, tmp_path).meshes[0].material
+    assert isinstance(material, MetallicRoughness) and material.color == (0.8, 0.8, 0.8)
+    assert "lost.png" in caplog.text and material.opacity == 1
