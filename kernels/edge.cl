@@ -2,8 +2,8 @@
 // along an edge of a path. path.cl and wave.cl put these stages together; each is for the edges in all lanes.
 //
 // World frame; light in W·sr⁻¹·m⁻². Light is returned as what reaches the eye, 0 in lanes that are not asked for.
-#include "bsdf.cl"
 #include "light.cl"
+#include "shading.cl"
 #include VISIBILITY
 
 #define ROULETTE_DEPTH 4   // edges before Russian roulette may end a path
@@ -81,26 +81,6 @@ static inline real3 sky_light(const Scene *scene, const Path *path, ireal escape
 }
 
 #if PRIMITIVES
-// What the material of a surface is, in the frame of its shading normal.
-typedef struct {
-    Frame frame;
-    real3 wo;
-    Bsdf bsdf;
-} Shading;
-
-static inline Shading shading_at(const Scene *scene, const Path *path, Surface *surface) {
-    Shading shading;
-    real3 towards = negate(path->wi);
-#if NORMAL_MAPS
-    bend_normal(scene, surface);
-#endif
-    turn_towards(surface, towards);
-    shading.frame = frame_around(surface->ns);
-    shading.wo = to_local(shading.frame, towards);
-    bsdf_at(scene, surface, &shading.bsdf);
-    return shading;
-}
-
 #if LIGHTS
 // A ray towards a sampled point of a light, and what comes along it if nothing is in between.
 typedef struct {

@@ -8,8 +8,8 @@
 // To add one: a field of the record GUIDE (clrt/rendering/records.py), its like in Seen, and what it is, below.
 #include "camera.cl"
 #include "film.cl"
-#include "bsdf.cl"
 #include "light.cl"
+#include "shading.cl"
 #include VISIBILITY
 
 typedef struct { real3 albedo, normal; } Seen;
@@ -33,21 +33,13 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
 #endif
         if (!ANY(hit)) return seen;
 #if PRIMITIVES
-        real3 towards = negate(direction);
-#if NORMAL_MAPS
-        bend_normal(scene, &surface);
-#endif
-        turn_towards(&surface, towards);
-        Frame shading = frame_around(surface.ns);
-        real3 wo = to_local(shading, towards);
-        Bsdf bsdf;
-        bsdf_at(scene, &surface, &bsdf);
+        Shading shading = shading_at(scene, direction, &surface);
         real middle = (real)(0.5f);
-        BsdfSample sample = bsdf_sample(&bsdf, wo, (real2){middle, middle}, middle);
-        real3 wi = to_world(shading, sample.wi);
+        BsdfSample sample = bsdf_sample(&shading.bsdf, shading.wo, (real2){middle, middle}, middle);
+        real3 wi = to_world(shading.frame, sample.wi);
         ireal followed = hit & sample.specular & keeps_its_side(&sample, dot3(wi, surface.ng));
         ireal ends = hit & !followed;
-        seen.albedo = choose(ends, mul(tint, bsdf_albedo(&bsdf)), seen.albedo);
+        seen.albedo = choose(ends, mul(tint, bsdf_albedo(&shading.bsdf)), seen.albedo);
         seen.normal = choose(ends, surface.ns, seen.normal);
         if (depth >= max_depth || !ANY(followed)) return seen;
         tint = choose(followed, mul(tint, sample.weight), tint);

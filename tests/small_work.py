@@ -16,7 +16,8 @@ from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, U
 from clrt.device.open import Device
 from clrt.output.layers import layered
 from clrt.rendering.aovs import AOVS, film_aovs
-from clrt.rendering.compile import OFFSETS, compile_scene
+from clrt.rendering.choices import OFFSETS
+from clrt.rendering.compile import compile_scene
 from clrt.rendering.film import Film
 from clrt.rendering.first_hits import first_hits
 from clrt.rendering.guides import render_guides

@@ -32,7 +32,8 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
         raise click.UsageError("Missing argument 'SCENE'; write a scene file or a model, or --materials")
     from ..accel.kernels import HitTests
     from ..rendering.aovs import chosen_aovs, needs_direct_light, seen_first
-    from ..rendering.compile import Choices, compile_scene
+    from ..rendering.choices import Choices
+    from ..rendering.compile import compile_scene
     from ..rendering.first_hits import first_hit_program
     from ..scene.file import load
 

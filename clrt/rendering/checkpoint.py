@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import CheckpointError, OutputError, UsageError
 from ..scene.model import Scene
 from .checkpoint_file import older, read_checkpoint, write_checkpoint
-from .compile import Choices
+from .choices import Choices
 from .identity import differences, facts_of
 from .kept import KINDS, NO_SENSE, Kept, from_arrays, to_arrays
 

@@ -22,11 +22,11 @@ from ..device.launch import IN_FLIGHT
 from ..device.memory import check_host
 from ..device.open import Device
 from ..errors import DeviceError, NoRoomError
+from .accumulation import Accumulation
 from .compile import CompiledScene
 from .film import Film
 from .loop_limit import check_samples
 from .on_device import SceneOnDevice
-from .picture import Picture
 from .session import FEWEST_TILES, Session, first_launch
 from .tiles import TILE_PIXELS, row_by_row, tile_by_tile
 from .work import Work
@@ -40,7 +40,7 @@ PAUSE = 5e-4
 _log = logging.getLogger(__name__)
 
 
-class Crew(Picture):
+class Crew(Accumulation):
     """Renders samples of one scene at one size, compiled for each device. DeviceError where none is left."""
 
     def __init__(self, devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int],
@@ -168,7 +168,7 @@ class Crew(Picture):
 
 
 def make_picture(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
-                 seed: int, planned_spp: int | None) -> Picture:
+                 seed: int, planned_spp: int | None) -> Accumulation:
     """A session where there is one device with room for the film, else a crew."""
     if len(devices) == 1:
         with suppress(NoRoomError):

@@ -12,8 +12,8 @@ from ..device.preamble import typedefs
 from ..device.records import record
 from ..scene.materials import Material
 from ..scene.model import Scene
+from .accumulation import Accumulation
 from .compile import CompiledScene
-from .picture import Picture
 from .pixels import render_pixels
 
 #: Means over each pixel's rays, and what belongs to the ray through its middle.
@@ -23,7 +23,7 @@ OF_THE_MIDDLE = ("position", "depth", "primitive", "object", "material")
 SAMPLES = 16
 
 
-def first_hits(session: Picture, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
+def first_hits(session: Accumulation, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
     """Those of MEANS and OF_THE_MIDDLE that `names` has, of the scene that the session renders.
 
     As docs/aovs.md says: (height, width, 3) float32, but depth (height, width) float32 and ids (height, width) int32.
@@ -56,7 +56,8 @@ def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[
                               *defines, SEEN_FILES=materials), kind
 
 
-def _places(session: Picture, seen: NDArray[np.float64], missed: NDArray[np.bool_]) -> dict[str, NDArray[np.generic]]:
+def _places(session: Accumulation, seen: NDArray[np.float64],
+            missed: NDArray[np.bool_]) -> dict[str, NDArray[np.generic]]:
     """Position and depth of points (height, width, 3) in the compiled scene's frame."""
     camera, frame = session.compiled.camera, session.compiled.frame
     axis = np.subtract(camera.look_at, camera.position, dtype=np.float64)
@@ -69,7 +70,7 @@ def _places(session: Picture, seen: NDArray[np.float64], missed: NDArray[np.bool
             "depth": np.where(missed, np.inf, depth).astype(np.float32)}
 
 
-def _ids(session: Picture, scene: Scene, seen: NDArray[Any]) -> dict[str, NDArray[np.int64]]:
+def _ids(session: Accumulation, scene: Scene, seen: NDArray[Any]) -> dict[str, NDArray[np.int64]]:
     """What is met at first hits: which object of the scene, which primitive of that, and which material."""
     which, primitive = session.compiled.objects.met(seen["primitive"], seen["instance"])
     distinct: dict[Material, int] = {}

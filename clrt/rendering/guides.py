@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .picture import Picture
+from .accumulation import Accumulation
 from .pixels import render_pixels
 from .records import GUIDE
 
@@ -13,7 +13,7 @@ from .records import GUIDE
 SAMPLES = 8
 
 
-def render_guides(session: Picture, samples: int = SAMPLES) -> dict[str, NDArray[np.float32]]:
+def render_guides(session: Accumulation, samples: int = SAMPLES) -> dict[str, NDArray[np.float32]]:
     """The guides of the session's picture by name, each a mean over `samples` camera rays a pixel.
 
     - albedo (height, width, 3) float32 in [0, 1]: what part of white light the first surface reflects, linear Rec. 709

@@ -17,7 +17,7 @@ import numpy as np
 from ..device.sources import kernel_digest
 from ..scene.instancing import prototypes
 from ..scene.model import Scene
-from .compile import Choices
+from .choices import Choices
 
 PARTS = ("camera", "meshes", "instances", "spheres", "lights", "environment")
 #: Of those in RenderSettings, beside the size.

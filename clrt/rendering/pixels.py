@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from ..device.arrays import DeviceArray, empty_array, resident
 from ..device.launch import Launches
 from ..device.program import build, make_kernel
+from .accumulation import Accumulation
 from .loop_limit import check_pixels, mark_pixels
 from .on_device import WINDOW, WINDOWS
-from .picture import Picture
 from .session import FEWEST_TILES, FIRST_LAUNCH_SAMPLES, block_bits
 from .tiles import TILE_PIXELS, row_by_row, scattered
 
 
-def render_pixels(session: Picture, source: str, name: str, record: np.dtype[Any], samples: int) -> NDArray[Any]:
+def render_pixels(session: Accumulation, source: str, name: str, record: np.dtype[Any], samples: int) -> NDArray[Any]:
     """(height, width) records of the session's picture that kernel `name` of a program writes, in bounded launches.
 
     The kernel takes the scene, the records of a launch, the tiles and the launch, as `path` does. samples: what the

@@ -13,15 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accel.kernels import BUILDER_NAMES, TREES, HitTests
+from ..accel.kernels import HitTests
 from ..device.open import name_of, open_devices
 from ..errors import UsageError
 from ..scene.model import RenderSettings, Scene
 from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
 from .aovs import LIGHT, chosen_aovs, film_aovs, needs_direct_light, seen_first
 from .checkpoint import open_checkpoints
-from .compile import ENTRIES, OFFSETS, PATHS, WITH_LIGHT, Choices, compile_for_all
+from .choices import Choices
+from .compile import compile_for_all
 from .crew import make_picture
+from .features import INTEGRATORS, WITH_LIGHT
 from .film import RELATIVE_FLOOR, Film
 from .first_hits import first_hits
 from .kept import Kept
@@ -57,7 +59,7 @@ class Renderer:
     """A scene on a device, ready to render. Everything not given is taken from `scene.render`.
 
     device: see `clrt devices`; several render one picture together. size: (width, height); triangle, box, sphere: see
-    `HitTests`; offset, builder, layout, lanes, paths: see `compile.Choices`. spp: how many samples a pixel are
+    `HitTests`; offset, builder, layout, lanes, paths: see `choices.Choices`. spp: how many samples a pixel are
     planned, if that is known: the sampler then makes neighbouring pixels' errors differ for that many, and later ones
     begin anew (kernels/sampler). adaptive: whether tiles get samples by their error, from the pictures so far.
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
@@ -89,11 +91,10 @@ class Renderer:
         choices = [Choices(lanes or each.lanes, layout, builder, HitTests(triangle, box, sphere), offset,
                            needs_direct_light(self._aovs), paths or (None if each.packs else "lanes"))
                    for each in self.devices]
-        _check(choices[0])
         on_phase("build")
         compiled = compile_for_all(self.scene, choices, self.devices)
         self.compiled = compiled[0]
-        if settings.integrator in ENTRIES and not {"LIGHTS", "SKY"} & set(self.compiled.features):
+        if settings.integrator in INTEGRATORS and not {"LIGHTS", "SKY"} & set(self.compiled.features):
             logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
         self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene,
                                                    self.compiled.choices, name_of(self.devices))
@@ -248,12 +249,3 @@ class Renderer:
         next_power = 1 << done.bit_length()
         end = next_power if spp is None else min(next_power, spp)
         return max(1, min(end - done, self.session.pass_limit()))
-
-
-def _check(choices: Choices) -> None:
-    known: dict[str, Sequence[object]] = {"layout": [None, *TREES], "builder": [None, *BUILDER_NAMES],
-                                          "lanes": (1, 8, 16), "paths": (None, *PATHS), "offset": list(OFFSETS)}
-    for name, values in known.items():
-        if (value := getattr(choices, name)) not in values:
-            named = ", ".join(str(known_value) for known_value in values if known_value is not None)
-            raise UsageError(f"{name} {value!r} is unknown; choose from {named}")

@@ -13,12 +13,12 @@ from ..device.arrays import on_device
 from ..device.launch import Launches, calling, wait_for
 from ..device.open import Device
 from ..errors import NoRoomError
+from .accumulation import Accumulation
 from .camera import launch_record
 from .compile import CompiledScene
 from .film import Film
 from .loop_limit import check_samples
 from .on_device import SceneOnDevice, largest_film
-from .picture import Picture
 from .tiles import TILE_PIXELS
 from .work import Work
 
@@ -29,7 +29,7 @@ PASS_LAUNCHES = 4
 FIRST_LAUNCH_SAMPLES = 1 << 15
 
 
-class Session(Picture):
+class Session(Accumulation):
     """Renders samples of one compiled scene at one size. Raises NoRoomError where scene or film do not fit."""
 
     def __init__(self, device: Device, compiled: CompiledScene, size: tuple[int, int], max_depth: int,

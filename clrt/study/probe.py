@@ -14,7 +14,8 @@ from ..device.arrays import empty_array, on_device
 from ..device.launch import run_kernel
 from ..device.open import Device
 from ..device.program import build, make_kernel
-from ..rendering.compile import Choices, compile_scene
+from ..rendering.choices import Choices
+from ..rendering.compile import compile_scene
 from ..scene.model import Scene
 
 Doubles = NDArray[np.float64]

@@ -3,58 +3,39 @@
 //   f = color/pi + specular·(n + 2)(n + 4)/(8·pi·(2^(−n/2) + n))·cos^n h
 // with n = shininess. Less is reflected from elsewhere.
 #include "bsdf/phong_lobes.cl"
-#include "bsdf/interface.cl"
 
-struct blinn_phong {
-    real3 color, specular;
-    real shininess;
-#if LOCAL
-    real ambient;
-#endif
-};
+struct blinn_phong { PowerLobes lobes; };
 
 static inline struct blinn_phong blinn_phong_at(const Scene *scene, ireal index, const Surface *surface) {
-    struct blinn_phong m;
-    m.specular = PARAMETER3(blinn_phong, specular);
-    m.color = phong_body(COLOR(blinn_phong), m.specular);
-    m.shininess = PARAMETER(blinn_phong, shininess);
-#if LOCAL
-    m.ambient = PARAMETER(blinn_phong, ambient);
-#endif
+    struct blinn_phong m = {power_lobes(COLOR(blinn_phong), PARAMETER3(blinn_phong, specular), PARAMETER(blinn_phong, shininess), AMBIENT(blinn_phong))};
     return m;
 }
 
 static inline real3 blinn_phong_eval(const struct blinn_phong *m, real3 wo, real3 wi) {
-    real n = m->shininess, lobe = power(normalize3(add(wo, wi)).z, n);
+    real n = m->lobes.shininess, lobe = power(normalize3(add(wo, wi)).z, n);
 #if LOCAL
-    real3 value = mad3(m->color, wi.z, scale(m->specular, lobe));
+    real3 value = mad3(m->lobes.color, wi.z, scale(m->lobes.specular, lobe));
 #else
     real brightest = (n + 2.0f) * (n + 4.0f) / (8.0f * (power((real)(0.5f), 0.5f * n) + n));
-    real3 value = scale(mad3(m->specular, brightest * lobe, m->color), wi.z);
+    real3 value = scale(mad3(m->lobes.specular, brightest * lobe, m->lobes.color), wi.z);
 #endif
     return choose((wo.z > 0.0f) & (wi.z > 0.0f), scale(value, (real)(1.0f / PI)), splat(ZERO));
 }
 
 static inline real blinn_phong_pdf(const struct blinn_phong *m, real3 wo, real3 wi) {
     real3 sum = add(wo, wi);
-    real length = length3(sum), share = gloss_share(m->color, m->specular);
+    real length = length3(sum), share = gloss_share(&m->lobes);
     // dωi = 4·(wo·h) dωh, with wo·h = |wo + wi|/2.
-    real pdf = share * power_pdf(sum.z / length, m->shininess) / (2.0f * length) + (1.0f - share) * cosine_pdf(wi.z);
+    real pdf = share * power_pdf(sum.z / length, m->lobes.shininess) / (2.0f * length) + (1.0f - share) * cosine_pdf(wi.z);
     return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
 }
 
-static inline real3 blinn_phong_albedo(const struct blinn_phong *m) {
-#if LOCAL
-    return scale(m->color, m->ambient);
-#else
-    return add(m->color, m->specular);
-#endif
-}
+static inline real3 blinn_phong_albedo(const struct blinn_phong *m) { return lobes_albedo(&m->lobes); }
 
 static inline BsdfSample blinn_phong_sample(const struct blinn_phong *m, real3 wo, real2 u, real lobe) {
-    real3 h = sample_power(u, m->shininess);
+    real3 h = sample_power(u, m->lobes.shininess);
     BsdfSample sample = no_sample();
-    sample.wi = choose(lobe < gloss_share(m->color, m->specular), sub(scale(h, 2.0f * dot3(wo, h)), wo), sample_cosine(u));
+    sample.wi = choose(lobe < gloss_share(&m->lobes), sub(scale(h, 2.0f * dot3(wo, h)), wo), sample_cosine(u));
     sample.pdf = blinn_phong_pdf(m, wo, sample.wi);
     sample.weight = scale(blinn_phong_eval(m, wo, sample.wi), sample.pdf > 0.0f ? 1.0f / sample.pdf : ZERO);
     return sample;

@@ -3,57 +3,38 @@
 //   f = color/pi + specular·(n + 2)/(2·pi)·cos^n a
 // with n = shininess, and a the angle between wi and the mirrored wo. Beyond the horizon the gloss is lost.
 #include "bsdf/phong_lobes.cl"
-#include "bsdf/interface.cl"
 
-struct phong {
-    real3 color, specular;
-    real shininess;
-#if LOCAL
-    real ambient;
-#endif
-};
+struct phong { PowerLobes lobes; };
 
 static inline struct phong phong_at(const Scene *scene, ireal index, const Surface *surface) {
-    struct phong m;
-    m.specular = PARAMETER3(phong, specular);
-    m.color = phong_body(COLOR(phong), m.specular);
-    m.shininess = PARAMETER(phong, shininess);
-#if LOCAL
-    m.ambient = PARAMETER(phong, ambient);
-#endif
+    struct phong m = {power_lobes(COLOR(phong), PARAMETER3(phong, specular), PARAMETER(phong, shininess), AMBIENT(phong))};
     return m;
 }
 
 static inline real mirrored_cosine(real3 wo, real3 wi) { return wo.z * wi.z - wo.x * wi.x - wo.y * wi.y; }
 
 static inline real3 phong_eval(const struct phong *m, real3 wo, real3 wi) {
-    real lobe = power(maximum(mirrored_cosine(wo, wi), ZERO), m->shininess);
+    real lobe = power(maximum(mirrored_cosine(wo, wi), ZERO), m->lobes.shininess);
 #if LOCAL
-    real3 value = mad3(m->color, wi.z, scale(m->specular, lobe));
+    real3 value = mad3(m->lobes.color, wi.z, scale(m->lobes.specular, lobe));
 #else
-    real3 value = scale(mad3(m->specular, (0.5f * m->shininess + 1.0f) * lobe, m->color), wi.z);
+    real3 value = scale(mad3(m->lobes.specular, (0.5f * m->lobes.shininess + 1.0f) * lobe, m->lobes.color), wi.z);
 #endif
     return choose((wo.z > 0.0f) & (wi.z > 0.0f), scale(value, (real)(1.0f / PI)), splat(ZERO));
 }
 
 static inline real phong_pdf(const struct phong *m, real3 wo, real3 wi) {
-    real share = gloss_share(m->color, m->specular);
-    real pdf = share * power_pdf(mirrored_cosine(wo, wi), m->shininess) + (1.0f - share) * cosine_pdf(wi.z);
+    real share = gloss_share(&m->lobes);
+    real pdf = share * power_pdf(mirrored_cosine(wo, wi), m->lobes.shininess) + (1.0f - share) * cosine_pdf(wi.z);
     return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
 }
 
-static inline real3 phong_albedo(const struct phong *m) {
-#if LOCAL
-    return scale(m->color, m->ambient);
-#else
-    return add(m->color, m->specular);
-#endif
-}
+static inline real3 phong_albedo(const struct phong *m) { return lobes_albedo(&m->lobes); }
 
 static inline BsdfSample phong_sample(const struct phong *m, real3 wo, real2 u, real lobe) {
     Frame mirrored = frame_around(vector(-wo.x, -wo.y, wo.z));
     BsdfSample sample = no_sample();
-    sample.wi = choose(lobe < gloss_share(m->color, m->specular), to_world(mirrored, sample_power(u, m->shininess)),
+    sample.wi = choose(lobe < gloss_share(&m->lobes), to_world(mirrored, sample_power(u, m->lobes.shininess)),
                        sample_cosine(u));
     sample.pdf = phong_pdf(m, wo, sample.wi);
     sample.weight = scale(phong_eval(m, wo, sample.wi), sample.pdf > 0.0f ? 1.0f / sample.pdf : ZERO);

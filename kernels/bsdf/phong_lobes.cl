@@ -3,23 +3,51 @@
 // In the path integrators the body reflects what the gloss leaves, at most 1 − specular, so that no light is made. The local
 // integrator (LOCAL) draws both as their authors wrote them, with the irradiance over pi for a light's colour:
 //   color·(n·l) + specular·(…)^shininess
+#include "bsdf/interface.cl"
 #include "sampling.cl"
 
 // x^n for x in [0, 1]; 1 for n = 0.
 static inline real power(real x, real n) { return exp(n * log(maximum(x, (real)(1e-30f)))); }
 
-static inline real3 phong_body(real3 color, real3 specular) {
+typedef struct {
+    real3 color, specular;
+    real shininess;
 #if LOCAL
-    return color;
+    real ambient;
+#endif
+} PowerLobes;
+
+#if LOCAL
+#define AMBIENT(kind) PARAMETER(kind, ambient)
 #else
-    return vector(minimum(color.x, 1.0f - specular.x), minimum(color.y, 1.0f - specular.y),
-                  minimum(color.z, 1.0f - specular.z));
+#define AMBIENT(kind) ZERO
+#endif
+
+static inline PowerLobes power_lobes(real3 color, real3 specular, real shininess, real ambient) {
+    PowerLobes m;
+    m.color = color;
+    m.specular = specular;
+    m.shininess = shininess;
+#if LOCAL
+    m.ambient = ambient;
+#else
+    real3 left = sub(splat(ONE), specular);
+    m.color = vector(minimum(color.x, left.x), minimum(color.y, left.y), minimum(color.z, left.z));
+#endif
+    return m;
+}
+
+static inline real3 lobes_albedo(const PowerLobes *m) {
+#if LOCAL
+    return scale(m->color, m->ambient);
+#else
+    return add(m->color, m->specular);
 #endif
 }
 
 // The part of the light that the gloss is given, by luminance.
-static inline real gloss_share(real3 color, real3 specular) {
-    real gloss = luminance(specular), sum = gloss + luminance(color);
+static inline real gloss_share(const PowerLobes *m) {
+    real gloss = luminance(m->specular), sum = gloss + luminance(m->color);
     return sum > 0.0f ? gloss / sum : ZERO;
 }
 

@@ -1,8 +1,6 @@
 // What part of white light the surface reflects or lets through, head on.
 #include "bsdf.cl"
 
-static inline real2 picture_place(Sampler *sampler) { return next_2d(sampler); }
-
 static inline real3 picture_value(const Scene *scene, const Launch *launch, real3 direction, real t,
                                   Surface *surface) {
     turn_towards(surface, negate(direction));

@@ -2,8 +2,6 @@
 // it is the distance. Not averaged over the pixel: the mean of what is near and what is far is no place.
 #include "surface.cl"
 
-static inline real2 picture_place(Sampler *sampler) { return (real2){(real)(0.5f), (real)(0.5f)}; }
-
 static inline real3 picture_value(const Scene *scene, const Launch *launch, real3 direction, real t,
                                   Surface *surface) {
 #if ALL_AROUND

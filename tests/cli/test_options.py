@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from clrt.accel.kernels import BOX_TESTS, BUILDER_NAMES, SPHERE_TESTS, TREES, TRIANGLE_TESTS
 from clrt.cli import bench_rays, info, render
-from clrt.rendering.compile import OFFSETS
+from clrt.rendering.choices import OFFSETS
 
 KNOWN: dict[str, Iterable[str]] = {"triangle": TRIANGLE_TESTS, "box": BOX_TESTS, "sphere": SPHERE_TESTS,
                                    "offset": OFFSETS, "layout": TREES, "builder": BUILDER_NAMES}

@@ -24,7 +24,8 @@ from clrt.device.open import Device
 from clrt.device.program import build, compose, files_of
 from clrt.errors import KernelError
 from clrt.rendering.aovs import AOVS
-from clrt.rendering.compile import OFFSETS, Choices, compile_scene
+from clrt.rendering.choices import OFFSETS, Choices
+from clrt.rendering.compile import compile_scene
 from clrt.rendering.first_hits import first_hit_program
 from clrt.scene import instancing
 from clrt.scene.materials import MATERIALS

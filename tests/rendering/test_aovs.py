@@ -13,7 +13,8 @@ import clrt
 from clrt.device.program import files_of
 from clrt.errors import CheckpointError, UsageError
 from clrt.rendering.aovs import AOVS, chosen_aovs
-from clrt.rendering.compile import Choices, compile_scene
+from clrt.rendering.choices import Choices
+from clrt.rendering.compile import compile_scene
 from clrt.rendering.first_hits import first_hit_program
 from clrt.rendering.renderer import Renderer
 from clrt.scene.materials import Dielectric, Diffuse, Mirror

@@ -9,7 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.device.open import Device
-from clrt.rendering.compile import Choices, compile_scene
+from clrt.rendering.choices import Choices
+from clrt.rendering.compile import compile_scene
 from clrt.scene import microfacets
 from clrt.scene.file import load
 from clrt.scene.materials import MetallicRoughness

@@ -250,7 +250,7 @@ def test_planes_do_not_shadow_themselves(device: Device, monkeypatch: pytest.Mon
 
 def test_checkpoints_tell_instances_apart() -> None:
     """By what they show, not by how many objects say it."""
-    from clrt.rendering.compile import Choices
+    from clrt.rendering.choices import Choices
 
     scene = crowd("turned")
     moved, painted = list(scene.instances), list(scene.instances)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from clrt.device.open import Device
-from clrt.rendering.compile import Choices, compile_scene
+from clrt.rendering.choices import Choices
+from clrt.rendering.compile import compile_scene
 from clrt.scene import sheen
 from clrt.scene.materials import MetallicRoughness
 from clrt.scene.model import Scene, Sphere

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from clrt.device.open import Device
-from clrt.rendering.compile import Choices, compile_scene
+from clrt.rendering.choices import Choices
+from clrt.rendering.compile import compile_scene
 from clrt.scene.lights import DirectionalLight, Light, PointLight
 from clrt.scene.materials import BlinnPhong, Dielectric, Diffuse, Material, Mirror, Phong
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere

@@ -20,7 +20,7 @@ from clrt.rendering import loop_limit
 from clrt.rendering.first_hits import first_hits
 from clrt.rendering.guides import render_guides
 from clrt.rendering.renderer import Renderer
-from clrt.rendering.picture import Picture
+from clrt.rendering.accumulation import Accumulation
 from clrt.rendering.work import Part, Work
 from clrt.scene.materials import Diffuse
 from clrt.scene.model import Camera, Mesh, Scene
@@ -131,7 +131,7 @@ def test_too_long_lists_are_refused(device: Device) -> None:
 def test_pixels_that_were_ended_are_missed(device: Device, entry: str, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     limit(monkeypatch, 50_000)
-    render: dict[str, Callable[[Picture], dict[str, Any]]] = {
+    render: dict[str, Callable[[Accumulation], dict[str, Any]]] = {
         "guides": render_guides,
         "first_hit": lambda session: first_hits(session, scene(), ["normal", "depth"])}
     seen = render[entry](Renderer(scene(), device=device.info.id, size=SIZE).session)

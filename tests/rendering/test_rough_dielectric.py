@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from clrt.device.open import Device
-from clrt.rendering.compile import Choices, compile_scene
+from clrt.rendering.choices import Choices
+from clrt.rendering.compile import compile_scene
 from clrt.scene.lights import Light, PointLight
 from clrt.scene.materials import Dielectric, Diffuse
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS
 from clrt.device.open import Device
-from clrt.rendering import compile as compile_module
+from clrt.rendering import pack as pack_module
 from clrt.rendering import session as session_module
-from clrt.rendering.compile import OFFSETS, compile_scene
+from clrt.rendering.choices import OFFSETS
+from clrt.rendering.compile import compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Instance, Integrator, Mesh, RenderSettings, Sampler, Scene, Sphere
@@ -132,7 +133,7 @@ def test_spheres_in_the_tree_and_out_of_it_agree(device: Device, reference: Doub
                                                  monkeypatch: pytest.MonkeyPatch) -> None:
     """As above; few spheres are met before the tree, many in it."""
     assert "LONE_SPHERES" in session(device, everything(), layout=layout).compiled.features
-    monkeypatch.setattr(compile_module, "FEW_SPHERES", 0)
+    monkeypatch.setattr(pack_module, "FEW_SPHERES", 0)
     assert "LEAF_SPHERES" in session(device, everything(), layout=layout).compiled.features
     picture = film(device, everything(), layout=layout).mean
     differs = np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)

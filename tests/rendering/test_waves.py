@@ -10,7 +10,7 @@ import pytest
 
 from clrt.device.open import Device
 from clrt.errors import UsageError
-from clrt.rendering.compile import Choices
+from clrt.rendering.choices import Choices
 from clrt.rendering.film import Film
 from clrt.rendering.renderer import Renderer
 from clrt.rendering.tiles import tile_sums
@@ -36,7 +36,7 @@ def followed(device: Device, paths: str, scene: Scene, *parts: int, **chosen: An
     for samples in parts or [SPP]:
         for _ in running.render(samples):
             pass
-    assert running.compiled.entry == {"lanes": "path.cl", "waves": "wave.cl"}[paths]
+    assert running.compiled.entry == {"lanes": "integrate.cl", "waves": "wave.cl"}[paths]
     return running.film()
 
 

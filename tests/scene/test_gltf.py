@@ -1,3 +1,5 @@
+"""What glTF files become: containers, accessors, nodes, cameras, extensions."""
+
 from __future__ import annotations
 
 import logging

@@ -18,7 +18,7 @@ from .tiles import tile_pixels, tiles_of
 from .work import Work
 
 
-class Picture(ABC):
+class Accumulation(ABC):
     """The samples of one compiled scene at one size. Nothing depends on how the work is cut, or on who does it."""
 
     def __init__(self, size: tuple[int, int]) -> None:

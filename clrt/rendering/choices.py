@@ -1,0 +1,58 @@
+"""What a device or a user chooses about a scene's program, beside what the scene needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..accel.kernels import BUILDER_NAMES, TREES, HitTests
+from ..errors import UsageError
+from .records import PIXEL, PIXEL_WITH_DIRECT
+
+#: Where rays leave a surface.
+OFFSETS = {"bound": "offset/bound.cl", "ulp": "offset/ulp.cl", "fixed": "offset/fixed.cl"}
+#: How paths are followed, and with how many lanes in waves.
+PATHS, WAVE_LANES = ("lanes", "waves"), 8
+#: Paths a work-item.
+LANES = (1, 8, 16)
+
+
+@dataclass(frozen=True)
+class Choices:
+    """lanes: see LANES; offset: see OFFSETS; direct_light: whether the film keeps it apart.
+
+    paths: how they are followed: "lanes", each in its lane (kernels/path.cl), or "waves", many together edge by edge
+    (kernels/wave.cl); None for waves where there are 8 lanes, as they need.
+    layout: a name in TREES, or None for the one that fits the device and the scene.
+    Raises UsageError for what is unknown, or can't be chosen together.
+    """
+
+    lanes: int = 8
+    layout: str | None = None
+    builder: str | None = None
+    tests: HitTests = HitTests()
+    offset: str = "bound"
+    direct_light: bool = False
+    paths: str | None = None
+
+    def __post_init__(self) -> None:
+        known: dict[str, tuple[object, ...]] = {"layout": (None, *TREES), "builder": (None, *BUILDER_NAMES),
+                                                "lanes": LANES, "paths": (None, *PATHS), "offset": tuple(OFFSETS)}
+        for name, values in known.items():
+            if (value := getattr(self, name)) not in values:
+                named = ", ".join(str(known_value) for known_value in values if known_value is not None)
+                raise UsageError(f"{name} {value!r} is unknown; choose from {named}")
+        if self.paths == "waves" and self.lanes != WAVE_LANES:
+            raise UsageError(f"paths in waves need {WAVE_LANES} lanes, not {self.lanes}; leave out one of the choices")
+
+    @property
+    def waves(self) -> bool:
+        """Whether paths are followed in waves."""
+        return self.lanes == WAVE_LANES and self.paths != "lanes"
+
+    @property
+    def pixel(self) -> np.dtype[Any]:
+        """The record of a pixel of the film."""
+        return PIXEL_WITH_DIRECT if self.direct_light else PIXEL

@@ -1,0 +1,99 @@
+"""What a packed scene has compiled in: features, preamble and files. A program contains what its scene needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from ..accel.kernels import tree_defines, tree_features, tree_files
+from ..device.preamble import defines, scene_struct, type_list, typedefs
+from ..scene.materials import MATERIALS, Material
+from ..scene.textures import Texture
+from .camera import camera_file
+from .choices import OFFSETS, Choices
+from .emitters import SURFACES, TYPES
+from .pack import Packed
+from .records import COUNTS, GUIDE, LAUNCH
+from .tiles import TILE
+
+#: Of a scene's unit, what float32 holds.
+LARGEST_UNIT = 2.0**127
+#: Integrators that follow paths, and the kernel files of those of light; others show what is seen first
+#: (kernels/picture.cl).
+WITH_LIGHT = ("path", "direct")
+INTEGRATORS = {"path": "path.cl", "direct": "path.cl", "local": "whitted.cl"}
+
+
+def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
+    """The names that are defined while compiling: what the scene has, and the parts of materials that it uses.
+
+    loop_limit: whether the device ends loops (see device.loops).
+    """
+    scene, emitters, materials = packed.scene, packed.emitters, packed.materials
+    features = {f"MATERIAL_{kind.kernel.upper()}" for kind in materials.used}
+    features |= {f"LIGHT_{kind.upper()}" for kind in emitters.types}
+    features |= set().union(*(material.features() for material in packed.shapes.users))
+    has = {**tree_features(bool(scene.meshes), bool(scene.spheres), packed.shapes.lone),
+           "SPHERES": bool(scene.spheres), "INSTANCES": bool(scene.instances),
+           "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes),
+           "VERTEX_COLORS": any(mesh.colors is not None for mesh in scene.meshes),
+           "TEXTURES": packed.uv_sets > 0, "NORMAL_MAPS": bool(materials.mapped("normal_map")),
+           "EMISSION_TEXTURES": any(isinstance(user.emission, Texture) for user in packed.shapes.users),
+           "OPACITY": bool(materials.with_value("opacity")),
+           "SKY": packed.sky.kernel is not None, "LIGHTS": emitters.count > 0, "LIGHT_TREE": emitters.choice.tree,
+           "EMITTERS": any(t in SURFACES for t in emitters.types),
+           "LOCAL": scene.render.integrator == "local", "PIXEL_MIDDLE": scene.render.integrator == "depth",
+           "DIRECT_LIGHT": choices.direct_light, "LOOP_LIMIT": loop_limit}
+    return features | {name for name, present in has.items() if present}
+
+
+def preamble_of(packed: Packed, choices: Choices, features: set[str], part_bytes: int | None) -> str:
+    """What is defined before all kernel files. part_bytes: see CompiledScene."""
+    emitters, materials = packed.emitters, packed.materials
+    # Only programs that know lengths of the scene's know its unit: others are shared whatever it is.
+    lengths = choices.offset != "bound" or packed.scene.render.integrator == "depth"
+    unit = {"SCENE_UNIT": min(packed.frame.unit, LARGEST_UNIT)} if lengths else {}
+    surfaces = [t for t in emitters.types if t in SURFACES]
+    return "\n".join([
+        defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(packed.tree), **unit}),
+        defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
+        defines({feature: 1 for feature in sorted(features)}),
+        typedefs({"Counts": COUNTS, "Pixel": choices.pixel, "Guide": GUIDE, "Launch": LAUNCH}),
+        scene_struct(packed.buffers, part_bytes),
+        type_list("MATERIAL_TYPES", _numbered(materials.used)),
+        type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),
+        type_list("NORMAL_MAPPED_TYPES", _numbered(materials.mapped("normal_map"))),
+        type_list("SPREADING_TYPES", _numbered(materials.featured("TRANSMISSION_LOBES"))),
+        type_list("ABSORBING_TYPES", _numbered(materials.featured("ATTENUATION"))),
+        defines({"UV_SETS": packed.uv_sets}),
+        *(f"#define READ_{name} {'TEXTURED' if reads else 'CONSTANT'}" for name, reads in materials.reads.items()),
+        type_list("LIGHT_TYPES", [(t, TYPES.index(t)) for t in emitters.types]),
+        type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces])])
+
+
+def files_for(packed: Packed, choices: Choices, features: set[str]) -> dict[str, list[str]]:
+    """What each `#include NAME` of the kernels stands for."""
+    scene, emitters, sky = packed.scene, packed.emitters, packed.sky
+    integrator, lights = scene.render.integrator, [f"light/{t}.cl" for t in emitters.types if t != "sky"]
+    parts = sorted({part for kind in packed.materials.used for part in kind.parts})
+    # A depth is that of what is in focus: the ray through the middle of a lens.
+    camera = replace(scene.camera, aperture_radius=0.0) if integrator == "depth" else scene.camera
+    return {**tree_files(packed.tree.name, choices.tests, bool(scene.meshes), bool(scene.spheres), packed.shapes.lone,
+                         bool(scene.instances)),
+            **{f"{part}_FILE": [f"bsdf/{part.lower()}.cl"] if part in features else [] for part in parts},
+            "PLACEMENT_FILE": ["placement.cl"] if scene.instances else [],
+            "OFFSET": [OFFSETS[choices.offset]],
+            "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in packed.materials.used],
+            "LIGHT_CHOICE": emitters.choice.files,
+            "LIGHT_TREE_FILE": ["light/tree.cl"] if emitters.choice.tree else [],
+            "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else []),
+            "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
+            "OPACITY_FILE": ["opacity.cl"] if "OPACITY" in features else [],
+            "TEXTURE_FILES": ["texture.cl"] if packed.uv_sets else [],
+            "SAMPLER": [f"sampler/{scene.render.sampler}.cl"], "CAMERA": [camera_file(camera)],
+            "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"],
+            "INTEGRATOR": [INTEGRATORS.get(integrator, "picture.cl")], "PICTURE": [f"picture/{integrator}.cl"]}
+
+
+def _numbered(kinds: Iterable[type[Material]]) -> list[tuple[str, int]]:
+    return [(kind.kernel, MATERIALS.index(kind)) for kind in kinds]

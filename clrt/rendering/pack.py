@@ -1,0 +1,136 @@
+"""Scene → buffers. The only code that packs a scene for the device."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..accel.build import FEW_SPHERES, build_tree, fitting_layout
+from ..accel.kernels import tree_buffers
+from ..accel.layouts import Layout, leaf_spheres
+from ..device.open import Device
+from ..device.preamble import Buffers
+from ..scene.instancing import arranged
+from ..scene.materials import Material
+from ..scene.model import Scene
+from ..scene.scaling import Frame, frame_of, in_frame
+from .choices import Choices
+from .corners import pack_corners
+from .emitters import Emitters, pack_emitters
+from .environment import Sky, pack_sky
+from .filters import filter_quantiles
+from .geometry import corners_of, normal_records, sphere_records, triangle_records
+from .materials import Materials, pack_materials
+from .placements import Objects, Placements
+from .records import COUNTS
+from .textures import Textures
+
+
+class Shapes:
+    """The scene in its frame, with those meshes first that only its instances show.
+
+    triangles: (m, 3, 3) float32; normals: see `corners_of`; spheres: (s, 4) float32, center and radius; lone: whether
+    these are so few that no tree holds them.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        scene, *of_objects = arranged(scene)
+        self.frame = frame_of(scene)
+        scene = in_frame(scene, self.frame)
+        self.objects = Objects([len(mesh.faces) for mesh in scene.meshes], len(scene.spheres), *of_objects)
+        self.placements = Placements(scene.instances, rest=bool(scene.meshes or scene.spheres))
+        self.scene = replace(scene, meshes=self.placements.meshes + scene.meshes)
+        self.triangles, self.normals = corners_of(self.scene.meshes)
+        self.spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
+        self.lone = 0 < len(self.spheres) <= FEW_SPHERES
+
+    @cached_property
+    def users(self) -> list[Material]:
+        """The materials of meshes, spheres and instances."""
+        return [*(mesh.material for mesh in self.scene.meshes), *(sphere.material for sphere in self.scene.spheres),
+                *self.placements.materials]
+
+    def tree(self, choices: Choices, device: Device | None) -> Layout:
+        """The tree over all but lone spheres."""
+        in_tree, test = self.spheres[:0] if self.lone else self.spheres, choices.tests.triangle
+        layout = choices.layout or fitting_layout(device, len(self.triangles), len(in_tree), test,
+                                                  bool(self.scene.instances))
+        build = self.placements.tree if self.scene.instances else build_tree
+        return build(device, layout, choices.builder, self.triangles, in_tree, test)
+
+    def buffers(self, codes: NDArray[np.int32], emitters: Emitters) -> dict[str, tuple[str, Any]]:
+        """What surfaces are made of; codes: of the users' materials."""
+        meshes, spheres = self.scene.meshes, self.spheres
+        of_meshes, of_spheres, of_instances = np.split(codes, np.cumsum([len(meshes), len(spheres)]))
+        buffers: dict[str, tuple[str, Any]] = {}
+        if self.lone:
+            every = np.arange(len(spheres), dtype=np.int32)
+            first = len(self.triangles) - self.placements.before
+            buffers["leaf_spheres"] = ("LeafSphere", leaf_spheres(spheres, every, first))
+        if len(self.triangles):
+            material = np.repeat(of_meshes, [len(mesh.faces) for mesh in meshes])
+            buffers["triangles"] = ("Triangle", triangle_records(self.triangles, material, emitters.triangle,
+                                                                 self.normals))
+        if len(self.normals):
+            buffers["normals"] = ("Normals", normal_records(self.normals))
+        if len(spheres):
+            buffers["spheres"] = ("Sphere", sphere_records(spheres, of_spheres, emitters.sphere))
+        if self.scene.instances:
+            buffers["placements"] = ("Placement", self.placements.records(of_instances))
+        return buffers
+
+
+@dataclass(frozen=True)
+class Packed:
+    """A scene for a device, as yet without its program. counts: a COUNTS record; uv_sets: how many its textures use."""
+
+    shapes: Shapes
+    tree: Layout
+    materials: Materials
+    emitters: Emitters
+    sky: Sky
+    uv_sets: int
+    buffers: Buffers
+    counts: NDArray[Any]
+
+    @property
+    def scene(self) -> Scene:
+        """See `Shapes`."""
+        return self.shapes.scene
+
+    @property
+    def frame(self) -> Frame:
+        """See `Shapes`."""
+        return self.shapes.frame
+
+
+def pack_scene(scene: Scene, choices: Choices, device: Device | None) -> Packed:
+    """Packs a valid scene; device: where large trees are built, if given."""
+    shapes = Shapes(scene)
+    with ThreadPoolExecutor(1) as beside:  # a sky takes as long as a tree, and neither needs all cores
+        packing = beside.submit(pack_sky, scene.environment)
+        tree = shapes.tree(choices, device)
+        sky = packing.result()
+    textures = Textures()
+    emitters = pack_emitters(shapes.scene, shapes.triangles, sky, textures)
+    materials = pack_materials(shapes.users, textures)
+    buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters)
+    buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, bool(materials.mapped("normal_map")))
+    buffers |= materials.buffers | textures.buffers() | emitters.buffers | sky.buffers
+    if scene.render.filter != "box":
+        buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))
+    return Packed(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, _counts(shapes, emitters))
+
+
+def _counts(shapes: Shapes, emitters: Emitters) -> NDArray[Any]:
+    counts = np.zeros(1, COUNTS)
+    counts["triangles"], counts["spheres"] = len(shapes.triangles), len(shapes.spheres)
+    counts["lights"] = emitters.count
+    for kind, count in emitters.counts.items():
+        counts[f"{kind}_lights"] = count
+    return counts

@@ -1,0 +1,36 @@
+// A sample a lane: a work-item takes LANES pixels through `sample_count` samples.
+//
+// INTEGRATOR provides
+//
+//   seen_along(scene, launch, &ray, active, &sampler, &rays, &direct)   what arrives at the eye along camera rays, 0 in
+//                                                                       idle lanes; adds how many rays that took;
+//                                                                       direct: set where DIRECT_LIGHT is compiled in
+//
+// PIXEL_MIDDLE: all samples are of the ray through the pixel's middle.
+#include "camera.cl"
+#include "film.cl"
+#include INTEGRATOR
+
+__attribute__((vec_type_hint(real)))
+kernel void integrate(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles, const Launch launch) {
+    Scene scene = SCENE_ARGUMENTS;
+    LanePixels own;
+    if (!lane_pixels(&launch, tiles, &own)) return;
+    Accumulator pixels = load_pixels(film, AS_INT(own.index));
+    for (uint s = 0; s < launch.sample_count; ++s) {
+        Sampler sampler = sampler_at(own.code, (ureal)(launch.first_sample + s), launch.seed, launch.block_bits);
+#if PIXEL_MIDDLE
+        real2 place = {(real)(0.5f), (real)(0.5f)};
+#else
+        real2 place = next_2d(&sampler);
+#endif
+        CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, place, &sampler);
+        real3 direct;
+        real3 seen = seen_along(&scene, &launch, &ray, own.inside, &sampler, &pixels.rays, &direct);
+        ireal kept = accumulate(&pixels, seen, own.inside);
+#if DIRECT_LIGHT
+        accumulate_direct(&pixels, direct, kept);
+#endif
+    }
+    store_pixels(film, own.index, own.inside, &pixels);
+}
