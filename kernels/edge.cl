@@ -140,10 +140,10 @@ static inline ireal go_on(Path *path, const Surface *surface, const Shading *sha
 #endif
     path->origin = offset_origin(surface->p, surface->p_error, surface->ng, path->wi);
 
-    // 4. Russian roulette: end weak paths, keep the mean (Arvo and Kirk 1990). By the root of the throughput: fewer
-    // are ended than by the throughput itself, and in rooms the error falls by more than the time grows.
+    // 4. Russian roulette: end weak paths, keep the mean (Arvo and Kirk 1990). Those that go on have a throughput of a
+    // third at least: in rooms the error falls by more than the time grows.
     if (depth >= ROULETTE_DEPTH) {
-        real survival = minimum(sqrt(largest(path->beta)), ONE);
+        real survival = minimum(3.0f * largest(path->beta), ONE);
         active = active & (choice.y < survival);
         path->beta = choose(active, scale(path->beta, 1.0f / survival), path->beta);
     }
