@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.scene.animation import Animation, Keyframe
 from clrt.scene.fields import LATER
 from clrt.scene.file import load
 from clrt.scene.instance_reader import InstanceTable
@@ -36,6 +37,8 @@ REFERENCE_RELMSE = 1.44e-5
 Doubles = NDArray[np.float64]
 #: Keys that are not read as fields.
 ELSEWHERE = {"[environment]": {"sky"}}
+#: Fields that are no keys.
+NO_KEYS = {"[animation]": {"keyframes"}}
 
 
 def render(scene: Scene, device: Device, **options: Any) -> tuple[Doubles, Doubles, int]:
@@ -136,7 +139,8 @@ def test_the_manuals_example_loads_and_renders(tmp_path: Path, device: Device) -
     assert mean.mean() > 0.05
 
 
-TABLES: dict[str, type] = {"[camera]": Camera, "[render]": RenderSettings, "[environment]": Environment,
+TABLES: dict[str, type] = {"[camera]": Camera, "[animation]": Animation, "[[keyframe]]": Keyframe,
+                           "[render]": RenderSettings, "[environment]": Environment,
                            "[materials.NAME]": Material, "[[mesh]]": MeshTable, "[[instance]]": InstanceTable,
                            "[[sphere]]": Sphere,
                            **{f'type = "{kind.kernel}"': kind for kind in (*MATERIALS, *LIGHTS)}}
@@ -149,7 +153,7 @@ def test_the_manual_has_every_key_with_its_default(heading: str) -> None:
     kind = TABLES[heading]
     rows = _rows(heading)
     shared = SHARED if issubclass(kind, Material) and kind is not Material else frozenset()
-    known = {field.name: field for field in fields(kind) if field.name not in shared}
+    known = {field.name: field for field in fields(kind) if field.name not in shared | NO_KEYS.get(heading, set())}
     assert set(rows) - {"type"} - ELSEWHERE.get(heading, set()) == set(known)
     hints = get_type_hints(kind)
     for name, field in known.items():

@@ -11,6 +11,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from ..device.open import Device
+from ..scene.model import Camera
 from .compile import CompiledScene
 from .film import Film
 from .on_device import SceneOnDevice
@@ -64,6 +65,18 @@ class Accumulation(ABC):
     @abstractmethod
     def _work(self) -> Iterator[None]:
         """Launches what is in hand."""
+
+    def look(self, camera: Camera) -> None:
+        """Begins anew, without any samples, as this camera sees the scene (see `SceneOnDevice.look`)."""
+        self.wait()
+        self.work = Work(np.zeros(tiles_of(self.size), np.int64))
+        for scene in self.scenes:
+            scene.look(camera)
+        self._clear()
+
+    @abstractmethod
+    def _clear(self) -> None:
+        """Makes the film black."""
 
     @abstractmethod
     def wait(self) -> None:

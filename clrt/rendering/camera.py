@@ -12,11 +12,13 @@ from .records import LAUNCH
 
 FILES = {"perspective": "camera/pinhole.cl", "orthographic": "camera/orthographic.cl",
          "equirectangular": "camera/equirectangular.cl"}
+#: Of the LAUNCH record.
+CAMERA_FIELDS = ("position", "right", "up", "forward", "lens_radius")
 
 
-def camera_file(camera: Camera) -> str:
-    """The kernel file of its rays."""
-    return "camera/thin_lens.cl" if camera.aperture_radius else FILES[camera.projection]
+def camera_file(camera: Camera, integrator: str) -> str:
+    """The kernel file of its rays. A depth is that of what is in focus: the ray through the middle of a lens."""
+    return "camera/thin_lens.cl" if camera.aperture_radius and integrator != "depth" else FILES[camera.projection]
 
 
 def launch_record(camera: Camera, size: tuple[int, int]) -> NDArray[Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,7 +17,7 @@ from ..device.open import Device
 from ..device.preamble import Buffers
 from ..device.program import compose, files_of
 from ..scene.model import Camera, Scene
-from ..scene.scaling import Frame
+from ..scene.scaling import Frame, camera_in
 from ..scene.validate import validate
 from .choices import Choices
 from .features import WITH_LIGHT, features_of, files_for, preamble_of
@@ -60,6 +60,10 @@ class CompiledScene:
         preamble, files: what that needs besides, before it and for its own `#include NAME`.
         """
         return compose("\n".join([self.preamble, *preamble]), entry, {**self.chosen_files, **files})
+
+    def seen_by(self, camera: Camera, file: str) -> CompiledScene:
+        """The same, seen by another camera of the scene, whose kernel file this is (see `camera_file`)."""
+        return replace(self, camera=camera_in(camera, self.frame), chosen_files={**self.chosen_files, "CAMERA": [file]})
 
     @property
     def kernel(self) -> str:

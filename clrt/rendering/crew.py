@@ -142,6 +142,9 @@ class Crew(Accumulation):
             raise error
         _log.warning("%s is left out: %s; the others do its work again", worker.name, error)
 
+    def _clear(self) -> None:
+        self._film.fill(0)
+
     def wait(self) -> None:
         """Waits for the launches in flight, and for none that is still in hand."""
         while self._shares():

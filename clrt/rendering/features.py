@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 from ..accel.kernels import tree_defines, tree_features, tree_files
 from ..device.preamble import defines, scene_struct, type_list, typedefs
@@ -76,8 +75,6 @@ def files_for(packed: Packed, choices: Choices, features: set[str]) -> dict[str,
     scene, emitters, sky = packed.scene, packed.emitters, packed.sky
     integrator, lights = scene.render.integrator, [f"light/{t}.cl" for t in emitters.types if t != "sky"]
     parts = sorted({part for kind in packed.materials.used for part in kind.parts})
-    # A depth is that of what is in focus: the ray through the middle of a lens.
-    camera = replace(scene.camera, aperture_radius=0.0) if integrator == "depth" else scene.camera
     return {**tree_files(packed.tree.name, choices.tests, bool(scene.meshes), bool(scene.spheres), packed.shapes.lone,
                          bool(scene.instances)),
             **{f"{part}_FILE": [f"bsdf/{part.lower()}.cl"] if part in features else [] for part in parts},
@@ -90,7 +87,7 @@ def files_for(packed: Packed, choices: Choices, features: set[str]) -> dict[str,
             "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
             "OPACITY_FILE": ["opacity.cl"] if "OPACITY" in features else [],
             "TEXTURE_FILES": ["texture.cl"] if packed.uv_sets else [],
-            "SAMPLER": [f"sampler/{scene.render.sampler}.cl"], "CAMERA": [camera_file(camera)],
+            "SAMPLER": [f"sampler/{scene.render.sampler}.cl"], "CAMERA": [camera_file(scene.camera, integrator)],
             "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"],
             "INTEGRATOR": [INTEGRATORS.get(integrator, "picture.cl")], "PICTURE": [f"picture/{integrator}.cl"]}
 

@@ -18,6 +18,8 @@ from ..device.open import Device
 from ..device.program import BuiltProgram, build, make_kernel
 from ..device.pulse import taking_any_time
 from ..errors import NoRoomError
+from ..scene.model import Camera
+from .camera import CAMERA_FIELDS, launch_record
 from .compile import CompiledScene
 from .loop_limit import most_samples
 
@@ -85,6 +87,14 @@ class SceneOnDevice:
             yield
         except cl.MemoryError as error:
             raise NoRoomError(f"{self.device.info.name}: {size(self.device_bytes)} do not fit: {error}") from error
+
+    def look(self, camera: Camera) -> None:
+        """What is launched from now on is seen by this camera, whose kernel file is that of the one before."""
+        self.compiled = self.compiled.seen_by(camera, *self.compiled.chosen_files["CAMERA"])
+        width, height = int(self.launch["width"][0]), int(self.launch["height"][0])
+        record = launch_record(self.compiled.camera, (width, height))
+        for name in CAMERA_FIELDS:
+            self.launch[name] = record[name]
 
     def warm_up(self, film: cl.Buffer, tiles: cl.Buffer) -> None:
         """Launches no work: some drivers compile, or take memory, at the first launch. It belongs to the build."""

@@ -16,12 +16,15 @@ from numpy.typing import NDArray
 from ..accel.kernels import HitTests
 from ..device.open import name_of, open_devices
 from ..errors import UsageError
-from ..scene.model import RenderSettings, Scene
+from ..scene.model import Camera, RenderSettings, Scene
+from ..scene.validate import validate
+from .accumulation import Accumulation
 from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
 from .aovs import LIGHT, chosen_aovs, film_aovs, needs_direct_light, seen_first
+from .camera import camera_file
 from .checkpoint import open_checkpoints
 from .choices import Choices
-from .compile import compile_for_all
+from .compile import CompiledScene, compile_for_all
 from .crew import make_picture
 from .features import INTEGRATORS, WITH_LIGHT
 from .film import RELATIVE_FLOOR, Film
@@ -69,6 +72,10 @@ class Renderer:
     Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
 
+    history: list[dict[str, Any]]
+    stop_reason: str | None
+    seconds: float
+
     def __init__(self, scene: Scene, *, device: str | int | Sequence[str | int] | None = None,
                  size: tuple[int, int] | None = None, spp: int | None = None,
                  max_depth: int | None = None, seed: int | None = None,
@@ -92,32 +99,61 @@ class Renderer:
                            needs_direct_light(self._aovs), paths or (None if each.packs else "lanes"))
                    for each in self.devices]
         on_phase("build")
-        compiled = compile_for_all(self.scene, choices, self.devices)
-        self.compiled = compiled[0]
+        self._compiled = compile_for_all(self.scene, choices, self.devices)
         if settings.integrator in INTEGRATORS and not {"LIGHTS", "SKY"} & set(self.compiled.features):
             logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
         self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene,
                                                    self.compiled.choices, name_of(self.devices))
         on_phase("compile")
-        depth = min(settings.max_depth, 2) if settings.integrator == "direct" else settings.max_depth
         planned = None if spp is None else int(spp) * (MOST_TIMES_PLANNED if settings.adaptive else 1)
         self._planned_spp = kept.planned_spp if kept else planned
-        self.session = make_picture(self.devices, compiled, settings.size, depth, settings.seed, self._planned_spp)
-        self._noise = kept.noise if kept else NoiseEstimate(self._planned_spp)
-        self._first_hits = self._seen_first()
-        self.history: list[dict[str, Any]] = kept.history if kept else []
-        self.stop_reason: str | None = None
-        self.seconds = kept.seconds if kept else 0.0
+        self.session = self._make_picture()
+        self._begin()
         self._clock = 0.0
         self._interrupted = False
         if kept:
+            self._noise, self.history, self.seconds = kept.noise, kept.history, kept.seconds
             self.session.restore(kept.film, kept.work)
             self.state()
+
+    def _make_picture(self) -> Accumulation:
+        settings = self.settings
+        depth = min(settings.max_depth, 2) if settings.integrator == "direct" else settings.max_depth
+        return make_picture(self.devices, self._compiled, settings.size, depth, settings.seed, self._planned_spp)
+
+    def _begin(self) -> None:
+        """A picture without any samples."""
+        self._noise = NoiseEstimate(self._planned_spp)
+        self._first_hits = self._seen_first()
+        self.history, self.stop_reason, self.seconds = [], None, 0.0
+
+    @property
+    def compiled(self) -> CompiledScene:
+        """The scene as it was compiled for the first device."""
+        return self._compiled[0]
 
     @property
     def settings(self) -> RenderSettings:
         """The scene's settings with what was given."""
         return self.scene.render
+
+    def look(self, camera: Camera) -> None:
+        """Begins another picture: the scene as this camera sees it, to the last bit as a new renderer would draw it.
+
+        Tree and buffers stay; so does the program, unless a lens or another projection comes in. SceneError where the
+        camera is wrong, UsageError where a checkpoint is kept, which is of one picture.
+        """
+        if self._checkpoints is not None:
+            raise UsageError("a checkpoint is of one picture, seen by one camera; make a renderer for each")
+        validate(Scene(camera=camera))
+        self.scene = replace(self.scene, camera=camera)
+        files, file = self.compiled.chosen_files["CAMERA"], camera_file(camera, self.settings.integrator)
+        self._compiled = [each.seen_by(camera, file) for each in self._compiled]
+        if files == [file]:
+            self.session.look(camera)
+        else:
+            self.session = self._make_picture()
+        self._begin()
 
     def passes(self, *, spp: int | None = None, time: float | None = None, error: float | None = None,
                reference: NDArray[np.float32] | None = None) -> Iterator[State]:

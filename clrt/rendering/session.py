@@ -27,6 +27,8 @@ FEWEST_TILES = 16
 #: Launches of a pass, about, unless a single sample a pixel takes more.
 PASS_LAUNCHES = 4
 FIRST_LAUNCH_SAMPLES = 1 << 15
+#: Pixels of all kinds are whole numbers of it.
+BLACK = np.zeros(8, np.uint32)
 
 
 class Session(Accumulation):
@@ -74,6 +76,10 @@ class Session(Accumulation):
     def _launch(self) -> cl.Event:
         """Enqueues the kernel for the range in the launch record."""
         return self._scene.enqueue_pixels(self._film, self._tiles)
+
+    def _clear(self) -> None:
+        with calling():
+            cl.enqueue_fill_buffer(self.device.queue, self._film, BLACK, 0, self._film.size)
 
     def wait(self) -> None:
         """Waits for the launches in flight."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, is_dataclass
 from functools import lru_cache
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
@@ -98,8 +98,9 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
             yield from _problems(_factor(parts[0], value), value.factor, f"{path}.factor")
     elif hint is Texture and not isinstance(value, Texture):
         yield f'{path}: {show(value)} is no texture; write {{ image = "FILE" }}'
-    elif hint is Texture:
-        yield from field_problems(Texture, {field.name: getattr(value, field.name) for field in fields(Texture)}, path)
+    elif isinstance(hint, type) and is_dataclass(hint):
+        yield from (field_problems(hint, {field.name: getattr(value, field.name) for field in fields(hint)}, path)
+                    if isinstance(value, hint) else [f"{path}: {show(value)} is no {hint.__name__}; write one"])
     elif origin is Literal:
         if not (isinstance(value, str) and value in parts):
             yield f"{path}: {show(value)} {unknown(value, parts)}"

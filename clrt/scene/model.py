@@ -10,6 +10,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 from numpy.typing import NDArray
 
+from .animation import Animation
 from .lights import Light
 from .material import tuples_for_lists
 from .materials import Diffuse, Material
@@ -160,7 +161,8 @@ class RenderSettings:
 
 @dataclass(eq=False, kw_only=True)
 class Scene:
-    """Everything that one picture needs. `camera` takes it; `cameras`: those of the model files, by name."""
+    """Everything that one picture needs. `camera` takes it; `cameras`: those of the model files, by name; `animation`:
+    how the camera moves (scene.animation)."""
 
     meshes: list[Mesh] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)
@@ -171,3 +173,4 @@ class Scene:
     render: RenderSettings = field(default_factory=RenderSettings)
     name: str = "scene"
     cameras: dict[str, Camera] = field(default_factory=dict)
+    animation: Animation | None = None

@@ -94,7 +94,7 @@ def in_frame(scene: Scene, frame: Frame) -> Scene:
         return scene
     return replace(scene, meshes=[replace(mesh, vertices=frame.points(mesh.vertices),
                                           material=mesh.material.in_unit(frame.unit)) for mesh in scene.meshes],
-                   camera=_camera(scene.camera, frame),
+                   camera=camera_in(scene.camera, frame),
                    spheres=[_sphere(sphere, frame) for sphere in scene.spheres],
                    lights=[_light(light, frame) for light in scene.lights])
 
@@ -115,7 +115,8 @@ def _instances(instances: list[Instance], frame: Frame) -> list[Instance]:
     return placed
 
 
-def _camera(camera: Camera, frame: Frame) -> Camera:
+def camera_in(camera: Camera, frame: Frame) -> Camera:
+    """A camera in a frame."""
     focus, height = (length and length * frame.unit for length in (camera.focus_distance, camera.view_height))
     return replace(camera, position=frame.point(camera.position), look_at=frame.point(camera.look_at),
                    aperture_radius=camera.aperture_radius * frame.unit, focus_distance=focus, view_height=height)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import SceneError
+from .animation import Animation, Keyframe
 from .fields import field_problems, show, unknown
 from .instance_reader import InstanceReader, InstanceTable, placed
 from .instancing import meshes_by_id
@@ -21,7 +23,8 @@ from .textures import WHITE, Texture
 
 Kind = TypeVar("Kind")
 Table = Mapping[str, Any]
-SECTIONS = ("camera", "render", "environment", "materials", "mesh", "instance", "sphere", "light")
+SECTIONS = ("camera", "animation", "keyframe", "render", "environment", "materials", "mesh", "instance", "sphere",
+            "light")
 
 
 class SceneReader:
@@ -55,7 +58,8 @@ class SceneReader:
                       for one in self._instance(values, f"instance[{i}]")]
         return Scene(meshes=meshes, instances=instances, lights=lights, spheres=[each for each in spheres if each],
                      camera=self._named_camera(lens) if "name" in lens else camera, cameras=self._cameras,
-                     environment=environment or Environment(), render=render or RenderSettings(), name=self._path.stem)
+                     environment=environment or Environment(), render=render or RenderSettings(), name=self._path.stem,
+                     animation=self._animation())
 
     def _camera(self, values: Table) -> Camera:
         """The camera; if some of it is wrong, what places it, so that this is checked all the same."""
@@ -69,6 +73,24 @@ class SceneReader:
         self.problems += camera_problems(name, self._cameras, "camera.name")
         self.problems += [f"camera: has a name and {key}; keep one of them" for key in values if key != "name"]
         return self._cameras.get(name, Camera())
+
+    def _animation(self) -> Animation | None:
+        """How the camera moves, if it does; None, too, if what is written of it is wrong."""
+        if not {"animation", "keyframe"} & set(self._document):
+            return None
+        table = self._table("animation")
+        if "keyframes" in table:
+            self.problems.append("animation.keyframes: is written as tables of their own; write [[keyframe]]")
+        whole = self._build(Animation, {key: table[key] for key in table if key != "keyframes"}, "animation")
+        keys = [self._keyframe(values, f"keyframe[{i}]") for i, values in enumerate(self._tables("keyframe"))]
+        known = tuple(key for key in keys if key)
+        return replace(whole, keyframes=known) if whole and len(known) == len(keys) else None
+
+    def _keyframe(self, values: Any, where: str) -> Keyframe | None:
+        if isinstance(values, dict):
+            return self._build(Keyframe, values, where)
+        self.problems.append(f"{where}: {show(values)} is not a table; write [[keyframe]]")
+        return None
 
     def _table(self, name: str) -> Table:
         """The section [name], empty if there is none."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from .animation import Animation, animation_problems
 from .fields import field_problems, show
 from .instance_problems import matrix_problems
 from .instancing import painted
@@ -32,7 +33,11 @@ def validate(scene: Scene) -> None:
 
 def scene_problems(scene: Scene) -> list[str]:
     """One sentence a problem, empty if the scene can be rendered."""
-    problems = _camera_problems(scene.camera) + _environment_problems(scene.environment)
+    problems = _camera_problems(scene.camera)
+    if scene.animation is not None:
+        problems += _object_problems(scene.animation, Animation, "animation") or (
+            [] if problems else animation_problems(scene.camera, scene.animation))
+    problems += _environment_problems(scene.environment)
     problems += _object_problems(scene.render, RenderSettings, "render")
     users: list[tuple[str, Mesh | Sphere | Instance]] = []
     of_mesh: dict[int, list[str]] = {}  # by its id

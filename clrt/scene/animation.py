@@ -1,0 +1,158 @@
+"""A camera that moves, by keyframes or once around what it looks at, and the still scene of each frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from annotated_types import Gt, Lt
+
+from ..errors import SceneError, UsageError
+from .curves import Doubles, smooth
+from .material import tuples_for_lists
+from .textures import NonNegative
+
+if TYPE_CHECKING:
+    from .model import Camera, Scene
+
+Vector = tuple[float, float, float]
+Positive = Annotated[float, Gt(0)]
+#: More are a slip of the keys.
+MOST_FRAMES = 1_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Keyframe:
+    """The camera's fields (see `Camera`) at a `time` in seconds. A field that is None is free: it moves between those
+    keyframes that have it, and is the camera's own where none has."""
+
+    time: float
+    position: Vector | None = None
+    look_at: Vector | None = None
+    up: Vector | None = None
+    fov_degrees: Annotated[float, Gt(0), Lt(180)] | None = None
+    aperture_radius: NonNegative | None = None
+    focus_distance: Positive | None = None
+    view_height: Positive | None = None
+
+    def __post_init__(self) -> None:
+        tuples_for_lists(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Animation:
+    """fps: frames a second. keyframes: two or more, by ascending times; the first one's is that of frame 0.
+
+    turntable_seconds: instead of them, the camera goes once around what it looks at, about its `up`, counter-clockwise
+    seen from there; below 0 clockwise. The frame after the last one would be the first again.
+    """
+
+    fps: Positive = 24.0
+    turntable_seconds: float | None = None
+    keyframes: tuple[Keyframe, ...] = ()
+
+    def __post_init__(self) -> None:
+        tuples_for_lists(self)
+
+    @property
+    def seconds(self) -> float:
+        """How long it takes, at least 0."""
+        if self.turntable_seconds is not None:
+            return abs(self.turntable_seconds)
+        return self.keyframes[-1].time - self.keyframes[0].time if self.keyframes else 0.0
+
+    @property
+    def frames(self) -> int:
+        """How many there are; of keyframes the last one's is among them, if it falls on a frame."""
+        if self.turntable_seconds is not None:
+            return max(1, round(self.seconds * self.fps))
+        return 1 + int(self.seconds * self.fps * (1 + 1e-9))
+
+
+def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
+    """The scene, its camera going once around in so many frames."""
+    return replace(scene, animation=Animation(fps=fps, turntable_seconds=frames / fps))
+
+
+def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[int, Scene]]:
+    """The numbers of all frames, or of those `chosen`, and for each the still scene that it shows, which differs from
+    the others by its camera alone. SceneError where there is no animation, UsageError for a frame that is none of it.
+    """
+    if scene.animation is None:
+        raise SceneError(f"{scene.name}: nothing moves; write [[keyframe]] tables or an [animation]")
+    count = scene.animation.frames
+    numbers = range(count) if chosen is None else list(chosen)
+    for number in numbers:
+        if not 0 <= number < count:
+            raise UsageError(f"{scene.name} has no frame {number}; its frames are 0 to {count - 1}")
+    cameras = _cameras(scene.camera, scene.animation, np.array(numbers, np.float64))
+    return ((number, replace(scene, camera=camera, animation=None)) for number, camera in zip(numbers, cameras))
+
+
+def animation_problems(camera: Camera, animation: Animation) -> list[str]:
+    """What is wrong with an animation whose fields keep their limits: one sentence a problem."""
+    keys, around = animation.keyframes, animation.turntable_seconds
+    if around is not None and keys:
+        return ["animation: has turntable_seconds and keyframes; keep one of them"]
+    if around is None and len(keys) < 2:
+        return [f"animation: has {len(keys) or 'no'} keyframe{'s' * (not keys)} and no turntable_seconds; write two "
+                "[[keyframe]] tables or more"]
+    if around == 0:
+        return ["animation.turntable_seconds: 0 is no time; write how long once around takes"]
+    times = [key.time for key in keys]
+    problems = [f"keyframe[{i + 1}].time: {times[i + 1]:g} is not after {times[i]:g}, that of the one before; write "
+                "them in order" for i in range(len(times) - 1) if times[i + 1] <= times[i]]
+    if not problems and animation.seconds * animation.fps >= MOST_FRAMES:
+        problems = [f"animation: would have {animation.seconds * animation.fps:.0f} frames, more than {MOST_FRAMES}; "
+                    "check the times, in seconds, and fps"]
+    return problems or _view_problems(camera, animation)
+
+
+def _view_problems(camera: Camera, animation: Animation) -> list[str]:
+    """The first frame whose camera looks nowhere."""
+    moving = _moving(camera, animation, np.arange(animation.frames, dtype=np.float64))
+    position, look_at, up = (moving.get(name, np.array([getattr(camera, name)], np.float64))
+                             for name in ("position", "look_at", "up"))
+    forward = look_at - position
+    length, height = np.linalg.norm(forward, axis=1), np.linalg.norm(up, axis=1)
+    bad = np.linalg.norm(np.cross(forward, up), axis=1) <= 1e-6 * length * height
+    if not bad.any():
+        return []
+    frame = int(bad.argmax())
+    what = "where it looks comes to where it is" if not length[frame % len(length)] else "it looks along its up"
+    return [f"animation: in frame {frame}, {frame / animation.fps:g} s after the first, the camera sees nothing: "
+            f"{what}; move a keyframe, or write one between"]
+
+
+def _cameras(camera: Camera, animation: Animation, numbers: Doubles) -> Iterator[Camera]:
+    moving = {name: rows.tolist() for name, rows in _moving(camera, animation, numbers).items()}
+    for i in range(len(numbers)):
+        values: dict[str, Any] = {name: rows[i] if len(rows[i]) > 1 else rows[i][0] for name, rows in moving.items()}
+        yield replace(camera, **values)
+
+
+def _moving(camera: Camera, animation: Animation, numbers: Doubles) -> dict[str, Doubles]:
+    """The fields that move: of each frame a row."""
+    if animation.turntable_seconds is not None:
+        turn = np.copysign(2 * np.pi / animation.frames, animation.turntable_seconds)
+        return {"position": _around(camera, turn * numbers)}
+    keys, moving = animation.keyframes, {}
+    at = keys[0].time + numbers / animation.fps
+    for name in [field.name for field in fields(Keyframe) if field.name != "time"]:
+        known = [(key.time, np.atleast_1d(getattr(key, name))) for key in keys if getattr(key, name) is not None]
+        if known:
+            times, values = zip(*known)
+            moving[name] = smooth(times, values, at)
+    return moving
+
+
+def _around(camera: Camera, angles: Doubles) -> Doubles:
+    """(n, 3) where the camera has turned about its up, through what it looks at, by these angles."""
+    center, axis = np.array(camera.look_at, np.float64), np.array(camera.up, np.float64)
+    axis /= np.linalg.norm(axis)
+    arm = camera.position - center
+    along = axis * (axis @ arm)
+    cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    return np.asarray(center + along + cos * (arm - along) + sin * np.cross(axis, arm))
