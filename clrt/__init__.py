@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import trimesh as trimesh
-    from .api import load as load, render as render
+    from .api import animate as animate, load as load, render as render
     from .device.discover import devices as devices
     from .errors import (CheckpointError as CheckpointError, ClrtError as ClrtError, DeviceError as DeviceError,
                          KernelError as KernelError, OutputError as OutputError, SceneError as SceneError,
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from .output.image import Image as Image
     from .query import RayQuery as RayQuery
     from .rendering.renderer import Renderer as Renderer, State as State
+    from .scene.animation import (Animation as Animation, Keyframe as Keyframe, frames as frames,
+                                  turntable as turntable)
     from .scene.lights import (DirectionalLight as DirectionalLight, PointLight as PointLight,
                                SpotLight as SpotLight)
     from .scene.materials import (Dielectric as Dielectric, Diffuse as Diffuse, MetallicRoughness as MetallicRoughness,
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOME = {
-    "api": ("load", "render"),
+    "api": ("animate", "load", "render"),
     "device.discover": ("devices",),
     "errors": ("CheckpointError", "ClrtError", "DeviceError", "KernelError", "OutputError", "SceneError", "UsageError"),
     "instances": ("InstancedRayQuery",),
@@ -41,6 +43,7 @@ _HOME = {
     "output.image": ("Image",),
     "query": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
+    "scene.animation": ("Animation", "Keyframe", "frames", "turntable"),
     "scene.lights": ("DirectionalLight", "PointLight", "SpotLight"),
     "scene.materials": ("Dielectric", "Diffuse", "MetallicRoughness", "Mirror"),
     "scene.model": ("Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from .rendering.guides import render_guides
 from .rendering.renderer import Renderer
 from .rendering.report import render_report
 from .rendering.stops import planned_spp
+from .scene.animation import frames as _frames
 from .scene.file import load as _load
 from .scene.model import Scene
 
@@ -33,11 +35,34 @@ def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | N
     denoiser = Denoiser() if denoise else None
     scene = scene if isinstance(scene, Scene) else load(scene)
     renderer = Renderer(scene, spp=planned_spp(scene.render, spp, time, error), **options)
-    if denoise:
+    return _rendered(renderer, denoiser, reference, spp=spp, time=time, error=error)
+
+
+def animate(scene: Scene | str | Path, *, frames: Iterable[int] | None = None, spp: int | None = None,
+            time: float | None = None, error: float | None = None, denoise: bool = False,
+            **options: Any) -> Iterator[tuple[int, Image]]:
+    """Renders a scene whose camera moves, all `frames` or those with these numbers: yields each one's number and image.
+
+    All is as of `render`, frame by frame. Raises SceneError where nothing moves, and ClrtError subclasses.
+    """
+    denoiser = Denoiser() if denoise else None
+    scene = scene if isinstance(scene, Scene) else load(scene)
+    renderer = None
+    for number, still in _frames(scene, frames):
+        if renderer is None:
+            renderer = Renderer(still, spp=planned_spp(still.render, spp, time, error), **options)
+        else:
+            renderer.look(still.camera)
+        yield number, _rendered(renderer, denoiser, None, spp=spp, time=time, error=error)
+
+
+def _rendered(renderer: Renderer, denoiser: Denoiser | None, reference: NDArray[np.float32] | None,
+              **stops: Any) -> Image:
+    if denoiser:
         check_denoisable(renderer.settings.integrator)
     guides = render_guides(renderer.session) if denoiser else {}
     state = None
-    for state in renderer.passes(spp=spp, time=time, error=error, reference=reference):
+    for state in renderer.passes(reference=reference, **stops):
         pass
     assert state is not None  # passes() yields at least once
     image = Image(state.pixels, render_report(renderer, state), aovs=renderer.aovs(state))

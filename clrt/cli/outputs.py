@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 @dataclass
 class Outputs:
     """pictures: of the end result, with its aovs; denoise: whether the raw ones are kept beside them; view, exposure:
-    of .png pictures. One that cannot be written keeps none of the others from being written."""
+    of .png pictures; header: what is written there beside the report. One that cannot be written keeps none of the
+    others from being written."""
 
     pictures: tuple[Path, ...]
     aovs: tuple[str, ...]
@@ -30,6 +31,7 @@ class Outputs:
     exposure: float
     report: Path | None
     plot: Path | None
+    header: dict[str, Any] = field(default_factory=dict)
     _errors: list[OutputError] = field(default_factory=list)
 
     @property

@@ -32,6 +32,10 @@ class Progress:
     def phase(self, name: str) -> None:
         """A phase of PHASES begins."""
 
+    def frame(self, number: int, done: int, count: int) -> None:
+        """The frame of this number begins; of the `count` that are to be made so many are done."""
+        self._pace = Pace()
+
     def state(self, state: State, goal: Goal) -> None:
         """A state was reached on the way to the goal."""
 
@@ -49,6 +53,10 @@ class PlainProgress(Progress):
     def phase(self, name: str) -> None:
         _say(PHASES[name])
 
+    def frame(self, number: int, done: int, count: int) -> None:
+        super().frame(number, done, count)
+        _say(f"frame {number}, {done + 1} of {count}")
+
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)
         _say(self._told(state) + (f"  about {left:.0f} s left" if left is not None else ""))
@@ -59,6 +67,10 @@ class JsonProgress(Progress):
 
     def phase(self, name: str) -> None:
         _say(json.dumps({"phase": name}))
+
+    def frame(self, number: int, done: int, count: int) -> None:
+        super().frame(number, done, count)
+        _say(json.dumps({"phase": "frame", "frame": number, "done": done, "frames": count}))
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)
@@ -79,9 +91,14 @@ class BarProgress(Progress):
         self._bar = Bar(TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[status]}"),
                         console=Console(stderr=True))
         self._task = self._bar.add_task("", total=None, status="")
+        self._frame = ""
 
     def phase(self, name: str) -> None:
-        self._bar.update(self._task, description=PHASES[name])
+        self._bar.update(self._task, description=self._frame + PHASES[name])
+
+    def frame(self, number: int, done: int, count: int) -> None:
+        super().frame(number, done, count)
+        self._frame = f"frame {number}, {done + 1} of {count}: "
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)

@@ -14,6 +14,7 @@ import click
 
 from ..errors import DeviceError, UsageError
 from . import PROGRAM
+from .frames import Sequence, frame_options, make_sequence
 from .guard import guarded
 from .interrupt import Interruptible
 from .logs import silence, verbose_option
@@ -62,6 +63,7 @@ if TYPE_CHECKING:
 @click.option("--progress", "progress_kind", type=click.Choice(["bar", "plain", "json"]), help="Progress on stderr.")
 @click.option("--print-kernel", is_flag=True, help="Print the program that would run, and stop.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no warnings.")
+@frame_options
 @verbose_option
 @tracing_options
 def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tuple[int, int] | None, spp: int | None,
@@ -69,7 +71,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             integrator: str | None, sampler: str | None, pixel_filter: str | None, adaptive: bool | None,
             reference: Path | None, report: Path | None, plot: Path | None, aovs: tuple[str, ...], denoise: bool,
             checkpoint: Path | None, checkpoint_every: float, resume: bool, view: str, exposure: float,
-            progress_kind: str | None, print_kernel: bool, quiet: bool, **tracing: Any) -> None:
+            progress_kind: str | None, print_kernel: bool, quiet: bool, frames: str | None, turntable: int | None,
+            fps: float | None, **tracing: Any) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
     def advice() -> str:
         kept = checkpoint is not None and checkpoint.exists()
@@ -85,11 +88,16 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     from ..scene.file import load
 
     atexit.register(gc.freeze)  # else Python, as it ends, searches all modules' objects for garbage, in 0.05 s
-    if resume and checkpoint is None:
-        raise UsageError("--resume goes on from a checkpoint; name its file with --checkpoint")
     beside = chosen_aovs(",".join(aovs)) if aovs else ()
     results = Outputs(outputs or (Path(f"{scene.stem}.png"),), beside, denoise, view, exposure, report, plot)
-    results.check(reference, checkpoint)
+    sequence = make_sequence(results, frames, resume, {"checkpoint": checkpoint, "reference": reference, "plot": plot}
+                             ) if frames or turntable else None
+    if sequence is None:
+        if fps is not None:
+            raise UsageError("--fps is how fast frames follow each other; ask for some with --frames or --turntable")
+        if resume and checkpoint is None:
+            raise UsageError("--resume goes on from a checkpoint; name its file with --checkpoint")
+        results.check(reference, checkpoint)
     check_stops(spp, seconds, error)
     denoiser = Denoiser() if denoise else None
     if quiet:
@@ -98,11 +106,13 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     options: dict[str, Any] = {
         "size": size, "max_depth": depth, "seed": seed, "device": devices or None,
         "integrator": integrator, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
-        "checkpoint": None if print_kernel else checkpoint, "resume": resume and not print_kernel,
+        "checkpoint": None if print_kernel else checkpoint, "resume": resume and not (print_kernel or sequence),
         "checkpoint_seconds": checkpoint_every, "aovs": beside, **tracing}
     with make_progress(progress_kind, quiet) as progress:
         progress.phase("load")
         content = load(scene, camera)
+        if sequence is not None:
+            content = sequence.scene(content, size, turntable, fps)
         expected = None if reference is None else _read_reference(reference, size or content.render.size)
         planned = planned_spp(content.render, spp, seconds, error)
         if denoiser is not None:
@@ -113,16 +123,33 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             return
         with Interruptible(renderer.interrupt) as interruptible:
             try:
-                _render(renderer, results, Goal(planned, seconds, error), expected, denoiser, progress)
+                goal = Goal(planned, seconds, error)
+                if sequence is None:
+                    _render(renderer, results, goal, expected, denoiser, progress)
+                else:
+                    _render_frames(renderer, sequence, goal, denoiser, progress)
             except DeviceError as failure:
                 raise type(failure)(f"{failure}{advice()}") from failure
     if interruptible.asked:
         sys.exit(130)
 
 
+def _render_frames(renderer: Renderer, sequence: Sequence, goal: Goal, denoiser: Denoiser | None,
+                   progress: Progress) -> None:
+    """Renders the frames that are still to be made, each to the goal, and joins all to videos."""
+    shots = list(sequence.left(renderer, goal))
+    for done, (results, camera) in enumerate(shots):
+        progress.frame(results.header["frame"], done, len(shots))
+        renderer.look(camera)
+        _render(renderer, results, goal, None, denoiser, progress)
+        if renderer.stop_reason == "interrupted":
+            return
+    sequence.join()
+
+
 def _render(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, denoiser: Denoiser | None,
             progress: Progress) -> None:
-    """Renders to the goal, or until it is interrupted, and writes the results."""
+    """Renders to the goal, or until it is interrupted, and writes the results; of an interrupted frame none."""
     from ..output.denoise import denoised
     from ..output.image import Image
     from ..rendering.guides import render_guides
@@ -132,8 +159,10 @@ def _render(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, den
     progress.phase("render")
     for state in renderer.passes(spp=goal.spp, time=goal.seconds, error=goal.error, reference=expected):
         progress.state(state, goal)
+    if results.header and renderer.stop_reason == "interrupted":
+        return
     progress.phase("write")
-    image = Image(state.pixels, render_report(renderer, state), aovs=renderer.aovs(state))
+    image = Image(state.pixels, render_report(renderer, state) | results.header, aovs=renderer.aovs(state))
     if denoiser is None:
         results.save(image)
     else:

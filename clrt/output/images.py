@@ -29,6 +29,15 @@ _log = logging.getLogger(__name__)
 read_image = read_picture
 
 
+def metadata_of(path: Path, name: str) -> str | None:
+    """What `write_image` was told by a name; None where there is no such file, or nothing of that name in it."""
+    import OpenImageIO as oiio
+
+    opened = oiio.ImageInput.open(str(path)) if path.is_file() else None
+    value = opened.spec().get_string_attribute(name) if opened else ""
+    return value or None
+
+
 def check_writable(path: Path) -> None:
     """Raise OutputError unless a picture can be written at `path`; ask before rendering, not after."""
     check_target(path)

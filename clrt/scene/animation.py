@@ -81,7 +81,7 @@ def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[
     the others by its camera alone. SceneError where there is no animation, UsageError for a frame that is none of it.
     """
     if scene.animation is None:
-        raise SceneError(f"{scene.name}: nothing moves; write [[keyframe]] tables or an [animation]")
+        raise SceneError(f"{scene.name}: nothing moves; write [[keyframe]] tables, or have it turned (--turntable)")
     count = scene.animation.frames
     numbers = range(count) if chosen is None else list(chosen)
     for number in numbers:

@@ -1,0 +1,152 @@
+"""`clrt render --frames`: the frames of a scene whose camera moves, in numbered files and videos."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from ..errors import UsageError
+from .outputs import Outputs
+
+if TYPE_CHECKING:
+    from ..rendering.renderer import Renderer
+    from ..scene.model import Camera, Scene
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class Numbers(click.ParamType[str]):
+    """Frames: all, or numbers and ranges such as 3,7,0-99:5. Stays a text, which `chosen` reads."""
+
+    name = "FRAMES"
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> str:
+        if value != "all" and not _numbers(str(value)):
+            self.fail(f"{value!r} names no frames; write all, or numbers and ranges such as 12, 0-47, 0-99:5 or "
+                      "3,7,20-30", param, context)
+        return str(value)
+
+
+def frame_options(command: F) -> F:
+    """Which frames; with neither of the first two a still picture."""
+    for option in [
+        click.option("--fps", type=click.FloatRange(min=0, min_open=True),
+                     help="Frames a second; default: the scene's."),
+        click.option("--turntable", type=click.IntRange(min=1), metavar="N",
+                     help="Go once around what the camera looks at, in N frames."),
+        click.option("--frames", type=Numbers(),
+                     help="Frames of a moving camera, to numbered files (name_####.png) and videos (.gif, .mp4, .webm):"
+                          " all, or such as 12, 0-47, 0-99:5."),
+    ]:
+        command = option(command)
+    return command
+
+
+@dataclass
+class Sequence:
+    """outputs: with one name for all frames; videos: of these; chosen: numbers of frames, None for all; resume: whether
+    frames that are there are left out."""
+
+    outputs: Outputs
+    videos: tuple[Path, ...]
+    chosen: list[int] | None
+    resume: bool
+
+    def scene(self, scene: Scene, size: tuple[int, int] | None, turntable: int | None, fps: float | None) -> Scene:
+        """The scene as its first frame shows it. Finds out before the render whether there are such frames, and whether
+        what is asked of them can be written."""
+        from ..output.video import check_video
+        from ..scene.animation import Animation, frames, turntable as turned
+
+        if turntable is not None:
+            scene = turned(scene, turntable, fps or Animation.fps)
+        elif fps is not None and scene.animation is not None:
+            scene = replace(scene, animation=replace(scene.animation, fps=fps))
+        self._stills = {number: still.camera for number, still in frames(scene, self.chosen)}
+        self._fps = scene.animation.fps if scene.animation else 0.0
+        for video in self.videos:
+            check_video(video, size or scene.render.size, self._fps)
+        if self.videos and self.outputs.pictures[-1].parent == spool(self.videos[0]):
+            spool(self.videos[0]).mkdir(exist_ok=True)
+        self._of(0).check(None, None)
+        return replace(scene, camera=next(iter(self._stills.values())), animation=None)
+
+    def _of(self, number: int) -> Outputs:
+        """What is written of a frame."""
+        report = self.outputs.report and numbered(self.outputs.report, number)
+        return replace(self.outputs, pictures=tuple(numbered(path, number) for path in self.outputs.pictures),
+                       report=report)
+
+    def left(self, renderer: Renderer, goal: object) -> Iterator[tuple[Outputs, Camera]]:
+        """Outputs and camera of each frame that is still to be made. Of a picture is known what it was made of."""
+        from ..output.images import metadata_of
+        from ..rendering.identity import facts_of
+
+        facts = {**facts_of(renderer.scene, renderer.compiled.choices), "camera": ""}
+        asked = self.outputs
+        for number, camera in self._stills.items():
+            made_of = repr((sorted(facts.items()), camera, goal, asked.denoise, asked.view, asked.exposure, asked.aovs))
+            digest = hashlib.sha256(made_of.encode()).hexdigest()
+            outputs = replace(self._of(number), header={"frame": number, "frame_hash": digest})
+            done = self.resume and all(metadata_of(path, "clrt:frame_hash") == digest
+                                       for path in (*outputs.pictures, *outputs.raws))
+            if not (done and all(path.is_file() for path in (*outputs.beside, outputs.report) if path)):
+                yield outputs, camera
+
+    def join(self) -> None:
+        """Writes the videos, and removes what was kept for them alone."""
+        from ..output.video import write_video
+
+        for video in self.videos:
+            pattern = next(path for path in self.outputs.pictures if path.suffix.lower() == ".png")
+            click.echo(str(write_video(video, [numbered(pattern, number) for number in self._stills], self._fps)))
+        for video in self.videos[:1]:
+            shutil.rmtree(spool(video), ignore_errors=True)
+
+
+def make_sequence(outputs: Outputs, frames: str | None, resume: bool, single: Mapping[str, object]) -> Sequence:
+    """Of outputs as they were asked for, of which some may be videos; single: options for one picture alone."""
+    from ..output.video import is_video
+
+    for name, value in single.items():
+        if value is not None:
+            raise UsageError(f"--{name} is for one picture, not for many frames; leave it out")
+    videos = tuple(path for path in outputs.pictures if is_video(path))
+    pictures = tuple(path for path in outputs.pictures if not is_video(path))
+    if videos and not any(path.suffix.lower() == ".png" for path in pictures):
+        pictures += (spool(videos[0]) / "####.png",)
+    return Sequence(replace(outputs, pictures=pictures), videos, _numbers(frames or "all"), resume)
+
+
+def _numbers(text: str) -> list[int] | None:
+    """The frames that a text names, ascending; None for all, and empty where it names none."""
+    if text == "all":
+        return None
+    numbers: set[int] = set()
+    for part in text.split(","):
+        match = re.fullmatch(r"(\d{1,7})(?:-(\d{1,7})(?::0*([1-9]\d{0,6}))?)?", part.strip())
+        if not match:
+            return []
+        numbers |= {*range(int(match[1]), int(match[2] or match[1]) + 1, int(match[3] or 1))}
+    return sorted(numbers)
+
+
+def spool(video: Path) -> Path:
+    """Where a video's frames are kept until it is written, if they are not asked for themselves."""
+    return video.with_name(f"{video.name}.frames")
+
+
+def numbered(path: Path, number: int) -> Path:
+    """The name of a frame: its number in the place of the last ####, or after _ before the suffix."""
+    runs = list(re.finditer("#+", path.name))
+    if not runs:
+        return path.with_name(f"{path.stem}_{number:04}{path.suffix}")
+    first, end = runs[-1].span()
+    return path.with_name(f"{path.name[:first]}{number:0{end - first}}{path.name[end:]}")

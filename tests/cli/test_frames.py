@@ -1,0 +1,157 @@
+"""`clrt render --frames`: which files, with which pictures; what is left out; what is refused."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+import clrt
+from clrt.cli.frames import numbered
+from clrt.cli.render import command
+from clrt.output.images import read_image
+from clrt.output.video import write_video
+from clrt.scene.animation import frames
+
+FLIGHT = """
+camera = { fov_degrees = 50 }
+animation = { fps = 2 }
+render = { size = [24, 16], spp = 3, max_depth = 3 }
+environment = { color = [0.3, 0.5, 0.9] }
+sphere = [{ radius = 1 }, { radius = 0.5, center = [1.2, 0.3, 0.4] }]
+keyframe = [{ time = 0, position = [0, 1, 4] }, { time = 1, position = [3, 2, 3] },
+            { time = 2.5, position = [4, 0, 0] }]
+"""
+
+
+@pytest.fixture
+def flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Six frames around a ball."""
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "flight.toml"
+    path.write_text(FLIGHT)
+    return path
+
+
+def render(*arguments: str) -> list[str]:
+    """The files that were written."""
+    done = CliRunner().invoke(command, [*arguments, "-q"])
+    assert done.exit_code == 0, (done.output, done.exception)
+    return done.stdout.splitlines()
+
+
+@pytest.mark.parametrize(("name", "number", "expected"), [
+    ("a/x_####.png", 7, "a/x_0007.png"), ("#_##.exr", 123, "#_123.exr"), ("a#/x.png", 7, "a#/x_0007.png"),
+    ("x.y.png", 12345, "x.y_12345.png")])
+def test_names(name: str, number: int, expected: str) -> None:
+    assert numbered(Path(name), number) == Path(expected)
+
+
+def test_each_frame_is_what_a_render_of_its_own_gives(flight: Path) -> None:
+    """Bit for bit, by the command and from Python; reports are numbered, too."""
+    written = render("flight.toml", "--frames", "0,3-5:2", "-o", "f_##.exr", "--report", "f.json")
+    assert written == ["f_00.exr", "f_0000.json", "f_03.exr", "f_0003.json", "f_05.exr", "f_0005.json"]
+    images = dict(clrt.animate("flight.toml", frames=[0, 3, 5]))
+    for number, still in frames(clrt.load("flight.toml"), [0, 3, 5]):
+        alone = clrt.render(still)
+        np.testing.assert_array_equal(read_image(Path(f"f_{number:02}.exr")), alone.pixels)
+        np.testing.assert_array_equal(images[number].pixels, alone.pixels)
+        report = json.loads(Path(f"f_{number:04}.json").read_text())
+        assert (report["frame"], report["spp"], report["scene_hash"]) == (number, 3, alone.report["scene_hash"])
+    assert len({image.pixels.tobytes() for image in images.values()}) == 3
+
+
+def test_resume_makes_what_is_missing(flight: Path) -> None:
+    """What was made from another scene, or with other settings, or is not there."""
+    every = [f"flight_{n:04}.png" for n in range(6)]
+    assert render("flight.toml", "--frames", "all") == every
+    again = "flight.toml", "--frames", "all", "--resume"
+    assert render(*again) == []
+    Path(every[4]).unlink()
+    Path(every[1]).write_bytes(Path(every[0]).read_bytes())
+    assert render(*again) == [every[1], every[4]] and render(*again) == []
+    assert render(*again, "--exposure", "1") == render(*again, "--spp", "2") == every
+    flight.write_text(FLIGHT.replace("position = [4, 0, 0]", "position = [4, 0, 1]"))
+    assert render(*again, "--spp", "2") == [every[1], *every[3:]], "all but those that fall on other keyframes"
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".mp4", ".webm"])
+def test_videos(suffix: str, flight: Path) -> None:
+    """Every frame in its place and time; without .png frames nothing else is left."""
+    from imageio.v3 import imiter, immeta, improps, imread
+
+    wanted = "flight.toml", "--turntable", "6", "--fps", "12", "--size", "48x32"
+    pictures = [f"flight_{n:04}.png" for n in range(6)]
+    assert render(*wanted, "-o", f"v{suffix}", "-o", "flight.png") == [*pictures, f"v{suffix}"]
+    assert render(*wanted, "-o", f"w{suffix}") == [*(f"w{suffix}.frames/{n:04}.png" for n in range(6)), f"w{suffix}"]
+    assert Path(f"v{suffix}").read_bytes() == Path(f"w{suffix}").read_bytes() or suffix == ".webm"
+    assert {path.name for path in Path().iterdir()} == {"flight.toml", f"v{suffix}", f"w{suffix}", *pictures}
+    plugin = "pillow" if suffix == ".gif" else "FFMPEG"
+    assert improps(f"w{suffix}", plugin=plugin).n_images in (6, float("inf"))
+    shown = np.stack([np.asarray(frame)[..., :3] for frame in imiter(f"w{suffix}", plugin=plugin)])
+    assert shown.shape == (6, 32, 48, 3)
+    meta = immeta(f"w{suffix}", plugin=plugin)
+    assert meta.get("fps", 12) == 12
+    still = np.stack([imread(picture) for picture in pictures]).astype(float)
+    errors = [[np.abs(a - b).mean() for b in still] for a in shown.astype(float)]
+    assert np.argmin(errors, axis=1).tolist() == list(range(6)) and np.diag(errors).max() < 6
+
+
+def test_gifs_keep_time(tmp_path: Path) -> None:
+    """Of 24 frames a second no frame is more than half a hundredth early or late, though a frame lasts hundredths."""
+    paths = [tmp_path / f"{n}.png" for n in range(30)]
+    for n, path in enumerate(paths):
+        Image.new("RGB", (8, 8), (8 * n, 0, 0)).save(path)
+    lasting = []
+    with Image.open(write_video(tmp_path / "a.gif", paths, 24)) as gif:
+        for n in range(30):
+            gif.seek(n)
+            lasting.append(gif.info["duration"])
+        assert gif.info["loop"] == 0
+    np.testing.assert_allclose(np.cumsum(lasting), 1000 / 24 * np.arange(1, 31), atol=5)
+
+
+def test_interrupted_frames_are_not_written_and_resume_ends_it(flight: Path) -> None:
+    wanted = [sys.executable, "-m", "clrt", "render", "flight.toml", "--frames", "all", "--spp", "400", "--progress",
+              "json", "--size", "200x150", "-o", "f.gif", "-o", "####.png"]
+    running = subprocess.Popen(wanted, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+    assert running.stderr is not None
+    for line in running.stderr:
+        told: dict[str, Any] = json.loads(line)
+        if told["phase"] == "frame" and told["frame"] == 2:
+            running.send_signal(signal.SIGINT)
+            break
+    running.stderr.read()
+    assert running.wait() == 130 and {path.name for path in Path().iterdir()} == {"flight.toml", "0000.png", "0001.png"}
+    done = subprocess.run([*wanted, "--resume"], capture_output=True, text=True)
+    assert done.stdout.split() == ["0002.png", "0003.png", "0004.png", "0005.png", "f.gif"], done.stderr
+
+
+@pytest.mark.parametrize(("arguments", "code", "words"), [
+    (["--frames", "7-5"], 2, "'7-5' names no frames"), (["--frames", "0-4:0"], 2, "0-99:5"),
+    (["--frames", "6"], 2, "flight has no frame 6; its frames are 0 to 5"),
+    (["--frames", "all", "--checkpoint", "c"], 2, "--checkpoint is for one picture"),
+    (["--fps", "3"], 2, "--turntable"),
+    (["--frames", "0", "-o", "a.mp4", "--size", "25x16"], 2, "26x16"), (["-o", "a.gif"], 6, ".gif"),
+    (["--frames", "0", "-o", "a.gif", "--fps", "60"], 2, "60 frames a second"),
+    (["--frames", "0", "-o", "no/a.png"], 6, "does not exist")])
+def test_mistakes_end_in_one_message(arguments: list[str], code: int, words: str, flight: Path) -> None:
+    done = subprocess.run([sys.executable, "-m", "clrt", "render", "flight.toml", *arguments], capture_output=True,
+                          text=True)
+    assert done.returncode == code and words in done.stderr and "Traceback" not in done.stderr
+    assert not done.stdout and [path.name for path in Path().iterdir()] == ["flight.toml"]
+
+
+def test_what_does_not_move_has_no_frames(flight: Path) -> None:
+    flight.write_text("sphere = [{}]\n")
+    done = subprocess.run([sys.executable, "-m", "clrt", "render", "flight.toml", "--frames", "all"],
+                          capture_output=True, text=True)
+    assert done.returncode == 3 and "flight: nothing moves; write [[keyframe]]" in done.stderr
