@@ -10,12 +10,14 @@ from .bench_hits import hits_command
 from .bench_numerics import numerics_command
 from .bench_peers import peers_command
 from .bench_rays import rays_command
+from .bench_theses import theses_command
 
 
 @click.group()
 def command() -> None:
-    """Measure this machine: rays, build, hits, peers, converge, numerics."""
+    """Measure this machine: rays, build, hits, peers, converge, numerics, theses."""
 
 
-for each in (rays_command, build_command, hits_command, peers_command, converge_command, numerics_command):
+for each in (rays_command, build_command, hits_command, peers_command, converge_command, numerics_command,
+             theses_command):
     command.add_command(each)

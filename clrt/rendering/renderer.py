@@ -145,7 +145,7 @@ class Renderer:
         """
         if self._checkpoints is not None:
             raise UsageError("a checkpoint is of one picture, seen by one camera; make a renderer for each")
-        validate(Scene(camera=camera))
+        validate(Scene(camera=camera, render=self.settings))
         self.scene = replace(self.scene, camera=camera)
         files, file = self.compiled.chosen_files["CAMERA"], camera_file(camera, self.settings.integrator)
         self._compiled = [each.seen_by(camera, file) for each in self._compiled]

@@ -1,16 +1,21 @@
-"""Intersection tests drawn by matplotlib, which is an extra."""
+"""Experiments drawn by matplotlib, which is an extra."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..output.plots import write_figure
 from .families import FIGURES
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 #: Zero errors are drawn here, below all that was counted.
 ZERO = 1e-3
+#: Okabe and Ito's, which most colour-blind eyes tell apart.
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#f0e442")
 
 
 def plot_families(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
@@ -32,3 +37,43 @@ def plot_families(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
         device = f"{result['device']['name']} ({result['device']['platform']})"
         row[0].annotate(device, (0, 1.12), xycoords="axes fraction")
     return write_figure(path, figure)
+
+
+def plot_theses(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
+    """What `measure_theses` found: for each ratio two bars, ours and theirs; then, over the depth of mirrors, frames a
+    second relative to depth 4, whose logarithm is the same wherever they were measured. Returns the path."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 3.9), layout="constrained")
+    bars, curves = figure.subplots(1, 2, width_ratios=(1.1, 1))
+    _draw_ratios(bars, results)
+    for result, color in zip([result for result in results if _depths(result)], COLORS):
+        for key, style in (("seconds", "o-"), ("theirs", "s:")):
+            points = _depths(result, key)
+            start = dict(points).get(4, points[0][1]) if points else 0.0
+            curves.plot([depth for depth, _ in points], [start / seconds for _, seconds in points], style, color=color,
+                        markersize=4, label=result["name"] + (f", {result['thesis']}" if key == "theirs" else ""))
+    curves.set(xscale="log", xlabel="depth of mirrors", ylabel="frames a second, over those at depth 4", ylim=(0, None))
+    curves.set_xticks(ticks := [1, 2, 4, 10, 25, 40], [str(tick) for tick in ticks])
+    curves.minorticks_off()
+    curves.grid(linewidth=0.4, alpha=0.4)
+    curves.legend(frameon=False, fontsize="small")
+    return write_figure(path, figure)
+
+
+def _draw_ratios(axis: Axes, results: Sequence[Mapping[str, Any]]) -> None:
+    ratios = [(f"{result['name']}: {ratio['of']}\n/ {ratio['over']}", ratio["ours"], ratio["theirs"])
+              for result in results for ratio in result["ratios"]][::-1]
+    for row, (_, ours, theirs) in enumerate(ratios):
+        for value, place, color in ((ours, row + 0.18, COLORS[0]), (theirs, row - 0.18, "grey")):
+            if value:
+                axis.barh(place, value, 0.34, color=color)
+                axis.annotate(f" {value:.{0 if value > 100 else 2}f}", (value, place), va="center", fontsize="small")
+    axis.set(xscale="log", xlabel="times as long a frame; blue: clrt, grey: theirs")
+    axis.set_yticks(range(len(ratios)), [name for name, _, _ in ratios], fontsize="small")
+    axis.margins(x=0.2)
+
+
+def _depths(result: Mapping[str, Any], key: str = "seconds") -> list[tuple[int, float]]:
+    """Depth and seconds of the rows that have both."""
+    return [(row["depth"], row[key]) for row in result["rows"].values() if row["depth"] and row[key]]

@@ -47,7 +47,7 @@ def bumpy_ball(subdivisions: int = 7) -> Mesh:
 def closed_room(vertices: Floats, faces: Faces) -> Mesh:
     """The mesh in the middle of a cube of 12 triangles, whose half edge is 1.5 times the mesh's largest extent."""
     center, extent = _frame(vertices)
-    return _joined([(vertices, faces), _box(center, 1.5 * extent)])
+    return joined([(vertices, faces), _box(center, 1.5 * extent)])
 
 
 def subdivide(vertices: Floats, faces: Faces) -> Mesh:
@@ -67,7 +67,7 @@ def rotated_copies(vertices: Floats, faces: Faces, count: int, seed: int = 0) ->
     center, extent = _frame(vertices)
     side = int(np.ceil(count ** (1 / 3)))
     cells = np.stack(np.unravel_index(rng.permutation(side ** 3)[:count], (side,) * 3), axis=1)
-    return _joined([((vertices - center) @ _rotation(rng).T + 1.2 * extent * cell, faces) for cell in cells])
+    return joined([((vertices - center) @ _rotation(rng).T + 1.2 * extent * cell, faces) for cell in cells])
 
 
 def workloads(vertices: Floats, faces: Faces, target: Floats, trace: Tracer, size: tuple[int, int],
@@ -143,7 +143,8 @@ def _box(center: Doubles, half: float) -> Mesh:
     return ((center + half * corners).astype(np.float32), np.concatenate([sides[:, [0, 1, 2]], sides[:, [0, 2, 3]]]))
 
 
-def _joined(meshes: list[tuple[NDArray[Any], Faces]]) -> Mesh:
+def joined(meshes: list[tuple[NDArray[Any], Faces]]) -> Mesh:
+    """All in one mesh."""
     first = np.cumsum([0] + [len(vertices) for vertices, _ in meshes]).astype(np.int32)
     return (np.concatenate([vertices for vertices, _ in meshes]).astype(np.float32),
             np.concatenate([faces + start for (_, faces), start in zip(meshes, first)]))

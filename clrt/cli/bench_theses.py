@@ -1,0 +1,67 @@
+"""`clrt bench theses`: the experiments of two theses, beside their own figures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+@click.command("theses")
+@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--quick", is_flag=True, help="Smaller pictures, fewer triangles in the hall, and fewer frames.")
+@click.option("--dragon", type=click.Path(path_type=Path), metavar="FILE", help="A model for the generated dragon.")
+@click.option("--tree", type=click.Path(path_type=Path), metavar="FILE", help="A model for the generated tree.")
+@click.option("--statue", type=click.Path(path_type=Path), metavar="FILE", help="A model for the generated statue.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw them there.")
+def theses_command(device: str | None, quick: bool, json_file: Path | None, plot: Path | None,
+                   **models: Path | None) -> None:
+    """What a frame takes with and without a tree, rasterised and traced, and by the depth of mirrors.
+
+    The scenes are like those of the theses (docs/theses.md), whose own figures stand beside, from other machines: what
+    can be compared is the ratios.
+    """
+    from ..output.files import check_target
+    from ..output.plots import check_plot
+    from ..output.report import write_report
+    from ..study.plots import plot_theses
+    from ..study.theses import QUICK, Effort, Models, measure_theses
+
+    if json_file is not None:
+        check_target(json_file)
+    if plot is not None:
+        check_plot(plot)
+    results = []
+    for result in measure_theses(QUICK if quick else Effort(), Models(**models), device=device,
+                                 say=partial(click.echo, err=True)):
+        click.echo("\n".join(_lines(result)) + "\n")
+        results.append(result)
+    click.echo("theirs: on another machine, in the scene and at the size of the title"
+               "\nof 1/16: measured in a picture of so many times fewer pixels, and scaled")
+    if plot is not None:
+        click.echo(str(plot_theses(plot, results)))
+    if json_file is not None:
+        write_report(json_file, {"quick": quick, "models": models, "experiments": results})
+        click.echo(str(json_file))
+
+
+def _lines(result: Mapping[str, Any]) -> list[str]:
+    width, height = result["size"]
+    lines = [result["title"], f"  {result['triangles']} triangles, {width}x{height}; {result['device']}, "
+             f"{result['platform']}; theirs: {result['machine']}",
+             f"  {'':36}{'ms a frame':>12}{'frames/s':>10}{'frames':>8}{'rays/sample':>13}{'Mrays/s':>9}"
+             f"{'theirs: ms':>12}{'frames/s':>10}"]
+    for name, row in result["rows"].items():
+        theirs = f"{1e3 * row['theirs']:12.4g}{1 / row['theirs']:10.4g}" if row["theirs"] else ""
+        part = f", of 1/{row['part']**2}" if row["part"] > 1 else ""
+        lines.append(f"  {name + part:36}{1e3 * row['seconds']:12.4g}{row['frames_per_second']:10.4g}{row['frames']:8}"
+                     f"{row['rays'] / row['samples']:13.3f}{1e-6 * row['rays'] / row['seconds']:9.3g}{theirs}")
+    for ratio in result["ratios"]:
+        cpu = f" ({ratio['cpu']:.4g} of processor time)" if result["device_type"] == "cpu" else ""
+        theirs = f"; theirs {ratio['theirs']:.4g}" if ratio["theirs"] else ""
+        lines.append(f"  {ratio['of']} / {ratio['over']}: {ratio['ours']:.4g} times as long{cpu}{theirs}")
+    return lines
