@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from math import ceil, inf, sqrt
+from math import ceil, inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,17 +13,21 @@ import click
 from .options import Size
 
 if TYPE_CHECKING:
+    from ..scene.model import Integrator
     from ..study.converge import Effort
 
 #: Those of contestants.py, there after "clrt, ".
 NAMES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "lanes 8", "lanes 16", "paths in lanes",
          "unplanned"]
+INTEGRATORS = ["path", "direct", "local"]
 
 
 @click.command("converge")
 @click.argument("scenes", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SCENE...")
 @click.option("--choice", "names", multiple=True, type=click.Choice(NAMES),
               help="Compare these alone, with the first; may be repeated. Default: up to bvh2.")
+@click.option("--integrator", "integrators", multiple=True, type=click.Choice(INTEGRATORS),
+              help="Instead of the scene's; may be repeated. Each is compared with a reference of its own.")
 @click.option("--peers", is_flag=True, help="Beside other renderers, where installed: Mitsuba, Cycles.")
 @click.option("--device", "selectors", multiple=True, metavar="SEL", help="See `clrt devices`; may be repeated.")
 @click.option("--size", type=Size(), help="Picture size in pixels.")
@@ -38,8 +41,9 @@ NAMES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "la
 @click.option("--quick", is_flag=True, help="Fewer seeds and a rougher reference.")
 @click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
-def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], peers: bool, selectors: tuple[str, ...],
-                     size: tuple[int, int] | None, json_file: Path | None, plot: Path | None, **asked: Any) -> None:
+def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrators: tuple[Integrator, ...], peers: bool,
+                     selectors: tuple[str, ...], size: tuple[int, int] | None, json_file: Path | None,
+                     plot: Path | None, **asked: Any) -> None:
     """How fast pictures of each SCENE come near a reference of many samples, which is rendered once and kept.
 
     Pictures of 1, 2, 4 ... samples a pixel by all contestants in turns, with several seeds. Also whether the error that
@@ -47,12 +51,13 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], peers: bo
     """
     from ..device.discover import choose
     from ..output.files import check_target
-    from ..output.plots import check_plot, plot_errors
+    from ..output.plots import check_plot
     from ..output.report import write_report
     from ..scene.file import load
     from ..study.calibration import calibrations
     from ..study.contestants import CHOICES, MORE_CHOICES
     from ..study.converge import measure_convergence
+    from ..study.plots import plot_convergence
     from .converge_tables import calibration_lines, scene_lines
 
     if json_file is not None:
@@ -60,11 +65,14 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], peers: bo
     if plot is not None:
         check_plot(plot)
     devices = [choose(selector)[0] for selector in selectors or (None,)]
-    for device in devices:
-        click.echo(f"device {device.index}: {device.name} ({device.platform}, {device.driver})")
+    named = [f"device {device.index}: {device.name} ({device.platform}, {device.driver})" for device in devices]
+    click.echo("\n".join(named))
     loaded = [load(scene) for scene in scenes]
     if size is not None:
         loaded = [replace(scene, render=replace(scene.render, size=size)) for scene in loaded]
+    if integrators:
+        loaded = [replace(scene, name=f"{scene.name}, {name}", render=replace(scene.render, integrator=name))
+                  for scene in loaded for name in integrators]
     chosen = [name if name == "clrt" else f"clrt, {name}" for name in names] or list(CHOICES)
     results = []
     for result in measure_convergence(
@@ -76,7 +84,7 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], peers: bo
     for line in calibration_lines(told):
         click.echo(line)
     if plot is not None:
-        click.echo(str(plot_errors(plot, {result["scene"]: _curves(result) for result in results})))
+        click.echo(str(plot_convergence(plot, results, named)))
     if json_file is not None:
         write_report(json_file, {"quick": asked["quick"], "scenes": results, "calibration": told})
         click.echo(str(json_file))
@@ -90,9 +98,3 @@ def _effort(quick: bool, seconds: float | None, spp: tuple[int, ...], seeds: int
     return Effort(seconds=seconds or (inf if spp else usual.seconds), seeds=seeds or usual.seeds, steps=usual.steps,
                   step_spp=ceil(reference_spp / usual.steps) if reference_spp else usual.step_spp,
                   spp=sorted(set(spp)) or usual.spp)
-
-
-def _curves(result: Mapping[str, Any]) -> dict[str, list[tuple[float, float]]]:
-    """√relMSE against seconds, of each contestant."""
-    return {name: [(seconds, sqrt(max(relmse, 0))) for seconds, relmse in zip(row["seconds"], row["relmse"])]
-            for name, row in result["contestants"].items()}

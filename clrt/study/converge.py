@@ -104,9 +104,10 @@ def _compare(picture: Picture, reference: Reference) -> Point:
 def figures(points: Points, reference: Reference) -> dict[str, dict[str, Any]]:
     """Of each contestant, by samples: spp, seconds, cpu_seconds, relmse: means over seeds, of the times medians.
 
-    From relmse the reference's own is subtracted. last: where in these lists the most samples are whose error is still
-    above the reference's own. There: msamples (a second); relmse_seconds and relmse_cpu_seconds, relMSE times seconds,
-    which stays while errors fall with the square root of time; these over the first contestant's: ratio, cpu_ratio.
+    relmse_range: the least and the greatest of the seeds. From both the reference's own is subtracted. last: where in
+    these lists the most samples are whose error is still above the reference's own. There: msamples (a second);
+    relmse_seconds and relmse_cpu_seconds, relMSE times seconds, which stays while errors fall with the square root of
+    time; these over the first contestant's: ratio, cpu_ratio.
     slope: of log relMSE over log samples, up to last (−1 where samples are independent). Of the most samples of all:
     each channel's mean_ratio to the reference, whether it agrees with 1 (see AGREES), and what `mean_tests` says of it.
     noise_ratio: by samples and seeds, see `noise_ratio`. NaN: has no meaning.
@@ -136,6 +137,8 @@ def _averages(levels: Mapping[int, Sequence[Point]], own: float) -> dict[str, An
             "seconds": [median(point.seconds for point in level) for level in levels.values()],
             "cpu_seconds": [median(point.cpu_seconds for point in level) for level in levels.values()],
             "relmse": [fmean(point.relmse for point in level) - own for level in levels.values()],
+            "relmse_range": [[choose(point.relmse for point in level) - own for choose in (min, max)]
+                             for level in levels.values()],
             "noise_ratio": [[noise_ratio(point.noise, point.relmse, own) for point in level]
                             for level in levels.values()],
             "mean_ratio": [fmean(channel) for channel in channels],

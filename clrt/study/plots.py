@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..output.plots import write_figure
+from ..output.plots import MARKERS, write_figure
 from .families import FIGURES
 
 if TYPE_CHECKING:
@@ -37,6 +38,50 @@ def plot_families(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
         device = f"{result['device']['name']} ({result['device']['platform']})"
         row[0].annotate(device, (0, 1.12), xycoords="axes fraction")
     return write_figure(path, figure)
+
+
+def plot_convergence(path: Path, results: Sequence[Mapping[str, Any]], devices: Sequence[str]) -> Path:
+    """What `measure_convergence` found, a column a scene: √relMSE against seconds and against samples a pixel, the mean
+    of the seeds with a band from the least to the greatest. devices: what is written below of them. Returns the path.
+
+    Dotted lines fall as errors of independent samples do; the grey one is the reference's own error.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(3.8 * len(results), 6.4), layout="constrained")
+    axes = figure.subplots(2, len(results), squeeze=False, sharey="col")
+    names = list(dict.fromkeys(name for result in results for name in result["contestants"]))
+    for result, column in zip(results, axes.T):
+        for axis, (key, label) in zip(column, (("seconds", "seconds"), ("spp", "samples a pixel"))):
+            _draw_convergence(axis, result, names, key)
+            axis.set(xscale="log", yscale="log", xlabel=label)
+            axis.grid(linewidth=0.4, alpha=0.4)
+        column[0].set_title(f"{result['scene']}, {'x'.join(map(str, result['size']))}", fontsize="medium")
+    for row in axes:
+        row[0].set_ylabel("error (√relMSE)")
+    marks = {label: mark for axis in axes.flat for mark, label in zip(*axis.get_legend_handles_labels())}
+    figure.legend(marks.values(), marks.keys(), loc="outside lower center", ncols=2 + len(results), frameon=False,
+                  fontsize="small", title="\n".join(devices), title_fontsize="x-small")
+    return write_figure(path, figure)
+
+
+def _draw_convergence(axis: Axes, result: Mapping[str, Any], names: Sequence[str], key: str) -> None:
+    """Curves over `key`; a contestant has its colour and mark by its place in `names`."""
+    slope: list[tuple[float, float]] = []
+    for place, name in enumerate(names):
+        row = result["contestants"].get(name)
+        points = [] if row is None else [(x, sqrt(y), sqrt(max(low, 0)), sqrt(high)) for x, y, (low, high) in zip(
+            row[key], row["relmse"], row["relmse_range"]) if x > 0 and y > 0]
+        if points:
+            x, y, low, high = zip(*points)
+            color = COLORS[place % len(COLORS)]
+            axis.plot(x, y, label=name, color=color, marker=MARKERS[place % len(MARKERS)], markersize=4, linewidth=1.3)
+            axis.fill_between(x, low, high, color=color, alpha=0.15, linewidth=0)
+            slope = slope or [(x[0], y[0]), (x[-1], y[0] * sqrt(x[0] / x[-1]))]
+    if slope:
+        axis.plot(*zip(*slope), ":", color="grey", linewidth=1, label="slope −½", zorder=0)
+    own = sqrt(result["reference"]["relmse"])
+    axis.axhline(own, color="lightgrey", linewidth=1, label="the reference's own", zorder=0)
 
 
 def plot_theses(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:

@@ -202,7 +202,9 @@ main(["bench", "converge", "ball.toml", "--quick", "--time", "0.004", "--peers",
     assert list(scene["contestants"]) == list(CHOICES)
     for name, row in scene["contestants"].items():
         assert {"spp", "seconds", "cpu_seconds", "relmse", "last", "msamples", "relmse_seconds", "relmse_cpu_seconds",
-                "ratio", "cpu_ratio", "slope", "mean_ratio", "agrees", "noise_ratio", "z", "p", "biased"} == set(row)
+                "ratio", "cpu_ratio", "slope", "mean_ratio", "agrees", "noise_ratio", "z", "p", "biased",
+                "relmse_range"} == set(row)
+        assert all(low <= mean <= high for mean, (low, high) in zip(row["relmse"], row["relmse_range"]))
         assert len(row["spp"]) == len(row["seconds"]) == len(row["relmse"]) == len(row["noise_ratio"])
         assert any(line.startswith(f"  {name}  ") for line in done.stdout.splitlines())
     assert scene["contestants"]["clrt"]["ratio"] == 1
@@ -227,6 +229,19 @@ def test_command_does_what_is_asked(tmp_path: Path) -> None:
         assert written["calibration"][name]["pictures"] == 8 and not row["biased"]
     assert written["calibration"]["clrt, independent"]["median"] == pytest.approx(1, abs=0.15)
     assert "3: " in done.output and "pictures  to 1.2x   median    worst" in done.output
+
+
+def test_each_integrator_has_a_reference_of_its_own(tmp_path: Path) -> None:
+    """Fewer edges, and no light from other surfaces: their pictures differ, and each agrees with its own."""
+    (tmp_path / "ball.toml").write_text(SCENE)
+    asked = ["--integrator", "path", "--integrator", "direct", "--choice", "clrt", "--spp", "64", "--seeds", "3",
+             "--reference-spp", "512", "--quick", "--json", str(tmp_path / "c.json"), "--plot", str(tmp_path / "c.svg")]
+    done = CliRunner().invoke(converge_command, [str(tmp_path / "ball.toml"), *asked])
+    assert done.exit_code == 0, done.output
+    scenes = json.loads((tmp_path / "c.json").read_text())["scenes"]
+    assert [scene["scene"] for scene in scenes] == ["ball, path", "ball, direct"]
+    assert all(scene["contestants"]["clrt"]["mean_ratio"] == pytest.approx([1, 1, 1], abs=0.02) for scene in scenes)
+    assert (tmp_path / "c.svg").read_text().count("<svg") == 1
 
 
 def test_command_knows_all_choices() -> None:
