@@ -135,8 +135,9 @@ def _mirrors(name: str, title: str, scene: Scene, effort: Effort, traced: Mappin
     variants = [Variant(f"depth {depth}", scene, {"max_depth": depth + 1},
                         1 / traced[depth] if depth in traced else None, depth=depth) for depth in effort.depths]
     if "raster" in get_args(Integrator):
-        variants.append(Variant("rasterised, no reflections", scene, RASTER,
-                                1 / 530 if name == "mirrors" else None))
+        dull = replace(scene, meshes=[replace(mesh, material=STONE) if mesh.material == GLASS else mesh
+                                      for mesh in scene.meshes])
+        variants.append(Variant("rasterised, no reflections", dull, RASTER, 1 / 530 if name == "mirrors" else None))
     return Experiment(name, title, "S", variants, [("depth 25", "depth 4")])
 
 
