@@ -22,7 +22,7 @@ from .small_work import work
 
 #: How a device is worked with, whatever its type.
 DEVICES: dict[str, dict[str, Any]] = {"cpu": {"lanes": 8, "local_size": 1, "layout": "bvh8"},
-                                      "gpu": {"lanes": 1, "local_size": 4, "layout": "cwbvh"}}
+                                      "gpu": {"lanes": 1, "local_size": 4, "layout": "cwbvh", "fuses": False}}
 #: Shares so small that even here several work-items get one.
 SHARES = {"SMALLEST_BLOCK": {"cpu": 4, "gpu": 4}, "SCAN_ITEMS": 4, "SCAN_PART": 256}
 ENQUEUE_COPY = cl.enqueue_copy

@@ -19,9 +19,7 @@ from clrt.device.sources import kernel_folder
 from . import small_work
 from .oclgrind_program import DEVICES
 
-#: Its LLVM lacks an intrinsic that its clang writes where it optimises, or inlines what says that it must be.
-OPTIONS = {"OCLGRIND_DATA_RACES": "1", "OCLGRIND_UNINITIALIZED": "1", "OCLGRIND_CHECK_API": "1",
-           "OCLGRIND_BUILD_OPTIONS": "-cl-opt-disable -Dalways_inline="}
+OPTIONS = {"OCLGRIND_DATA_RACES": "1", "OCLGRIND_UNINITIALIZED": "1", "OCLGRIND_CHECK_API": "1"}
 #: pyopencl asks devices of all makers what those of one can tell.
 NO_FAULT = """
 Oclgrind - OpenCL runtime error detected
@@ -35,7 +33,7 @@ LAUNCH = """
 import sys, pyopencl as cl
 context = cl.Context(cl.get_platforms()[0].get_devices())
 queue, arrays = cl.CommandQueue(context), [cl.Buffer(context, cl.mem_flags.READ_WRITE, 32) for _ in range(2)]
-cl.Program(context, sys.argv[1]).build(cache_dir=False).broken(queue, (8,), (4,), *arrays)
+cl.Program(context, sys.argv[1]).build(["-cl-opt-disable"], cache_dir=False).broken(queue, (8,), (4,), *arrays)
 queue.finish()
 """
 BROKEN = {

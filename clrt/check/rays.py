@@ -15,7 +15,7 @@ from .star import SQUARES, Doubles, Rays, Star, make_star, rays_from_elsewhere, 
 
 ELSEWHERE = 300
 #: Squares along an edge of the surface, and rays from inside, that a slow device gets at least.
-FEW_SQUARES, FEW_RAYS = 4, 128
+FEW_SQUARES, FEW_RAYS = 4, 64
 #: A hit's point follows from some 30 operations on coordinates, each of which may round.
 ROUNDINGS = 30.0
 

@@ -45,6 +45,12 @@ class Device:
                 and platform.machine().lower() in ("x86_64", "amd64"))
 
     @property
+    def fuses(self) -> bool:
+        """Whether fma is an instruction there. Intel's runtime and Oclgrind have it without saying so."""
+        return (self.vectors or self.info.type == "simulator"
+                or bool(self.cl.single_fp_config & cl.device_fp_config.FMA))
+
+    @property
     def local_size(self) -> int:
         """Work-items of a group. On a CPU one: its compiler then has no loop over work-items to write around."""
         return 1 if self.vectors else 64

@@ -27,6 +27,8 @@ from .sources import kernel_folder
 
 log = logging.getLogger(__name__)
 OPTIONS = ["-cl-std=CL1.2"]
+#: Oclgrind's LLVM lacks an intrinsic that its clang writes where it optimises, or inlines what says that it must be.
+SIMULATOR_OPTIONS = ["-cl-opt-disable", "-Dalways_inline="]
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|(\w+))\s*$')
 _built: dict[str, cl.Program] = {}
 
@@ -76,9 +78,11 @@ def build(device: Device, source: str) -> BuiltProgram:
     """Builds `source` for the device, or takes it from this process or the cache; KernelError with the log if refused.
 
     PoCL keeps what it compiled itself, and asking it for a binary costs as much as compiling, so for it the cache only
-    remembers that a program was built before.
+    remembers that a program was built before. Where the device has no instruction for fma, kernels/fma.cl comes first.
     """
     start = time.perf_counter()
+    if not device.fuses:
+        source = compose("", "fma.cl", {}) + source
     identity = "\n".join([source, *OPTIONS, device.info.id, device.info.platform_version, device.info.driver])
     key = hashlib.sha256(identity.encode()).hexdigest()
     context_key = f"{key}-{device.context.int_ptr}"
@@ -121,7 +125,8 @@ def _compile(device: Device, source: str) -> cl.Program:
     where, start = f"{device.info.name} ({device.info.platform})", time.perf_counter()
     program = cl.Program(device.context, source)
     try:
-        in_background(where, lambda: _quietly_built(program, OPTIONS))
+        options = OPTIONS + (SIMULATOR_OPTIONS if device.info.type == "simulator" else [])
+        in_background(where, lambda: _quietly_built(program, options))
         log = f"built in {time.perf_counter() - start:.2f} s\n{_build_log(device, program)}"
     except cl.Error as error:
         log = str(error).strip()

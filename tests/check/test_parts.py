@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from clrt.check import star
+from clrt.check.arithmetic import check_arithmetic
 from clrt.check.exact import nearest_float32, ulps
 from clrt.check.findings import Findings
 from clrt.check.floats import operands
 from clrt.check.parts import PARTS
 from clrt.device.open import Device
+from clrt.query import RayQuery
 
 
 @pytest.mark.parametrize("part", PARTS)
@@ -20,6 +22,20 @@ def test_a_device_passes(device: Device, part: str) -> None:
     findings = Findings()
     PARTS[part](device, findings)
     assert not findings.failures
+
+
+def test_fma_of_plain_operations(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What kernels/fma.cl puts in its place is rounded once, too, and so hits have the same bits."""
+    surface, hits = star.make_star(4), []
+    rays = star.rays_from_elsewhere(surface, 1000)
+    for fuses in (True, False):
+        monkeypatch.setattr(Device, "fuses", fuses)
+        query = RayQuery(surface.vertices, surface.faces, device=device.info.id)
+        hits.append(query.closest_hit(rays.origins, rays.directions))
+    findings = Findings()
+    check_arithmetic(device, findings)
+    assert not findings.failures
+    assert np.array_equal(hits[0], hits[1])
 
 
 def test_the_nearest_float() -> None:
