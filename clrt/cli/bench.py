@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from .bench_agree import agree_command
 from .bench_build import build_command
 from .bench_converge import converge_command
 from .bench_hits import hits_command
@@ -15,9 +16,9 @@ from .bench_theses import theses_command
 
 @click.group()
 def command() -> None:
-    """Measure this machine: rays, build, hits, peers, converge, numerics, theses."""
+    """Measure this machine: rays, build, hits, peers, converge, agree, numerics, theses."""
 
 
-for each in (rays_command, build_command, hits_command, peers_command, converge_command, numerics_command,
-             theses_command):
+for each in (rays_command, build_command, hits_command, peers_command, converge_command, agree_command,
+             numerics_command, theses_command):
     command.add_command(each)

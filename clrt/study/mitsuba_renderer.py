@@ -14,7 +14,9 @@ import numpy as np
 
 from ..scene.model import Scene
 from .contestants import Contestant, Picture
-from .mitsuba_scene import Plugin, mitsuba_scene
+from .mitsuba_bsdfs import Plugin
+from .mitsuba_gltf import register
+from .mitsuba_scene import mitsuba_scene
 
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
 #: How its samples are drawn, by what is added to its name.
@@ -69,6 +71,7 @@ def _library() -> tuple[Any, str]:
     library = import_module("mitsuba")
     library.set_variant(variant)
     library.set_log_level(library.LogLevel.Error)
+    register(library)
     return library, f"mitsuba {variant.split('_')[0]}"
 
 
@@ -86,16 +89,22 @@ def _native(library: Any, value: Any) -> Any:
     return value
 
 
-def _mesh(library: Any, *, vertices: Any, faces: Any, normals: Any, **plugins: Any) -> Any:
+def _mesh(library: Any, *, vertices: Any, faces: Any, normals: Any, uv: Any = None, colors: Any = None,
+          **plugins: Any) -> Any:
     """A mesh with its bsdf and emitter; flat where it has no normals."""
     properties = library.Properties()
     properties["face_normals"] = normals is None
     for name, plugin in plugins.items():
         properties[name] = library.load_dict(plugin)
-    mesh = library.Mesh("mesh", len(vertices), len(faces), properties, has_vertex_normals=normals is not None)
+    mesh = library.Mesh("mesh", len(vertices), len(faces), properties, has_vertex_normals=normals is not None,
+                        has_vertex_texcoords=uv is not None)
+    if colors is not None:
+        mesh.add_attribute("vertex_color", 3, colors.ravel())
     arrays = library.traverse(mesh)
     arrays["vertex_positions"], arrays["faces"] = vertices.ravel(), faces.ravel()
     if normals is not None:
         arrays["vertex_normals"] = normals.ravel()
+    if uv is not None:
+        arrays["vertex_texcoords"] = uv.ravel()
     arrays.update()
     return mesh

@@ -1,162 +1,138 @@
 """A scene as Mitsuba 3 is told of it: dictionaries of plugins by the names of its manual, for its `rgb` variants.
 
 Numbers, names and numpy arrays only, so that nothing of Mitsuba is needed here: 4x4 arrays are transforms, arrays of
-three dimensions pictures, and a plugin of type "mesh" has vertices, faces and normals (mitsuba_renderer.py builds it).
-To add a material, write what it is in BSDFS.
+three dimensions pictures, and a plugin of type "mesh" has the arrays of one (mitsuba_renderer.py builds it). What
+materials are there is in mitsuba_bsdfs.py.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import sqrt
+from math import cos, radians, tan
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..scene.lights import Light, PointLight, SpotLight
 from ..scene.instancing import unfolded
-from ..scene.material import ALPHA_MIN
-from ..scene.materials import Conductor, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
-from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
-from ..scene.textures import untextured
-
-Plugin = dict[str, Any]
+from ..scene.lights import Light, PointLight, SpotLight
+from ..scene.materials import Dielectric
+from ..scene.model import Environment, Mesh, Scene, Sphere
+from .mitsuba_bsdfs import Plugin, bsdf, color, medium, rgb
 
 #: How near and far the camera sees, of the distance to where it looks.
 NEAR, FAR = 1e-4, 1e6
-#: An alpha up to which the separable Smith term takes less than 4e-4 of even light that the height-correlated leaves.
-NEARLY_SMOOTH = 0.09
+#: Of the picture that a spot throws, in which its falloff is told: texels a side, and the widest cone.
+SPOT_TEXELS, SPOT_DEGREES = 2048, 80
 
 
 def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
     """The plugins of `scene` with its own settings. UsageError names what has no counterpart in Mitsuba."""
     if scene.render.filter != "box":
         raise UsageError(f'{scene.name}: Mitsuba is compared with filter = "box"')
-    if scene.render.integrator == "local":
-        raise UsageError(f'{scene.name}: Mitsuba has no integrator "local"')
+    if scene.render.integrator not in ("path", "direct"):
+        raise UsageError(f'{scene.name}: Mitsuba has no integrator "{scene.render.integrator}"')
     depth = scene.render.max_depth if scene.render.integrator == "path" else min(scene.render.max_depth, 2)
-    plugins: Plugin = {"type": "scene", "integrator": {"type": "path", "max_depth": depth},
-                       "sensor": _sensor(scene, sampler)}
-    plugins |= {f"mesh{i}": _surface(_mesh(mesh), mesh) for i, mesh in enumerate(unfolded(scene).meshes)}
-    plugins |= {f"sphere{i}": _surface({"type": "sphere", "center": list(sphere.center), "radius": sphere.radius},
-                                       sphere) for i, sphere in enumerate(scene.spheres)}
+    owners: list[Mesh | Sphere] = [*unfolded(scene).meshes, *scene.spheres]
+    absorbs = any(isinstance(owner.material, Dielectric) and medium(owner.material) for owner in owners)
+    plugins: Plugin = {"type": "scene", "sensor": _sensor(scene, sampler),
+                       "integrator": {"type": "volpath" if absorbs else "path", "max_depth": depth}}
+    plugins |= {f"{'mesh' if isinstance(owner, Mesh) else 'sphere'}{i}": _surface(owner)
+                for kind in (Mesh, Sphere) for i, owner in enumerate(each for each in owners if isinstance(each, kind))}
     plugins |= {f"light{i}": _light(light) for i, light in enumerate(scene.lights)}
     return plugins | _environment(scene.environment)
 
 
 def _sensor(scene: Scene, sampler: str) -> Plugin:
-    """A pinhole or lens, and its film: pixels are means over their own squares."""
+    """The camera and its film: pixels are means over their own squares."""
     camera, (width, height) = scene.camera, scene.render.size
-    if camera.projection != "perspective":
-        raise UsageError(f"{scene.name}: Mitsuba is not told of {camera.projection} cameras yet")
     distance = float(np.linalg.norm(np.subtract(camera.look_at, camera.position)))
-    lens: Plugin = {"type": "perspective"}
-    if camera.aperture_radius:
-        lens = {"type": "thinlens", "aperture_radius": camera.aperture_radius,
-                "focus_distance": camera.focus_distance or distance}
-    return {**lens, "fov": camera.fov_degrees, "fov_axis": "y", "to_world": _look_at(camera),
-            "near_clip": NEAR * distance, "far_clip": FAR * distance, "sampler": {"type": sampler},
+    to_world = _frame(camera.position, np.subtract(camera.look_at, camera.position), camera.up)
+    lens: Plugin = {"type": "perspective", "fov": camera.fov_degrees, "fov_axis": "y"}
+    if camera.projection == "equirectangular":
+        raise UsageError(f"{scene.name}: Mitsuba has no equirectangular camera")
+    if camera.projection == "orthographic":
+        tall = camera.view_height or 2 * distance * tan(radians(camera.fov_degrees) / 2)
+        lens = {"type": "orthographic"}    # of -1 to 1 in its x
+        to_world = to_world @ np.diag([tall * width / height / 2, tall * width / height / 2, 1, 1])
+    elif camera.aperture_radius:
+        lens |= {"type": "thinlens", "aperture_radius": camera.aperture_radius,
+                 "focus_distance": camera.focus_distance or distance}
+    return {**lens, "to_world": to_world, "near_clip": NEAR * distance, "far_clip": FAR * distance,
+            "sampler": {"type": sampler},
             "film": {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
                      "component_format": "float32", "rfilter": {"type": "box"}}}
 
 
-def _look_at(camera: Camera) -> NDArray[np.float64]:
-    """Camera to world: Mitsuba's cameras look along +z, with +x to the picture's left."""
-    forward = np.subtract(camera.look_at, camera.position, dtype=np.float64)
+def _frame(position: Any, direction: Any, up: Any = (0.0, 1.0, 0.0)) -> NDArray[np.float64]:
+    """Local to world, of cameras and spots: Mitsuba's look along +z, with +x to the picture's left."""
+    forward = np.asarray(direction, np.float64)
     forward /= np.linalg.norm(forward)
-    left = np.cross(np.asarray(camera.up, np.float64), forward)
+    left = np.cross(np.asarray(up, np.float64), forward)
     left /= np.linalg.norm(left)
     matrix = np.eye(4)
-    matrix[:3] = np.column_stack([left, np.cross(forward, left), forward, camera.position])
+    matrix[:3] = np.column_stack([left, np.cross(forward, left), forward, position])
     return matrix
 
 
-def _mesh(mesh: Mesh) -> Plugin:
-    return {"type": "mesh", "vertices": mesh.vertices, "faces": mesh.faces, "normals": mesh.normals}
-
-
-def _surface(shape: Plugin, owner: Mesh | Sphere) -> Plugin:
-    """The shape with its material, and its light where it has any."""
-    kind = type(owner.material)
-    if kind not in BSDFS:
-        raise UsageError(f"{owner.name}: Mitsuba is not told of {owner.material.kernel} yet")
-    try:
-        shape["bsdf"] = BSDFS[kind](owner.material)
-    except ValueError as error:
-        raise UsageError(f"{owner.name}: Mitsuba cannot draw {error}") from None
+def _surface(owner: Mesh | Sphere) -> Plugin:
+    """A mesh or sphere with its material, what is inside, and its light where it has any."""
+    shape = _mesh(owner) if isinstance(owner, Mesh) else _sphere(owner)
+    shape["bsdf"] = bsdf(owner)
+    if isinstance(owner.material, Dielectric) and (inside := medium(owner.material)):
+        shape["interior"] = inside
     if any(owner.material.radiance):
-        shape["emitter"] = {"type": "area", "radiance": _rgb(untextured(owner.material.emission))}
+        shape["emitter"] = {"type": "area", "radiance": color(owner.material.emission)}
     return shape
 
 
-def _diffuse(material: Diffuse) -> Plugin:
-    return _two_sided({"type": "diffuse", "reflectance": _rgb(untextured(material.color))})
+def _mesh(mesh: Mesh) -> Plugin:
+    arrays: Plugin = {"vertices": mesh.vertices, "faces": mesh.faces, "normals": mesh.normals}
+    sets = {texture.uv_set for texture in mesh.material.textures()}
+    if len(sets) > 1:
+        raise UsageError(f"{mesh.name}: Mitsuba's meshes have one set of texture coordinates")
+    if sets:
+        arrays["uv"] = mesh.uv1 if sets == {1} else mesh.uv
+    if mesh.colors is not None:
+        arrays["colors"] = mesh.colors[:, :3]
+    return {"type": "mesh", **arrays}
 
 
-def _mirror(material: Mirror) -> Plugin:
-    color = _rgb(untextured(material.color))
-    return _two_sided({"type": "conductor", "material": "none", "specular_reflectance": color})
-
-
-def _metal(material: MetallicRoughness) -> Plugin:
-    """`principled` is GGX under Schlick's Fresnel term with the separable Smith term, if metallic is 1, exactly."""
-    lobes = material.lobes
-    if np.any(lobes.albedo):
-        raise ValueError("metallic_roughness that is not all metal: its own has another diffuse part")
-    if material.features() & {"LAYERS", "SPECULAR"}:
-        raise ValueError("metals with layers")
-    if material.smith != "separable" or material.multiple_scattering:
-        raise ValueError('metals but with smith = "separable" and single scattering')
-    return _two_sided({"type": "principled", "metallic": 1.0, "roughness": sqrt(lobes.alpha),
-                       "base_color": _rgb(lobes.f0)})
-
-
-def _dielectric(material: Dielectric) -> Plugin:
-    if material.attenuation_distance is not None or (material.thin and material.rough):
-        raise ValueError("glass that absorbs, or is thin and rough")
-    if untextured(material.roughness)**2 > NEARLY_SMOOTH:
-        raise ValueError("glass rougher than 0.3: its own has the separable Smith term")
-    plugin = {"type": "thindielectric" if material.thin else "dielectric", "int_ior": material.ior, "ext_ior": 1.0}
-    if material.thin and untextured(material.color) != (1.0, 1.0, 1.0):
-        raise ValueError("thin glass in color: its own is not crossed again by what bounces inside")
-    if material.rough:
-        plugin |= {"type": "roughdielectric", "distribution": "ggx",
-                   "alpha": max(untextured(material.roughness)**2, ALPHA_MIN)}
-    return plugin | {"specular_transmittance": _rgb(untextured(material.color))}
-
-
-def _conductor(material: Conductor) -> Plugin:
-    values = material.parameters()
-    if untextured(material.roughness)**2 > NEARLY_SMOOTH:
-        raise ValueError("conductor rougher than 0.3: its own has the separable Smith term")
-    return _two_sided({"type": "roughconductor", "distribution": "ggx", "eta": _rgb(values["eta"]),
-                       "k": _rgb(values["k"]), "alpha": max(untextured(material.roughness)**2, ALPHA_MIN)})
-
-
-BSDFS: dict[type[Material], Callable[[Any], Plugin]] = {
-    Diffuse: _diffuse, Mirror: _mirror, MetallicRoughness: _metal, Dielectric: _dielectric, Conductor: _conductor}
-
-
-def _two_sided(bsdf: Plugin) -> Plugin:
-    """As seen from behind, too, where Mitsuba's reflecting surfaces are black."""
-    return {"type": "twosided", "front": bsdf}
+def _sphere(sphere: Sphere) -> Plugin:
+    """Turned so that its texture coordinates are ours: from its z down, and round from −x, the middle, towards −y."""
+    place = np.eye(4)
+    place[:3] = np.column_stack([(0, 0, -sphere.radius), (-sphere.radius, 0, 0), (0, sphere.radius, 0), sphere.center])
+    return {"type": "sphere", "to_world": place}
 
 
 def _light(light: Light) -> Plugin:
     if isinstance(light, PointLight):
-        return {"type": "point", "position": list(light.position), "intensity": _rgb(light.intensity)}
+        return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
     if isinstance(light, SpotLight):
-        raise UsageError("spot: Mitsuba's spots fall off by the angle, ours by its cosine, squared")
-    return {"type": "directional", "direction": list(light.direction), "irradiance": _rgb(light.irradiance)}
+        return _spot(light)
+    return {"type": "directional", "direction": list(light.direction), "irradiance": rgb(light.irradiance)}
+
+
+def _spot(light: SpotLight) -> Plugin:
+    """Mitsuba's falls off evenly in the angle; ours is told as a picture that one of even strength throws."""
+    if light.outer_degrees > SPOT_DEGREES:
+        raise UsageError(f"spot: Mitsuba is told of cones up to {SPOT_DEGREES} degrees from their axis")
+    across = (np.arange(SPOT_TEXELS) * 2 + 1) / SPOT_TEXELS - 1
+    off = np.hypot(across[:, None], across) * tan(radians(light.outer_degrees))
+    inner, outer = cos(radians(light.inner_degrees)), cos(radians(light.outer_degrees))
+    falloff = np.clip((1 / np.sqrt(1 + off**2) - outer) / (inner - outer), 0, 1) ** 2
+    up = (0.0, 1.0, 0.0) if abs(light.direction[1]) < 0.9 * float(np.linalg.norm(light.direction)) else (1.0, 0.0, 0.0)
+    return {"type": "spot", "to_world": _frame(light.position, light.direction, up), "intensity": rgb(light.intensity),
+            "cutoff_angle": light.outer_degrees, "beam_width": light.outer_degrees,
+            "texture": {"type": "bitmap", "bitmap": np.repeat(falloff[..., None], 3, 2).astype(np.float32),
+                        "raw": True, "wrap_mode": "clamp"}}
 
 
 def _environment(environment: Environment) -> Plugin:
     """No plugin where the sky is black, since Mitsuba samples all lights alike."""
     color = environment.strength * np.asarray(environment.color)
     if environment.image is None:
-        return {"sky": {"type": "constant", "radiance": _rgb(color)}} if color.any() else {}
+        return {"sky": {"type": "constant", "radiance": rgb(color)}} if color.any() else {}
     angle = np.radians(environment.rotation_degrees)
     turned = np.eye(4)
     turned[np.ix_([0, 2], [0, 2])] = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
@@ -175,7 +151,3 @@ def rows_at_poles(image: NDArray[np.float32]) -> NDArray[np.float32]:
     rows[1::2] = image
     rows[::2] = (padded[:-1] + padded[1:]) / 2
     return rows
-
-
-def _rgb(values: Any) -> Plugin:
-    return {"type": "rgb", "value": [float(value) for value in values]}

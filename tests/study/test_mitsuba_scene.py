@@ -15,7 +15,8 @@ from clrt.scene.lights import DirectionalLight, PointLight
 from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from clrt.study.mitsuba_renderer import newest_llvm
-from clrt.study.mitsuba_scene import BSDFS, mitsuba_scene, rows_at_poles
+from clrt.study.mitsuba_bsdfs import BSDFS
+from clrt.study.mitsuba_scene import mitsuba_scene, rows_at_poles
 
 RNG = np.random.default_rng(5)
 

@@ -1,0 +1,63 @@
+"""`clrt bench agree`: whether another renderer draws the same pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import Size
+
+
+@click.command("agree")
+@click.argument("scenes", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SCENE...")
+@click.option("--size", type=Size(), help="Picture size in pixels; default: the scene's.")
+@click.option("--depth", type=click.IntRange(1, 1024), help="Most edges of a path; default: the scene's.")
+@click.option("--spp", type=click.IntRange(min=1), default=64, show_default=True, help="Samples a pixel of a picture.")
+@click.option("--seeds", type=click.IntRange(min=2), default=16, show_default=True, help="Pictures of each renderer.")
+@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+def agree_command(scenes: tuple[Path, ...], size: tuple[int, int] | None, depth: int | None, spp: int, seeds: int,
+                  device: str | None, json_file: Path | None) -> None:
+    """Whether clrt and Mitsuba (pip install mitsuba) draw the same pictures of each SCENE.
+
+    Each block of 16 x 16 pixels is compared by the spread of its means over the seeds. Exit code 1 where one differs
+    by more than chance, or the mean of a picture by more than 0.5 %.
+    """
+    from ..output.files import check_target
+    from ..output.report import write_report
+    from ..scene.file import load
+    from ..study.agreement import agreement
+
+    if json_file is not None:
+        check_target(json_file)
+    results = []
+    for number, path in enumerate(scenes):
+        scene = load(path)
+        settings = scene.render
+        settings = replace(settings, size=size or settings.size, max_depth=depth or settings.max_depth)
+        result = agreement(replace(scene, render=settings), spp, seeds, device)
+        for line in ([] if number else HEAD) + [_line(result)]:
+            click.echo(line)
+        results.append(result)
+    if json_file is not None:
+        write_report(json_file, {"scenes": results})
+        click.echo(str(json_file))
+    if not all(result["agree"] for result in results):
+        raise SystemExit(1)
+
+
+HEAD = [f"{'':22}{'pixels':>10}  {'mean over Mitsuba’s, ± standard error':48}{'blocks':>7}{'noise':>9}{'most':>9}"
+        f"{'largest':>9}{'p':>8}  agree",
+        "  noise: standard error of a block's relative difference, the median and the most; largest: such difference;",
+        "  p: of the least likely block and channel, corrected for their number"]
+
+
+def _line(result: Mapping[str, Any]) -> str:
+    means = " ".join(f"{ratio:.5f}±{error:.5f}" for ratio, error in zip(result["mean_ratio"], result["mean_error"]))
+    return (f"{result['scene']:22}{'x'.join(map(str, result['size'])):>10}  {means:48}{result['blocks']:7}"
+            + "".join(f"{value:9.3%}" for value in (*result["noise"], result["difference"]))
+            + f"{result['p']:8.2g}  " + ("yes" if result["agree"] else f"no: {result['rejected']} blocks differ"))

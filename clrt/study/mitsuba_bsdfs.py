@@ -1,0 +1,152 @@
+"""Materials as Mitsuba 3 is told of them: its own plugins where they mean the same, and `gltf` (mitsuba_gltf.py).
+
+To add a material, write what it is in BSDFS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError
+from ..scene.material import ALPHA_MIN, as_color
+from ..scene.materials import Conductor, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from ..scene.model import Mesh, Sphere
+from ..scene.pictures import linear_from_srgb
+from ..scene.textures import Texture, untextured
+
+Plugin = dict[str, Any]
+Floats = NDArray[np.float32]
+
+#: An alpha up to which the separable Smith term takes less than 4e-4 of even light that the height-correlated leaves.
+NEARLY_SMOOTH = 0.09
+CHANNELS = ("red", "green", "blue", "alpha")
+
+
+def bsdf(owner: Mesh | Sphere) -> Plugin:
+    """The owner's material, with vertex colours. UsageError names what has no counterpart."""
+    material = owner.material
+    if type(material) not in BSDFS:
+        raise UsageError(f"{owner.name}: Mitsuba is not told of {material.kernel} yet")
+    try:
+        plugin = BSDFS[type(material)](material)
+        if isinstance(owner, Mesh) and owner.colors is not None:
+            plugin = _painted(plugin, material)
+        if material.normal_map is not None:
+            plugin = {"type": "normalmap", "normalmap": _bend(material.normal_map), "bsdf": plugin}
+        plugin = plugin if isinstance(material, Dielectric) else {"type": "twosided", "front": plugin}
+        if material.one_sided or material.alpha_cutoff is not None:
+            raise ValueError("surfaces with one side, or cut out: it filters the cut")
+        if material.opacity != 1:
+            plugin = {"type": "mask", "opacity": number(material.opacity), "bsdf": plugin}
+    except ValueError as error:
+        raise UsageError(f"{owner.name}: Mitsuba cannot draw {error}") from None
+    return plugin
+
+
+def rgb(values: Any) -> Plugin:
+    return {"type": "rgb", "value": [float(value) for value in values]}
+
+
+def color(value: Any) -> Plugin:
+    """A colour, of which a texture is a picture that Mitsuba need not decode."""
+    if not isinstance(value, Texture):
+        return rgb(value)
+    return _bitmap(value, linear_from_srgb(_channels(value, "red", "green", "blue")) * np.array(as_color(value.factor)))
+
+
+def number(value: Any) -> Any:
+    """Likewise."""
+    if not isinstance(value, Texture):
+        return float(value)
+    return _bitmap(value, _channels(value, *[value.channel] * 3) * np.max(value.factor))
+
+
+def medium(material: Dielectric) -> Plugin | None:
+    """What is inside, where it absorbs."""
+    if material.attenuation_distance is None:
+        return None
+    rates = material.parameters()["absorption"]
+    return {"type": "homogeneous", "albedo": 0.0, "sigma_t": rgb(rates)}
+
+
+def _channels(texture: Texture, *names: str) -> Floats:
+    """(h, w, names), from 0 to 1."""
+    return np.asarray(texture.picture.texels[..., [CHANNELS.index(name) for name in names]] / 255, np.float32)
+
+
+def _bend(texture: Texture) -> Plugin:
+    """A normal map: linear, and with the factor in it."""
+    xyz = _channels(texture, "red", "green", "blue")
+    xyz[..., :2] = 0.5 + (xyz[..., :2] - 0.5) * np.max(texture.factor)
+    return _bitmap(texture, xyz)
+
+
+def _bitmap(texture: Texture, texels: Any) -> Plugin:
+    if texture.wrap[0] != texture.wrap[1]:
+        raise ValueError("a texture that wraps in two ways")
+    to_picture = np.eye(4)
+    to_picture[:2][:, [0, 1, 3]] = texture.to_picture
+    return {"type": "bitmap", "bitmap": np.asarray(texels, np.float32), "raw": True, "to_uv": to_picture,
+            "wrap_mode": texture.wrap[0], "filter_type": "bilinear" if texture.filter == "linear" else "nearest"}
+
+
+def _painted(plugin: Plugin, material: Material) -> Plugin:
+    """With vertex colours in the place of a colour that is white."""
+    if not isinstance(material, Diffuse) or material.color != (1.0, 1.0, 1.0):
+        raise ValueError("vertex colours but of diffuse, whose color is [1, 1, 1]")
+    return plugin | {"reflectance": {"type": "mesh_attribute", "name": "vertex_color"}}
+
+
+def _diffuse(material: Diffuse) -> Plugin:
+    return {"type": "diffuse", "reflectance": color(material.color)}
+
+
+def _mirror(material: Mirror) -> Plugin:
+    return {"type": "conductor", "material": "none", "specular_reflectance": color(material.color)}
+
+
+def _metallic_roughness(material: MetallicRoughness) -> Plugin:
+    """`principled` is GGX under Schlick's Fresnel term with the separable Smith term, if metallic is 1, exactly."""
+    if material.features() & {"LAYERS", "SPECULAR"}:
+        raise ValueError("metallic_roughness with layers")
+    if material.smith not in ("separable", "height_correlated") or material.multiple_scattering:
+        raise ValueError('metals but with smith = "separable" or "height_correlated", and single scattering')
+    values = material.parameters()
+    if material.smith == "separable" and values["metallic"] == 1 and not material.textures():
+        lobes = material.lobes
+        return {"type": "principled", "metallic": 1.0, "roughness": sqrt(lobes.alpha), "base_color": rgb(lobes.f0)}
+    return {"type": "gltf", "color": color(values["color"]), "f0": rgb(values["f0"]),
+            "metallic": number(values["metallic"]), "roughness": number(values["roughness"]),
+            "separable": material.smith == "separable"}
+
+
+def _dielectric(material: Dielectric) -> Plugin:
+    if material.thin and material.rough:
+        raise ValueError("glass that is thin and rough")
+    if untextured(material.roughness)**2 > NEARLY_SMOOTH:
+        raise ValueError("glass rougher than 0.3: its own has the separable Smith term")
+    if material.thin and untextured(material.color) != (1.0, 1.0, 1.0):
+        raise ValueError("thin glass in color: its own is not crossed again by what bounces inside")
+    plugin = {"type": "thindielectric" if material.thin else "dielectric", "int_ior": material.ior, "ext_ior": 1.0}
+    if material.rough:
+        plugin |= {"type": "roughdielectric", "distribution": "ggx",
+                   "alpha": max(untextured(material.roughness)**2, ALPHA_MIN)}
+    return plugin | {"specular_transmittance": color(material.color)}
+
+
+def _conductor(material: Conductor) -> Plugin:
+    values = material.parameters()
+    if untextured(material.roughness)**2 > NEARLY_SMOOTH:
+        raise ValueError("conductor rougher than 0.3: its own has the separable Smith term")
+    return {"type": "roughconductor", "distribution": "ggx", "eta": rgb(values["eta"]), "k": rgb(values["k"]),
+            "alpha": max(untextured(material.roughness)**2, ALPHA_MIN)}
+
+
+BSDFS: dict[type[Material], Callable[[Any], Plugin]] = {
+    Diffuse: _diffuse, Mirror: _mirror, MetallicRoughness: _metallic_roughness, Dielectric: _dielectric,
+    Conductor: _conductor}
