@@ -32,8 +32,8 @@ typedef struct {
 #endif
 
 #if TRIANGLES
-// By how much points are drawn from a triangle's edges towards its middle, along its plane: more than they are then moved
-// off it, so that rays from a corner of two walls do not start behind the other wall.
+// Nearer to a triangle's edge no point is: so far, in heights of the triangle, those beyond are drawn back along its plane.
+// That is more than they are then moved off it, so that rays from a corner of two walls do not start behind the other wall.
 #define INWARD (32.0f * UNIT_ROUNDOFF)
 
 // The edges are brought to length one or so first: the square of their product must not leave the range of floats.
@@ -47,7 +47,8 @@ static inline void triangle_surface(const Scene *scene, const Hits *hits, ireal 
     real3 p1 = GATHER3(scene->triangles, primitive, .p1);
     real3 p2 = GATHER3(scene->triangles, primitive, .p2);
     real b1 = hits->u, b2 = hits->v, b0 = 1.0f - b1 - b2;
-    real inner1 = b1 * (1.0f - 3.0f * INWARD) + INWARD, inner2 = b2 * (1.0f - 3.0f * INWARD) + INWARD;
+    real inner1 = minimum(maximum(b1, (real)(INWARD)), (real)(1.0f - 2.0f * INWARD));
+    real inner2 = minimum(maximum(b2, (real)(INWARD)), 1.0f - INWARD - inner1);
     real inner0 = 1.0f - inner1 - inner2;
     surface->p = mad3(p0, inner0, mad3(p1, inner1, scale(p2, inner2)));
     real3 size = mad3(absolute3(p0), inner0, mad3(absolute3(p1), inner1, scale(absolute3(p2), inner2)));

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import prod
+from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Ge, Le
+from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .fields import show, unknown
@@ -14,13 +19,25 @@ from .placing import Placing
 from .transform import Matrix, transform_camera, transform_faults, transform_mesh
 
 
+#: That one table may make.
+MOST_INSTANCES = 2_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Repeat(Placing):
+    """The keys of an entry of `repeat`: so many copies, each placed from the one before it."""
+
+    count: Annotated[int, Ge(1), Le(MOST_INSTANCES)]
+
+
 @dataclass(frozen=True, kw_only=True)
 class InstanceTable(Placing):
-    """The keys of [[instance]]."""
+    """The keys of [[instance]]; the entries of its `repeat` are read apart."""
 
     mesh: str
     name: str | None = None
     material: str | None = None
+    repeat: Any = ()
 
 
 class InstanceReader:
@@ -41,15 +58,30 @@ class InstanceReader:
         wrong = f"names {len(tables)} meshes; rename them" if tables else unknown(mesh, self._shown)
         return [] if len(tables) == 1 else [f"{where}.mesh: {show(mesh)} {wrong}"]
 
-    def read(self, table: InstanceTable, material: Material | None, where: str) -> list[Instance]:
-        """One for each mesh that the table's mesh shows. Raises SceneError for a transform that cannot be."""
-        matrix = table.to_world(where)
-        for fault, found in transform_faults(matrix[None, :3]).items():
-            if found[0]:
-                raise SceneError(f"{where}: its transform {fault}; write a scale without 0")
+    def read(self, table: InstanceTable, repeats: Sequence[Repeat], material: Material | None, where: str,
+             ) -> list[Instance]:
+        """One for each mesh that the table's mesh shows, and their copies. SceneError for transforms that cannot be."""
+        if (count := prod(repeat.count for repeat in repeats)) > MOST_INSTANCES:
+            raise SceneError(f"{where}.repeat: makes {count} copies; write counts of at most {MOST_INSTANCES} in all")
+        matrices = table.to_world(where)[None]
+        for i, repeat in enumerate(repeats):
+            matrices = repeated(matrices, repeat.to_world(f"{where}.repeat[{i}]"), repeat.count)
+        for fault, found in transform_faults(matrices[:, :3]).items():
+            if found.any():
+                copy = f", of copy {found.argmax()}," if found.size > 1 else ""
+                raise SceneError(f"{where}: its transform{copy} {fault}; write a scale without 0")
         shown = self._shown.get(table.mesh, [[]])[0]
         return [replace(moved(each, matrix), material=material or each.material, name=table.name or each.name)
-                for each in shown]
+                for matrix in matrices for each in shown]
+
+
+def repeated(matrices: NDArray[np.float64], step: Matrix, count: int) -> NDArray[np.float64]:
+    """(n, 4, 4) and count − 1 copies of them, each under one `step` more than those before it: (count·n, 4, 4)."""
+    copies = [matrices]
+    with np.errstate(all="ignore"):    # what grows beyond all numbers is found by the caller
+        for _ in range(count - 1):
+            copies.append(step @ copies[-1])
+    return np.concatenate(copies)
 
 
 def placed(model: Model, matrix: Matrix, material: Material | None, others: dict[str, Material]) -> Model:

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from ..errors import SceneError
 from .animation import Animation, Keyframe
 from .fields import field_problems, show, unknown
-from .instance_reader import InstanceReader, InstanceTable, placed
+from .instance_reader import InstanceReader, InstanceTable, Repeat, placed
 from .instancing import meshes_by_id
 from .lights import LIGHTS, Light
 from .materials import MATERIALS, Diffuse, Material
@@ -216,7 +216,15 @@ class SceneReader:
         material = self._material(values, where)
         table = self._build(InstanceTable, _one_scale(values), where)
         self.problems += self._instances.problems(values["mesh"], where) if "mesh" in values else []
-        return table and self._tried(self._instances.read, table, material, where) or []
+        repeats = self._repeats(values.get("repeat", ()), f"{where}.repeat")
+        return table and self._tried(self._instances.read, table, repeats, material, where) or []
+
+    def _repeats(self, values: Any, where: str) -> list[Repeat]:
+        if not isinstance(values, tuple) or not all(isinstance(entry, dict) for entry in values):
+            self.problems.append(f"{where}: {show(values)} is not a list of tables; write [{{ count = 3, … }}]")
+            return []
+        built = [self._build(Repeat, _one_scale(entry), f"{where}[{i}]") for i, entry in enumerate(values)]
+        return [each for each in built if each]
 
     def _tried(self, read: Callable[..., Kind], *arguments: Any) -> Kind | None:
         """read(*arguments), or None if it finds mistakes."""
