@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge, Lt
+from annotated_types import Ge, Le, Lt
 
 from ..errors import SceneError
+from .creases import creased
+from .instancing import meshes_by_id
 from .materials import Diffuse
 from .meshes import read_model
 from .model import Instance, Mesh, Model, Vector
@@ -33,13 +35,26 @@ class MeshTable(Placing):
     material: str | None = None
     materials: Mapping[str, str] | None = None
     normals: Normals = "file"
+    crease_degrees: Annotated[float, Ge(0), Le(180)] | None = None
     visible: bool = True
 
     def read(self, folder: Path, where: str) -> Model:
         """What is in its file, which is relative to `folder`, or in its vertices and faces, untransformed.
 
-        Raises SceneError for a file that cannot be read, indices out of range, and no geometry or two.
+        Raises SceneError for a file that cannot be read, indices out of range, no geometry or two, and creases of
+        normals that are not computed.
         """
+        if self.crease_degrees is None:
+            return self._read(folder, where)
+        if self.normals != "smooth":
+            raise SceneError(f'{where}: has crease_degrees, but normals = "{self.normals}"; write normals = "smooth"')
+        model = self._read(folder, where)
+        meshes = {number: creased(mesh, self.crease_degrees)
+                  for number, mesh in meshes_by_id([*model.instances, *map(Instance, model.meshes)]).items()}
+        return replace(model, meshes=[meshes[id(mesh)] for mesh in model.meshes],
+                       instances=[replace(each, mesh=meshes[id(each.mesh)]) for each in model.instances])
+
+    def _read(self, folder: Path, where: str) -> Model:
         inline = self.vertices is not None or self.faces is not None or self.uv is not None
         if self.file is not None and inline:
             raise SceneError(f"{where}: has a file and vertices, faces or uv; keep one of them")

@@ -44,21 +44,26 @@ def smooth_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """
     points, count = weld(vertices)
     corners = points[faces]
+    weighted = corner_normals(vertices, faces)
+    sums = np.stack([np.bincount(corners.ravel(), weighted[:, axis], count) for axis in range(3)], axis=1)
+    cancelled = np.linalg.norm(sums, axis=1) < 1e-9
+    if cancelled.any():
+        sums[cancelled] = _some_normal(corners, unit(weighted[::3]), count)[cancelled]
+    return unit(sums).astype(np.float32)[points]
+
+
+def corner_normals(vertices: FloatArray, faces: IntArray) -> NDArray[np.float64]:
+    """(3m, 3), by face and corner: the face's normal, as long as its angle there; 0 where the face has no area."""
     positions = [vertices[faces[:, corner]].astype(np.float64) for corner in range(3)]
     edges = [positions[(corner + 1) % 3] - positions[corner] for corner in range(3)]
     areas = np.cross(edges[0], edges[1])
-    doubled_area = np.linalg.norm(areas, axis=1)
-    face_normals = unit(areas)
-    sums = np.zeros((count, 3))
+    doubled_area, normals = np.linalg.norm(areas, axis=1), unit(areas)
+    weighted = np.empty((len(faces), 3, 3))
     for corner in range(3):
         # atan2 is exact for needles too, unlike the arc cosine; |a x b| is the same at all three corners.
         angles = np.arctan2(doubled_area, -np.einsum("ij,ij->i", edges[corner], edges[corner - 1]))
-        for axis in range(3):
-            sums[:, axis] += np.bincount(corners[:, corner], angles * face_normals[:, axis], count)
-    cancelled = np.linalg.norm(sums, axis=1) < 1e-9
-    if cancelled.any():
-        sums[cancelled] = _some_normal(corners, face_normals, count)[cancelled]
-    return unit(sums).astype(np.float32)[points]
+        weighted[:, corner] = angles[:, None] * normals
+    return weighted.reshape(-1, 3)
 
 
 def weld(vertices: FloatArray) -> tuple[NDArray[np.int64], int]:

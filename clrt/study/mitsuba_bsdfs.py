@@ -6,6 +6,7 @@ To add a material, write what it is in BSDFS.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import sqrt
 from typing import Any
 
@@ -17,13 +18,15 @@ from ..scene.material import ALPHA_MIN, as_color
 from ..scene.materials import Conductor, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ..scene.model import Mesh, Sphere
 from ..scene.pictures import linear_from_srgb
-from ..scene.textures import Texture, untextured
+from ..scene.textures import Texture, Wrap, untextured
 
 Plugin = dict[str, Any]
 Floats = NDArray[np.float32]
 
 #: An alpha up to which the separable Smith term takes less than 4e-4 of even light that the height-correlated leaves.
 NEARLY_SMOOTH = 0.09
+#: So many times finer is what cut-outs are cut from, each way.
+CUTS = 4
 CHANNELS = ("red", "green", "blue", "alpha")
 
 
@@ -39,10 +42,10 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
         if material.normal_map is not None:
             plugin = {"type": "normalmap", "normalmap": _bend(material.normal_map), "bsdf": plugin}
         plugin = plugin if isinstance(material, Dielectric) else {"type": "twosided", "front": plugin}
-        if material.one_sided or material.alpha_cutoff is not None:
-            raise ValueError("surfaces with one side, or cut out: it filters the cut")
+        if material.one_sided:
+            raise ValueError("surfaces with one side")
         if material.opacity != 1:
-            plugin = {"type": "mask", "opacity": number(material.opacity), "bsdf": plugin}
+            plugin = {"type": "mask", "opacity": _opacity(material), "bsdf": plugin}
     except ValueError as error:
         raise UsageError(f"{owner.name}: Mitsuba cannot draw {error}") from None
     return plugin
@@ -70,13 +73,35 @@ def medium(material: Dielectric) -> Plugin | None:
     """What is inside, where it absorbs."""
     if material.attenuation_distance is None:
         return None
-    rates = material.parameters()["absorption"]
-    return {"type": "homogeneous", "albedo": 0.0, "sigma_t": rgb(rates)}
+    rates = np.array(material.parameters()["absorption"])
+    most = float(max(rates.max(), 1e-30))
+    return {"type": "homogeneous", "albedo": 0.0, "sigma_t": rgb(rates / most), "scale": most}
 
 
 def _channels(texture: Texture, *names: str) -> Floats:
     """(h, w, names), from 0 to 1."""
     return np.asarray(texture.picture.texels[..., [CHANNELS.index(name) for name in names]] / 255, np.float32)
+
+
+def _opacity(material: Material) -> Any:
+    """What is cut out is cut finely beforehand, since Mitsuba would filter the cut. (Passing one is an edge there.)"""
+    texture, cutoff = material.opacity, material.alpha_cutoff
+    if cutoff is None or not isinstance(texture, Texture):
+        return number(texture if cutoff is None or isinstance(texture, Texture) else float(texture >= cutoff))
+    fine = finer(_channels(texture, *[texture.channel] * 3) * np.max(texture.factor), texture.wrap, CUTS)
+    return _bitmap(replace(texture, filter="nearest"), fine >= cutoff)
+
+
+def finer(texels: Any, wrap: tuple[Wrap, Wrap], times: int) -> Any:
+    """(h, w, channels) between its texels' middles: (times·h, times·w, channels)."""
+    for axis in (0, 1):
+        size = texels.shape[axis]
+        at = (np.arange(times * size) + 0.5) / times - 0.5
+        low = np.floor(at).astype(int)
+        share = np.expand_dims(at - low, [1, 2] if axis == 0 else [0, 2])
+        ends = [each % size if wrap[axis] == "repeat" else each.clip(0, size - 1) for each in (low, low + 1)]
+        texels = np.take(texels, ends[0], axis) * (1 - share) + np.take(texels, ends[1], axis) * share
+    return texels
 
 
 def _bend(texture: Texture) -> Plugin:

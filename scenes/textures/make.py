@@ -83,7 +83,7 @@ def tile() -> None:
     x, y = 2 * u - 1, 2 * v - 1
     r, angle = np.hypot(x, y), np.arctan2(y, x)
     corner, turn = np.hypot(1 - abs(x), 1 - abs(y)), np.arctan2(1 - abs(y), 1 - abs(x))
-    flower = step(0.62 + 0.2 * np.cos(8 * angle) - r, 0, 0.03) * step(r - 0.3 - 0.08 * np.cos(8 * angle + np.pi), 0, 0.03)
+    flower = step(0.62 + 0.2 * np.cos(8 * angle) - r, 0, 0.03) * step(r - 0.3 + 0.08 * np.cos(8 * angle), 0, 0.03)
     middle = step(0.2 - r, 0, 0.03)
     arcs = step(0.06 - abs(corner - 0.62 - 0.04 * np.cos(12 * turn)), 0, 0.03)
     stars = step(0.28 + 0.12 * np.cos(8 * turn) - corner, 0, 0.03)

@@ -201,3 +201,21 @@ def test_scenes_load_without_opencl(folder: Path) -> None:
 def test_materials_of_every_type_load(folder: Path) -> None:
     scene = load(write(folder, GOOD + '[[sphere]]\nmaterial = "glass"\n'))
     assert scene.spheres[1].material == Mirror()
+
+
+def test_instances_repeat_by_steps_of_the_world(folder: Path) -> None:
+    """Copy i is where i steps take the first one: here a ring, and rings above it, each twice as large."""
+    scene = load(write(folder, """
+instance = [{ mesh = "one", translate = [1, 0, 0], repeat = [
+    { count = 4, rotate_degrees = [0, 90, 0] }, { count = 3, scale = 2, translate = [0, 1, 0] }] }]
+[[mesh]]
+name = "one"
+vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+faces = [[0, 1, 2]]
+visible = false
+"""))
+    places = [each.to_world[:, 3] for each in scene.instances]
+    expected = [(size * x, height, size * z) for size, height in ((1, 0), (2, 1), (4, 3))
+                for x, z in ((1, 0), (0, -1), (-1, 0), (0, 1))]
+    np.testing.assert_allclose(places, expected, atol=1e-12)
+    np.testing.assert_allclose(scene.instances[-1].to_world[:, :3], [[0, 0, -4], [0, 4, 0], [4, 0, 0]], atol=1e-12)

@@ -11,11 +11,12 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.errors import UsageError
-from clrt.scene.lights import DirectionalLight, PointLight
+from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.textures import Picture, Texture
+from clrt.study.mitsuba_bsdfs import BSDFS, finer
 from clrt.study.mitsuba_renderer import newest_llvm
-from clrt.study.mitsuba_bsdfs import BSDFS
 from clrt.study.mitsuba_scene import mitsuba_scene, rows_at_poles
 
 RNG = np.random.default_rng(5)
@@ -46,13 +47,19 @@ def test_camera_looks_where_it_should_with_its_left_to_the_left() -> None:
     np.testing.assert_allclose(np.cross(matrix[:3, 2], [-4, -1.5, -4]), 0, atol=1e-12)
 
 
-def test_lenses_are_told_and_other_cameras_refused() -> None:
+def test_lenses_and_parallel_rays_are_told() -> None:
     lens = Camera(position=(0, 0, 4), aperture_radius=0.1)
     for camera, focus in ((lens, 4), (replace(lens, focus_distance=2.5), 2.5)):
         sensor = mitsuba_scene(replace(ball(Diffuse()), camera=camera))["sensor"]
         assert (sensor["type"], sensor["aperture_radius"], sensor["focus_distance"]) == ("thinlens", 0.1, focus)
-    with pytest.raises(UsageError, match="orthographic cameras"):
-        mitsuba_scene(replace(ball(Diffuse()), camera=Camera(projection="orthographic")))
+    plan = Camera(position=(0, 5, 0), look_at=(0, 0, 0), up=(0, 0, -1), projection="orthographic", view_height=3)
+    wide = replace(ball(Diffuse()), camera=plan, render=RenderSettings(size=(80, 40)))
+    sensor = mitsuba_scene(wide)["sensor"]
+    assert sensor["type"] == "orthographic"
+    np.testing.assert_allclose(sensor["to_world"] @ [-1, 0.5, 0, 1], [3, 5, -1.5, 1], atol=1e-12,
+                               err_msg="of -1 to 1 in its x, which is the picture's left")
+    with pytest.raises(UsageError, match="no equirectangular camera"):
+        mitsuba_scene(replace(wide, camera=Camera(projection="equirectangular")))
 
 
 def test_depth_counts_edges_and_direct_light_is_two_of_them() -> None:
@@ -74,12 +81,70 @@ def test_materials_are_told_by_what_they_reflect() -> None:
 
 
 @pytest.mark.parametrize(("material", "words"), [
-    (MetallicRoughness(metallic=0.5, smith="separable"), "not all metal"),
-    (MetallicRoughness(metallic=1.0), 'smith = "separable"'),
-    (MetallicRoughness(preset="gold", smith="separable", multiple_scattering=True), "single scattering")])
+    (MetallicRoughness(clearcoat=0.5), "with layers"), (MetallicRoughness(smith="schlick"), 'smith = "separable"'),
+    (MetallicRoughness(preset="gold", multiple_scattering=True), "single scattering"),
+    (Dielectric(roughness=0.5), "rougher than 0.3"), (Diffuse(one_sided=True), "one side")])
 def test_what_has_no_counterpart_is_refused_by_name(material: Material, words: str) -> None:
     with pytest.raises(UsageError, match=f"the ball: Mitsuba cannot draw .*{words}"):
         mitsuba_scene(ball(material))
+
+
+def test_other_gloss_is_a_plugin_of_our_own() -> None:
+    """Of all values by which the formula of docs/scene-format.md goes."""
+    plastic = bsdf(MetallicRoughness(preset="plastic_high", color=(0.1, 0.2, 0.3), roughness=0.4))
+    assert plastic == {"type": "gltf", "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}, "metallic": 0,
+                       "roughness": 0.4, "f0": {"type": "rgb", "value": [0.05, 0.05, 0.05]}, "separable": False}
+
+
+PICTURE = Picture(np.array([[[0, 51, 102, 255], [255, 153, 204, 0]]], np.uint8))
+
+
+def test_textures_are_linear_pictures_with_their_factors() -> None:
+    """sRGB's curve by its formula for colours, none for numbers, which are grey; their places by the transform."""
+    paint = Texture(picture=PICTURE, factor=(0.5, 1, 1), scale=(2, 3), offset=(0.25, 0), wrap=("clamp", "clamp"))
+    told = bsdf(Diffuse(color=paint))["reflectance"]
+    assert (told["type"], told["raw"], told["wrap_mode"], told["filter_type"]) == ("bitmap", True, "clamp", "bilinear")
+    curve = [((value / 255 + 0.055) / 1.055) ** 2.4 for value in (51, 102, 255, 153, 204)]
+    expected = [[0, curve[0], curve[1]], [0.5 * curve[2], curve[3], curve[4]]]
+    np.testing.assert_allclose(told["bitmap"][0], expected, rtol=1e-5)
+    np.testing.assert_allclose(told["to_uv"] @ [1, 1, 0, 1], [2.25, 3, 0, 1])
+    rough = bsdf(MetallicRoughness(roughness=Texture(picture=PICTURE, channel="blue", factor=0.5)))["roughness"]
+    np.testing.assert_allclose(rough["bitmap"][0], [[0.2] * 3, [0.4] * 3], rtol=1e-6)
+
+
+def test_cuts_are_made_between_texels() -> None:
+    """From 1 to 0 over the width of a texel: a threshold of a quarter is passed three quarters of the way."""
+    leaf = Texture(picture=PICTURE, channel="alpha", wrap=("clamp", "clamp"))
+    told = mitsuba_scene(ball(Diffuse(opacity=leaf, alpha_cutoff=0.25)))["sphere0"]["bsdf"]
+    assert (told["type"], told["opacity"]["filter_type"]) == ("mask", "nearest")
+    assert told["opacity"]["bitmap"].shape == (4, 8, 3)
+    np.testing.assert_array_equal(told["opacity"]["bitmap"][0, :, 0], [1, 1, 1, 1, 1, 0, 0, 0])
+    np.testing.assert_allclose(finer(np.array([[[0.0], [1.0]]]), ("repeat", "repeat"), 2)[0, :, 0], [.25, .25, .75, .75])
+
+
+def test_glass_that_absorbs_has_a_medium_inside() -> None:
+    """exp(−sigma·distance) is the attenuation colour."""
+    told = mitsuba_scene(ball(Dielectric(attenuation_color=(0.25, 0.5, 1), attenuation_distance=2)))
+    assert told["integrator"]["type"] == "volpath"
+    inside = told["sphere0"]["interior"]
+    sigma = inside["scale"] * np.array(inside["sigma_t"]["value"])
+    np.testing.assert_allclose(np.exp(-2 * sigma), [0.25, 0.5, 1], rtol=1e-6)
+    assert inside["albedo"] == 0 and max(inside["sigma_t"]["value"]) <= 1
+
+
+def test_spots_throw_their_falloff() -> None:
+    """At an angle of which the cosine is half way between the cones' f is ½, and the light f²."""
+    light = SpotLight(position=(0, 3, 0), direction=(0, -2, 0), intensity=(1, 2, 3), inner_degrees=20,
+                      outer_degrees=60)
+    told = mitsuba_scene(Scene(lights=[light]))["light0"]
+    np.testing.assert_allclose(told["to_world"][:3, [2, 3]], [[0, 0], [-1, 3], [0, 0]], atol=1e-12)
+    assert (told["cutoff_angle"], told["beam_width"]) == (60, 60)
+    half = (np.cos(np.radians(20)) + 0.5) / 2
+    across = np.tan(np.arccos(half)) / np.tan(np.radians(60))     # of the picture's half width
+    row = told["texture"]["bitmap"][len(told["texture"]["bitmap"]) // 2, :, 0]
+    middles = (np.arange(len(row)) + 0.5) / len(row) * 2 - 1
+    assert np.interp(across, middles, row) == pytest.approx(0.25, abs=1e-3)
+    assert np.interp(0.1, middles, row) == 1 and row[0] < 1e-6
 
 
 def test_other_filters_are_refused() -> None:
