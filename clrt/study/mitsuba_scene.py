@@ -18,6 +18,7 @@ from ..scene.instancing import unfolded
 from ..scene.lights import Light, PointLight, SpotLight
 from ..scene.materials import Dielectric
 from ..scene.model import Environment, Mesh, Scene, Sphere
+from ..scene.textures import Texture
 from .mitsuba_bsdfs import Plugin, bsdf, color, medium, rgb
 
 #: How near and far the camera sees, of the distance to where it looks.
@@ -82,6 +83,8 @@ def _surface(owner: Mesh | Sphere) -> Plugin:
     if isinstance(owner.material, Dielectric) and (inside := medium(owner.material)):
         shape["interior"] = inside
     if any(owner.material.radiance):
+        if isinstance(owner, Sphere) and isinstance(owner.material.emission, Texture):
+            raise UsageError(f"{owner.name}: Mitsuba samples the light of painted balls as if they were turned")
         shape["emitter"] = {"type": "area", "radiance": color(owner.material.emission)}
     return shape
 
