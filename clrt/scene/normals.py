@@ -45,10 +45,12 @@ def smooth_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
     points, count = weld(vertices)
     corners = points[faces]
     weighted = corner_normals(vertices, faces)
-    sums = np.stack([np.bincount(corners.ravel(), weighted[:, axis], count) for axis in range(3)], axis=1)
+    sums = np.zeros((count, 3))
+    for axis in range(3):
+        sums[:, axis] = np.bincount(corners.ravel(), weighted[:, axis], count)
     cancelled = np.linalg.norm(sums, axis=1) < 1e-9
     if cancelled.any():
-        sums[cancelled] = _some_normal(corners, unit(np.asarray(weighted[::3])), count)[cancelled]
+        sums[cancelled] = _some_normal(corners, unit(weighted[::3]), count)[cancelled]
     return unit(sums).astype(np.float32)[points]
 
 
