@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 #: Rows of the gallery. A row is as wide as the gallery, its pictures equally high.
-ROWS = [["textures", "night", "instances"], ["spheres", "caustics", "cornell"],
-        ["depth_of_field", "sunlit", "spot", "glass"], ["mirrors", "materials", "local", "furnace"]]
+ROWS = [["textures", "night", "instances"], ["spheres", "caustics", "cornell", "tree"],
+        ["depth_of_field", "sunlit", "dragon"], ["mirrors", "materials", "local"], ["spot", "glass", "furnace"]]
 #: Pixels: the gallery's width, the gap between its pictures, and the height of a picture of its own.
 WIDTH, GAP, HEIGHT = 1280, 6, 320
 #: Samples a pixel where the denoiser has little to do with fewer than a scene asks for, and what an eye sees best.
