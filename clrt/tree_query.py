@@ -16,7 +16,7 @@ from .accel.kernels import HitTests, tree_buffers, tree_defines, tree_features, 
 from .accel.layouts import LANES, Layout
 from .accel.wide import EMPTY
 from .device.arrays import resident
-from .device.launch import resized, run_seconds, wait_for
+from .device.launch import LaunchSize, run_seconds, wait_for
 from .device.loops import loop_turns
 from .device.open import Device
 from .device.preamble import defines, scene_struct, typedefs
@@ -64,7 +64,7 @@ class TreeQuery:
         """Of a tree over so many triangles and spheres, whose points are those of the rays in `frame`."""
         self.device = device
         self.kernel_seconds = self.longest_launch = 0.0
-        self._sizes = dict.fromkeys(QUERIES, FIRST)
+        self._sizes = {name: LaunchSize(FIRST) for name in QUERIES}
         self._hit = INSTANCE_HIT if "instances" in tree.buffers else HIT
         self._counts = np.zeros(1, COUNTS)
         self._counts["triangles"], self._counts["spheres"] = counts
@@ -155,7 +155,7 @@ class TreeQuery:
         """Parts of n rays, each for a launch."""
         first = 0
         while first < n:
-            size = min(CHUNK, max(FEWEST, self._sizes[name]))
+            size = min(CHUNK, max(FEWEST, self._sizes[name].units))
             yield slice(first, min(n, first + size))
             first += size
 
@@ -176,7 +176,7 @@ class TreeQuery:
         seconds = time.perf_counter() - start
         self.kernel_seconds += seconds
         self.longest_launch = max(self.longest_launch, run_seconds(launched) or seconds)
-        self._sizes[name] = resized(self._sizes[name], n, run_seconds(launched) or seconds)
+        self._sizes[name].learn(n, run_seconds(launched) or seconds)
         wait_for(cl.enqueue_copy(queue, answers, output, is_blocking=False))
 
     def _way(self, name: str, directions: NDArray[np.float32]) -> str:

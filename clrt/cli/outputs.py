@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -73,6 +74,12 @@ class Outputs:
         results = [*self.pictures, *self.raws, *self.beside, self.report, self.plot, reference]
         if checkpoint is not None and checkpoint.resolve() in [path.resolve() for path in results if path]:
             raise UsageError(f"{checkpoint}: is named for something else, too; name another --checkpoint")
+
+    def prepare(self) -> None:
+        """Loads what writes pictures while the first samples are rendered, so that nothing waits for it in the end."""
+        from ..output.images import load_writer
+
+        threading.Thread(target=load_writer, daemon=True).start()
 
     def save(self, image: Image, raw: bool = False) -> None:
         """Writes the pictures, or the raw ones."""

@@ -6,6 +6,7 @@ import atexit
 import gc
 import signal
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,7 @@ from .progress import Goal, Progress, make_progress
 
 if TYPE_CHECKING:
     from ..output.denoise import Denoiser
-    from ..rendering.renderer import Renderer
+    from ..rendering.renderer import Renderer, State
 
 
 @click.command()
@@ -150,17 +151,24 @@ def _render_frames(renderer: Renderer, sequence: Sequence, goal: Goal, denoiser:
 def _render(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, denoiser: Denoiser | None,
             progress: Progress) -> None:
     """Renders to the goal, or until it is interrupted, and writes the results; of an interrupted frame none."""
-    from ..output.denoise import denoised
-    from ..output.image import Image
     from ..rendering.guides import render_guides
-    from ..rendering.report import render_report
 
     guides = render_guides(renderer.session) if denoiser else {}
     progress.phase("render")
+    results.prepare()
     for state in renderer.passes(spp=goal.spp, time=goal.seconds, error=goal.error, reference=expected):
         progress.state(state, goal)
-    if results.header and renderer.stop_reason == "interrupted":
-        return
+        unfinished = results.header and renderer.stop_reason == "interrupted"
+        if renderer.stop_reason is not None and not unfinished:    # its last checkpoint is written at the same time
+            _write(renderer, state, results, denoiser, guides, expected, progress)
+
+
+def _write(renderer: Renderer, state: State, results: Outputs, denoiser: Denoiser | None, guides: Mapping[str, Any],
+           expected: Any, progress: Progress) -> None:
+    from ..output.denoise import denoised
+    from ..output.image import Image
+    from ..rendering.report import render_report
+
     progress.phase("write")
     image = Image(state.pixels, render_report(renderer, state) | results.header, aovs=renderer.aovs(state))
     if denoiser is None:

@@ -1,8 +1,8 @@
 """Bounded launches: work is cut so that no launch runs long, and waiting never blocks signals.
 
 A watchdog kills launches of 2 s on some systems, and a driver that waits inside a call cannot be interrupted. So a
-launch gets as much work as fills about TARGET_SECONDS, judged by the launches before it, few are in flight, and their
-events are polled. One that has not ended after `patience` has hung.
+launch gets as much work as fills TARGET_SECONDS at most, judged by the launches before it (`LaunchSize`), few are in
+flight, and their events are polled. One that has not ended after `patience` has hung.
 """
 
 from __future__ import annotations
@@ -19,20 +19,44 @@ from .fork import check_process
 from .open import Device
 from .pulse import VARIABLE, counted_call, note_hang, patience
 
-TARGET_SECONDS = 0.08
+TARGET_SECONDS = 0.07
+#: By how much a launch may be larger than the one before.
+GROWTH = 2
+#: How much of what was expected before a faster launch is still expected after it.
+REMEMBERED = 0.7
+#: Launches of less than this part of the work and of the target tell nothing: most of them is what any launch costs.
+LEAST_TELLING = 0.25
 IN_FLIGHT = 2
 #: Waiting counts at most so much between two looks: a process that was stopped (Ctrl-Z) has not waited.
 LONGEST_LOOK = 0.1
 
 
-class Launches:
-    """Feeds a queue with launches of adapted size. Sizes are in units of work, whatever the caller counts.
+class LaunchSize:
+    """How much work the next launch gets, in units of whatever the caller counts: `units`.
 
-    longest: seconds that a launch took, at most. None grows to more than twice the one before.
+    It goes by the slowest launches of late, not by their mean: some parts of a picture cost more than others, and other
+    programs come and go, so that launches that take the target on average would often take twice that.
     """
 
+    def __init__(self, first: int) -> None:
+        self.units = first
+        self._unit_seconds = 0.0
+
+    def learn(self, work: int, seconds: float) -> None:
+        """Hears what a launch of `work` units took."""
+        if work < LEAST_TELLING * self.units and seconds < LEAST_TELLING * TARGET_SECONDS:
+            return
+        took = seconds / work
+        self._unit_seconds = max(took, REMEMBERED * self._unit_seconds + (1 - REMEMBERED) * took)
+        wanted = TARGET_SECONDS / max(self._unit_seconds, 1e-15)
+        self.units = max(1, int(min(wanted, GROWTH * max(work, self.units))))
+
+
+class Launches:
+    """Feeds a queue with launches of adapted size. longest: seconds that a launch took, at most."""
+
     def __init__(self, first_size: int) -> None:
-        self.size = first_size
+        self._size = LaunchSize(first_size)
         self._running: deque[tuple[cl.Event, cl.Event, int]] = deque()
         self._wait = Wait()
         self._last = self.longest = 0.0
@@ -48,6 +72,11 @@ class Launches:
         if not self._running:
             self._last, self._wait = time.perf_counter(), Wait()
         self._running.append((event, last, work))
+
+    @property
+    def size(self) -> int:
+        """Units of work that the next one should have."""
+        return self._size.units
 
     @property
     def full(self) -> bool:
@@ -74,13 +103,7 @@ class Launches:
         seconds = run_seconds(event) or now - self._last
         self._last, self._wait = now, Wait()
         self.longest = max(self.longest, seconds)
-        self.size = resized(self.size, work, seconds)
-
-
-def resized(size: int, work: int, seconds: float) -> int:
-    """The work of the next launch, where the last one's took so long: it was `work`, and should have been `size`."""
-    wanted = work * TARGET_SECONDS / max(seconds, 1e-6)
-    return max(1, int(min(wanted, 2 * max(work, size))))
+        self._size.learn(work, seconds)
 
 
 def run_seconds(event: cl.Event) -> float:

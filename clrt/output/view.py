@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
+from ..rendering.bands import in_bands
 from .ocio import ACES, ocio_view
 
 FloatArray = NDArray[np.float32]
@@ -110,10 +111,14 @@ def to_display(pixels: FloatArray, view: str = "srgb", exposure: float = 0.0) ->
     NaN and negative values become 0, +Inf 255; the rest is rounded to nearest, halves up, without dithering.
     Raises UsageError for an unknown view.
     """
-    shown = view_called(view)
-    with np.errstate(over="ignore", invalid="ignore"):
-        exposed = pixels * np.exp2(np.float32(exposure))
-    linear = np.clip(np.nan_to_num(exposed, nan=0.0, posinf=BRIGHTEST), np.float32(0), np.float32(BRIGHTEST))
-    signal: FloatArray = np.clip(shown(linear), 0, 1)
-    levels: FloatArray = np.floor(255 * signal + np.float32(0.5))
-    return levels.astype(np.uint8)
+    shown, gain = view_called(view), np.exp2(np.float32(exposure))
+    levels = np.empty(pixels.shape, np.uint8)
+
+    def fill(rows: slice) -> None:
+        with np.errstate(over="ignore", invalid="ignore"):
+            exposed = pixels[rows] * gain
+        linear = np.clip(np.nan_to_num(exposed, nan=0.0, posinf=BRIGHTEST), np.float32(0), np.float32(BRIGHTEST))
+        levels[rows] = np.floor(255 * np.clip(shown(linear), 0, 1) + np.float32(0.5))
+
+    in_bands(len(pixels), fill)
+    return levels

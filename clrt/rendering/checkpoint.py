@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,7 @@ class Checkpoints:
         self.path, self._facts, self._device, self._every = path, facts, device, seconds
         self._next = time.perf_counter() + seconds
         self._failed, self._newest_is_whole = False, True
+        self._writer: threading.Thread | None = None
 
     def warn_of_another(self) -> None:
         """Warns where there is one already, which this render will replace."""
@@ -43,6 +45,17 @@ class Checkpoints:
     def due(self) -> bool:
         """Whether it is time for the next one."""
         return time.perf_counter() >= self._next
+
+    def begin(self, kept: Kept) -> None:
+        """Begins to write one, of which nothing may change until `wait` has returned."""
+        self.wait()
+        self._writer = threading.Thread(target=self.write, args=(kept,), daemon=True)
+        self._writer.start()
+
+    def wait(self) -> None:
+        """Returns when what `begin` began has ended."""
+        if self._writer is not None:
+            self._writer.join()
 
     def write(self, kept: Kept) -> None:
         """Writes one; where that is not possible it warns, once, and what was written before stays."""

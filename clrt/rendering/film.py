@@ -8,23 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .bands import in_bands
+
 #: Added to the squared reference in relMSE, so that black pixels do not divide by zero.
 RELATIVE_FLOOR = 0.01
-
-
-def relative_to(mean: NDArray[np.float64], variance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """expected² + 0.01 for a picture (h, w, 3) with the variance of its values.
-
-    What is expected of a pixel is the mean of the eight around it, so that one bright by chance does not count itself;
-    and from there on towards its own as far as its variance cannot explain the difference (James and Stein 1961).
-    """
-    padded = np.pad(mean, ((1, 1), (1, 1), (0, 0)), mode="edge")
-    rows = padded[:-2] + padded[1:-1] + padded[2:]
-    around = (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:] - mean) / 8
-    difference = mean - around
-    with np.errstate(divide="ignore", invalid="ignore"):
-        own = np.nan_to_num(np.maximum(1 - variance / difference**2, 0))
-    return np.asarray((around + own * difference) ** 2 + RELATIVE_FLOOR)
 
 
 class Film:
@@ -44,28 +31,49 @@ class Film:
         return self._mean_of("direct")
 
     def _mean_of(self, name: str) -> NDArray[np.float64]:
-        total = self.pixels[name].astype(np.float64) + self.pixels[f"{name}_error"]
-        return np.asarray(total / np.maximum(self.pixels["count"], 1)[..., None])
+        mean = np.empty((*self.pixels.shape, 3))
 
-    @cached_property
-    def variance(self) -> NDArray[np.float64]:
-        """(height, width, 3): of the mean, the sample variance over n; NaN of fewer than two samples.
+        def fill(rows: slice) -> None:
+            pixels = self.pixels[rows]
+            total = pixels[name].astype(np.float64) + pixels[f"{name}_error"]
+            mean[rows] = total / np.maximum(pixels["count"], 1)[..., None]
 
-        Where squares were too large to be summed (kernels/film.cl) it is taken as mean², the most it can be.
-        """
-        count = self.pixels["count"].astype(np.float64)[..., None]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            squares = (self.pixels["square"].astype(np.float64) + self.pixels["square_error"]) / count
-            summed = squares >= (1 - 1e-6) * self.mean**2    # false for NaN, too
-            variance = np.where(summed, np.maximum(squares - self.mean**2, 0) / (count - 1), self.mean**2)
-        return np.where(count < 2, np.nan, variance)
-
-    @cached_property
-    def relative_to(self) -> NDArray[np.float64]:
-        """(height, width, 3): what squared errors are divided by in relMSE, as far as this picture tells."""
-        return relative_to(self.mean, self.variance)
+        in_bands(len(mean), fill)
+        return mean
 
     @property
+    def variance(self) -> NDArray[np.float64]:
+        """(height, width, 3): of the mean, the sample variance over n; NaN of fewer than two samples."""
+        return np.concatenate(in_bands(len(self.mean), self._variance))
+
+    def _variance(self, rows: slice) -> NDArray[np.float64]:
+        """Where squares were too large to be summed (kernels/film.cl) it is taken as mean², the most it can be."""
+        pixels, most = self.pixels[rows], self.mean[rows] ** 2
+        count = pixels["count"].astype(np.float64)[..., None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            squares = (pixels["square"].astype(np.float64) + pixels["square_error"]) / count
+            summed = squares >= (1 - 1e-6) * most    # false for NaN, too
+            variance = np.where(summed, np.maximum(squares - most, 0) / (count - 1), most)
+        return np.where(count < 2, np.nan, variance)
+
+    def relative_to(self, rows: slice) -> NDArray[np.float64]:
+        """(rows, width, 3): what squared errors are divided by in relMSE, expected² + 0.01, as far as it is known.
+
+        What is expected of a pixel is the mean of the eight around it, so that one bright by chance does not count
+        itself; and from there on towards its own as far as its variance cannot explain the difference (James and Stein
+        1961).
+        """
+        own, variance = self.mean[rows], self._variance(rows)
+        first, edges = max(rows.start - 1, 0), (int(rows.start == 0), int(rows.stop == len(self.mean)))
+        padded = np.pad(self.mean[first:rows.stop + 1], (edges, (1, 1), (0, 0)), mode="edge")
+        sums = padded[:-2] + padded[1:-1] + padded[2:]
+        around = (sums[:, :-2] + sums[:, 1:-1] + sums[:, 2:] - own) / 8
+        difference = own - around
+        with np.errstate(divide="ignore", invalid="ignore"):
+            towards_own = np.nan_to_num(np.maximum(1 - variance / difference**2, 0))
+        return np.asarray((around + towards_own * difference) ** 2 + RELATIVE_FLOOR)
+
+    @cached_property
     def noise(self) -> float | None:
         """√relMSE that independent samples would have: sqrt(mean(Var[mean] / (expected² + 0.01))) over all values.
 
@@ -74,7 +82,8 @@ class Film:
         count = self.pixels["count"]
         if not count.size or count.min() < 2:
             return None
-        return float(np.sqrt(np.mean(self.variance / self.relative_to)))
+        sums = in_bands(len(self.mean), lambda rows: float(np.sum(self._variance(rows) / self.relative_to(rows))))
+        return float(np.sqrt(sum(sums) / self.mean.size))
 
     @property
     def samples(self) -> int:

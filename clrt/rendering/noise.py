@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .bands import in_bands
 from .film import Film
 from .tiles import over_pixels, tile_sums
 
@@ -53,7 +54,9 @@ class NoiseEstimate:
         due = tile_samples == 2 ** (self._level + 1)
         if not due.any():
             return
-        change = tile_sums((mean - self._mean) ** 2 / film.relative_to)
+        before = self._mean
+        change = np.concatenate(in_bands(
+            len(mean), lambda rows: tile_sums((mean[rows] - before[rows]) ** 2 / film.relative_to(rows))))
         level = self._level[due]
         self._changes += [np.full(due.shape, np.nan) for _ in range(max(level) + 1 - len(self._changes))]
         for k in np.unique(level[level >= 0]):

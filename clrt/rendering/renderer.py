@@ -111,6 +111,7 @@ class Renderer:
         self._begin()
         self._clock = 0.0
         self._interrupted = False
+        self._last: State
         if kept:
             self._noise, self.history, self.seconds = kept.noise, kept.history, kept.seconds
             self.session.restore(kept.film, kept.work)
@@ -163,7 +164,14 @@ class Renderer:
         first; without any of them at the scene's `spp`. Call it again to go on. reference: (height, width, 3).
         """
         check_stops(spp, time, error)
-        spp = planned_spp(self.settings, spp, time, error)
+        try:
+            yield from self._passes(planned_spp(self.settings, spp, time, error), time, error, reference)
+        finally:
+            if self._checkpoints is not None:
+                self._checkpoints.wait()
+
+    def _passes(self, spp: int | None, time: float | None, error: float | None,
+                reference: NDArray[np.float32] | None) -> Iterator[State]:
         self._clock = clock.perf_counter() - self.seconds
         self.stop_reason = self._reached(spp, time, error)
         if self.stop_reason is not None:
@@ -178,12 +186,18 @@ class Renderer:
             due = now >= next_state or done & (done - 1) == 0 or looks or self._adapts
             if self.stop_reason is None and not due:
                 continue
-            state = self._record_state(reference)
+            film = self._film()
+            if self._halfway:
+                self._keep(film, last=True)     # at once: history and estimate have nothing of this pass
+            state = self._record_state(film, reference)
             if self.stop_reason is None and looks and low_enough(state.noise, error):
                 self.stop_reason = "error"
+            if self.stop_reason is None and self._interrupted:    # while it made this state
+                self.stop_reason, self._interrupted = "interrupted", False
             cost = clock.perf_counter() - now
             next_state = now + max(STATE_SECONDS, STATE_COST * cost)
-            self._keep(state.film, last=self.stop_reason is not None)
+            if not self._halfway:
+                self._keep(film, last=self.stop_reason is not None)
             yield state
 
     def interrupt(self) -> None:
@@ -192,13 +206,17 @@ class Renderer:
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
-        film, tile_samples = self.session.film(), self.session.tile_samples
+        return self._state_of(self.session.film(), reference)
+
+    def _state_of(self, film: Film, reference: NDArray[np.float32] | None) -> State:
+        tile_samples = self.session.tile_samples
         self._noise.add(film, tile_samples)
         relmse = None
         if reference is not None:
             expected = reference.astype(np.float64)
             relmse = float(np.mean((film.mean - expected) ** 2 / (expected**2 + RELATIVE_FLOOR)))
-        noise = self._noise.at(film, tile_samples)
+        # The pass that it was interrupted in adds to no estimate: what was known before it is told at once.
+        noise = self._noise.at(self._last.film if self._halfway and self.history else film, tile_samples)
         self._last = State(self.session.samples_done, self.seconds, noise, relmse, film)
         return self._last
 
@@ -264,21 +282,31 @@ class Renderer:
         ends = [end for end in (spp, None if error is None else done + step - done % step) if end is not None]
         return self.session.render(self._pass_size(done, min(ends, default=None)))
 
-    def _record_state(self, reference: NDArray[np.float32] | None) -> State:
-        """The state, and its entry in the history, unless it is of a pass that will be gone on with."""
+    def _film(self) -> Film:
+        """The film with all that was launched, and the time until then."""
         self.session.wait()
         self.seconds = clock.perf_counter() - self._clock
-        state = self.state(reference)
-        if self.stop_reason != "interrupted" or not self.session.work.parts:
+        return self.session.film()
+
+    @property
+    def _halfway(self) -> bool:
+        """Whether it was interrupted inside a pass, which may be gone on with."""
+        return self.stop_reason == "interrupted" and bool(self.session.work.parts)
+
+    def _record_state(self, film: Film, reference: NDArray[np.float32] | None) -> State:
+        """The state, and its entry in the history, unless it is of a pass that will be gone on with."""
+        state = self._state_of(film, reference)
+        if not self._halfway:
             entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
             self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
         return state
 
     def _keep(self, film: Film | None = None, last: bool = False) -> None:
-        """Writes a checkpoint where one is due, or the last one; film: as it is now, if that is known."""
+        """Writes a checkpoint where one is due, or begins to write the last one; film: as it is now, if it is known."""
         if self._checkpoints is not None and (last or self._checkpoints.due):
-            self._checkpoints.write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(),
-                                         self.session.work, self._noise))
+            write = self._checkpoints.begin if last else self._checkpoints.write
+            write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(), self.session.work,
+                       self._noise))
 
     def _pass_size(self, done: int, spp: int | None) -> int:
         """Samples of the next pass: never past a power of two, so that history has them, nor past the end."""

@@ -26,7 +26,7 @@ from .work import Work
 FEWEST_TILES = 16
 #: Launches of a pass, about, unless a single sample a pixel takes more.
 PASS_LAUNCHES = 4
-FIRST_LAUNCH_SAMPLES = 1 << 15
+FIRST_LAUNCH_SAMPLES = 1 << 13
 #: Pixels of all kinds are whole numbers of it.
 BLACK = np.zeros(8, np.uint32)
 
