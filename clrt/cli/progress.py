@@ -6,6 +6,7 @@ import json
 import sys
 from collections import deque
 from dataclasses import dataclass
+from math import floor
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -26,8 +27,8 @@ class Progress:
         self._pace.add(state.seconds, state.film.samples)
         return time_left(state, goal, self._pace.rate)
 
-    def _told(self, state: State) -> str:
-        return describe(state, self._pace.rate)
+    def _told(self, state: State, goal: Goal) -> str:
+        return f"{goal.percent(state)}{describe(state, self._pace.rate)}"
 
     def phase(self, name: str) -> None:
         """A phase of PHASES begins."""
@@ -59,7 +60,7 @@ class PlainProgress(Progress):
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)
-        _say(self._told(state) + (f"  about {left:.0f} s left" if left is not None else ""))
+        _say(self._told(state, goal) + (f"  about {left:.0f} s left" if left is not None else ""))
 
 
 class JsonProgress(Progress):
@@ -102,7 +103,7 @@ class BarProgress(Progress):
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)
-        status = self._told(state) + (f"  {left:.0f} s left" if left is not None else "")
+        status = self._told(state, goal) + (f"  {left:.0f} s left" if left is not None else "")
         self._bar.update(self._task, total=1.0, completed=goal.done(state), status=status)
 
     def __enter__(self) -> Progress:
@@ -157,8 +158,12 @@ class Goal:
         """The part that is done, 0 to 1."""
         parts = [state.spp / self.spp] if self.spp else []
         parts += [state.seconds / self.seconds] if self.seconds else []
-        parts += [(self.error / state.noise) ** 2] if self.error and state.noise else []
+        parts += [(self.error / state.stops_by) ** 2] if self.error and state.stops_by else []
         return min(1.0, max(parts, default=0.0))
+
+    def percent(self, state: State) -> str:
+        """What is done for certain, rounded down: 100 % is the end, and nothing else."""
+        return f"{floor(100 * self.done(state)):3} %  "
 
 
 def time_left(state: State, goal: Goal, rate: float) -> float | None:
@@ -169,14 +174,16 @@ def time_left(state: State, goal: Goal, rate: float) -> float | None:
     ends = [] if goal.seconds is None else [goal.seconds - state.seconds]
     if goal.spp is not None:
         ends.append((goal.spp * state.film.pixels.size - state.film.samples) / rate)
-    if goal.error is not None and state.noise:
-        ends.append(((state.noise / goal.error) ** 2 - 1) * state.film.samples / rate)
+    if goal.error is not None and state.stops_by:
+        ends.append(((state.stops_by / goal.error) ** 2 - 1) * state.film.samples / rate)
     return max(0.0, min(ends)) if ends else None
 
 
 def describe(state: State, rate: float) -> str:
     """Samples, time, samples a second and error in one line."""
     error = "" if state.noise is None else f"  noise {state.noise:.4f}"
+    if state.tile_noise is not None:
+        error += f" (of tiles {state.tile_noise:.4f})"
     if state.relmse is not None:
         error += f"  relMSE {state.relmse:.3g}"
     return f"{state.spp} spp  {state.seconds:.1f} s  {rate / 1e6:.2f} Msamples/s{error}"

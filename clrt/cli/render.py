@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 @click.option("--spp", type=click.IntRange(min=1), help="Stop at this many samples a pixel.")
 @click.option("--time", "seconds", type=float, metavar="SECONDS", help="Stop after this time.")
 @click.option("--error", type=float, help="Stop at this estimated error (root of relMSE).")
+@click.option("--error-percentile", type=click.FloatRange(0, 100, min_open=True), metavar="PERCENT",
+              help="Stop where so much of the picture, in tiles of 8x8 pixels, has that error, not the whole.")
 @click.option("--depth", type=click.IntRange(1, 1024), help="Path edges: 1 glow only, 2 direct light, 3 one bounce.")
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers.")
 @click.option("--device", "devices", multiple=True, metavar="SEL",
@@ -68,7 +70,8 @@ if TYPE_CHECKING:
 @verbose_option
 @tracing_options
 def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tuple[int, int] | None, spp: int | None,
-            seconds: float | None, error: float | None, depth: int | None, seed: int | None, devices: tuple[str, ...],
+            seconds: float | None, error: float | None, error_percentile: float | None, depth: int | None,
+            seed: int | None, devices: tuple[str, ...],
             integrator: str | None, sampler: str | None, pixel_filter: str | None, adaptive: bool | None,
             reference: Path | None, report: Path | None, plot: Path | None, aovs: tuple[str, ...], denoise: bool,
             checkpoint: Path | None, checkpoint_every: float, resume: bool, view: str, exposure: float,
@@ -100,6 +103,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             raise UsageError("--resume goes on from a checkpoint; name its file with --checkpoint")
         results.check(reference, checkpoint)
     check_stops(spp, seconds, error)
+    if error_percentile is not None and error is None:
+        raise UsageError("--error-percentile says of how much of the picture --error is asked; name that, too")
     denoiser = Denoiser() if denoise else None
     if quiet:
         silence()
@@ -108,7 +113,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         "size": size, "max_depth": depth, "seed": seed, "device": devices or None,
         "integrator": integrator, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
         "checkpoint": None if print_kernel else checkpoint, "resume": resume and not (print_kernel or sequence),
-        "checkpoint_seconds": checkpoint_every, "aovs": beside, **tracing}
+        "checkpoint_seconds": checkpoint_every, "error_percentile": error_percentile, "aovs": beside, **tracing}
     with make_progress(progress_kind, quiet) as progress:
         progress.phase("load")
         content = load(scene, camera)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from .bands import in_bands
 from .film import Film
-from .tiles import over_pixels, tile_sums
+from .tiles import over_pixels, tile_pixels, tile_sums
 
 #: By how much the squared error falls when samples double: as for independent ones, up to the third power.
 LEAST_FALL, MOST_FALL = 2.0, 8.0
@@ -71,6 +71,14 @@ class NoiseEstimate:
         if limit is None or not self._changes or self._level.min() < 1:
             return limit
         return min(limit, float(np.sqrt(np.sum(self.tile_errors(tile_samples)) / film.mean.size)))
+
+    def of_tiles(self, tile_samples: NDArray[np.int64], size: tuple[int, int], percent: float) -> float | None:
+        """The √relMSE of a tile that so many per cent of the tiles of a picture of `size` do not exceed; None before
+        all have two samples."""
+        if not self._changes or self._level.min() < 1:
+            return None
+        errors = self.tile_errors(tile_samples) / (3 * tile_pixels(size))
+        return float(np.sqrt(np.percentile(errors, percent, method="higher")))
 
     def tile_errors(self, tile_samples: NDArray[np.int64]) -> NDArray[np.float64]:
         """(rows, columns) estimated sums over a tile's values of squared error / (expected² + 0.01).

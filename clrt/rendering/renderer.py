@@ -7,6 +7,7 @@ import time as clock
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ from .film import RELATIVE_FLOOR, Film
 from .first_hits import first_hits
 from .kept import Kept
 from .noise import NoiseEstimate
-from .stops import check_step, check_stops, low_enough, planned_spp
+from .stops import check_percentile, check_step, check_stops, low_enough, planned_spp
 from .tiles import tile_pixels, tile_sums
 
 #: Between two states at least this long passes, and this many times what making a state costs.
@@ -44,13 +45,25 @@ MOST_TIMES_PLANNED = 4
 @dataclass(frozen=True)
 class State:
     """The picture so far. spp: samples a pixel, the mean where sampling is adaptive; noise: estimated √relMSE, None
-    below 2 samples; relmse: against the reference, if given."""
+    below 2 samples; relmse: against the reference, if given; tile_noise: what the renderer's percentile of tiles have
+    at most, if it has one."""
 
     spp: int
     seconds: float
     noise: float | None
     relmse: float | None
     film: Film
+    tile_noise: float | None = None
+
+    @property
+    def stops_by(self) -> float | None:
+        """What is compared with a wanted error."""
+        return self.noise if self.tile_noise is None else self.tile_noise
+
+    @property
+    def noise_ratio(self) -> float | None:
+        """The noise over the true √relMSE, where both are known."""
+        return self.noise / sqrt(self.relmse) if self.noise is not None and self.relmse else None
 
     @cached_property
     def pixels(self) -> NDArray[np.float32]:
@@ -68,6 +81,8 @@ class Renderer:
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
     checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the end; resume:
     go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
+    error_percentile: a wanted error is reached where so many per cent of the tiles of 8 x 8 pixels have it, not the
+    whole picture, which some that converge slowly would keep from ending.
     aovs: pictures that are made beside, by their names (docs/aovs.md); those of a state: see `aovs`.
     Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
@@ -84,8 +99,11 @@ class Renderer:
                  sphere: str = "robust", offset: str = "bound", builder: str | None = None, layout: str | None = None,
                  lanes: int | None = None, paths: str | None = None,
                  on_phase: Callable[[str], None] = lambda phase: None, checkpoint: str | Path | None = None,
-                 resume: bool = False, checkpoint_seconds: float = 30.0, aovs: str | Iterable[str] = ()) -> None:
+                 resume: bool = False, checkpoint_seconds: float = 30.0,
+                 error_percentile: float | None = None, aovs: str | Iterable[str] = ()) -> None:
         self._aovs = chosen_aovs(aovs)
+        check_percentile(error_percentile)
+        self._percentile = error_percentile
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
                                  "sampler": sampler, "filter": filter, "adaptive": adaptive}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
@@ -190,7 +208,7 @@ class Renderer:
             if self._halfway:
                 self._keep(film, last=True)     # at once: history and estimate have nothing of this pass
             state = self._record_state(film, reference)
-            if self.stop_reason is None and looks and low_enough(state.noise, error):
+            if self.stop_reason is None and looks and low_enough(state.stops_by, error):
                 self.stop_reason = "error"
             if self.stop_reason is None and self._interrupted:    # while it made this state
                 self.stop_reason, self._interrupted = "interrupted", False
@@ -217,7 +235,9 @@ class Renderer:
             relmse = float(np.mean((film.mean - expected) ** 2 / (expected**2 + RELATIVE_FLOOR)))
         # The pass that it was interrupted in adds to no estimate: what was known before it is told at once.
         noise = self._noise.at(self._last.film if self._halfway and self.history else film, tile_samples)
-        self._last = State(self.session.samples_done, self.seconds, noise, relmse, film)
+        percentile = self._percentile
+        of_tiles = None if percentile is None else self._noise.of_tiles(tile_samples, self.session.size, percentile)
+        self._last = State(self.session.samples_done, self.seconds, noise, relmse, film, of_tiles)
         return self._last
 
     def aovs(self, state: State) -> dict[str, NDArray[np.generic]]:
@@ -238,7 +258,7 @@ class Renderer:
         if done and spp is not None and done >= spp:
             return "spp"
         looks = done and error is not None and self._is_check(done) and not self.session.work.parts
-        return "error" if looks and low_enough(self.state().noise, error) else None
+        return "error" if looks and low_enough(self.state().stops_by, error) else None
 
     def _run_pass(self, spp: int | None, time: float | None, error: float | None) -> None:
         """One pass; sets the stop reason where `time` is over or it is interrupted, maybe inside the pass."""

@@ -32,7 +32,8 @@ def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
                    "features": compiled.features, "longest_launch_seconds": session.longest_launch},
         "peak_device_bytes": session.device_bytes, "history": renderer.history,
         **({"devices": session.shares()} if len(infos) > 1 else {}),
-        **({} if state.relmse is None else {"relmse": state.relmse}),
+        **({} if state.tile_noise is None else {"tile_noise": state.tile_noise}),
+        **({} if state.relmse is None else {"relmse": state.relmse, "noise_ratio": state.noise_ratio}),
     }
 
 

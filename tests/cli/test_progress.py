@@ -81,3 +81,10 @@ def test_how_much_is_told(tmp_path: Path, options: list[str], shown: list[str], 
     result = render(tmp_path, "--progress", "plain", *options)
     assert (result.returncode, result.stdout) == (0, "scene.png\n"), result.stderr
     assert all(word in result.stderr for word in shown) and not any(word in result.stderr for word in hidden)
+
+
+def test_percentages_are_rounded_down() -> None:
+    """A render that has not ended is never told to be at 100 %."""
+    assert Goal(1000, None, None).percent(state(999, 3.0)) == " 99 %  "
+    assert Goal(None, None, 0.1).percent(state(10, 3.0, 0.1001)) == " 99 %  "
+    assert Goal(1000, None, None).percent(state(1000, 3.0)) == "100 %  "

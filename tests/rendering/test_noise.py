@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from clrt.device.open import Device
+from clrt.errors import UsageError
 from clrt.rendering.film import RELATIVE_FLOOR
 from clrt.rendering.renderer import Renderer
+from clrt.rendering.tiles import tile_sums
 from clrt.scene.materials import Diffuse, MetallicRoughness
 from clrt.scene.model import Camera, Environment, RenderSettings, Sampler, Scene, Sphere
 
@@ -61,3 +63,22 @@ def test_noise_of_a_picture_without_any(device: Device) -> None:
     scene = Scene(environment=Environment(color=(1.0, 1.0, 1.0)), render=RenderSettings(size=(8, 8), spp=4))
     noises = [state.noise for state in Renderer(scene, device=device.info.index).passes()]
     assert noises[0] is None and max(noise for noise in noises if noise is not None) < 1e-6
+
+
+def test_a_percentile_of_tiles_ends_a_render(device: Device) -> None:
+    """The fewer tiles need the wanted error, the sooner; and they have it, by the estimate and by the truth."""
+    scene, index, size = outdoors(), device.info.index, (64, 64)
+    truth = list(Renderer(scene, device=index, size=size, seed=1, spp=1024).passes(spp=1024))[-1].film.mean
+    states = {percent: list(Renderer(scene, device=index, size=size, error_percentile=percent).passes(error=0.1))[-1]
+              for percent in (50, 90, 100)}
+    assert states[50].spp < states[90].spp < states[100].spp
+    for percent, state in states.items():
+        errors = tile_sums((state.film.mean - truth) ** 2 / (truth**2 + RELATIVE_FLOOR)) / (3 * 64)
+        assert state.tile_noise is not None and state.tile_noise <= 0.1
+        assert np.mean(np.sqrt(errors) <= 0.12) >= 0.9 * percent / 100
+
+
+@pytest.mark.parametrize("percentile", [0, -1, 101, float("nan")])
+def test_percentiles_that_are_none(percentile: float) -> None:
+    with pytest.raises(UsageError, match="error_percentile"):
+        Renderer(room(), error_percentile=percentile)

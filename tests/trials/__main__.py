@@ -1,0 +1,19 @@
+"""`python -m tests.trials [NAME...]`: see the package."""
+
+from __future__ import annotations
+
+import sys
+import time
+from importlib import import_module
+
+NAMES = ("launches", "interrupts", "kills", "damage", "errors", "scaling", "drivers", "caches")
+
+for name in sys.argv[1:] or NAMES:
+    if name not in NAMES:
+        sys.exit(f"no trial {name!r}; there are {', '.join(NAMES)}")
+    module = import_module(f".{name}", __package__)
+    print(f"== {name}: {(module.__doc__ or '').splitlines()[0]}", flush=True)
+    start = time.perf_counter()
+    for line in module.trial():
+        print(f"  {line}", flush=True)
+    print(f"  ({time.perf_counter() - start:.0f} s)", flush=True)

@@ -1,0 +1,56 @@
+"""kill -9 at 100 random moments, then --resume: film, samples and estimate, bit for bit."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..cli.test_checkpoints import arrays
+from .renders import ALL_THE_TIME, CORNELL, finish, start
+
+KILLS = 100
+#: The second takes longer for the same number: rounds of some tiles each.
+MODES = {"even": ("--spp", 320), "adaptive": ("--spp", 192, "--adaptive")}
+
+
+def trial() -> Iterator[str]:
+    moments, met = random.Random(11), Counter[str]()
+    whole = {mode: left_alone(mode) for mode in MODES}
+    for number in range(KILLS):
+        mode = list(MODES)[number % 2]
+        expected, seconds = whole[mode]
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            process = render(folder, mode)
+            time.sleep(moments.uniform(0.3, max(0.4, seconds)))
+            met["alive"] += process.poll() is None
+            process.kill()
+            process.communicate()
+            met["with a checkpoint"] += (folder / "a.ck").exists()
+            met["half written"] += (folder / "a.ck.new").exists()
+            met["the older alone"] += (folder / "a.ck~").exists() and not (folder / "a.ck").exists()
+            finish(render(folder, mode))
+            met["equal"] += arrays(folder / "a.ck") == expected
+    yield f"{met['equal']} of {KILLS} equal; when killed: " + ", ".join(
+        f"{count} {what}" for what, count in met.items() if what != "equal")
+
+
+def render(folder: Path, mode: str) -> subprocess.Popen[str]:
+    return start(folder, CORNELL, "--size", "64x64", "--checkpoint", "a.ck", "--resume", "--checkpoint-every", 0, "-o",
+                 "a.exr", "-q", *MODES[mode], program=ALL_THE_TIME)
+
+
+def left_alone(mode: str) -> tuple[dict[str, bytes], float]:
+    """What the checkpoint of a render holds in the end that nobody killed, and the seconds it took."""
+    for _ in range(2):     # the first one compiles
+        with tempfile.TemporaryDirectory() as name:
+            clock = time.perf_counter()
+            finish(render(Path(name), mode))
+            seconds = time.perf_counter() - clock
+            found = arrays(Path(name) / "a.ck")
+    return found, seconds

@@ -1,0 +1,60 @@
+"""One device of one thread, then two of one thread each: same picture, and how much faster; one killed on the way.
+
+POCL_MAX_PTHREAD_COUNT=1 makes one thread each of PoCL's devices, and a device may be named twice. Means nothing but on
+a machine with two idle cores.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from statistics import median
+
+from clrt.output.images import read_image
+
+from ..cli.test_faults import FAULTY, fault
+from .renders import CORNELL, GALLERY, finish, start
+
+TURNS, FAILURES = 5, 20
+SCENES = [scene for scene in GALLERY if scene.stem in ("cornell", "glass", "spheres", "spot")]
+RENDERS = {"one": ("--device", "0"), "two": ("--device", "0", "--device", "0")}
+
+
+def trial() -> Iterator[str]:
+    os.environ["POCL_MAX_PTHREAD_COUNT"] = "1"
+    yield f"{'scene':12}{'one':>9}{'two':>9}  times as fast"
+    for scene in SCENES:
+        seconds: dict[str, list[float]] = {name: [] for name in RENDERS}
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            for _ in range(TURNS):
+                for kind, devices in RENDERS.items():
+                    finish(start(folder, scene, "--size", "512x384", "--spp", 64, "-q", "-o", f"{kind}.exr",
+                                 "--report", f"{kind}.json", *devices))
+                    seconds[kind].append(json.loads((folder / f"{kind}.json").read_text())["seconds"])
+            pictures = [read_image(folder / f"{kind}.exr").tobytes() for kind in RENDERS]
+        one, two = (median(seconds[kind]) for kind in RENDERS)
+        same = "same picture" if pictures[0] == pictures[1] else "OTHER PICTURE"
+        yield f"{scene.stem:12}{one:8.2f}s{two:8.2f}s  {one / two:.2f}, {same}"
+    del os.environ["POCL_MAX_PTHREAD_COUNT"]
+    yield f"one of two that fails at a random moment: {failing()} of {FAILURES} ended in the same picture"
+
+
+def failing() -> int:
+    """How often two devices, of which one is lost or never ends a launch, made the picture of one."""
+    moments, options = random.Random(2), (CORNELL, "--size", "256x256", "--spp", "64", "-o")
+    with tempfile.TemporaryDirectory() as name:
+        folder, library = Path(name), Path(name) / "libfaulty.so"
+        subprocess.run(["gcc", "-shared", "-fPIC", "-w", "-o", str(library), str(FAULTY), "-ldl"], check=True)
+        finish(start(folder, *options, "whole.exr", *RENDERS["one"]))
+        whole, same = read_image(folder / "whole.exr").tobytes(), 0
+        for number in range(FAILURES):
+            faulty = fault(library, ("lost", "endless")[number % 2], number // 2 % 2, moments.randrange(1, 12))
+            messages = finish(start(folder, *options, "a.exr", *RENDERS["two"], environment=os.environ | faulty))
+            same += "is left out" in messages and read_image(folder / "a.exr").tobytes() == whole
+    return same
