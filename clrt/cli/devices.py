@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -34,6 +33,7 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     it passes.
     """
     from ..device.discover import NOTHING, as_dict, find_devices, select
+    from ..device.preference import preferred_device
 
     before = [info for info, _ in find_devices(again=True)]
     wanted = [select(selector)[0].id for selector in selectors]
@@ -48,8 +48,9 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
         click.echo("\n".join(line for info in found for line in _lines(info)), nl=bool(found))
     if not found:
         click.echo(NOTHING, err=True)
-    if named := os.environ.get("CLRT_DEVICE"):
-        click.echo(f"CLRT_DEVICE={named}: {select(named)[0].index} is used where none is named", err=True)
+    if preference := preferred_device():
+        click.echo(f"{preference.origin} names {preference.selector!r}: device {select()[0].index} is used where none "
+                   "is named", err=True)
     problems = unmeasured + [f"{info.name} failed the check: update the driver and run `clrt devices --check` again; "
                              "until that passes, it is used only if it is named"
                              for info in found if info.id in verdicts and info.failed]

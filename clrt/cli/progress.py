@@ -30,8 +30,8 @@ class Progress:
     def _told(self, state: State, goal: Goal) -> str:
         return f"{goal.percent(state)}{describe(state, self._pace.rate)}"
 
-    def phase(self, name: str) -> None:
-        """A phase of PHASES begins."""
+    def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
+        """A phase of PHASES begins; "render" on a device, with so much of its memory."""
 
     def frame(self, number: int, done: int, count: int) -> None:
         """The frame of this number begins; of the `count` that are to be made so many are done."""
@@ -51,8 +51,8 @@ class Progress:
 class PlainProgress(Progress):
     """A line for each phase and state."""
 
-    def phase(self, name: str) -> None:
-        _say(PHASES[name])
+    def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
+        _say(PHASES[name] + where(device, device_bytes))
 
     def frame(self, number: int, done: int, count: int) -> None:
         super().frame(number, done, count)
@@ -66,8 +66,8 @@ class PlainProgress(Progress):
 class JsonProgress(Progress):
     """One JSON object a line, with `phase`; in the phase "render" also the state."""
 
-    def phase(self, name: str) -> None:
-        _say(json.dumps({"phase": name}))
+    def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
+        _say(json.dumps({"phase": name, **({"device": device, "device_bytes": device_bytes} if device else {})}))
 
     def frame(self, number: int, done: int, count: int) -> None:
         super().frame(number, done, count)
@@ -94,8 +94,8 @@ class BarProgress(Progress):
         self._task = self._bar.add_task("", total=None, status="")
         self._frame = ""
 
-    def phase(self, name: str) -> None:
-        self._bar.update(self._task, description=self._frame + PHASES[name])
+    def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
+        self._bar.update(self._task, description=self._frame + PHASES[name] + where(device, device_bytes))
 
     def frame(self, number: int, done: int, count: int) -> None:
         super().frame(number, done, count)
@@ -177,6 +177,11 @@ def time_left(state: State, goal: Goal, rate: float) -> float | None:
     if goal.error is not None and state.stops_by:
         ends.append(((state.stops_by / goal.error) ** 2 - 1) * state.film.samples / rate)
     return max(0.0, min(ends)) if ends else None
+
+
+def where(device: str, device_bytes: int) -> str:
+    """On which device, and how much memory that takes there."""
+    return f" on {device}, {device_bytes / 2**20:.1f} MiB there" if device else ""
 
 
 def describe(state: State, rate: float) -> str:

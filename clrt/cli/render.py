@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import logging
 import signal
 import sys
 from collections.abc import Mapping
@@ -26,6 +27,9 @@ from .progress import Goal, Progress, make_progress
 if TYPE_CHECKING:
     from ..output.denoise import Denoiser
     from ..rendering.renderer import Renderer, State
+
+#: Where there is a reference, a noise that is farther from the true error than by this factor is warned of.
+RIGHT = 1.2
 
 
 @click.command()
@@ -156,10 +160,11 @@ def _render_frames(renderer: Renderer, sequence: Sequence, goal: Goal, denoiser:
 def _render(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, denoiser: Denoiser | None,
             progress: Progress) -> None:
     """Renders to the goal, or until it is interrupted, and writes the results; of an interrupted frame none."""
+    from ..device.open import name_of
     from ..rendering.guides import render_guides
 
     guides = render_guides(renderer.session) if denoiser else {}
-    progress.phase("render")
+    progress.phase("render", device=name_of(renderer.devices), device_bytes=renderer.session.device_bytes)
     results.prepare()
     for state in renderer.passes(spp=goal.spp, time=goal.seconds, error=goal.error, reference=expected):
         progress.state(state, goal)
@@ -176,6 +181,10 @@ def _write(renderer: Renderer, state: State, results: Outputs, denoiser: Denoise
 
     progress.phase("write")
     image = Image(state.pixels, render_report(renderer, state) | results.header, aovs=renderer.aovs(state))
+    ratio = state.noise_ratio
+    if ratio is not None and not 1 / RIGHT <= ratio <= RIGHT:
+        logging.getLogger(__name__).warning("the noise that is told is %.2f times the error against the "
+                                            "reference, which may have noise of its own", ratio)
     if denoiser is None:
         results.save(image)
     else:

@@ -8,7 +8,6 @@ check (clrt.check) is used only if named.
 from __future__ import annotations
 
 import logging
-import os
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -19,6 +18,7 @@ from .describe import DeviceInfo, describe, describe_empty, describe_faulty, siz
 from .fork import check_process
 from .loader import devices_of
 from .platforms import load_platforms
+from .preference import preferred_device
 from .speeds import kept_speed
 from .verdicts import kept_verdict
 
@@ -65,13 +65,15 @@ def choose(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
 def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
     """The device that `selector` names: a number, an id, "cpu", "gpu" or a unique part of a name.
 
-    Without one, $CLRT_DEVICE, else the best. Raises DeviceError, listing the candidates, where none or several match.
+    Without one the user's (see `preferred_device`), else the best. Raises DeviceError, listing the candidates, where
+    none or several match, and UsageError for a configuration file that is none.
     """
-    found = find_devices()
+    found, origin = find_devices(), ""
     if not found:
         raise DeviceError(NOTHING)
     if selector is None:
-        selector = os.environ.get("CLRT_DEVICE") or None
+        selector, origin = preferred_device() or (None, "")
+    asked = f"{selector!r}" + (f" ({origin})" if origin else "")
     matches = [pair for pair in found if _matches(pair[0], selector)]
     if str(selector).lower() in ("cpu", "gpu", "none"):
         matches = sorted((pair for pair in matches if pair[0].usable), key=lambda pair: pair[0].failed)[:1]
@@ -83,9 +85,9 @@ def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
     if not matches and selector is None:
         raise DeviceError(f"no device can be used; `clrt devices` says why and what to do:\n{listing}")
     if not matches:
-        raise DeviceError(f"no usable device matches {selector!r}; there are:\n{listing}")
+        raise DeviceError(f"no usable device matches {asked}; there are:\n{listing}")
     if len(matches) > 1:
-        raise DeviceError(f"{len(matches)} devices match {selector!r}; name one by number or id:\n{listing}")
+        raise DeviceError(f"{len(matches)} devices match {asked}; name one by number or id:\n{listing}")
     info, device = matches[0]
     if not info.usable or device is None:
         raise DeviceError(f"{info.name} cannot be used: {info.why}")

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..rendering.bands import in_bands
 from .ocio import ACES, ocio_view
 
 FloatArray = NDArray[np.float32]
@@ -23,6 +22,8 @@ View = Callable[[FloatArray], FloatArray]
 REINHARD_WHITE = 16.0
 #: Brighter is shown as this: far beyond any display, and its square still fits into float32.
 BRIGHTEST = 1e15
+#: So many are shown at a time: what is made of more comes anew from the system each time, which takes longer.
+ROWS = 16
 #: "agx": Rec. 709 with its primaries drawn towards white, and what becomes 0 and 1 of it, as binary logarithms.
 AGX_INSET = np.array([[0.842479062253094, 0.0784335999999992, 0.0792237451477643],
                       [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
@@ -113,12 +114,9 @@ def to_display(pixels: FloatArray, view: str = "srgb", exposure: float = 0.0) ->
     """
     shown, gain = view_called(view), np.exp2(np.float32(exposure))
     levels = np.empty(pixels.shape, np.uint8)
-
-    def fill(rows: slice) -> None:
+    for first in range(0, len(pixels), ROWS):
         with np.errstate(over="ignore", invalid="ignore"):
-            exposed = pixels[rows] * gain
+            exposed = pixels[first:first + ROWS] * gain
         linear = np.clip(np.nan_to_num(exposed, nan=0.0, posinf=BRIGHTEST), np.float32(0), np.float32(BRIGHTEST))
-        levels[rows] = np.floor(255 * np.clip(shown(linear), 0, 1) + np.float32(0.5))
-
-    in_bands(len(pixels), fill)
+        levels[first:first + ROWS] = np.floor(255 * np.clip(shown(linear), 0, 1) + np.float32(0.5))
     return levels

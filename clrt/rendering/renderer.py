@@ -5,9 +5,7 @@ from __future__ import annotations
 import logging
 import time as clock
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from math import sqrt
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +30,7 @@ from .film import RELATIVE_FLOOR, Film
 from .first_hits import first_hits
 from .kept import Kept
 from .noise import NoiseEstimate
+from .state import State as State
 from .stops import check_percentile, check_step, check_stops, low_enough, planned_spp
 from .tiles import tile_pixels, tile_sums
 
@@ -40,35 +39,6 @@ STATE_SECONDS = 0.5
 STATE_COST = 20
 #: Where sampling is adaptive, by how much some tiles' samples may exceed what is planned before they begin anew.
 MOST_TIMES_PLANNED = 4
-
-
-@dataclass(frozen=True)
-class State:
-    """The picture so far. spp: samples a pixel, the mean where sampling is adaptive; noise: estimated √relMSE, None
-    below 2 samples; relmse: against the reference, if given; tile_noise: what the renderer's percentile of tiles have
-    at most, if it has one."""
-
-    spp: int
-    seconds: float
-    noise: float | None
-    relmse: float | None
-    film: Film
-    tile_noise: float | None = None
-
-    @property
-    def stops_by(self) -> float | None:
-        """What is compared with a wanted error."""
-        return self.noise if self.tile_noise is None else self.tile_noise
-
-    @property
-    def noise_ratio(self) -> float | None:
-        """The noise over the true √relMSE, where both are known."""
-        return self.noise / sqrt(self.relmse) if self.noise is not None and self.relmse else None
-
-    @cached_property
-    def pixels(self) -> NDArray[np.float32]:
-        """(height, width, 3) float32, linear Rec. 709."""
-        return self.film.mean.astype(np.float32)
 
 
 class Renderer:

@@ -67,7 +67,8 @@ def test_json_progress_is_a_line_an_object(tmp_path: Path) -> None:
     told: list[dict[str, Any]] = [json.loads(line) for line in result.stderr.splitlines()]
     phases = [each["phase"] for each in told]
     assert result.returncode == 0 and list(dict.fromkeys(phases)) == ["load", "build", "compile", "render", "write"]
-    states = [each for each in told if len(each) > 1]
+    states = [each for each in told if "spp" in each]
+    assert [each["device_bytes"] > 0 for each in told if "device" in each] == [True]
     assert [each["spp"] for each in states] == [1, 2, 4] and all(set(each) == STATE for each in states)
     assert all(each["samples_per_second"] > 0 and each["seconds_left"] >= 0 for each in states)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -11,7 +12,7 @@ from clrt.device import discover, pocl
 from clrt.device.describe import DeviceInfo
 from clrt.device.discover import choose, devices, find_devices
 from clrt.device.open import Device, open_device
-from clrt.errors import DeviceError
+from clrt.errors import ClrtError, DeviceError, UsageError
 
 FIELDS = ["index", "id", "name", "platform", "platform_version", "driver", "type", "compute_units", "global_bytes",
           "max_alloc_bytes", "usable", "why", "chosen"]
@@ -28,6 +29,7 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> list[DeviceInfo]:
                      why="its driver has no compiler" if i == 2 else "fine") for i, (name, kind) in enumerate(MACHINE)]
     monkeypatch.setattr(discover, "find_devices", lambda: [(info, own[1]) for info in infos])
     monkeypatch.delenv("CLRT_DEVICE", raising=False)
+    monkeypatch.setenv("CLRT_CONFIG", "/nowhere/config.toml")
     return infos
 
 
@@ -55,6 +57,34 @@ def test_environment_variable(machine: list[DeviceInfo], monkeypatch: pytest.Mon
     assert choose("0")[0] is machine[0]
     monkeypatch.setenv("CLRT_DEVICE", "")
     assert choose()[0] is machine[0]
+
+
+def test_configuration_file(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Its device stands in where neither the variable nor a selector is given; without one the best is used."""
+    file = tmp_path / "config.toml"
+    monkeypatch.setenv("CLRT_CONFIG", str(file))
+    assert choose()[0] is machine[0], "there need be none"
+    for content, chosen in (('device = "epyc"', 3), ("device = 0", 0), ('device = "cpu"', 3), ('device = ""', 0),
+                            ("# nothing", 0)):
+        file.write_text(content)
+        assert choose()[0] is machine[chosen]
+    file.write_text('device = "epyc"')
+    assert choose("0")[0] is machine[0]
+    monkeypatch.setenv("CLRT_DEVICE", "0")
+    assert choose()[0] is machine[0]
+
+
+@pytest.mark.parametrize(("content", "error", "words"), [
+    (b'device = "quadro"', DeviceError, r"no usable device matches 'quadro' \(.*config.toml\).*Radeon"),
+    (b"device = [0]", UsageError, "config.toml: device is \\[0\\]"), (b"device = true", UsageError, "device is True"),
+    (b"device = gpu", UsageError, "config.toml: is no TOML"), (b"\xff", UsageError, "config.toml: is no TOML"),
+    (b'devise = "gpu"', UsageError, "config.toml: devise is unknown; there is device")])
+def test_mistakes_in_the_configuration_file(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
+                                            content: bytes, error: type[ClrtError], words: str) -> None:
+    (tmp_path / "config.toml").write_bytes(content)
+    monkeypatch.setenv("CLRT_CONFIG", str(tmp_path / "config.toml"))
+    with pytest.raises(error, match=f"(?s){words}"):
+        choose()
 
 
 def test_no_device_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

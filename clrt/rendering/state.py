@@ -1,0 +1,41 @@
+"""What a render shows of itself on its way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .film import Film
+
+
+@dataclass(frozen=True)
+class State:
+    """The picture so far. spp: samples a pixel, the mean where sampling is adaptive; noise: estimated √relMSE, None
+    below 2 samples; relmse: against the reference, if given; tile_noise: what the renderer's percentile of tiles have
+    at most, if it has one."""
+
+    spp: int
+    seconds: float
+    noise: float | None
+    relmse: float | None
+    film: Film
+    tile_noise: float | None = None
+
+    @property
+    def stops_by(self) -> float | None:
+        """What is compared with a wanted error."""
+        return self.noise if self.tile_noise is None else self.tile_noise
+
+    @property
+    def noise_ratio(self) -> float | None:
+        """The noise over the true √relMSE, where both are known."""
+        return self.noise / sqrt(self.relmse) if self.noise is not None and self.relmse else None
+
+    @cached_property
+    def pixels(self) -> NDArray[np.float32]:
+        """(height, width, 3) float32, linear Rec. 709."""
+        return self.film.mean.astype(np.float32)
