@@ -6,7 +6,8 @@ import sys
 import time
 from importlib import import_module
 
-NAMES = ("launches", "interrupts", "kills", "damage", "errors", "scaling", "drivers", "caches")
+NAMES = ("launches", "interrupts", "kills", "damage", "errors", "calibration",
+         "scaling", "drivers", "caches")
 
 for name in sys.argv[1:] or NAMES:
     if name not in NAMES:

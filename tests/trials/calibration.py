@@ -1,0 +1,37 @@
+"""The estimated error over the true one, of pictures of each scene of the gallery at several numbers of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isfinite
+from statistics import median
+
+from clrt.rendering.renderer import Renderer
+from clrt.study.calibration import RIGHT, calibration, noise_ratio
+
+from .references import true_relmse, with_references
+
+LEVELS = (2, 4, 8, 16, 32, 64, 128)
+#: Below it, all that is known is one difference, of one sample and two.
+FEWEST = 4
+SEEDS = 3
+
+
+def trial() -> Iterator[str]:
+    every: list[float] = []
+    yield f"{'scene':18}" + "".join(f"{spp:>7}" for spp in LEVELS) + f"  samples a pixel; medians of {SEEDS} seeds"
+    for path, scene, reference in with_references():
+        medians = []
+        for spp in LEVELS:
+            ratios = []
+            for seed in range(SEEDS):
+                for state in Renderer(scene, spp=spp, seed=seed).passes(spp=spp):
+                    pass
+                error = true_relmse(state, reference) + reference.relmse
+                ratios.append(noise_ratio(state.noise or 0.0, error, reference.relmse))
+            medians.append(median(ratios))
+            every += [ratio for ratio in ratios if isfinite(ratio) and spp >= FEWEST]
+        yield f"{path.stem:18}" + "".join(f"{ratio:7.2f}" for ratio in medians)
+    told = calibration(every)
+    yield (f"of {told['pictures']} pictures of {FEWEST} samples or more {told['within']:.1%} are right to {RIGHT}; median "
+           f"{told['median']:.2f}, worst {told['worst']:.2f}")

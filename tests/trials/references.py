@@ -1,0 +1,34 @@
+"""Scenes of the gallery at a small size, with references that say how noisy they are themselves."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import clrt
+from clrt.output.compare import relmse
+from clrt.rendering.state import State
+from clrt.study.reference import Reference, render_reference
+
+from .renders import GALLERY
+
+#: Pixels along the longer side.
+SIDE = 256
+STEPS, STEP_SPP = 8, 256
+
+
+def with_references() -> Iterator[tuple[Path, clrt.Scene, Reference]]:
+    """Each scene; references of 2048 samples a pixel are kept in the cache."""
+    for path in GALLERY:
+        scene = clrt.load(path)
+        width, height = (round(extent * SIDE / max(scene.render.size)) for extent in scene.render.size)
+        scene = replace(scene, render=replace(scene.render, size=(width, height)))
+        print(f"    {path.stem}", file=sys.stderr, flush=True)
+        yield path, scene, render_reference(scene, STEPS, step_spp=STEP_SPP)
+
+
+def true_relmse(state: State, reference: Reference) -> float:
+    """Of the state's picture, without what is the reference's own."""
+    return max(0.0, (relmse(state.pixels, reference.pixels) or 0.0) - reference.relmse)
