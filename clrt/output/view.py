@@ -112,11 +112,11 @@ def to_display(pixels: FloatArray, view: str = "srgb", exposure: float = 0.0) ->
     NaN and negative values become 0, +Inf 255; the rest is rounded to nearest, halves up, without dithering.
     Raises UsageError for an unknown view.
     """
-    shown, gain = view_called(view), np.exp2(np.float32(exposure))
+    shown = view_called(view)
     levels = np.empty(pixels.shape, np.uint8)
     for first in range(0, len(pixels), ROWS):
         with np.errstate(over="ignore", invalid="ignore"):
-            exposed = pixels[first:first + ROWS] * gain
+            exposed = pixels[first:first + ROWS] * np.exp2(np.float32(exposure))
         linear = np.clip(np.nan_to_num(exposed, nan=0.0, posinf=BRIGHTEST), np.float32(0), np.float32(BRIGHTEST))
         levels[first:first + ROWS] = np.floor(255 * np.clip(shown(linear), 0, 1) + np.float32(0.5))
     return levels

@@ -33,5 +33,5 @@ def trial() -> Iterator[str]:
             every += [ratio for ratio in ratios if isfinite(ratio) and spp >= FEWEST]
         yield f"{path.stem:18}" + "".join(f"{ratio:7.2f}" for ratio in medians)
     told = calibration(every)
-    yield (f"of {told['pictures']} pictures of {FEWEST} samples or more {told['within']:.1%} are right to {RIGHT}; median "
-           f"{told['median']:.2f}, worst {told['worst']:.2f}")
+    yield (f"of {told['pictures']} pictures of {FEWEST} samples or more {told['within']:.1%} are right to {RIGHT}; "
+           f"median {told['median']:.2f}, worst {told['worst']:.2f}")
