@@ -11,7 +11,7 @@ from clrt.study.calibration import RIGHT, calibration, noise_ratio
 
 from .references import true_relmse, with_references
 
-LEVELS = (2, 4, 8, 16, 32, 64, 128)
+LEVELS = (2, 4, 8, 16, 32, 64, 128, 256)
 #: Below it, all that is known is one difference, of one sample and two.
 FEWEST = 4
 SEEDS = 3
