@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..cli.test_checkpoints import arrays
-from .renders import ALL_THE_TIME, CORNELL, finish, start
+from .renders import ALL_THE_TIME, CORNELL, await_rendering, finish, start
 
 KILLS = 100
 #: The second takes longer for the same number: rounds of some tiles each.
@@ -27,7 +27,8 @@ def trial() -> Iterator[str]:
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             process = render(folder, mode)
-            time.sleep(moments.uniform(0.3, max(0.4, seconds)))
+            await_rendering(process)
+            time.sleep(moments.uniform(0, seconds))
             met["alive"] += process.poll() is None
             process.kill()
             process.communicate()
@@ -42,15 +43,14 @@ def trial() -> Iterator[str]:
 
 def render(folder: Path, mode: str) -> subprocess.Popen[str]:
     return start(folder, CORNELL, "--size", "64x64", "--checkpoint", "a.ck", "--resume", "--checkpoint-every", 0, "-o",
-                 "a.exr", "-q", *MODES[mode], program=ALL_THE_TIME)
+                 "a.exr", "--progress", "json", *MODES[mode], program=ALL_THE_TIME)
 
 
 def left_alone(mode: str) -> tuple[dict[str, bytes], float]:
-    """What the checkpoint of a render holds in the end that nobody killed, and the seconds it took."""
-    for _ in range(2):     # the first one compiles
-        with tempfile.TemporaryDirectory() as name:
-            clock = time.perf_counter()
-            finish(render(Path(name), mode))
-            seconds = time.perf_counter() - clock
-            found = arrays(Path(name) / "a.ck")
-    return found, seconds
+    """What the checkpoint of a render holds in the end that nobody killed, and the seconds that it rendered."""
+    with tempfile.TemporaryDirectory() as name:
+        process = render(Path(name), mode)
+        await_rendering(process)
+        clock = time.perf_counter()
+        finish(process)
+        return arrays(Path(name) / "a.ck"), time.perf_counter() - clock
