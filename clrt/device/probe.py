@@ -21,7 +21,7 @@ from .loader import devices_of, load
 #: Seconds that all probes together may take. A slow start of many GPUs is no hang.
 LIMIT = 7.0
 #: On a busy machine they may take longer: so many times, as long as a probe computes in so many seconds at least once.
-PATIENCE, IDLE = 4.0, 2.0
+PATIENCE, IDLE = 10.0, 2.0
 
 
 def probe(libraries: Sequence[str], limit: float = LIMIT) -> list[str]:
