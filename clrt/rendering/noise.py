@@ -72,10 +72,10 @@ class NoiseEstimate:
             return limit
         return min(limit, float(np.sqrt(np.sum(self.tile_errors(tile_samples)) / film.mean.size)))
 
-    def of_tiles(self, tile_samples: NDArray[np.int64], size: tuple[int, int], percent: float) -> float | None:
+    def of_tiles(self, tile_samples: NDArray[np.int64], size: tuple[int, int], percent: float | None) -> float | None:
         """The √relMSE of a tile that so many per cent of the tiles of a picture of `size` do not exceed; None before
-        all have two samples."""
-        if not self._changes or self._level.min() < 1:
+        all have two samples, and of no percentage."""
+        if percent is None or not self._changes or self._level.min() < 1:
             return None
         errors = self.tile_errors(tile_samples) / (3 * tile_pixels(size))
         return float(np.sqrt(np.percentile(errors, percent, method="higher")))

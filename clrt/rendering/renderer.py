@@ -31,7 +31,7 @@ from .first_hits import first_hits
 from .kept import Kept
 from .noise import NoiseEstimate
 from .state import State as State
-from .stops import check_percentile, check_step, check_stops, low_enough, planned_spp
+from .stops import check_step, check_stops, checked_percentile, low_enough, planned_spp
 from .tiles import tile_pixels, tile_sums
 
 #: Between two states at least this long passes, and this many times what making a state costs.
@@ -51,8 +51,7 @@ class Renderer:
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
     checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the end; resume:
     go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
-    error_percentile: a wanted error is reached where so many per cent of the tiles of 8 x 8 pixels have it, not the
-    whole picture, which some that converge slowly would keep from ending.
+    error_percentile: a wanted error is reached where so many per cent of the tiles of 8 x 8 pixels have it.
     aovs: pictures that are made beside, by their names (docs/aovs.md); those of a state: see `aovs`.
     Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
@@ -72,8 +71,7 @@ class Renderer:
                  resume: bool = False, checkpoint_seconds: float = 30.0,
                  error_percentile: float | None = None, aovs: str | Iterable[str] = ()) -> None:
         self._aovs = chosen_aovs(aovs)
-        check_percentile(error_percentile)
-        self._percentile = error_percentile
+        self._percentile = checked_percentile(error_percentile)
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
                                  "sampler": sampler, "filter": filter, "adaptive": adaptive}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
@@ -97,8 +95,7 @@ class Renderer:
         self._planned_spp = kept.planned_spp if kept else planned
         self.session = self._make_picture()
         self._begin()
-        self._clock = 0.0
-        self._interrupted = False
+        self._clock, self._interrupted = 0.0, False
         self._last: State
         if kept:
             self._noise, self.history, self.seconds = kept.noise, kept.history, kept.seconds
@@ -182,8 +179,7 @@ class Renderer:
                 self.stop_reason = "error"
             if self.stop_reason is None and self._interrupted:    # while it made this state
                 self.stop_reason, self._interrupted = "interrupted", False
-            cost = clock.perf_counter() - now
-            next_state = now + max(STATE_SECONDS, STATE_COST * cost)
+            next_state = now + max(STATE_SECONDS, STATE_COST * (clock.perf_counter() - now))
             if not self._halfway:
                 self._keep(film, last=self.stop_reason is not None)
             yield state
@@ -205,8 +201,7 @@ class Renderer:
             relmse = float(np.mean((film.mean - expected) ** 2 / (expected**2 + RELATIVE_FLOOR)))
         # The pass that it was interrupted in adds to no estimate: what was known before it is told at once.
         noise = self._noise.at(self._last.film if self._halfway and self.history else film, tile_samples)
-        percentile = self._percentile
-        of_tiles = None if percentile is None else self._noise.of_tiles(tile_samples, self.session.size, percentile)
+        of_tiles = self._noise.of_tiles(tile_samples, self.session.size, self._percentile)
         self._last = State(self.session.samples_done, self.seconds, noise, relmse, film, of_tiles)
         return self._last
 
@@ -286,8 +281,8 @@ class Renderer:
     def _record_state(self, film: Film, reference: NDArray[np.float32] | None) -> State:
         """The state, and its entry in the history, unless it is of a pass that will be gone on with."""
         state = self._state_of(film, reference)
+        entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
         if not self._halfway:
-            entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
             self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
         return state
 

@@ -21,10 +21,11 @@ def check_stops(spp: int | None, time: float | None, error: float | None) -> Non
             raise UsageError(f"{name} is {value}; it must be above 0")
 
 
-def check_percentile(percentile: float | None) -> None:
-    """UsageError unless it is one, if it is given."""
+def checked_percentile(percentile: float | None) -> float | None:
+    """It; UsageError unless it is one, if it is given."""
     if percentile is not None and not 0 < percentile <= 100:
         raise UsageError(f"error_percentile is {percentile}; it must be above 0 and at most 100")
+    return percentile
 
 
 def check_step(done: int) -> int:
