@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.stats import binomtest
 
 from clrt.device.open import Device
 from clrt.errors import UsageError
@@ -40,22 +41,23 @@ def outdoors() -> Scene:
 @pytest.mark.parametrize("make", [room, outdoors])
 @pytest.mark.parametrize("sampler, highest", [("sobol", 1.5), ("independent", 1.5), ("stratified", 2.5)])
 def test_noise_is_the_error(device: Device, make: Callable[[], Scene], sampler: Sampler, highest: float) -> None:
-    """√relMSE is told within a factor of 1.2 mostly, of 1.5 always: the true one of so small a picture is chance, too.
+    """√relMSE is told within a factor of 1.2 in three of four pictures, as far as 30 can say, and of 1.5 always.
 
-    The truth has a 32nd of the variance of the picture with most samples. The halves of a
-    jittered grid are no grids of their own, so what it tells of the whole is too much.
+    The true one of so small a picture is chance, too, and the truth has a 32nd of the variance of the picture with most
+    samples. The halves of a jittered grid are no grids of their own, so what it tells of the whole is too much.
     """
     scene, index, size = make(), device.info.index, (48, 48)
     truth = list(Renderer(scene, device=index, size=size, seed=1, spp=2048).passes(spp=2048))[-1].film.mean
     told = []
-    for seed in (4, 5, 6):
+    for seed in range(4, 10):
         renderer = Renderer(scene, device=index, size=size, sampler=sampler, spp=64, seed=seed)
         for spp in (8, 16, 24, 32, 64):
             state = list(renderer.passes(spp=spp))[-1]
             assert state.noise is not None
             told.append(state.noise / np.sqrt(np.mean((state.film.mean - truth)**2 / (truth**2 + RELATIVE_FLOOR))))
     assert 1 / 1.5 < min(told) and max(told) < highest
-    assert sampler == "stratified" or np.mean(np.abs(np.log(told)) < np.log(1.2)) > 0.75
+    close = int(np.sum(np.abs(np.log(told)) < np.log(1.2)))
+    assert sampler == "stratified" or binomtest(close, len(told), 0.75, alternative="less").pvalue > 1e-3
 
 
 def test_noise_of_a_picture_without_any(device: Device) -> None:
