@@ -22,9 +22,9 @@ typedef struct {
     ireal inside;
 } LanePixels;
 
-// False where there are none.
-static inline bool lane_pixels(const Launch *launch, global const uint *tiles, LanePixels *p) {
-    uint first = (uint)get_global_id(0) * LANES;
+// The LANES pixels of number `group` in the launch; false where there are none.
+static inline bool group_pixels(const Launch *launch, global const uint *tiles, uint group, LanePixels *p) {
+    uint first = group * LANES;
     if (first >= launch->pixel_count) return false;
     first += launch->first_pixel;
     uint across = (launch->width + TILE - 1) / TILE, tile = tiles[first / (TILE * TILE)];
@@ -44,9 +44,18 @@ static inline bool lane_pixels(const Launch *launch, global const uint *tiles, L
     return true;
 }
 
-// A ray through the pixel (x, y): u draws the place from the filter around the pixel's middle, which is that of (½, ½).
+static inline bool lane_pixels(const Launch *launch, global const uint *tiles, LanePixels *p) {
+    return group_pixels(launch, tiles, (uint)get_global_id(0), p);
+}
+
+// A place (sx, sy) of the pixel (x, y): u draws it from the filter around the pixel's middle, which is that of (½, ½).
+static inline real2 place_in_pixel(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u) {
+    return (real2){2.0f * (TO_REAL(x) + filter_sample(scene, u.x)) / (float)launch->width - 1.0f,
+                   2.0f * (TO_REAL(y) + filter_sample(scene, u.y)) / (float)launch->height - 1.0f};
+}
+
+// A ray through such a place.
 static inline CameraRay camera_ray(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u, Sampler *sampler) {
-    real sx = 2.0f * (TO_REAL(x) + filter_sample(scene, u.x)) / (float)launch->width - 1.0f;
-    real sy = 2.0f * (TO_REAL(y) + filter_sample(scene, u.y)) / (float)launch->height - 1.0f;
-    return ray_through(launch, sx, sy, sampler);
+    real2 place = place_in_pixel(scene, launch, x, y, u);
+    return ray_through(launch, place.x, place.y, sampler);
 }

@@ -1,9 +1,9 @@
-// The `local` integrator: each light's own, directly, and none that surfaces send each other (Whitted 1980, "An Improved
-// Illumination Model for Shaded Display"; Nadolny 3.1 to 3.3, Suchiński 7.4 and 7.5).
+// The integrators `local` and `raster`: each light's own, directly, and none that surfaces send each other (Whitted 1980, "An
+// Improved Illumination Model for Shaded Display"; Nadolny 3.1 to 3.3, Suchiński 7.4 and 7.5).
 //
 // Perfect mirrors and smooth glass are followed, glass at random by either way. On the first surface that is neither falls
 //   the light of every lamp, point and beam that a shadow ray finds in sight: points and beams cast hard shadows; of lamps
-//   with an area a point is drawn for every sample, as the path integrator does;
+//   with an area a point is drawn for every sample, as the path integrator does; NO_SHADOWS: of all lamps, unasked;
 //   ambient light: the sky's, as if nothing stood in its way.
 // World frame; L in W·sr⁻¹·m⁻².
 #include "camera.cl"
@@ -34,10 +34,14 @@ static inline real3 light_of_one(const Scene *scene, int light, const Surface *s
     real3 contribution = scale(mul(bsdf_eval(&shading->bsdf, shading->wo, wi), sample.radiance), 1.0f / sample.pdf);
     ireal useful = active & same_side(wi.z, dot3(sample.wi, surface->ng)) & (sample.pdf > 0.0f) & is_positive3(contribution);
     if (!ANY(useful)) return splat(ZERO);
+#if NO_SHADOWS
+    return choose(useful, contribution, splat(ZERO));
+#else
     real3 origin = offset_origin(surface->p, surface->p_error, surface->ng, sample.wi);
     *rays += useful ? (ureal)(1) : (ureal)(0);
     real visible = transmittance(scene, origin, sample.target, sample.wi, sample.infinite, useful);
     return choose(visible > 0.0f, scale(contribution, visible), splat(ZERO));
+#endif
 }
 #endif
 
@@ -56,8 +60,9 @@ static inline real3 shade(const Scene *scene, const Surface *surface, const Shad
     return choose(active, L, splat(ZERO));
 }
 
-static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active, Sampler *sampler,
-                               ureal *rays, real3 *direct) {
+// Along camera rays; closest: what they hit first, where that was rasterised.
+static inline real3 local_light(const Scene *scene, const Launch *launch, const CameraRay *ray, const Hits *closest,
+                                ireal active, Sampler *sampler, ureal *rays) {
     real3 L = splat(ZERO), beta = splat(ONE), origin = ray->origin, direction = ray->direction;
 #if ATTENUATION
     real3 absorption = splat(ZERO);
@@ -65,7 +70,12 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
         Surface surface;
+#if RASTER
+        Hits next = depth == 1 ? *closest : closest_hit(scene, origin, direction, (real)(INFINITY), active);
+        Hits hits = first_surface_from(scene, &next, &origin, direction, active, sampler, &surface);
+#else
         Hits hits = first_surface(scene, &origin, direction, active, sampler, &surface);
+#endif
         ireal hit = active & (hits.primitive >= 0);
 #if ATTENUATION
         beta = mul(beta, attenuated(absorption, hit ? hits.t : (real)(INFINITY)));
@@ -93,4 +103,9 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
         origin = offset_origin(surface.p, surface.p_error, surface.ng, direction);
 #endif
     }
+}
+
+static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active, Sampler *sampler,
+                               ureal *rays, real3 *direct) {
+    return local_light(scene, launch, ray, 0, active, sampler, rays);
 }

@@ -47,7 +47,7 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
     materials |= {instance.material or instance.mesh.material for instance in content.instances}
     report: dict[str, Any] = {
         "scene": content.name, "size": "x".join(map(str, content.render.size)), "spp": content.render.spp,
-        "max_depth": content.render.max_depth,
+        "max_depth": content.render.max_depth, "integrator": content.render.integrator,
         "meshes": len(content.meshes), "triangles": sum(len(mesh.faces) for mesh in content.meshes),
         "instances": {"entries": len(content.instances), "in_tree": compiled.instances,
                       "triangles": sum(len(instance.mesh.faces) for instance in content.instances)},

@@ -47,8 +47,9 @@ RIGHT = 1.2
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers.")
 @click.option("--device", "devices", multiple=True, metavar="SEL",
               help="Number, id, part of a name, cpu or gpu; see `clrt devices`. Given twice, both render.")
-@click.option("--integrator", type=click.Choice(["path", "direct", "local", "normals", "albedo", "depth"]),
+@click.option("--integrator", type=click.Choice(["path", "direct", "local", "raster", "normals", "albedo", "depth"]),
               help="What to compute.")
+@click.option("--shadows/--no-shadows", default=None, help="Whether local and raster ask what stands before lights.")
 @click.option("--sampler", type=click.Choice(["sobol", "stratified", "independent"]), help="Where samples come from.")
 @click.option("--filter", "pixel_filter", type=click.Choice(["box", "tent", "blackman_harris"]), help="Pixel filter.")
 @click.option("--adaptive", is_flag=True, default=None, help="More samples where the error is larger.")
@@ -76,11 +77,11 @@ RIGHT = 1.2
 def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tuple[int, int] | None, spp: int | None,
             seconds: float | None, error: float | None, error_percentile: float | None, depth: int | None,
             seed: int | None, devices: tuple[str, ...],
-            integrator: str | None, sampler: str | None, pixel_filter: str | None, adaptive: bool | None,
-            reference: Path | None, report: Path | None, plot: Path | None, aovs: tuple[str, ...], denoise: bool,
-            checkpoint: Path | None, checkpoint_every: float, resume: bool, view: str, exposure: float,
-            progress_kind: str | None, print_kernel: bool, quiet: bool, frames: str | None, turntable: int | None,
-            fps: float | None, **tracing: Any) -> None:
+            integrator: str | None, shadows: bool | None, sampler: str | None, pixel_filter: str | None,
+            adaptive: bool | None, reference: Path | None, report: Path | None, plot: Path | None,
+            aovs: tuple[str, ...], denoise: bool, checkpoint: Path | None, checkpoint_every: float, resume: bool,
+            view: str, exposure: float, progress_kind: str | None, print_kernel: bool, quiet: bool,
+            frames: str | None, turntable: int | None, fps: float | None, **tracing: Any) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
     def advice() -> str:
         kept = checkpoint is not None and checkpoint.exists()
@@ -115,7 +116,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's end is Ctrl-C, too
     options: dict[str, Any] = {
         "size": size, "max_depth": depth, "seed": seed, "device": devices or None,
-        "integrator": integrator, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
+        "integrator": integrator, "shadows": shadows, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
         "checkpoint": None if print_kernel else checkpoint, "resume": resume and not (print_kernel or sequence),
         "checkpoint_seconds": checkpoint_every, "error_percentile": error_percentile, "aovs": beside, **tracing}
     with make_progress(progress_kind, quiet) as progress:

@@ -73,7 +73,8 @@ class CompiledScene:
     @property
     def pixels(self) -> int:
         """How many a work-item of the entry takes."""
-        return TILE_PIXELS if self.entry == "wave.cl" else self.choices.lanes
+        whole = self.entry == "wave.cl" or (self.entry == "raster.cl" and self.choices.lanes > 1)
+        return TILE_PIXELS if whole else self.choices.lanes
 
     @property
     def files(self) -> list[str]:
@@ -96,12 +97,14 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     packed = pack_scene(scene, choices, device)
     features = features_of(packed, choices, device is not None and loop_turns(device) is not None)
     part_bytes = needed_parts((array for _, array in packed.buffers.values()), device.info) if device else None
-    in_waves = scene.render.integrator in WITH_LIGHT and choices.waves and "LOOP_LIMIT" not in features
+    if entry is None:
+        integrator = scene.render.integrator
+        in_waves = integrator in WITH_LIGHT and choices.waves and "LOOP_LIMIT" not in features
+        entry = "raster.cl" if integrator == "raster" else "wave.cl" if in_waves else "integrate.cl"
     return CompiledScene(packed.buffers, packed.counts, sorted(features),
                          preamble_of(packed, choices, features, part_bytes), files_for(packed, choices, features),
-                         entry or ("wave.cl" if in_waves else "integrate.cl"), packed.tree, choices,
-                         packed.scene.camera, packed.frame, len(packed.scene.instances), packed.shapes.objects,
-                         part_bytes)
+                         entry, packed.tree, choices, packed.scene.camera, packed.frame,
+                         len(packed.scene.instances), packed.shapes.objects, part_bytes)
 
 
 def compile_for_all(scene: Scene, choices: Sequence[Choices], devices: Sequence[Device]) -> list[CompiledScene]:

@@ -11,8 +11,9 @@ from ..scene.textures import Texture
 from .camera import camera_file
 from .choices import OFFSETS, Choices
 from .emitters import SURFACES, TYPES
+from .filters import filter_reach
 from .pack import Packed
-from .records import COUNTS, GUIDE, LAUNCH
+from .records import COUNTS, GUIDE, LAUNCH, OUTLINE
 from .tiles import TILE
 
 #: Of a scene's unit, what float32 holds.
@@ -20,7 +21,8 @@ LARGEST_UNIT = 2.0**127
 #: Integrators that follow paths, and the kernel files of those of light; others show what is seen first
 #: (kernels/picture.cl).
 WITH_LIGHT = ("path", "direct")
-INTEGRATORS = {"path": "path.cl", "direct": "path.cl", "local": "whitted.cl"}
+INTEGRATORS = {"path": "path.cl", "direct": "path.cl", "local": "whitted.cl",
+               "raster": "whitted.cl"}
 
 
 def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
@@ -29,6 +31,7 @@ def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
     loop_limit: whether the device ends loops (see device.loops).
     """
     scene, emitters, materials = packed.scene, packed.emitters, packed.materials
+    local = scene.render.integrator in ("local", "raster")
     features = {f"MATERIAL_{kind.kernel.upper()}" for kind in materials.used}
     features |= {f"LIGHT_{kind.upper()}" for kind in emitters.types}
     features |= set().union(*(material.features() for material in packed.shapes.users))
@@ -41,7 +44,8 @@ def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
            "OPACITY": bool(materials.with_value("opacity")),
            "SKY": packed.sky.kernel is not None, "LIGHTS": emitters.count > 0, "LIGHT_TREE": emitters.choice.tree,
            "EMITTERS": any(t in SURFACES for t in emitters.types),
-           "LOCAL": scene.render.integrator == "local", "PIXEL_MIDDLE": scene.render.integrator == "depth",
+           "LOCAL": local, "NO_SHADOWS": local and not scene.render.shadows,
+           "RASTER": scene.render.integrator == "raster", "PIXEL_MIDDLE": scene.render.integrator == "depth",
            "DIRECT_LIGHT": choices.direct_light, "LOOP_LIMIT": loop_limit}
     return features | {name for name, present in has.items() if present}
 
@@ -53,6 +57,7 @@ def preamble_of(packed: Packed, choices: Choices, features: set[str], part_bytes
     lengths = choices.offset != "bound" or packed.scene.render.integrator == "depth"
     unit = {"SCENE_UNIT": min(packed.frame.unit, LARGEST_UNIT)} if lengths else {}
     surfaces = [t for t in emitters.types if t in SURFACES]
+    rasterised = [typedefs({"Outline": OUTLINE}), defines({"FILTER_REACH": filter_reach(packed.scene.render.filter)})]
     return "\n".join([
         defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(packed.tree), **unit}),
         defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
@@ -67,7 +72,8 @@ def preamble_of(packed: Packed, choices: Choices, features: set[str], part_bytes
         defines({"UV_SETS": packed.uv_sets}),
         *(f"#define READ_{name} {'TEXTURED' if reads else 'CONSTANT'}" for name, reads in materials.reads.items()),
         type_list("LIGHT_TYPES", [(t, TYPES.index(t)) for t in emitters.types]),
-        type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces])])
+        type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces]),
+        *(rasterised if "RASTER" in features else [])])
 
 
 def files_for(packed: Packed, choices: Choices, features: set[str]) -> dict[str, list[str]]:

@@ -45,3 +45,8 @@ def filter_quantiles(name: str) -> NDArray[np.void]:
     quantiles = np.zeros(CELLS + 1, FILTER)
     quantiles["quantile"] = 0.5 + radius * high
     return quantiles
+
+
+def filter_reach(name: str) -> float:
+    """How far beyond its pixel a sample may be taken, in pixels."""
+    return FILTERS[name][0] - 0.5 if name in FILTERS else 0.0

@@ -22,6 +22,7 @@ from ..scene.model import Camera
 from .camera import CAMERA_FIELDS, launch_record
 from .compile import CompiledScene
 from .loop_limit import most_samples
+from .raster import Bins
 
 #: Defined in programs whose film is the pixels of a launch.
 WINDOWS = "#define FILM_WINDOWS 1\n"
@@ -49,6 +50,7 @@ class SceneOnDevice:
     def __init__(self, device: Device, compiled: CompiledScene, launch: NDArray[Any], film_bytes: int,
                  windows: bool = False) -> None:
         self.device, self.compiled, self.launch, self.film_bytes = device, compiled, launch, film_bytes
+        self._bins: Bins | None = None
         self._check_memory()
         primitives = int(compiled.counts["triangles"][0] + compiled.counts["spheres"][0])
         #: Of a pixel, in one launch; None where it does not matter.
@@ -59,6 +61,8 @@ class SceneOnDevice:
         self._kernel = make_kernel(device, self.program, compiled.kernel)
         #: What every kernel of the scene takes first (SCENE_PARAMETERS).
         self.scene_arguments = [*sum(scene, []), compiled.counts[0]]
+        if compiled.entry == "raster.cl":
+            self._bins = Bins(device, compiled, self.scene_arguments)
         self.build_seconds = self.program.build_seconds
 
     def _uploaded(self, array: Any) -> list[cl.Buffer]:
@@ -70,7 +74,7 @@ class SceneOnDevice:
     @property
     def device_bytes(self) -> int:
         """Memory of all buffers on the device."""
-        return self.compiled.bytes + self.film_bytes
+        return self.compiled.bytes + self.film_bytes + (self._bins.bytes if self._bins else 0)
 
     def _check_memory(self) -> None:
         compiled, part_bytes = self.compiled, self.compiled.part_bytes
@@ -106,7 +110,8 @@ class SceneOnDevice:
 
     def enqueue_pixels(self, film: cl.Buffer, tiles: cl.Buffer) -> cl.Event:
         """Enqueues the integrator for the range in the launch record, of the picture's tiles in `tiles`."""
-        self._kernel.set_args(*self.scene_arguments, film, tiles, self.launch[0])
+        bins = self._bins.of(self.launch) if self._bins else []
+        self._kernel.set_args(*self.scene_arguments, film, tiles, self.launch[0], *bins)
         return self.enqueue(self._kernel, int(self.launch["pixel_count"][0]), self.compiled.pixels)
 
     def enqueue(self, kernel: cl.Kernel, pixel_count: int, share: int | None = None) -> cl.Event:

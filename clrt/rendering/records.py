@@ -57,6 +57,10 @@ GUIDE = record(albedo="3f4", pad0="i4", normal="3f4", pad1="i4")
 #: Where DIRECT_LIGHT is compiled in, a pixel has the sum of its samples' direct light, too.
 DIRECT = record(direct="3f4", pad0="u4", direct_error="3f4", pad1="u4")
 PIXEL_WITH_DIRECT = np.dtype([*PIXEL.descr, *DIRECT.descr])
+#: A primitive as the camera sees it (kernels/raster/outline.cl). edge0 … nearness: functions of places of the picture,
+#: or of a sphere its centre and radius; instance: below 0 for spheres; rows: of pixels, that it may cover.
+OUTLINE = record(edge0="3f4", primitive="i4", edge1="3f4", instance="i4", edge2="3f4", first_row="i4", nearness="3f4",
+                 last_row="i4")
 #: A filter's quantile, in pixels from a pixel's edge.
 FILTER = np.dtype([("quantile", "f4")])
 

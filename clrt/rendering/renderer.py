@@ -61,19 +61,18 @@ class Renderer:
     seconds: float
 
     def __init__(self, scene: Scene, *, device: str | int | Sequence[str | int] | None = None,
-                 size: tuple[int, int] | None = None, spp: int | None = None,
-                 max_depth: int | None = None, seed: int | None = None,
-                 integrator: str | None = None, sampler: str | None = None, filter: str | None = None,
-                 adaptive: bool | None = None, triangle: str = "watertight", box: str = "robust",
-                 sphere: str = "robust", offset: str = "bound", builder: str | None = None, layout: str | None = None,
-                 lanes: int | None = None, paths: str | None = None,
-                 on_phase: Callable[[str], None] = lambda phase: None, checkpoint: str | Path | None = None,
-                 resume: bool = False, checkpoint_seconds: float = 30.0,
+                 size: tuple[int, int] | None = None, spp: int | None = None, max_depth: int | None = None,
+                 seed: int | None = None, integrator: str | None = None, shadows: bool | None = None,
+                 sampler: str | None = None, filter: str | None = None, adaptive: bool | None = None,
+                 triangle: str = "watertight", box: str = "robust", sphere: str = "robust", offset: str = "bound",
+                 builder: str | None = None, layout: str | None = None, lanes: int | None = None,
+                 paths: str | None = None, on_phase: Callable[[str], None] = lambda phase: None,
+                 checkpoint: str | Path | None = None, resume: bool = False, checkpoint_seconds: float = 30.0,
                  error_percentile: float | None = None, aovs: str | Iterable[str] = ()) -> None:
         self._aovs = chosen_aovs(aovs)
         self._percentile = checked_percentile(error_percentile)
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
-                                 "sampler": sampler, "filter": filter, "adaptive": adaptive}
+                                 "shadows": shadows, "sampler": sampler, "filter": filter, "adaptive": adaptive}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
         self.devices = open_devices(device)

@@ -20,8 +20,6 @@ from .textures import Texture
 
 #: Fields whose values are no plain data; whoever holds them checks them.
 ELSEWHERE = frozenset({"image", "material", "materials", "mesh", "picture", "to_world"})
-#: Words of the scene format that this version knows but cannot draw yet.
-LATER = frozenset({"raster"})
 FLOAT32_MAX = float(np.finfo(np.float32).max)
 #: More mistakes than this in one object are counted, not listed.
 MOST = 12
@@ -55,8 +53,6 @@ def unknown(name: object, known: Iterable[str]) -> str:
 
     known = sorted(known)
     near = difflib.get_close_matches(str(name), known, 1) or [word for word in known if word.startswith(f"{name}_")]
-    if str(name) in LATER:
-        return f"is not supported yet; this version knows {', '.join(known)}"
     if near:
         return f'is unknown; did you mean "{near[0]}"?'
     return f"is unknown; write one of {', '.join(known)}" if known else "is unknown; none is defined"

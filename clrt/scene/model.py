@@ -22,7 +22,7 @@ IntArray = NDArray[np.int32]
 Positive = Annotated[float, Gt(0)]
 Pixels = Annotated[int, Ge(1), Le(65536)]
 Projection = Literal["perspective", "orthographic", "equirectangular"]
-Integrator = Literal["path", "direct", "local", "normals", "albedo", "depth"]
+Integrator = Literal["path", "direct", "local", "raster", "normals", "albedo", "depth"]
 Sampler = Literal["sobol", "stratified", "independent"]
 Filter = Literal["box", "tent", "blackman_harris"]
 
@@ -144,13 +144,15 @@ class Environment:
 @dataclass(frozen=True, kw_only=True)
 class RenderSettings:
     """How to render unless told otherwise. `size`: (width, height). `max_depth` counts path edges:
-    1 = only what glows, 2 = + direct light, 3 = + one bounce."""
+    1 = only what glows, 2 = + direct light, 3 = + one bounce. shadows: whether they are cast, where the integrator is
+    local or raster."""
 
     size: tuple[Pixels, Pixels] = (512, 512)
     spp: Annotated[int, Ge(1)] = 64
     max_depth: Annotated[int, Ge(1), Le(1024)] = 8
     seed: Annotated[int, Ge(0), Lt(2**32)] = 0
     integrator: Integrator = "path"
+    shadows: bool = True
     sampler: Sampler = "sobol"
     filter: Filter = "box"
     adaptive: bool = False

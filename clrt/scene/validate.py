@@ -38,7 +38,7 @@ def scene_problems(scene: Scene) -> list[str]:
         problems += _object_problems(scene.animation, Animation, "animation") or (
             [] if problems else animation_problems(scene.camera, scene.animation))
     problems += _environment_problems(scene.environment)
-    problems += _object_problems(scene.render, RenderSettings, "render")
+    problems += _object_problems(scene.render, RenderSettings, "render") or _raster_problems(scene)
     users: list[tuple[str, Mesh | Sphere | Instance]] = []
     of_mesh: dict[int, list[str]] = {}  # by its id
     for i, mesh in enumerate(scene.meshes):
@@ -209,6 +209,17 @@ def _camera_problems(camera: Camera) -> list[str]:
     return [f'camera.{name}: {show(value)} is of no use to projection = "{camera.projection}"; leave it out'
             for name, value in given.items() if value is not None
             and camera.projection != ("orthographic" if name == "view_height" else "perspective")]
+
+
+def _raster_problems(scene: Scene) -> list[str]:
+    """Whether the integrator is one for another camera."""
+    camera = scene.camera
+    if scene.render.integrator != "raster" or (camera.projection == "perspective" and not camera.aperture_radius):
+        return []
+    given = (f"projection = {show(camera.projection)}" if camera.projection != "perspective"
+             else f"aperture_radius = {camera.aperture_radius:g}")
+    return [f'render.integrator: "raster" draws what a pinhole sees, and the camera has {given}; leave that out, or '
+            'write "local"']
 
 
 def _environment_problems(environment: Environment) -> list[str]:

@@ -12,13 +12,13 @@ static inline real3 behind(const Surface *surface, real3 direction) {
     return offset_origin(surface->p, surface->p_error, surface->ng, direction);
 }
 
-// The first surfaces that stop the rays; lanes that meet none get any. The origin ends on the last surface that let its ray
-// through, and `gone` is what the ray has gone from where it began to there.
-static inline Hits first_stop(const Scene *scene, real3 *origin, real3 direction, ireal active, Sampler *sampler,
-                              Surface *surface, real *gone) {
+// The first surfaces that stop rays, whose closest hits are known; lanes that meet none get any. The origin ends on the last
+// surface that let its ray through, and `gone` is what the ray has gone from where it began to there.
+static inline Hits first_stop_from(const Scene *scene, const Hits *closest, real3 *origin, real3 direction, ireal active,
+                                   Sampler *sampler, Surface *surface, real *gone) {
     real u = next_1d(sampler);
     *gone = ZERO;
-    Hits hits = closest_hit(scene, *origin, direction, (real)(INFINITY), active);
+    Hits hits = *closest;
     for (int layer = 0; layer < MOST_LAYERS; ++layer) {
         *surface = surface_at(scene, *origin, direction, &hits);
         real opacity = opacity_at(scene, surface, direction);
@@ -37,13 +37,25 @@ static inline Hits first_stop(const Scene *scene, real3 *origin, real3 direction
     return hits;
 }
 
+static inline Hits first_stop(const Scene *scene, real3 *origin, real3 direction, ireal active, Sampler *sampler,
+                              Surface *surface, real *gone) {
+    Hits closest = closest_hit(scene, *origin, direction, (real)(INFINITY), active);
+    return first_stop_from(scene, &closest, origin, direction, active, sampler, surface, gone);
+}
+
 // The same; t is from where the ray began.
-static inline Hits first_surface(const Scene *scene, real3 *origin, real3 direction, ireal active, Sampler *sampler,
-                                 Surface *surface) {
+static inline Hits first_surface_from(const Scene *scene, const Hits *closest, real3 *origin, real3 direction, ireal active,
+                                      Sampler *sampler, Surface *surface) {
     real gone;
-    Hits hits = first_stop(scene, origin, direction, active, sampler, surface, &gone);
+    Hits hits = first_stop_from(scene, closest, origin, direction, active, sampler, surface, &gone);
     hits.t += gone;
     return hits;
+}
+
+static inline Hits first_surface(const Scene *scene, real3 *origin, real3 direction, ireal active, Sampler *sampler,
+                                 Surface *surface) {
+    Hits closest = closest_hit(scene, *origin, direction, (real)(INFINITY), active);
+    return first_surface_from(scene, &closest, origin, direction, active, sampler, surface);
 }
 
 // What part of the light comes through to `origin` from a target, or from infinitely far along wi.

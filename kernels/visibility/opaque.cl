@@ -2,14 +2,20 @@
 #include "surface.cl"
 #include "sampler.cl"
 
-// The surfaces that rays meet; lanes that meet nothing get that of primitive 0. The origin stays.
+// The surfaces that rays meet, whose closest hits are known; lanes that meet nothing get that of primitive 0. The origin
+// stays.
+static inline Hits first_surface_from(const Scene *scene, const Hits *closest, real3 *origin, real3 direction, ireal active,
+                                      Sampler *sampler, Surface *surface) {
+#if PRIMITIVES
+    *surface = surface_at(scene, *origin, direction, closest);
+#endif
+    return *closest;
+}
+
 static inline Hits first_surface(const Scene *scene, real3 *origin, real3 direction, ireal active, Sampler *sampler,
                                  Surface *surface) {
-    Hits hits = closest_hit(scene, *origin, direction, (real)(INFINITY), active);
-#if PRIMITIVES
-    *surface = surface_at(scene, *origin, direction, &hits);
-#endif
-    return hits;
+    Hits closest = closest_hit(scene, *origin, direction, (real)(INFINITY), active);
+    return first_surface_from(scene, &closest, origin, direction, active, sampler, surface);
 }
 
 // What part of the light comes through to `origin` from a target, or from infinitely far along wi.

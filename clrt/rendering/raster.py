@@ -1,0 +1,112 @@
+"""What a camera sees, sorted into the bins of its picture for the integrator `raster` (kernels/raster)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+from numpy.typing import NDArray
+
+from ..device.blocks import Blocks
+from ..device.launch import calling
+from ..device.memory import size
+from ..device.open import Device
+from ..errors import NoRoomError
+from .compile import CompiledScene
+from .records import OUTLINE
+from .tiles import tiles_of
+
+#: As in kernels/raster/bins.cl: sizes of bins, and how many times as wide each is as the one before.
+LEVELS, WIDER = 3, 8
+#: What of a LAUNCH record says what is seen where.
+VIEW = ("position", "right", "up", "forward", "width", "height")
+#: Numbers of entries and outlines are uint32.
+MOST = 2**32 - 1
+
+
+def bin_count(picture: tuple[int, int]) -> int:
+    """How many bins of all sizes a picture of (width, height) has."""
+    rows, columns = tiles_of(picture)
+    count = 0
+    for _ in range(LEVELS):
+        count += rows * columns
+        rows, columns = -(-rows // WIDER), -(-columns // WIDER)
+    return count
+
+
+def drawn_before(compiled: CompiledScene) -> NDArray[np.int64]:
+    """(k + 1,): how many triangles are drawn in the instances before each, or k = 1, and in all."""
+    total = int(compiled.counts["triangles"][0])
+    if "placements" not in compiled.buffers:
+        return np.array([0, total])
+    firsts = compiled.buffers["placements"][1]["first"].astype(np.int64)
+    ends = np.append(np.unique(firsts), total)
+    faces = ends[np.searchsorted(ends, firsts, side="right").clip(max=len(ends) - 1)] - firsts
+    return np.append(0, np.cumsum(faces))
+
+
+class Bins:
+    """The bins of one camera at a time, on a device. scene_arguments: what every kernel of the scene takes first.
+
+    NoRoomError where more primitives are to be drawn than can be numbered.
+    """
+
+    def __init__(self, device: Device, compiled: CompiledScene, scene_arguments: list[Any]) -> None:
+        self._device, self._scene = device, scene_arguments
+        before = drawn_before(compiled)
+        self._drawn = int(before[-1]), int(compiled.counts["spheres"][0])
+        if sum(self._drawn) > MOST:
+            raise NoRoomError(f"{sum(self._drawn)} primitives are too many to be rasterised, {MOST} at most; take the "
+                              "integrator local, or fewer instances")
+        self._blocks = Blocks(device, compiled.source_of("raster/outline.cl"))
+        self._before, self._instances = self._blocks.upload(before.astype(np.uint32)), len(before) - 1
+        self._view = b""
+        self._held: list[cl.Buffer] = []
+
+    @property
+    def bytes(self) -> int:
+        """Memory of the bins and of what is in them."""
+        return sum(buffer.size for buffer in self._held)
+
+    def of(self, launch: NDArray[Any]) -> list[cl.Buffer]:
+        """What the raster kernel takes last, for the camera of a LAUNCH record; NoRoomError where it sees too much."""
+        view = b"".join(launch[name].tobytes() for name in VIEW)
+        if view != self._view:
+            self._view = b""
+            with calling():
+                self._sort(launch[0])
+            self._view = view
+        return self._held
+
+    def _sort(self, launch: np.void) -> None:
+        blocks, bins = self._blocks, bin_count((int(launch["width"]), int(launch["height"])))
+        blocks.free(*self._held)
+        self._held = []
+        nothing, numbers, counts = blocks.empty(np.uint32, 1), blocks.zeros(np.uint32, 1), blocks.zeros(np.uint32, bins)
+        self._run(launch, 0, numbers, counts, nothing, nothing)
+        starts = np.append(0, np.cumsum(blocks.download(counts, np.uint32, bins), dtype=np.int64))
+        seen = int(blocks.download(numbers, np.uint32, 1)[0])
+        self._check(4 * int(starts[-1]), seen * OUTLINE.itemsize)
+        self._held = [blocks.upload(starts.astype(np.uint32)), blocks.empty(np.uint32, int(starts[-1])),
+                      blocks.empty(OUTLINE, seen)]
+        places = blocks.upload(starts[:-1].astype(np.uint32))
+        numbers_again = blocks.zeros(np.uint32, 1)
+        self._run(launch, 1, numbers_again, places, *self._held[1:])
+        blocks.finish()
+        blocks.free(nothing, numbers, numbers_again, counts, places)
+
+    def _run(self, launch: np.void, fill: int, *sorted_into: cl.Buffer) -> None:
+        triangles, spheres = self._drawn
+        arguments = *self._scene, launch, fill, *sorted_into
+        if triangles:
+            self._blocks.run("sort_triangles", triangles, *arguments, self._before, self._instances)
+        if spheres:
+            self._blocks.run("sort_spheres", spheres, *arguments)
+
+    def _check(self, *sizes: int) -> None:
+        info = self._device.info
+        if max(sizes) > info.max_alloc_bytes:
+            raise NoRoomError(f"{info.name}: what the camera sees takes a buffer of {size(max(sizes))} to rasterise, "
+                              f"and there they have {size(info.max_alloc_bytes)} at most; take the integrator local, a "
+                              "smaller picture or fewer primitives")

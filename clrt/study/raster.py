@@ -1,0 +1,45 @@
+"""What a camera sees first, rasterised and traced through the same places (kernels/study/raster_hits.cl)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.arrays import empty_array, on_device
+from ..device.launch import run_kernel
+from ..device.open import Device
+from ..device.preamble import typedefs
+from ..device.program import build, make_kernel
+from ..device.records import record
+from ..rendering.compile import compile_scene
+from ..rendering.raster import Bins
+from ..rendering.session import first_launch
+from ..rendering.tiles import TILE_PIXELS, tiles_of
+from ..scene.model import Scene
+from .probe import choices
+
+#: x, y: the place, from −1 to 1; t, u, v, primitive, instance: the hit as the kernels have it.
+SEEN = record(x="f4", y="f4", t="f4", u="f4", v="f4", primitive="i4", instance="i4", pad="i4")
+
+
+def seen_both_ways(device: Device, scene: Scene, sample: int = 0, **chosen: Any) -> tuple[NDArray[Any], NDArray[Any]]:
+    """(height, width) SEEN records, rasterised and traced, of a sample of each pixel; chosen: see `probe.choices`."""
+    scene = replace(scene, render=replace(scene.render, integrator="raster"))
+    compiled = compile_scene(scene, choices(device, **chosen), device=device)
+    width, height = size = scene.render.size
+    launch = first_launch(compiled, size, 1, scene.render.seed, scene.render.spp)
+    tiles = np.arange(np.prod(tiles_of(size)), dtype=np.uint32)
+    launch["pixel_count"], launch["first_sample"] = len(tiles) * TILE_PIXELS, sample
+    arguments = [*(on_device(device, array) for _, array in compiled.buffers.values()), compiled.counts[0]]
+    program = build(device, compiled.source_of("study/raster_hits.cl", typedefs({"Seen": SEEN})))
+    kernel = make_kernel(device, program, "raster_hits")
+    seen = [empty_array(device, SEEN, width * height) for _ in range(2)]
+    given = [*(each.buffer for each in seen), on_device(device, tiles), launch[0]]   # kernels keep no arguments alive
+    bins = Bins(device, compiled, arguments)
+    kernel.set_args(*arguments, *given, *bins.of(launch))
+    run_kernel(device, kernel, -(-len(tiles) * TILE_PIXELS // (compiled.choices.lanes * device.local_size)))
+    rasterised, traced = (each.read(device).reshape(height, width) for each in seen)
+    return rasterised, traced

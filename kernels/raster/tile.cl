@@ -1,0 +1,137 @@
+// What is seen first through places of a tile: the nearest of the primitives in its bins (raster/outline.cl), of equally
+// near ones the first, in whatever order they were entered.
+//
+// A work-item takes ROWS times LANES pixels: on a CPU a whole tile, so that each outline is read once for all of it.
+#include "camera.cl"
+#include "surface.cl"
+#include "raster/bins.cl"
+#include SPHERE_TEST
+
+#if LANES == 1
+#define ROWS 1
+#define ROW_HEIGHT 1
+#else
+#define ROWS (TILE * TILE / LANES)
+#define ROW_HEIGHT (LANES / TILE)
+#endif
+
+typedef struct {
+    global const uint *starts, *entries;
+    global const Outline *outlines;
+} Bins;
+
+#define BIN_PARAMETERS global const uint *bin_starts, global const uint *bin_entries, global const Outline *bin_outlines
+#define BIN_ARGUMENTS {bin_starts, bin_entries, bin_outlines}
+
+// LANES places of a tile, the camera's rays through them, and what is seen there so far.
+typedef struct {
+    real2 place;
+    CameraRay ray;
+    real length;               // of a direction whose part along the view is 1
+    ireal active;
+    real nearness;             // 1 over how far along the view it is
+    real edge0, edge1, edge2;  // of a triangle: the functions of its edges
+    ireal primitive, instance;
+#if SPHERES
+    real t;                    // of a sphere, or 0
+#endif
+} Row;
+
+static inline Row row_of(const Launch *launch, real2 place, CameraRay ray, ireal active) {
+    Row row;
+    row.place = place;
+    row.ray = ray;
+    row.length = 1.0f / dot3(ray.direction, broadcast(launch->forward));
+    row.active = active;
+    row.nearness = row.edge0 = row.edge1 = row.edge2 = ZERO;
+    row.primitive = (ireal)(-1);
+    row.instance = (ireal)(0);
+#if SPHERES
+    row.t = ZERO;
+#endif
+    return row;
+}
+
+// Where an outline is met nearer than all before; of equals the first counts.
+static inline ireal is_first(const Row *row, real nearness, int primitive, int instance) {
+    ireal before = (instance < row->instance) | ((instance == row->instance) & (primitive < row->primitive));
+    return (nearness > row->nearness) | ((nearness == row->nearness) & before);
+}
+
+#if TRIANGLES
+static inline real at_place(global const float *function, real2 place) {
+    return fma((real)(function[0]), place.x, fma((real)(function[1]), place.y, (real)(function[2])));
+}
+
+static inline void meet_triangle(global const Outline *outline, Row *row) {
+    real edge0 = at_place(outline->edge0, row->place), edge1 = at_place(outline->edge1, row->place);
+    real edge2 = at_place(outline->edge2, row->place), nearness = at_place(outline->nearness, row->place);
+    ireal inside = minimum(minimum(edge0, edge1), minimum(edge2, nearness - row->nearness)) >= 0.0f;
+    if (!ANY(inside)) return;
+    inside = inside & row->active & is_first(row, nearness, outline->primitive, outline->instance);
+    row->nearness = inside ? nearness : row->nearness;
+    row->edge0 = inside ? edge0 : row->edge0;
+    row->edge1 = inside ? edge1 : row->edge1;
+    row->edge2 = inside ? edge2 : row->edge2;
+    row->primitive = inside ? (ireal)(outline->primitive) : row->primitive;
+    row->instance = inside ? (ireal)(outline->instance) : row->instance;
+#if SPHERES
+    row->t = inside ? ZERO : row->t;
+#endif
+}
+#endif
+
+#if SPHERES
+SPHERE_OF(real, ireal, TwiceSeen, seen)
+
+static inline void meet_sphere(global const Outline *outline, Row *row) {
+    const real origin[3] = {row->ray.origin.x, row->ray.origin.y, row->ray.origin.z};
+    const real direction[3] = {row->ray.direction.x, row->ray.direction.y, row->ray.direction.z};
+    const real from[3] = {origin[0] - outline->edge0[0], origin[1] - outline->edge0[1], origin[2] - outline->edge0[2]};
+    ireal meets = row->active & seen_may_meet(from, direction, outline->edge1[0]);
+    if (!ANY(meets)) return;
+    real near, far;
+    seen_roots(origin, direction, outline->edge0, outline->edge1[0], &near, &far);
+    real t = near > 0.0f ? near : far, nearness = row->length / t;
+    meets = meets & is_first(row, nearness, outline->primitive, 0);
+    row->nearness = meets ? nearness : row->nearness;
+    row->t = meets ? t : row->t;
+    row->primitive = meets ? (ireal)(outline->primitive) : row->primitive;
+    row->instance = meets ? (ireal)(0) : row->instance;
+}
+#endif
+
+// Has `count` rows see all that is in the bins of their tile; (x, y): the first one's first pixel.
+static inline void rasterise(const Bins *bins, const Launch *launch, uint x, uint y, Row *rows,
+                             int count) {
+    for (uint level = 0; level < BIN_LEVELS; ++level) {
+        BinLevel size = bin_level(launch, level);
+        uint bin = size.first + (y / TILE >> BIN_SHIFT * level) * size.across + (x / TILE >> BIN_SHIFT * level);
+        uint end = bins->starts[bin + 1];
+        for (uint i = bins->starts[bin]; i < end; ++i) {
+            global const Outline *outline = bins->outlines + bins->entries[i];
+            int above = outline->first_row - (int)y, below = outline->last_row - (int)y;
+            if (below < 0) continue;
+            int last = below / ROW_HEIGHT < count ? below / ROW_HEIGHT : count - 1;
+            for (int row = above > 0 ? above / ROW_HEIGHT : 0; row <= last; ++row) {
+#if TRIANGLES && SPHERES
+                if (outline->instance >= 0) meet_triangle(outline, rows + row);
+                else meet_sphere(outline, rows + row);
+#elif TRIANGLES
+                meet_triangle(outline, rows + row);
+#else
+                meet_sphere(outline, rows + row);
+#endif
+            }
+        }
+    }
+}
+
+static inline Hits row_hits(const Row *row) {
+    real t = row->length / row->nearness, whole = row->edge0 + row->edge1 + row->edge2;
+    whole = whole > 0.0f ? 1.0f / whole : ZERO;
+#if SPHERES
+    t = row->t > 0.0f ? row->t : t;
+#endif
+    return (Hits){t, row->edge1 * whole, row->edge2 * whole, row->primitive, row->instance};
+}
