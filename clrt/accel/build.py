@@ -26,11 +26,17 @@ FEW = 4 * PACK
 
 
 def fitting_layout(device: Device | None, triangles: int, spheres: int, triangle: str = "watertight",
-                   instances: bool = False) -> str:
-    """The device's layout, or "packs" for vectors if what is to be in the tree, so many, is too little for one."""
+                   instances: bool = False, tree: bool | None = None) -> str:
+    """The device's layout, or "packs" for vectors if what is to be in the tree, so many, is too little for one.
+
+    tree: True for one however few they are, False for none however many.
+    """
     layout = device.layout if device else "bvh8"
-    few = 0 < triangles <= FEW and not (spheres or instances) and triangle == "watertight"
-    return "packs" if layout == "bvh8" and few else layout
+    packs = layout == "bvh8" and triangle == "watertight"
+    few = 0 < triangles <= FEW and not (spheres or instances)
+    if tree is False:
+        return "packs" if packs else "list"
+    return "packs" if packs and few and tree is None else layout
 
 
 def build_tree(device: Device | None, layout: str, builder: str | None, triangles: FloatArray,

@@ -44,7 +44,7 @@ class TwoLevels:
     def __init__(self, device: Device | None, layout: str, builder: str | None, meshes: Sequence[FloatArray],
                  mesh: IntArray, triangle: str = "watertight", spheres: FloatArray | None = None) -> None:
         if layout not in FORMS:
-            raise UsageError(f"the layout {layout} has no instances: take one of {', '.join(FORMS)}")
+            raise UsageError(f"the layout {layout} is no tree, which instances need: take one of {', '.join(FORMS)}")
         start = time.perf_counter()
         self._device, self._form, self._mesh = device, FORMS[layout], mesh
         balls = [np.zeros((0, 4), np.float32)] * len(meshes)

@@ -20,7 +20,7 @@ from .options import tracing_options
 @tracing_options
 def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple[str, ...], lanes: int | None,
             paths: str | None, triangle: str, box: str, sphere: str, offset: str, builder: str | None,
-            layout: str | None) -> None:
+            layout: str | None, tree: bool | None) -> None:
     """Show what SCENE contains and what is compiled for it; renders nothing and needs no device."""
     if list_materials:
         from .material_list import material_lines
@@ -40,9 +40,9 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
     names = chosen_aovs(",".join(aovs)) if aovs else ()
     content = load(scene)
     choices = Choices(lanes or 8, layout, builder, HitTests(triangle, box, sphere), offset, needs_direct_light(names),
-                      paths)
+                      paths, tree)
     compiled = compile_scene(content, choices)
-    tree = compiled.tree
+    built = compiled.tree
     materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}
     materials |= {instance.material or instance.mesh.material for instance in content.instances}
     report: dict[str, Any] = {
@@ -56,9 +56,9 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
         "materials": dict(Counter(material.kernel for material in materials)),
         "lights": {"entries": int(compiled.counts["lights"][0]),
                    **Counter(type(light).kernel for light in content.lights)},
-        "tree": {"layout": tree.name, "builder": tree.builder, "nodes": tree.nodes, "depth": tree.depth,
-                 "stack": tree.stack, "sah_cost": tree.sah_cost, "bytes": tree.bytes,
-                 "build_seconds": tree.build_seconds},
+        "tree": {"layout": built.name, "builder": built.builder, "nodes": built.nodes, "depth": built.depth,
+                 "stack": built.stack, "sah_cost": built.sah_cost, "bytes": built.bytes,
+                 "build_seconds": built.build_seconds},
         "features": compiled.features, "files": compiled.files, "kernel_bytes": len(compiled.source.encode()),
         "buffers": {name: array.nbytes for name, (_, array) in compiled.buffers.items()},
         "bytes": compiled.bytes,

@@ -47,6 +47,9 @@ def tracing_options(command: F) -> F:
                      help="Tree builder; default: sah for small scenes, ploc on the device for large ones."),
         click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "packs", "list"]),
                      help="Tree layout; packs (for small scenes) and list are no tree."),
+        click.option("--tree", type=click.Choice(["on", "off"]),
+                     help="Whether there is a tree, or every ray meets all there is; default: what is faster.",
+                     callback=lambda context, parameter, value: value and value == "on"),
     ]:
         command = option(command)
     return command

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..accel.kernels import BUILDER_NAMES, TREES, HitTests
+from ..accel.kernels import BUILDER_NAMES, TREELESS, TREES, HitTests
 from ..errors import UsageError
 from .records import PIXEL, PIXEL_WITH_DIRECT
 
@@ -25,7 +25,8 @@ class Choices:
 
     paths: how they are followed: "lanes", each in its lane (kernels/path.cl), or "waves", many together edge by edge
     (kernels/wave.cl); None for waves where there are 8 lanes, as they need.
-    layout: a name in TREES, or None for the one that fits the device and the scene.
+    layout: a name in TREES, or None for the one that fits the device and the scene. tree: False where every ray is to
+    meet all that there is one by one, True for a tree even where there is little; None for what is faster.
     Raises UsageError for what is unknown, or can't be chosen together.
     """
 
@@ -36,6 +37,7 @@ class Choices:
     offset: str = "bound"
     direct_light: bool = False
     paths: str | None = None
+    tree: bool | None = None
 
     def __post_init__(self) -> None:
         known: dict[str, tuple[object, ...]] = {"layout": (None, *TREES), "builder": (None, *BUILDER_NAMES),
@@ -46,6 +48,9 @@ class Choices:
                 raise UsageError(f"{name} {value!r} is unknown; choose from {named}")
         if self.paths == "waves" and self.lanes != WAVE_LANES:
             raise UsageError(f"paths in waves need {WAVE_LANES} lanes, not {self.lanes}; leave out one of the choices")
+        if self.tree is not None and self.layout is not None and self.tree == (self.layout in TREELESS):
+            raise UsageError(f"the layout {self.layout} is {'no tree' if self.tree else 'a tree'}, and tree is "
+                             f"{'on' if self.tree else 'off'}; leave out one of the choices")
 
     @property
     def waves(self) -> bool:

@@ -59,7 +59,7 @@ class Shapes:
         """The tree over all but lone spheres."""
         in_tree, test = self.spheres[:0] if self.lone else self.spheres, choices.tests.triangle
         layout = choices.layout or fitting_layout(device, len(self.triangles), len(in_tree), test,
-                                                  bool(self.scene.instances))
+                                                  bool(self.scene.instances), choices.tree)
         build = self.placements.tree if self.scene.instances else build_tree
         return build(device, layout, choices.builder, self.triangles, in_tree, test)
 

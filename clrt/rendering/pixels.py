@@ -13,7 +13,7 @@ from ..device.program import build, make_kernel
 from .accumulation import Accumulation
 from .loop_limit import check_pixels, mark_pixels
 from .on_device import WINDOW, WINDOWS
-from .session import FEWEST_TILES, FIRST_LAUNCH_SAMPLES, block_bits
+from .session import FEWEST_TILES, FIRST_LAUNCH_SAMPLES, block_bits, first_launch_samples
 from .tiles import TILE_PIXELS, row_by_row, scattered
 
 
@@ -29,7 +29,8 @@ def render_pixels(session: Accumulation, source: str, name: str, record: np.dtyp
     most = max(1, min(len(order), min(WINDOW, device.info.max_alloc_bytes) // (TILE_PIXELS * record.itemsize)))
     tiles, window = resident(device, order), empty_array(device, record, most * TILE_PIXELS)
     pixels = np.zeros((len(order), TILE_PIXELS), record)
-    launch, launches, done = session.launch.copy(), Launches(FIRST_LAUNCH_SAMPLES), 0
+    first = min(FIRST_LAUNCH_SAMPLES, first_launch_samples(session.compiled))
+    launch, launches, done = session.launch.copy(), Launches(first), 0
     launch["first_sample"], launch["sample_count"], launch["block_bits"] = 0, samples, block_bits(samples)
     work = TILE_PIXELS * max(samples, 1)
     while done < len(order):

@@ -45,7 +45,7 @@ class Renderer:
     """A scene on a device, ready to render. Everything not given is taken from `scene.render`.
 
     device: see `clrt devices`; several render one picture together. size: (width, height); triangle, box, sphere: see
-    `HitTests`; offset, builder, layout, lanes, paths: see `choices.Choices`. spp: how many samples a pixel are
+    `HitTests`; offset, builder, layout, tree, lanes, paths: see `choices.Choices`. spp: how many samples a pixel are
     planned, if that is known: the sampler then makes neighbouring pixels' errors differ for that many, and later ones
     begin anew (kernels/sampler). adaptive: whether tiles get samples by their error, from the pictures so far.
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
@@ -66,8 +66,9 @@ class Renderer:
                  sampler: str | None = None, filter: str | None = None, adaptive: bool | None = None,
                  triangle: str = "watertight", box: str = "robust", sphere: str = "robust", offset: str = "bound",
                  builder: str | None = None, layout: str | None = None, lanes: int | None = None,
-                 paths: str | None = None, on_phase: Callable[[str], None] = lambda phase: None,
-                 checkpoint: str | Path | None = None, resume: bool = False, checkpoint_seconds: float = 30.0,
+                 paths: str | None = None, tree: bool | None = None,
+                 on_phase: Callable[[str], None] = lambda phase: None, checkpoint: str | Path | None = None,
+                 resume: bool = False, checkpoint_seconds: float = 30.0,
                  error_percentile: float | None = None, aovs: str | Iterable[str] = ()) -> None:
         self._aovs = chosen_aovs(aovs)
         self._percentile = checked_percentile(error_percentile)
@@ -81,7 +82,7 @@ class Renderer:
             raise UsageError(f"the AOVs {' and '.join(LIGHT)} are of light, and the integrator is "
                              f"{settings.integrator}; choose {' or '.join(WITH_LIGHT)}")
         choices = [Choices(lanes or each.lanes, layout, builder, HitTests(triangle, box, sphere), offset,
-                           needs_direct_light(self._aovs), paths or (None if each.packs else "lanes"))
+                           needs_direct_light(self._aovs), paths or (None if each.packs else "lanes"), tree)
                    for each in self.devices]
         on_phase("build")
         self._compiled = compile_for_all(self.scene, choices, self.devices)

@@ -9,6 +9,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
+from ..accel.kernels import TREELESS
 from ..device.arrays import on_device
 from ..device.launch import Launches, calling, wait_for
 from ..device.open import Device
@@ -29,6 +30,8 @@ PASS_LAUNCHES = 4
 FIRST_LAUNCH_SAMPLES = 1 << 13
 #: Pixels of all kinds are whole numbers of it.
 BLACK = np.zeros(8, np.uint32)
+#: Primitives that a ray meets without a tree in about the time that it takes with one.
+QUICKLY_MET = 128
 
 
 class Session(Accumulation):
@@ -42,7 +45,7 @@ class Session(Accumulation):
             raise NoRoomError(f"{device.info.name}: a film of {size[0]}x{size[1]} has no room in a buffer")
         launch = first_launch(compiled, size, max_depth, seed, planned_spp)
         self._scene = SceneOnDevice(device, compiled, launch, film_bytes)
-        self._launches = Launches(FIRST_LAUNCH_SAMPLES)
+        self._launches = Launches(first_launch_samples(compiled))
         with self._scene.allocating():
             self._film = on_device(device, np.zeros(size[0] * size[1], compiled.choices.pixel))
             self._tiles = on_device(device, np.zeros(1, np.uint32))
@@ -116,6 +119,13 @@ def first_launch(compiled: CompiledScene, size: tuple[int, int], max_depth: int,
     launch = launch_record(compiled.camera, size)
     launch["max_depth"], launch["seed"], launch["block_bits"] = max_depth, seed, block_bits(planned_spp)
     return launch
+
+
+def first_launch_samples(compiled: CompiledScene) -> int:
+    """Samples of the first launch, before any has been timed: few where each ray meets all that there is."""
+    primitives = int(compiled.counts["triangles"][0] + compiled.counts["spheres"][0])
+    slow = compiled.tree.name in TREELESS and primitives > QUICKLY_MET
+    return FIRST_LAUNCH_SAMPLES * QUICKLY_MET // primitives if slow else FIRST_LAUNCH_SAMPLES
 
 
 def block_bits(planned_spp: int | None) -> int:

@@ -14,7 +14,7 @@ from ..device.open import Device
 from ..errors import NoRoomError
 from .compile import CompiledScene
 from .on_device import WINDOW, SceneOnDevice, largest_film
-from .session import FEWEST_TILES, FIRST_LAUNCH_SAMPLES
+from .session import FEWEST_TILES, first_launch_samples
 from .tiles import TILE_PIXELS
 from .work import Part
 
@@ -46,7 +46,7 @@ class Worker:
         film_bytes = IN_FLIGHT * self.window_tiles * self._tile_bytes
         self.scene = SceneOnDevice(device, compiled, launch, film_bytes, windows=True)
         self._windows = self._make_windows()
-        self.launches = Launches(FIRST_LAUNCH_SAMPLES)
+        self.launches = Launches(first_launch_samples(compiled))
         self.at: deque[Share] = deque()
         self._copies: list[cl.Event] = []   # their end is waited for where they are given up
         self.samples = 0

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS
+from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS, HitTests
 from clrt.device.open import Device
+from clrt.errors import UsageError
 from clrt.rendering import pack as pack_module
 from clrt.rendering import session as session_module
-from clrt.rendering.choices import OFFSETS
+from clrt.rendering.choices import OFFSETS, Choices
 from clrt.rendering.compile import compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, MetallicRoughness, Mirror
@@ -104,7 +105,8 @@ def reference(device: Device) -> Doubles:
 
 
 @pytest.mark.parametrize("chosen", [{"lanes": 1}, {"lanes": 16}, {"layout": "bvh2"}, {"layout": "packs"},
-                                    {"layout": "list"}, {"builder": "midpoint"}, {"lanes": 1, "layout": "bvh2"},
+                                    {"layout": "list"}, {"layout": None, "tree": False},
+                                    {"builder": "midpoint"}, {"lanes": 1, "layout": "bvh2"},
                                     *({"lanes": lanes, "layout": "cwbvh"} for lanes in (1, 8, 16))], ids=str)
 def test_lanes_layouts_and_builders_agree(device: Device, reference: Doubles, chosen: dict[str, Any]) -> None:
     """To float rounding: a sample is a chain of some hundred operations, so most pixels agree to 1e-5.
@@ -162,6 +164,19 @@ def test_pictures_do_not_depend_on_passes_and_launches(device: Device, monkeypat
                 pass
         films.append(running.film().pixels)
     assert all(pixels.tobytes() == films[0].tobytes() for pixels in films[1:])
+
+
+def test_a_tree_can_be_wanted_or_not() -> None:
+    """Of few triangles as of many; what contradicts itself is refused."""
+    few, many = quad([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], Diffuse()), Mesh(*rays.icosphere(3))
+    scenes = [Scene(meshes=[few]), Scene(meshes=[many])]
+    for tree, layouts in {None: ["packs", "bvh8"], True: ["bvh8", "bvh8"], False: ["packs", "packs"]}.items():
+        assert [compile_scene(scene, Choices(tree=tree)).tree.name for scene in scenes] == layouts
+    precomputed = Choices(tree=False, tests=HitTests("precomputed"))
+    assert [compile_scene(scene, precomputed).tree.name for scene in scenes] == ["list", "list"]
+    for layout, tree in (("list", True), ("bvh2", False)):
+        with pytest.raises(UsageError, match=f"the layout {layout}"):
+            Choices(layout=layout, tree=tree)
 
 
 def test_seeds_differ(device: Device) -> None:
