@@ -61,10 +61,13 @@ class Device:
         return "bvh8" if self.vectors else "cwbvh"
 
 
-def open_devices(selectors: str | int | Sequence[str | int] | None) -> list[Device]:
-    """Opens the devices that are named (see `choose`), at least one; DeviceError where that fails."""
-    several = [selectors] if selectors is None or isinstance(selectors, str | int) else list(selectors)
-    return [open_device(selector) for selector in several or [None]]
+def open_devices(selectors: str | int | Device | Sequence[str | int | Device] | None) -> list[Device]:
+    """Opens the devices that are named (see `choose`), at least one; DeviceError where that fails.
+
+    Those that are open already are taken as they are.
+    """
+    several = list(selectors) if isinstance(selectors, Sequence) and not isinstance(selectors, str) else [selectors]
+    return [each if isinstance(each, Device) else open_device(each) for each in several or [None]]
 
 
 def name_of(devices: Sequence[Device]) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..accel.kernels import HitTests
-from ..device.open import name_of, open_devices
+from ..device.open import Device, name_of, open_devices
 from ..errors import UsageError
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validate import validate
@@ -44,10 +44,11 @@ MOST_TIMES_PLANNED = 4
 class Renderer:
     """A scene on a device, ready to render. Everything not given is taken from `scene.render`.
 
-    device: see `clrt devices`; several render one picture together. size: (width, height); triangle, box, sphere: see
-    `HitTests`; offset, builder, layout, tree, lanes, paths: see `choices.Choices`. spp: how many samples a pixel are
-    planned, if that is known: the sampler then makes neighbouring pixels' errors differ for that many, and later ones
-    begin anew (kernels/sampler). adaptive: whether tiles get samples by their error, from the pictures so far.
+    device: see `clrt devices`, or one that is open; several render one picture together. size: (width, height);
+    triangle, box, sphere: see `HitTests`; offset, builder, layout, tree, lanes, paths: see `choices.Choices`. spp: how
+    many samples a pixel are planned, if that is known: the sampler then makes neighbouring pixels' errors differ for
+    that many, and later ones begin anew (kernels/sampler). adaptive: whether tiles get samples by their error, from the
+    pictures so far.
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
     checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the end; resume:
     go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
@@ -60,7 +61,7 @@ class Renderer:
     stop_reason: str | None
     seconds: float
 
-    def __init__(self, scene: Scene, *, device: str | int | Sequence[str | int] | None = None,
+    def __init__(self, scene: Scene, *, device: str | int | Device | Sequence[str | int | Device] | None = None,
                  size: tuple[int, int] | None = None, spp: int | None = None, max_depth: int | None = None,
                  seed: int | None = None, integrator: str | None = None, shadows: bool | None = None,
                  sampler: str | None = None, filter: str | None = None, adaptive: bool | None = None,
@@ -95,7 +96,8 @@ class Renderer:
         self._planned_spp = kept.planned_spp if kept else planned
         self.session = self._make_picture()
         self._begin()
-        self._clock, self._interrupted = 0.0, False
+        self._clock = 0.0
+        self._interrupted: str | None = None
         self._last: State
         if kept:
             self._noise, self.history, self.seconds = kept.noise, kept.history, kept.seconds
@@ -163,7 +165,8 @@ class Renderer:
             yield self.state(reference)
         next_state = 0.0
         while self.stop_reason is None:
-            self._run_pass(spp, time, error)
+            if self._run_pass(spp, time, error) == "abandoned":
+                return
             now, done = clock.perf_counter(), self.session.samples_done
             if self.stop_reason is None and spp is not None and done >= spp:
                 self.stop_reason = "spp"
@@ -186,7 +189,11 @@ class Renderer:
 
     def interrupt(self) -> None:
         """Has `passes` end after the launches in flight, with a state and a checkpoint; for signal handlers, too."""
-        self._interrupted = True
+        self._interrupted = "interrupted"
+
+    def abandon(self) -> None:
+        """Has `passes` end after the launch that is being made, with nothing: nobody wants the picture any more."""
+        self._interrupted = "abandoned"
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
@@ -225,18 +232,20 @@ class Renderer:
         looks = done and error is not None and self._is_check(done) and not self.session.work.parts
         return "error" if looks and low_enough(self.state().stops_by, error) else None
 
-    def _run_pass(self, spp: int | None, time: float | None, error: float | None) -> None:
-        """One pass; sets the stop reason where `time` is over or it is interrupted, maybe inside the pass."""
+    def _run_pass(self, spp: int | None, time: float | None, error: float | None) -> str | None:
+        """One pass; sets and returns the stop reason where `time` is over or it is interrupted, maybe inside the pass.
+        """
         for _ in self._adaptive_pass(spp) if self._adapts else self._even_pass(spp, error):
             self.seconds = clock.perf_counter() - self._clock
             if self._interrupted:
-                self.stop_reason, self._interrupted = "interrupted", False
-                return
+                self.stop_reason, self._interrupted = self._interrupted, None
+                return self.stop_reason
             if time is not None and self.seconds >= time and self.session.samples_done:
                 self.stop_reason = "time"
-                return
+                return self.stop_reason
             if self.session.work.parts:
                 self._keep()
+        return None
 
     @property
     def _adapts(self) -> bool:

@@ -1,0 +1,217 @@
+"""A scene that is edited while it is rendered: the newest one asked for is worked at, the newest picture is at hand."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from ..device.open import name_of
+from ..errors import ClrtError
+from ..output.image import Image
+from ..rendering.renderer import Renderer, State
+from ..rendering.report import render_report, tree_report
+from ..scene.model import Scene
+from .history import History
+from .settings import Selector, Settings
+from .snapshot import Snapshot
+from .studio import Asked, Studio, Superseded
+
+#: A movement without anything new for so many seconds has ended.
+SETTLED = 0.2
+_log = logging.getLogger(__name__)
+
+
+class Live:
+    """Everything may be called from any thread and returns at once, but for `wait`, `image` and `close`.
+
+    Scenes are never changed in place: `edit` takes a new one that shares what stays the same (dataclasses.replace),
+    which then is not uploaded, built or compiled again. device: instead of that of `settings`.
+    """
+
+    def __init__(self, scene: Scene, *, device: Selector = None,
+                 settings: Settings = Settings()) -> None:
+        if device is not None:
+            settings = replace(settings, device=device)
+        self._asked = self._current = Asked(1, scene, settings, False)
+        size = self._asked.size
+        black = np.zeros((size[1], size[0], 3), np.float32)
+        self._snapshot = Snapshot(scene=scene, settings=settings, pixels=black, size=size)
+        self._still: tuple[Renderer, State] | None = None
+        self._times: deque[float] = deque(maxlen=64)
+        self._history = History()
+        self._changed = threading.Condition(threading.RLock())
+        self._closed = False
+        self._studio = Studio(self._begin)
+        self._thread = threading.Thread(target=self._work, name="clrt live", daemon=True)
+        self._thread.start()
+
+    @property
+    def scene(self) -> Scene:
+        """The newest one asked for."""
+        return self._asked.scene
+
+    @property
+    def settings(self) -> Settings:
+        """The newest ones asked for."""
+        return self._asked.settings
+
+    @property
+    def asked(self) -> int:
+        """The number of the newest edit or choice; a snapshot says which one it shows."""
+        return self._asked.number
+
+    def edit(self, scene: Scene, *, moving: bool = False, step: bool = True) -> None:
+        """Shows this scene from now on; accumulation begins anew.
+
+        moving: more edits follow at once, as while something is dragged or one walks: the resolution is lowered as far
+        as the wanted frame rate takes, until none has come for SETTLED seconds. They are one step of the history.
+        step: whether it can be undone; walks had better not.
+        """
+        with self._changed:
+            if step:
+                self._history.record(self.scene, scene, moving)
+            self._ask(scene=scene, moving=moving)
+
+    def choose(self, settings: Settings) -> None:
+        """Renders with these from now on."""
+        self._ask(settings=settings, moving=False)
+
+    def undo(self) -> None:
+        """Takes the last step back, if there is one."""
+        with self._changed:
+            if self._history.can_undo:
+                self._ask(scene=self._history.undo(self.scene), moving=False)
+
+    def redo(self) -> None:
+        """Takes the step again that was taken back last, if there is one."""
+        with self._changed:
+            if self._history.can_redo:
+                self._ask(scene=self._history.redo(self.scene), moving=False)
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a step to take back."""
+        return self._history.can_undo
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether there is a step to take again."""
+        return self._history.can_redo
+
+    def snapshot(self) -> Snapshot:
+        """The newest picture, and how it is coming along."""
+        return self._snapshot
+
+    def wait(self, until: Callable[[Snapshot], bool], seconds: float | None = None) -> Snapshot:
+        """The first snapshot of which that holds, or the one after so many seconds."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._closed or until(self._snapshot), seconds)
+            return self._snapshot
+
+    def image(self) -> Image:
+        """The newest whole picture with its report, to be saved; the newest small or black one where there is none."""
+        still, snapshot = self._still, self._snapshot
+        report = render_report(*still) if still else {}
+        if snapshot.denoised is not None:
+            return Image(snapshot.denoised, report, snapshot.pixels)
+        return Image(still[1].pixels if still else snapshot.pixels, report)
+
+    def close(self) -> None:
+        """Ends the work and waits for that."""
+        with self._changed:
+            self._closed = True
+            self._studio.abandon()
+            self._changed.notify_all()
+        self._thread.join()
+
+    def __enter__(self) -> Live:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    def _ask(self, **changes: Any) -> None:
+        with self._changed:
+            self._asked = self._asked._replace(number=self._asked.number + 1, **changes)
+            self._studio.abandon()
+            self._changed.notify_all()
+
+    def _work(self) -> None:
+        """The thread: shows what was asked for last, until that is closed."""
+        asked: Asked | None = None
+        while (asked := self._next(asked)) is not None:
+            try:
+                self._show(asked)
+            except Superseded:
+                pass
+            except ClrtError as error:
+                self._publish(asked=asked.number, error=str(error), phase="rest")
+            except Exception as error:  # a mistake of ours must not leave a picture that never changes again
+                _log.exception("a picture failed")
+                self._publish(asked=asked.number, error=f"{type(error).__name__}: {error}", phase="rest")
+
+    def _next(self, last: Asked | None) -> Asked | None:
+        """What to show, once it is not the last; None in the end."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._closed or self._asked is not last)
+            return None if self._closed else self._asked
+
+    def _show(self, asked: Asked) -> None:
+        """Renders it to the end, first a small picture where a whole one would take too long."""
+        quick = self._studio.quick_size(asked)
+        if quick != asked.size:
+            self._render(asked, quick, asked.settings.samples)
+            if asked.moving:
+                self._publish(phase="rest")
+                with self._changed:
+                    self._changed.wait_for(lambda: self._is_superseded(asked), SETTLED)
+        self._render(asked, asked.size, asked.scene.render.spp)
+        self._publish(phase="rest")
+
+    def _render(self, asked: Asked, size: tuple[int, int], spp: int) -> None:
+        if self._is_superseded(asked):
+            raise Superseded
+        self._current = asked
+        for state in self._studio.states(asked, size, spp):
+            if state.spp >= min(asked.settings.samples, spp):
+                self._publish_picture(asked, state)
+        if self._is_superseded(asked):
+            raise Superseded
+
+    def _is_superseded(self, asked: Asked) -> bool:
+        return self._closed or self._asked is not asked
+
+    def _begin(self, phase: str) -> None:
+        if self._is_superseded(self._current):
+            raise Superseded
+        self._publish(phase=phase)
+
+    def _publish_picture(self, asked: Asked, state: State) -> None:
+        renderer = self._studio.renderer
+        assert renderer is not None
+        now = time.perf_counter()
+        self._times.append(now)
+        if renderer.settings.size == asked.size:
+            self._still = renderer, state
+        self._publish(
+            scene=asked.scene, settings=asked.settings, asked=asked.number, number=self._snapshot.number + 1,
+            size=asked.size, pixels=state.pixels, denoised=None, spp=state.spp, seconds=state.seconds,
+            noise=state.noise, history=list(renderer.history), error=None,
+            frames_per_second=float(sum(now - each < 1 for each in self._times)),
+            rays_per_second=state.film.rays / max(state.seconds, 1e-9), device=name_of(renderer.devices),
+            device_bytes=renderer.session.device_bytes, tree=tree_report(renderer),
+            features=renderer.compiled.features)
+
+    def _publish(self, **changes: Any) -> None:
+        with self._changed:
+            self._snapshot = replace(self._snapshot, **changes)
+            self._changed.notify_all()

@@ -1,0 +1,53 @@
+"""What a user chooses about an interactive picture beside the scene, whose own settings are edited with it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import UsageError
+
+
+Selector = str | int | Sequence[str | int] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How the newest scene is rendered; integrator, depth, size and end (`spp`) are those of `scene.render`.
+
+    device: see `clrt devices`; tree, builder, layout, triangle: see `rendering.renderer.Renderer`. scale: of the
+    picture's width and height. frame_rate: pictures a second while things move, for which the resolution is lowered as
+    far as it takes; 0: never. samples: a pixel of each of these. denoise: whether a picture at rest is denoised.
+    Raises UsageError.
+    """
+
+    device: Selector = None
+    tree: bool | None = None
+    builder: str | None = None
+    layout: str | None = None
+    triangle: str = "watertight"
+    scale: float = 1.0
+    frame_rate: float = 20.0
+    samples: int = 1
+    denoise: bool = False
+
+    def __post_init__(self) -> None:
+        for name, value, least, most in (("scale", self.scale, 0.01, 4.0), ("frame_rate", self.frame_rate, 0, 1000),
+                                         ("samples", self.samples, 1, 1 << 20)):
+            if not least <= value <= most:
+                raise UsageError(f"{name} is {value:g}; it must be {least:g} to {most:g}")
+
+    @property
+    def tracing(self) -> dict[str, Any]:
+        """Those that a Renderer takes by the same names."""
+        return {name: getattr(self, name) for name in ("tree", "builder", "layout", "triangle")}
+
+    def size_of(self, size: tuple[int, int]) -> tuple[int, int]:
+        """A scene's (width, height), scaled."""
+        return scaled(size, self.scale)
+
+
+def scaled(size: tuple[int, int], factor: float) -> tuple[int, int]:
+    """(width, height) times a factor, at least a pixel each."""
+    return max(1, round(size[0] * factor)), max(1, round(size[1] * factor))

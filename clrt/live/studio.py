@@ -1,0 +1,73 @@
+"""Renders what is asked for, one after another: what belongs to the thread that works."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from ..device.open import Device, open_devices
+from ..rendering.renderer import Renderer, State
+from ..scene.model import Scene
+from .pace import Pace
+from .settings import Selector, Settings
+
+
+class Asked(NamedTuple):
+    """What is to be seen. number: of the edit or choice; moving: more like it will follow at once."""
+
+    number: int
+    scene: Scene
+    settings: Settings
+    moving: bool
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Of the whole picture, (width, height)."""
+        return self.settings.size_of(self.scene.render.size)
+
+
+class Superseded(Exception):
+    """Something else was asked for meanwhile."""
+
+
+class Studio:
+    """Keeps what the next picture can use of the last one.
+
+    on_phase: hears what begins, and raises Superseded where that has become useless.
+    """
+
+    def __init__(self, on_phase: Callable[[str], None]) -> None:
+        self._on_phase = on_phase
+        self._devices: list[Device] = []
+        self._selector: object = self     # nobody's
+        self._pace = Pace()
+        self.renderer: Renderer | None = None
+
+    def quick_size(self, asked: Asked) -> tuple[int, int]:
+        """Of a picture that comes in time while things move; the whole one's where that does."""
+        rate = asked.settings.frame_rate
+        return self._pace.size(asked.size, asked.settings.samples, 1 / rate) if rate else asked.size
+
+    def states(self, asked: Asked, size: tuple[int, int], spp: int) -> Iterator[State]:
+        """The picture at more and more samples, up to `spp`."""
+        start = time.perf_counter()
+        self._open(asked.settings.device)
+        self.renderer = renderer = Renderer(asked.scene, device=self._devices, size=size, spp=spp,
+                                            on_phase=self._on_phase, **asked.settings.tracing)
+        preparation = time.perf_counter() - start - renderer.session.build_seconds
+        self._on_phase("render")
+        for first, state in enumerate(renderer.passes(spp=spp)):
+            if first == 0:
+                self._pace.note(size, state.spp, preparation, renderer.seconds)
+            yield state
+
+    def _open(self, selector: Selector) -> None:
+        if selector != self._selector:
+            self._selector, self.renderer = self, None
+            self._devices, self._selector = open_devices(selector), selector
+
+    def abandon(self) -> None:
+        """Has `states` end soon; for any thread."""
+        if (renderer := self.renderer) is not None:
+            renderer.abandon()
