@@ -163,8 +163,11 @@ class RenderSettings:
 
 @dataclass(eq=False, kw_only=True)
 class Scene:
-    """Everything that one picture needs. `camera` takes it; `cameras`: those of the model files, by name; `animation`:
-    how the camera moves (scene.animation)."""
+    """Everything that one picture needs. `camera` takes it; `cameras`: others by name, those of the model files, too;
+    `animation`: how the camera moves (scene.animation).
+
+    materials: those that the scene file names; its meshes and spheres refer to these objects.
+    """
 
     meshes: list[Mesh] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)
@@ -176,3 +179,4 @@ class Scene:
     name: str = "scene"
     cameras: dict[str, Camera] = field(default_factory=dict)
     animation: Animation | None = None
+    materials: dict[str, Material] = field(default_factory=dict)

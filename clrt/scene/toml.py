@@ -23,8 +23,8 @@ from .textures import WHITE, Texture
 
 Kind = TypeVar("Kind")
 Table = Mapping[str, Any]
-SECTIONS = ("camera", "animation", "keyframe", "render", "environment", "materials", "mesh", "instance", "sphere",
-            "light")
+SECTIONS = ("camera", "cameras", "animation", "keyframe", "render", "environment", "materials", "mesh", "instance",
+            "sphere", "light")
 
 
 class SceneReader:
@@ -41,8 +41,10 @@ class SceneReader:
         self.problems = [f'key "{key}" {unknown(key, SECTIONS)}' for key in document if key not in SECTIONS]
 
     def scene(self) -> Scene:
+        for name, values in self._table("cameras").items():
+            self._cameras[name] = self._camera(values, f"cameras.{name}")
         lens = self._table("camera")
-        camera = Camera() if "name" in lens else self._camera(lens)
+        camera = Camera() if "name" in lens else self._camera(lens, "camera")
         render = self._build(RenderSettings, self._table("render"), "render")
         environment = self._environment(self._table("environment"))
         for name, values in self._table("materials").items():
@@ -59,16 +61,19 @@ class SceneReader:
         return Scene(meshes=meshes, instances=instances, lights=lights, spheres=[each for each in spheres if each],
                      camera=self._named_camera(lens) if "name" in lens else camera, cameras=self._cameras,
                      environment=environment or Environment(), render=render or RenderSettings(), name=self._path.stem,
-                     animation=self._animation())
+                     animation=self._animation(), materials=self._materials)
 
-    def _camera(self, values: Table) -> Camera:
+    def _camera(self, values: Any, where: str) -> Camera:
         """The camera; if some of it is wrong, what places it, so that this is checked all the same."""
-        camera = self._build(Camera, values, "camera")
+        if not isinstance(values, dict):
+            self.problems.append(f"{where}: {show(values)} is not a table; write its keys below [{where}]")
+            return Camera()
+        camera = self._build(Camera, values, where)
         place = {key: values[key] for key in ("position", "look_at", "up") if key in values}
-        return camera or (Camera() if field_problems(Camera, place, "camera") else Camera(**place))
+        return camera or (Camera() if field_problems(Camera, place, where) else Camera(**place))
 
     def _named_camera(self, values: Table) -> Camera:
-        """The camera of a model file that the table names."""
+        """The one of `cameras` that the table names."""
         name = str(values["name"])
         self.problems += camera_problems(name, self._cameras, "camera.name")
         self.problems += [f"camera: has a name and {key}; keep one of them" for key in values if key != "name"]
@@ -236,10 +241,10 @@ class SceneReader:
 
 
 def camera_problems(name: str, cameras: Mapping[str, Camera], where: str) -> list[str]:
-    """Whether no model file has a camera of this name."""
+    """Whether there is no camera of this name."""
     if name in cameras:
         return []
-    remedy = unknown(name, cameras) if cameras else "is unknown, since no model file of the scene has a camera"
+    remedy = unknown(name, cameras) if cameras else "is unknown, since neither [cameras] nor a model file has one"
     return [f"{where}: {show(name)} {remedy}"]
 
 

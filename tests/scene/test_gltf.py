@@ -202,7 +202,7 @@ def test_cameras_by_name(tmp_path: Path) -> None:
     assert caught.value.problems == [f'{scene}: camera.name: "sid" is unknown; did you mean "side"?',
                                      f"{scene}: camera: has a name and fov_degrees; keep one of them"]
     scene.write_text('[camera]\nname = "side"\n')
-    with pytest.raises(SceneError, match='"side" is unknown, since no model file of the scene has a camera'):
+    with pytest.raises(SceneError, match='"side" is unknown, since neither .cameras. nor a model file has one'):
         load(scene)
 
 

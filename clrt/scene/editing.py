@@ -1,0 +1,51 @@
+"""Scenes made from others by a change. None is changed in place; what stays the same is shared."""
+
+from __future__ import annotations
+
+from collections.abc import Container
+from dataclasses import replace
+
+from .instancing import meshes_by_id
+from .materials import Material
+from .model import Instance, Mesh, Scene, Sphere
+
+
+def materials_of(scene: Scene) -> dict[str, Material]:
+    """All materials, each once, by names: those of the scene file first, then what a model file calls its own, then
+    what it is on. Materials of equal values are different ones as long as they are different objects."""
+    named = dict(scene.materials)
+    known = {id(material) for material in named.values()}
+    meshes = [*scene.meshes, *meshes_by_id(scene.instances).values()]
+    users: list[tuple[str, Material | None]] = [(mesh.material_name or mesh.name, mesh.material) for mesh in meshes]
+    users += [(instance.name, instance.material) for instance in scene.instances]
+    users += [(sphere.name, sphere.material) for sphere in scene.spheres]
+    for name, material in users:
+        if material is not None and id(material) not in known:
+            known.add(id(material))
+            named[free_name(name, named)] = material
+    return named
+
+
+def with_material(scene: Scene, old: Material, new: Material) -> Scene:
+    """The scene with `new` wherever `old` was, this very object, also among the scene's named ones."""
+    meshes = {id(mesh): replace(mesh, material=new) if mesh.material is old else mesh
+              for mesh in (*scene.meshes, *meshes_by_id(scene.instances).values())}
+
+    def changed(instance: Instance) -> Instance:
+        mesh: Mesh = meshes[id(instance.mesh)]
+        material = new if instance.material is old else instance.material
+        same = mesh is instance.mesh and material is instance.material
+        return instance if same else replace(instance, mesh=mesh, material=material)
+
+    spheres: list[Sphere] = [replace(each, material=new) if each.material is old else each for each in scene.spheres]
+    named = {name: new if material is old else material for name, material in scene.materials.items()}
+    return replace(scene, meshes=[meshes[id(mesh)] for mesh in scene.meshes], spheres=spheres, materials=named,
+                   instances=[changed(instance) for instance in scene.instances])
+
+
+def free_name(name: str, taken: Container[str]) -> str:
+    """The name, or with the first number behind it under which nothing is `taken`."""
+    number, free = 2, name
+    while free in taken:
+        number, free = number + 1, f"{name} {number}"
+    return free
