@@ -117,12 +117,11 @@ class Live:
             return self._snapshot
 
     def image(self) -> Image:
-        """The newest whole picture with its report, to be saved; the newest small or black one where there is none."""
-        still, snapshot = self._still, self._snapshot
+        """The newest picture, to be saved; with its report if it is a whole one."""
+        with self._changed:
+            still, snapshot = self._still, self._snapshot
         report = render_report(*still) if still else {}
-        if snapshot.denoised is not None:
-            return Image(snapshot.denoised, report, snapshot.pixels)
-        return Image(still[1].pixels if still else snapshot.pixels, report)
+        return Image(snapshot.shown, report, None if snapshot.denoised is None else snapshot.pixels)
 
     def close(self) -> None:
         """Ends the work and waits for that."""
@@ -180,7 +179,7 @@ class Live:
     def _render(self, asked: Asked, size: tuple[int, int], spp: int) -> None:
         if self._is_superseded(asked):
             raise Superseded
-        self._current = asked
+        self._current, self._still = asked, None
         for state in self._studio.states(asked, size, spp):
             if state.spp >= min(asked.settings.samples, spp):
                 self._publish_picture(asked, state)
@@ -200,16 +199,18 @@ class Live:
         assert renderer is not None
         now = time.perf_counter()
         self._times.append(now)
-        if renderer.settings.size == asked.size:
-            self._still = renderer, state
-        self._publish(
-            scene=asked.scene, settings=asked.settings, asked=asked.number, number=self._snapshot.number + 1,
-            size=asked.size, pixels=state.pixels, denoised=None, spp=state.spp, seconds=state.seconds,
-            noise=state.noise, history=list(renderer.history), error=None,
-            frames_per_second=float(sum(now - each < 1 for each in self._times)),
-            rays_per_second=state.film.rays / max(state.seconds, 1e-9), device=name_of(renderer.devices),
-            device_bytes=renderer.session.device_bytes, tree=tree_report(renderer),
-            features=renderer.compiled.features)
+        whole = renderer.settings.size == asked.size
+        picture = {
+            "scene": asked.scene, "settings": asked.settings, "asked": asked.number,
+            "number": self._snapshot.number + 1, "size": asked.size, "pixels": state.pixels, "denoised": None,
+            "spp": state.spp, "seconds": state.seconds, "noise": state.noise, "history": list(renderer.history),
+            "error": None, "frames_per_second": float(sum(now - each < 1 for each in self._times)),
+            "rays_per_second": state.film.rays / max(state.seconds, 1e-9), "device": name_of(renderer.devices),
+            "device_bytes": renderer.session.device_bytes, "tree": tree_report(renderer),
+            "features": renderer.compiled.features, "programs": self._studio.programs}
+        with self._changed:
+            self._still = (renderer, state) if whole else None
+            self._publish(**picture)
 
     def _publish(self, **changes: Any) -> None:
         with self._changed:

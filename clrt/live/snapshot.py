@@ -26,7 +26,8 @@ class Snapshot:
     scene, settings: what the picture shows, and `asked` which edit or choice that was (Live.asked); error: why
     what was asked for last is not shown, or None.
     frames_per_second: pictures in the last second. rays_per_second: of this picture. device: its name; device_bytes:
-    memory there; tree: as the report's `bvh`; programs: how many were built so far, found ones included.
+    memory there; tree: as the report's `bvh`; features: what is compiled in;
+    programs: how often another program was needed than before.
     """
 
     scene: Scene

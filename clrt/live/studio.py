@@ -43,6 +43,8 @@ class Studio:
         self._selector: object = self     # nobody's
         self._pace = Pace()
         self.renderer: Renderer | None = None
+        #: How often another one was needed than before.
+        self.programs = 0
 
     def quick_size(self, asked: Asked) -> tuple[int, int]:
         """Of a picture that comes in time while things move; the whole one's where that does."""
@@ -53,8 +55,10 @@ class Studio:
         """The picture at more and more samples, up to `spp`."""
         start = time.perf_counter()
         self._open(asked.settings.device)
+        last = self.renderer
         self.renderer = renderer = Renderer(asked.scene, device=self._devices, size=size, spp=spp,
-                                            on_phase=self._on_phase, **asked.settings.tracing)
+                                            on_phase=self._on_phase, before=last, **asked.settings.tracing)
+        self.programs += not (last and last.session.scene.program is renderer.session.scene.program)
         preparation = time.perf_counter() - start - renderer.session.build_seconds
         self._on_phase("render")
         for first, state in enumerate(renderer.passes(spp=spp)):

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from ..accel.layouts import Layout
@@ -19,6 +17,7 @@ from ..device.program import compose, files_of
 from ..scene.model import Camera, Scene
 from ..scene.scaling import Frame, camera_in
 from ..scene.validate import validate
+from .carried import Carried
 from .choices import Choices
 from .features import WITH_LIGHT, features_of, files_for, preamble_of
 from .pack import pack_scene
@@ -65,6 +64,11 @@ class CompiledScene:
         """The same, seen by another camera of the scene, whose kernel file this is (see `camera_file`)."""
         return replace(self, camera=camera_in(camera, self.frame), chosen_files={**self.chosen_files, "CAMERA": [file]})
 
+    def has_text_of(self, other: CompiledScene) -> bool:
+        """Whether both have the same program, in the same parts of arrays."""
+        return all(getattr(self, name) == getattr(other, name)
+                   for name in ("preamble", "chosen_files", "entry", "part_bytes"))
+
     @property
     def kernel(self) -> str:
         """The name of the entry's kernel."""
@@ -88,13 +92,14 @@ class CompiledScene:
 
 
 def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
-                  device: Device | None = None) -> CompiledScene:
+                  device: Device | None = None, carried: Carried | None = None) -> CompiledScene:
     """Validates and packs `scene` for the kernel file `entry`; SceneError lists all that is wrong with it.
 
-    entry: None for the scene's integrator; device: where large trees are built, if given.
+    entry: None for the scene's integrator; device: where large trees are built, if given; carried: what
+    was made for the scene before.
     """
     validate(scene)
-    packed = pack_scene(scene, choices, device)
+    packed = pack_scene(scene, choices, device, carried or Carried())
     features = features_of(packed, choices, device is not None and loop_turns(device) is not None)
     part_bytes = needed_parts((array for _, array in packed.buffers.values()), device.info) if device else None
     if entry is None:
@@ -105,14 +110,3 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
                          preamble_of(packed, choices, features, part_bytes), files_for(packed, choices, features),
                          entry, packed.tree, choices, packed.scene.camera, packed.frame,
                          len(packed.scene.instances), packed.shapes.objects, part_bytes)
-
-
-def compile_for_all(scene: Scene, choices: Sequence[Choices], devices: Sequence[Device]) -> list[CompiledScene]:
-    """The scene for each device with its choices: once for those that agree, unless trees were built on a device."""
-    compiled: list[CompiledScene] = []
-    for choice, device in zip(choices, devices):
-        alike = [done for done, other, chosen in zip(compiled, devices, choices) if chosen == choice
-                 and (other.layout, other.info.max_alloc_bytes) == (device.layout, device.info.max_alloc_bytes)
-                 and all(isinstance(array, np.ndarray) for _, array in done.buffers.values())]
-        compiled.append(alike[0] if alike else compile_scene(scene, choice, device=device))
-    return compiled

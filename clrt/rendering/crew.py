@@ -44,7 +44,8 @@ class Crew(Accumulation):
     """Renders samples of one scene at one size, compiled for each device. DeviceError where none is left."""
 
     def __init__(self, devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int],
-                 max_depth: int, seed: int, planned_spp: int | None = None) -> None:
+                 max_depth: int, seed: int, planned_spp: int | None = None,
+                 before: Sequence[SceneOnDevice] = ()) -> None:
         super().__init__(size)
         tiles = self.work.samples.size
         pixel = compiled[0].choices.pixel
@@ -55,7 +56,7 @@ class Crew(Accumulation):
         for device, scene in zip(devices, compiled):
             launch = first_launch(scene, size, max_depth, seed, planned_spp)
             try:
-                self.workers.append(Worker(device, scene, launch, tiles))
+                self.workers.append(Worker(device, scene, launch, tiles, before))
             except DeviceError as error:
                 if len(devices) == 1:
                     raise
@@ -171,9 +172,9 @@ class Crew(Accumulation):
 
 
 def make_picture(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
-                 seed: int, planned_spp: int | None) -> Accumulation:
-    """A session where there is one device with room for the film, else a crew."""
+                 seed: int, planned_spp: int | None, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
+    """A session where there is one device with room for the film, else a crew; before: see `SceneOnDevice`."""
     if len(devices) == 1:
         with suppress(NoRoomError):
-            return Session(devices[0], compiled[0], size, max_depth, seed, planned_spp)
-    return Crew(devices, compiled, size, max_depth, seed, planned_spp)
+            return Session(devices[0], compiled[0], size, max_depth, seed, planned_spp, before)
+    return Crew(devices, compiled, size, max_depth, seed, planned_spp, before)

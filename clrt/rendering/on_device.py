@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ..device.arrays import on_device, on_host
+from ..device.arrays import on_device, on_host, same_content
 from ..device.background import in_background
 from ..device.launch import calling, wait_for
 from ..device.memory import array_bytes, check_memory, part_count, part_records, parts, size
@@ -42,34 +43,46 @@ def largest_film(device: Device, compiled: CompiledScene) -> int:
 
 class SceneOnDevice:
     """launch: the LAUNCH record, whose ranges are for its user to set; film_bytes: what the film will take there;
-    windows: whether that is for the pixels of a launch, not the picture's.
+    windows: whether that is for the pixels of a launch, not the picture's. before: scenes of no use any more, whose
+    program and buffers are taken over where they are the same.
 
     Raises DeviceError, with the numbers, where scene and film do not fit, and KernelError.
     """
 
     def __init__(self, device: Device, compiled: CompiledScene, launch: NDArray[Any], film_bytes: int,
-                 windows: bool = False) -> None:
+                 windows: bool = False, before: Sequence[SceneOnDevice] = ()) -> None:
         self.device, self.compiled, self.launch, self.film_bytes = device, compiled, launch, film_bytes
         self._bins: Bins | None = None
         self._check_memory()
         primitives = int(compiled.counts["triangles"][0] + compiled.counts["spheres"][0])
         #: Of a pixel, in one launch; None where it does not matter.
         self.most_samples = most_samples(device, compiled.tree, primitives, int(launch["max_depth"][0]))
-        self.program: BuiltProgram = build(device, WINDOWS * windows + compiled.source)
+        self._windows = windows
+        last = next((each for each in before if each.device is device), None)
+        self._warm = last is not None and last._windows == windows and last.compiled.has_text_of(compiled)
+        self.program: BuiltProgram = (last.program if last and self._warm
+                                      else build(device, WINDOWS * windows + compiled.source))
         with self.allocating():
-            scene = [self._uploaded(array) for _, array in compiled.buffers.values()]
+            self._buffers = {name: last and last._buffer(name, array) or self._uploaded(array)
+                             for name, (_, array) in compiled.buffers.items()}
         self._kernel = make_kernel(device, self.program, compiled.kernel)
         #: What every kernel of the scene takes first (SCENE_PARAMETERS).
-        self.scene_arguments = [*sum(scene, []), compiled.counts[0]]
+        self.scene_arguments = [*sum(self._buffers.values(), []), compiled.counts[0]]
         if compiled.entry == "raster.cl":
             self._bins = Bins(device, compiled, self.scene_arguments)
-        self.build_seconds = self.program.build_seconds
+        self.build_seconds = 0.0 if self._warm else self.program.build_seconds
 
     def _uploaded(self, array: Any) -> list[cl.Buffer]:
         if self.compiled.part_bytes is None:
             return [on_device(self.device, array)]
         values = on_host(self.device, array)
         return [on_device(self.device, part) for part in parts(values, self.compiled.part_bytes)]
+
+    def _buffer(self, name: str, array: Any) -> list[cl.Buffer] | None:
+        """The buffer of this name, if it holds the same as an array."""
+        own = self.compiled.buffers.get(name, (None, None))[1]
+        kept = isinstance(array, np.ndarray) or self.compiled.part_bytes is None    # parts are copies
+        return self._buffers[name] if kept and same_content(own, array) else None
 
     @property
     def device_bytes(self) -> int:
@@ -102,6 +115,8 @@ class SceneOnDevice:
 
     def warm_up(self, film: cl.Buffer, tiles: cl.Buffer) -> None:
         """Launches no work: some drivers compile, or take memory, at the first launch. It belongs to the build."""
+        if self._warm:
+            return
         start = time.perf_counter()
         self.launch["pixel_count"] = 0
         with taking_any_time():

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accel.build import FEW_SPHERES, build_tree, fitting_layout
+from ..accel.build import FEW_SPHERES, fitting_layout
 from ..accel.kernels import tree_buffers
 from ..accel.layouts import Layout, leaf_spheres
 from ..device.open import Device
@@ -19,10 +19,11 @@ from ..scene.instancing import arranged
 from ..scene.materials import Material
 from ..scene.model import Scene
 from ..scene.scaling import Frame, frame_of, in_frame
+from .carried import Carried
 from .choices import Choices
 from .corners import pack_corners
 from .emitters import Emitters, pack_emitters
-from .environment import Sky, pack_sky
+from .environment import Sky
 from .filters import filter_quantiles
 from .geometry import corners_of, normal_records, sphere_records, triangle_records
 from .materials import Materials, pack_materials
@@ -55,13 +56,12 @@ class Shapes:
         return [*(mesh.material for mesh in self.scene.meshes), *(sphere.material for sphere in self.scene.spheres),
                 *self.placements.materials]
 
-    def tree(self, choices: Choices, device: Device | None) -> Layout:
+    def tree(self, choices: Choices, device: Device | None, carried: Carried) -> Layout:
         """The tree over all but lone spheres."""
         in_tree, test = self.spheres[:0] if self.lone else self.spheres, choices.tests.triangle
         layout = choices.layout or fitting_layout(device, len(self.triangles), len(in_tree), test,
                                                   bool(self.scene.instances), choices.tree)
-        build = self.placements.tree if self.scene.instances else build_tree
-        return build(device, layout, choices.builder, self.triangles, in_tree, test)
+        return carried.tree(device, layout, choices.builder, self.triangles, in_tree, test, self.placements)
 
     def buffers(self, codes: NDArray[np.int32], emitters: Emitters) -> dict[str, tuple[str, Any]]:
         """What surfaces are made of; codes: of the users' materials."""
@@ -109,12 +109,12 @@ class Packed:
         return self.shapes.frame
 
 
-def pack_scene(scene: Scene, choices: Choices, device: Device | None) -> Packed:
-    """Packs a valid scene; device: where large trees are built, if given."""
+def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: Carried) -> Packed:
+    """Packs a valid scene; device: where large trees are built, if given; carried: from the scene before."""
     shapes = Shapes(scene)
     with ThreadPoolExecutor(1) as beside:  # a sky takes as long as a tree, and neither needs all cores
-        packing = beside.submit(pack_sky, scene.environment)
-        tree = shapes.tree(choices, device)
+        packing = beside.submit(carried.sky, scene.environment)
+        tree = shapes.tree(choices, device, carried)
         sky = packing.result()
     textures = Textures()
     emitters = pack_emitters(shapes.scene, shapes.triangles, sky, textures)

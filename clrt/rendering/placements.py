@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accel.layouts import Layout
 from ..accel.two_level import TwoLevels, inverse
 from ..device.open import Device
 from ..scene.instancing import prototypes
@@ -27,33 +26,34 @@ class Placements:
     """Which meshes stand where. First comes the rest: what stands in the world as it is, if there is such.
 
     meshes: those that instances show; their triangles are stored one mesh after another, the rest's behind them.
-    before: how many come before the rest's. materials: (k,), each instance's.
+    before: how many come before the rest's. materials: (k,), each instance's. starts: where each mesh's begin. mesh,
+    to_world: which one stands where, and how, the rest first.
     """
 
     def __init__(self, instances: list[Instance], rest: bool) -> None:
         self.meshes, which = prototypes(instances)
         self.materials = [each.material or each.mesh.material for each in instances]
-        self._starts = np.cumsum([0, *(len(mesh.faces) for mesh in self.meshes)])
-        self.before = int(self._starts[-1])
+        self.starts = np.cumsum([0, *(len(mesh.faces) for mesh in self.meshes)])
+        self.before = int(self.starts[-1])
         itself = [np.eye(3, 4)] * rest
-        self._to_world = np.array([*itself, *(instance.to_world for instance in instances)])
-        self._mesh = np.concatenate([np.full(len(itself), len(self.meshes), np.int32), which])
+        self.to_world = np.array([*itself, *(instance.to_world for instance in instances)])
+        self.mesh = np.concatenate([np.full(len(itself), len(self.meshes), np.int32), which])
 
-    def tree(self, device: Device | None, layout: str, builder: str | None, triangles: FloatArray, spheres: FloatArray,
-             test: str) -> Layout:
-        """The tree over triangles (m, 3, 3), stored as above, and spheres (s, 4), which belong to the rest."""
-        meshes = np.split(triangles, self._starts[1:])
-        return TwoLevels(device, layout, builder, meshes, self._mesh, test, spheres).place(self._to_world)
+    def levels(self, device: Device | None, layout: str, builder: str | None, triangles: FloatArray,
+               spheres: FloatArray, test: str) -> TwoLevels:
+        """The trees over triangles (m, 3, 3), stored as above, and spheres (s, 4), which belong to the rest."""
+        meshes = np.split(triangles, self.starts[1:])
+        return TwoLevels(device, layout, builder, meshes, self.mesh, test, spheres)
 
     def records(self, codes: NDArray[np.int32]) -> NDArray[Any]:
         """PLACEMENT records. codes: (k,) int32, of the instances' materials."""
-        linear = self._to_world[..., :3]
-        records = np.zeros(len(self._mesh), PLACEMENT)
-        records["to_world"] = self._to_world
-        rounding = ROUNDINGS * np.abs(linear) @ np.abs(inverse(self._to_world)[..., :3])
+        linear = self.to_world[..., :3]
+        records = np.zeros(len(self.mesh), PLACEMENT)
+        records["to_world"] = self.to_world
+        rounding = ROUNDINGS * np.abs(linear) @ np.abs(inverse(self.to_world)[..., :3])
         for row in range(3):
             records[f"rounding{row}"] = rounding[:, row]
-        records["first"] = self._starts[self._mesh]
+        records["first"] = self.starts[self.mesh]
         records["material"] = np.concatenate([np.full(len(records) - len(codes), -1), codes])
         records["unit"] = np.sign(np.linalg.det(linear)) / np.abs(linear).max(axis=(1, 2))
         return records

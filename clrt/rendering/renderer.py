@@ -23,13 +23,15 @@ from .aovs import LIGHT, chosen_aovs, film_aovs, needs_direct_light, seen_first
 from .camera import camera_file
 from .checkpoint import open_checkpoints
 from .choices import Choices
-from .compile import CompiledScene, compile_for_all
+from .compile import CompiledScene
+from .compiler import Compiler
 from .crew import make_picture
 from .features import INTEGRATORS, WITH_LIGHT
 from .film import RELATIVE_FLOOR, Film
 from .first_hits import first_hits
 from .kept import Kept
 from .noise import NoiseEstimate
+from .on_device import SceneOnDevice
 from .state import State as State
 from .stops import check_step, check_stops, checked_percentile, low_enough, planned_spp
 from .tiles import tile_pixels, tile_sums
@@ -53,6 +55,8 @@ class Renderer:
     checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the end; resume:
     go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
     error_percentile: a wanted error is reached where so many per cent of the tiles of 8 x 8 pixels have it.
+    before: one that is of no use any more; what it has on the devices is taken over as far as its scene is the same:
+    parts of a scene that are the same objects must not have been changed in place.
     aovs: pictures that are made beside, by their names (docs/aovs.md); those of a state: see `aovs`.
     Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
@@ -70,7 +74,8 @@ class Renderer:
                  paths: str | None = None, tree: bool | None = None,
                  on_phase: Callable[[str], None] = lambda phase: None, checkpoint: str | Path | None = None,
                  resume: bool = False, checkpoint_seconds: float = 30.0,
-                 error_percentile: float | None = None, aovs: str | Iterable[str] = ()) -> None:
+                 error_percentile: float | None = None, aovs: str | Iterable[str] = (),
+                 before: Renderer | None = None) -> None:
         self._aovs = chosen_aovs(aovs)
         self._percentile = checked_percentile(error_percentile)
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
@@ -86,7 +91,9 @@ class Renderer:
                            needs_direct_light(self._aovs), paths or (None if each.packs else "lanes"), tree)
                    for each in self.devices]
         on_phase("build")
-        self._compiled = compile_for_all(self.scene, choices, self.devices)
+        reused = before is not None and before.devices == self.devices
+        self._compiler: Compiler = before._compiler if before and reused else Compiler(self.devices)
+        self._compiled = self._compiler.compile(self.scene, choices)
         if settings.integrator in INTEGRATORS and not {"LIGHTS", "SKY"} & set(self.compiled.features):
             logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
         self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene,
@@ -94,7 +101,7 @@ class Renderer:
         on_phase("compile")
         planned = None if spp is None else int(spp) * (MOST_TIMES_PLANNED if settings.adaptive else 1)
         self._planned_spp = kept.planned_spp if kept else planned
-        self.session = self._make_picture()
+        self.session = self._make_picture(before.session.scenes if before else ())
         self._begin()
         self._clock = 0.0
         self._interrupted: str | None = None
@@ -104,10 +111,11 @@ class Renderer:
             self.session.restore(kept.film, kept.work)
             self.state()
 
-    def _make_picture(self) -> Accumulation:
+    def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
         settings = self.settings
         depth = min(settings.max_depth, 2) if settings.integrator == "direct" else settings.max_depth
-        return make_picture(self.devices, self._compiled, settings.size, depth, settings.seed, self._planned_spp)
+        return make_picture(self.devices, self._compiled, settings.size, depth, settings.seed, self._planned_spp,
+                            before)
 
     def _begin(self) -> None:
         """A picture without any samples."""

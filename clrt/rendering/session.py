@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,13 +38,13 @@ class Session(Accumulation):
     """Renders samples of one compiled scene at one size. Raises NoRoomError where scene or film do not fit."""
 
     def __init__(self, device: Device, compiled: CompiledScene, size: tuple[int, int], max_depth: int,
-                 seed: int, planned_spp: int | None = None) -> None:
+                 seed: int, planned_spp: int | None = None, before: Sequence[SceneOnDevice] = ()) -> None:
         super().__init__(size)
         film_bytes = size[0] * size[1] * compiled.choices.pixel.itemsize
         if film_bytes > largest_film(device, compiled):
             raise NoRoomError(f"{device.info.name}: a film of {size[0]}x{size[1]} has no room in a buffer")
         launch = first_launch(compiled, size, max_depth, seed, planned_spp)
-        self._scene = SceneOnDevice(device, compiled, launch, film_bytes)
+        self._scene = SceneOnDevice(device, compiled, launch, film_bytes, before=before)
         self._launches = Launches(first_launch_samples(compiled))
         with self._scene.allocating():
             self._film = on_device(device, np.zeros(size[0] * size[1], compiled.choices.pixel))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,11 +41,12 @@ class Share(NamedTuple):
 class Worker:
     """Renders shares of a picture of so many tiles. DeviceError where it cannot, or not any more."""
 
-    def __init__(self, device: Device, compiled: CompiledScene, launch: NDArray[Any], tiles: int) -> None:
+    def __init__(self, device: Device, compiled: CompiledScene, launch: NDArray[Any], tiles: int,
+                 before: Sequence[SceneOnDevice] = ()) -> None:
         self._tile_bytes = TILE_PIXELS * compiled.choices.pixel.itemsize
         self.window_tiles = max(1, min(tiles, min(WINDOW, largest_film(device, compiled)) // self._tile_bytes))
         film_bytes = IN_FLIGHT * self.window_tiles * self._tile_bytes
-        self.scene = SceneOnDevice(device, compiled, launch, film_bytes, windows=True)
+        self.scene = SceneOnDevice(device, compiled, launch, film_bytes, windows=True, before=before)
         self._windows = self._make_windows()
         self.launches = Launches(first_launch_samples(compiled))
         self.at: deque[Share] = deque()

@@ -1,0 +1,55 @@
+"""Trees and skies that are carried over from one scene to the next, where what they are made of stayed the same."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..accel.build import build_tree
+from ..accel.layouts import Layout
+from ..accel.two_level import TwoLevels
+from ..device.open import Device
+from ..scene.model import Environment
+from .environment import Sky, pack_sky
+from .placements import Placements
+
+FloatArray = NDArray[np.float32]
+
+
+class Carried:
+    """The last tree and the last sky. Where only instances moved the tree's buffers are rewritten, on the device, too.
+    """
+
+    def __init__(self) -> None:
+        self._environment: Environment | None = None
+        self._sky: Sky | None = None
+        self._names: tuple[Any, ...] = ()
+        self._arrays: list[NDArray[Any]] = []
+        self._tree: Layout | None = None
+        self._levels: TwoLevels | None = None
+        self._to_world: NDArray[np.float64] = np.zeros(0)
+
+    def sky(self, environment: Environment) -> Sky:
+        """`pack_sky`, once as long as it is the same object."""
+        if self._sky is None or environment is not self._environment:
+            self._sky, self._environment = pack_sky(environment), environment
+        return self._sky
+
+    def tree(self, device: Device | None, layout: str, builder: str | None, triangles: FloatArray, spheres: FloatArray,
+             test: str, placements: Placements) -> Layout:
+        """The tree over triangles (m, 3, 3) and spheres (s, 4), and over instances if there are any."""
+        names = layout, builder, test, len(placements.materials)
+        arrays = [triangles, spheres, placements.mesh, placements.starts]
+        same = names == self._names and all(map(np.array_equal, arrays, self._arrays))
+        if not (self._tree and same):
+            self._names, self._arrays, self._levels = names, arrays, None
+            if placements.materials:
+                self._levels = placements.levels(device, layout, builder, triangles, spheres, test)
+            else:
+                self._tree = build_tree(device, layout, builder, triangles, spheres, test)
+        if self._levels and not (self._tree and same and np.array_equal(self._to_world, placements.to_world)):
+            self._tree, self._to_world = self._levels.place(placements.to_world), placements.to_world
+        assert self._tree
+        return self._tree
