@@ -1,0 +1,208 @@
+"""Random edits of a live session for some minutes: no error, and memory that does not grow.
+
+    python tests/soak_live.py SCENE --minutes 30
+
+Prints a line from time to time, and at the end what became of memory; exits with 1 where it grew by more than 5 %,
+where an edit that should work failed, or one that should not work did.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import shutil
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+import clrt
+from clrt.live.live import Live
+from clrt.scene.editing import materials_of, with_material
+from clrt.scene.lights import PointLight
+from clrt.scene.materials import MATERIALS, Material, MetallicRoughness
+from clrt.scene.model import Integrator, Scene, Sphere
+from clrt.scene.presets import Preset
+
+GROWTH = 1.05
+SIZE = (192, 144)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scene")
+    parser.add_argument("--minutes", type=float, default=30.0)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--device")
+    given = parser.parse_args()
+    scene = clrt.load(given.scene)
+    scene = replace(scene, render=replace(scene.render, size=SIZE, spp=64))
+    with Live(scene, device=given.device) as live:
+        soak = Soak(live, random.Random(given.seed))
+        memory = soak.run(60 * given.minutes)
+    print(f"{soak.edits} edits, {dict(soak.kinds)}")
+    print(f"{soak.pictures} pictures, {soak.programs} changes of program; seconds from edit to picture: "
+          f"median {np.median(soak.latencies):.3f}, 99 % {np.percentile(soak.latencies, 99):.3f}")
+    # Caches fill in the first third; what grows after it is a leak.
+    settled, last = (np.median(np.array(part), axis=0) for part in np.array_split(memory, 3)[1:])
+    for name, before, after in zip(("process", "device"), settled, last):
+        print(f"memory of the {name}: {before / 2**20:.1f} MiB in the second third, {after / 2**20:.1f} MiB in the last")
+    for problem in soak.problems:
+        print(problem)
+    return int(bool(soak.problems) or bool(np.any(last > GROWTH * settled)))
+
+
+class Soak:
+    """What was done, and what was wrong with it."""
+
+    def __init__(self, live: Live, random: random.Random) -> None:
+        self.live, self.random = live, random
+        self.kinds: Counter[str] = Counter()
+        self.problems: list[str] = []
+        self.latencies: list[float] = []
+        self.edits = self.programs = self.pictures = 0
+        self._edits: list[Callable[[], None]] = [
+            self.walk, self.material, self.preset, self.move_sphere, self.add_sphere, self.remove_sphere,
+            self.light, self.sky, self.integrator, self.settings, self.undo, self.redo, self.mistake]
+
+    def run(self, seconds: float) -> list[tuple[int, int]]:
+        """Edits for so long; memory of the process and on the device, second by second."""
+        end, memory, told = time.monotonic() + seconds, [], 0.0
+        while time.monotonic() < end:
+            edit = self.random.choice(self._edits)
+            self.kinds[edit.__name__] += 1
+            self.edits += 1
+            start = time.perf_counter()
+            edit()
+            if edit is not self.mistake:
+                wait = self.random.choice((0.0, 0.05, 0.3, 1.0))
+                seen = self.live.wait(lambda now: now.asked == self.live.asked, 60)
+                if seen.asked != self.live.asked:
+                    self.problems.append(f"{edit.__name__}: no picture in a minute")
+                if seen.error:
+                    self.problems.append(f"{edit.__name__}: {seen.error}")
+                self.latencies.append(time.perf_counter() - start)
+                time.sleep(wait)
+            memory.append((process_memory(), device_memory()))
+            if time.monotonic() > told + 30:
+                told, seen = time.monotonic(), self.live.snapshot()
+                print(f"{end - told:6.0f} s to go, {self.edits} edits, {memory[-1][0] / 2**20:.1f} MiB, "
+                      f"programs {seen.programs}", flush=True)
+        self.programs, self.pictures = self.live.snapshot().programs, self.live.snapshot().number
+        return memory
+
+    def walk(self) -> None:
+        """Ten steps."""
+        for _ in range(10):
+            camera = self.live.scene.camera
+            x, y, z = (value + self.random.gauss(0, 0.01) for value in camera.position)
+            there = replace(camera, position=(x, y, z))
+            self.live.edit(replace(self.live.scene, camera=there), moving=True, step=False)
+            time.sleep(self.random.uniform(0, 0.05))
+
+    def material(self) -> None:
+        """Another value of one of them."""
+        old = self._material()
+        self._edit(with_material(self.live.scene, old, replace(old, emission=self._color(self.random.choice((0, 3))))))
+
+    def preset(self) -> None:
+        """Another type, plain or a substance."""
+        substance = self.random.choice(get_args(Preset))
+        new = self.random.choice([kind() for kind in MATERIALS]
+                                 + [MetallicRoughness(preset=substance, roughness=self.random.random())])
+        self._edit(with_material(self.live.scene, self._material(), new))
+
+    def move_sphere(self) -> None:
+        """One that there is, as with a mouse."""
+        spheres = list(self.live.scene.spheres)
+        if spheres:
+            i = self.random.randrange(len(spheres))
+            for _ in range(5):
+                spheres[i] = replace(spheres[i], center=self._point(), radius=self.random.uniform(0.05, 0.5))
+                self._edit(replace(self.live.scene, spheres=list(spheres)), moving=True)
+
+    def add_sphere(self) -> None:
+        """Up to two dozen, which then are in the tree."""
+        ball = Sphere(center=self._point(), radius=0.1, material=self._material())
+        if len(self.live.scene.spheres) < 24:
+            self._edit(replace(self.live.scene, spheres=[*self.live.scene.spheres, ball]))
+
+    def remove_sphere(self) -> None:
+        """The last one."""
+        self._edit(replace(self.live.scene, spheres=self.live.scene.spheres[:-1]))
+
+    def light(self) -> None:
+        """One more, moved, or one less."""
+        lights = [each for each in self.live.scene.lights if self.random.random() < 0.7][:5]
+        lamp = PointLight(position=self._point(), intensity=self._color(5))
+        self._edit(replace(self.live.scene, lights=[*lights, lamp]))
+
+    def sky(self) -> None:
+        """Another strength and direction."""
+        sky = replace(self.live.scene.environment, strength=self.random.uniform(0.1, 2),
+                      rotation_degrees=self.random.uniform(0, 360))
+        self._edit(replace(self.live.scene, environment=sky))
+
+    def integrator(self) -> None:
+        """Another one, or depth."""
+        name = self.random.choice([*get_args(Integrator), "path", "path", "path"])
+        render = replace(self.live.scene.render, integrator=name, max_depth=self.random.randint(1, 12))
+        self._edit(replace(self.live.scene, render=render))
+
+    def settings(self) -> None:
+        """Tree, triangle test, scale."""
+        self.live.choose(replace(self.live.settings, tree=self.random.choice((None, True)),
+                                 triangle=self.random.choice(("watertight", "precomputed")),
+                                 scale=self.random.choice((1.0, 0.5))))
+
+    def undo(self) -> None:
+        """The last step."""
+        self.live.undo()
+
+    def redo(self) -> None:
+        """The last one undone."""
+        self.live.redo()
+
+    def mistake(self) -> None:
+        """What cannot be rendered says so, and the last picture stays."""
+        right, shown = self.live.scene, self.live.snapshot().number
+        self.live.edit(replace(right, camera=replace(right.camera, fov_degrees=200)), step=False)
+        seen = self.live.wait(lambda now: now.asked == self.live.asked, 60)
+        if not (seen.error and "fov_degrees" in seen.error and seen.number >= shown):
+            self.problems.append(f"a mistake was not found: {seen.error}")
+        self.live.edit(right, step=False)
+
+    def _edit(self, scene: Scene, moving: bool = False) -> None:
+        self.live.edit(scene, moving=moving)
+
+    def _material(self) -> Material:
+        return self.random.choice(list(materials_of(self.live.scene).values()))
+
+    def _point(self) -> tuple[float, float, float]:
+        return self.random.uniform(-1, 1), self.random.uniform(0, 1), self.random.uniform(-1, 1)
+
+    def _color(self, scale: float) -> tuple[float, float, float]:
+        return scale * self.random.random(), scale * self.random.random(), scale * self.random.random()
+
+
+def process_memory() -> int:
+    """Bytes that this process has in memory."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+
+
+def device_memory() -> int:
+    """Bytes that it has on NVIDIA's devices; 0 without any."""
+    if not shutil.which("nvidia-smi"):
+        return 0
+    asked = ["nvidia-smi", "--query-gpu=memory.used", "--format=csv,noheader,nounits"]
+    return sum(int(line) for line in subprocess.run(asked, capture_output=True, text=True).stdout.split()) << 20
+
+
+if __name__ == "__main__":
+    sys.exit(main())
