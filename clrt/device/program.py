@@ -30,6 +30,8 @@ OPTIONS = ["-cl-std=CL1.2"]
 #: Oclgrind's LLVM lacks an intrinsic that its clang writes where it optimises, or inlines what says that it must be.
 SIMULATOR_OPTIONS = ["-cl-opt-disable", "-Dalways_inline="]
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|(\w+))\s*$')
+#: Programs that are kept in memory, those used last: each takes some megabytes.
+MOST_KEPT = 32
 _built: dict[str, cl.Program] = {}
 
 
@@ -86,18 +88,22 @@ def build(device: Device, source: str) -> BuiltProgram:
     identity = "\n".join([source, *OPTIONS, device.info.id, device.info.platform_version, device.info.driver])
     key = hashlib.sha256(identity.encode()).hexdigest()
     context_key = f"{key}-{device.context.int_ptr}"
-    cached = context_key in _built
-    if not cached:
+    program = _built.pop(context_key, None)
+    cached = program is not None
+    if program is None:
         binary = read_binary(key)
         cached = binary is not None
-        _built[context_key] = (_from_binary(device, binary) if binary else None) or _compile(device, source)
+        program = (_from_binary(device, binary) if binary else None) or _compile(device, source)
         if not cached:
             keeps_its_own = device.info.platform == "Portable Computing Language"
-            write_binary(key, b"" if keeps_its_own else _binary(_built[context_key]))
+            write_binary(key, b"" if keeps_its_own else _binary(program))
+    _built[context_key] = program
+    for old in list(_built)[:-MOST_KEPT]:
+        _built.pop(old, None)
     seconds = time.perf_counter() - start
     log.info("program of %d files %s in %.2f s", len(files_of(source)), "found" if cached else "built", seconds)
     log.debug("its files: %s", " ".join(files_of(source)))
-    return BuiltProgram(_built[context_key], seconds, cached)
+    return BuiltProgram(program, seconds, cached)
 
 
 def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
