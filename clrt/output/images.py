@@ -98,6 +98,11 @@ def _write_png(path: Path, samples: NDArray[np.uint8], metadata: Mapping[str, st
     _write(path, samples, {**metadata, "png:compressionLevel": 1, "png:filter": 32})
 
 
+def write_texels(path: Path, texels: NDArray[np.uint8]) -> None:
+    """Write (h, w, 4) samples of a texture, alpha not multiplied in, as a .png that holds the same."""
+    _write(path, texels, {"oiio:UnassociatedAlpha": 1}, ("R", "G", "B", "A"))
+
+
 def rgbe_rounded(pixels: FloatArray) -> FloatArray:
     """The nearest colours that RGBE can hold: 8 bits a channel at the scale of the brightest one (Ward 1991).
 

@@ -9,6 +9,7 @@ from ..errors import SceneError
 from .framing import frame
 from .meshes import SUFFIXES, read_model
 from .model import Scene
+from .source import source_of_model
 from .sky import SUN, default_sky
 from .toml import SceneReader, camera_problems
 from .validate import scene_problems
@@ -41,7 +42,8 @@ def _load_model(path: Path) -> Scene:
     model = read_model(path)
     camera = next(iter(model.cameras.values()), None) or frame(model.meshes, model.instances)
     return Scene(meshes=model.meshes, instances=model.instances, camera=camera, cameras=model.cameras,
-                 environment=default_sky(), lights=model.lights or [SUN], name=path.stem)
+                 environment=default_sky(), lights=model.lights or [SUN], name=path.stem,
+                 source=source_of_model(path, model))
 
 
 def _load_toml(path: Path) -> tuple[Scene, list[str]]:

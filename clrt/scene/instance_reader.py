@@ -58,6 +58,10 @@ class InstanceReader:
         wrong = f"names {len(tables)} meshes; rename them" if tables else unknown(mesh, self._shown)
         return [] if len(tables) == 1 else [f"{where}.mesh: {show(mesh)} {wrong}"]
 
+    def materials(self, table: InstanceTable) -> list[Material | None]:
+        """Those of what the table's mesh shows, without the table's own."""
+        return [each.material for each in self._shown.get(table.mesh, [[]])[0]]
+
     def read(self, table: InstanceTable, repeats: Sequence[Repeat], material: Material | None, where: str,
              ) -> list[Instance]:
         """One for each mesh that the table's mesh shows, and their copies. SceneError for transforms that cannot be."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
@@ -15,6 +15,9 @@ from .lights import Light
 from .material import tuples_for_lists
 from .materials import Diffuse, Material
 from .textures import NonNegative
+
+if TYPE_CHECKING:
+    from .source import Source
 
 Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]
@@ -166,7 +169,8 @@ class Scene:
     """Everything that one picture needs. `camera` takes it; `cameras`: others by name, those of the model files, too;
     `animation`: how the camera moves (scene.animation).
 
-    materials: those that the scene file names; its meshes and spheres refer to these objects.
+    materials: those that the scene file names; its meshes and spheres refer to these objects. source: where its parts
+    were read from, if they were.
     """
 
     meshes: list[Mesh] = field(default_factory=list)
@@ -180,3 +184,4 @@ class Scene:
     cameras: dict[str, Camera] = field(default_factory=dict)
     animation: Animation | None = None
     materials: dict[str, Material] = field(default_factory=dict)
+    source: Source | None = None

@@ -34,7 +34,8 @@ class TextureReader:
     def __init__(self, folder: Path) -> None:
         """`folder`: what the tables' files are relative to."""
         self._folder = folder
-        self._pictures: dict[str, Picture] = {}
+        #: Those read so far, by their files.
+        self.pictures: dict[str, Picture] = {}
 
     def read(self, values: Mapping[str, Any], where: str) -> Texture:
         """Raises SceneError with all that is wrong with the table or its picture."""
@@ -47,9 +48,9 @@ class TextureReader:
         if problems:
             raise SceneError(problems)
         name = values.pop("image")
-        if name not in self._pictures:
+        if name not in self.pictures:
             try:
-                self._pictures[name] = Picture(read_texels(self._folder / name), name)
+                self.pictures[name] = Picture(read_texels(self._folder / name), name)
             except SceneError as error:
                 raise SceneError([f"{where}.image: {problem}" for problem in error.problems]) from None
-        return Texture(picture=self._pictures[name], **values)
+        return Texture(picture=self.pictures[name], **values)

@@ -18,6 +18,7 @@ from .mesh_table import MeshTable
 from .model import Camera, Environment, Instance, Model, RenderSettings, Scene, Sphere
 from .pictures import read_picture
 from .sky import SUN, default_sky
+from .source import Origin, Source, material_of, parts_of
 from .texture_table import TextureReader
 from .textures import WHITE, Texture
 
@@ -38,6 +39,7 @@ class SceneReader:
         self._textures = TextureReader(path.parent)
         self._cameras: dict[str, Camera] = {}
         self._instances = InstanceReader()
+        self._source = Source()
         self.problems = [f'key "{key}" {unknown(key, SECTIONS)}' for key in document if key not in SECTIONS]
 
     def scene(self) -> Scene:
@@ -61,7 +63,13 @@ class SceneReader:
         return Scene(meshes=meshes, instances=instances, lights=lights, spheres=[each for each in spheres if each],
                      camera=self._named_camera(lens) if "name" in lens else camera, cameras=self._cameras,
                      environment=environment or Environment(), render=render or RenderSettings(), name=self._path.stem,
-                     animation=self._animation(), materials=self._materials)
+                     animation=self._animation(), materials=self._materials,
+                     source=self._sources())
+
+    def _sources(self) -> Source:
+        self._source.files += [(picture, (self._path.parent / name).resolve())
+                               for name, picture in self._textures.pictures.items()]
+        return self._source
 
     def _camera(self, values: Any, where: str) -> Camera:
         """The camera; if some of it is wrong, what places it, so that this is checked all the same."""
@@ -149,6 +157,7 @@ class SceneReader:
                               if key in values]
         if "image" in values:
             image = self._picture(values["image"])
+            self._source.files += [] if image is None else [(image, (self._path.parent / values["image"]).resolve())]
             if "color" in values:
                 self.problems.append("environment: has a color and an image; keep one of them")
         return self._build(Environment, {**values, "image": image}, "environment")
@@ -195,11 +204,17 @@ class SceneReader:
             model = Model(meshes=[])
         else:
             own = {mesh.material_name for mesh in (*model.meshes, *meshes_by_id(model.instances).values())}
+            before = list(map(material_of, parts_of(model)))
             model = placed(model, matrix, material, self._others(values, own, where))
+            self._source.meshes.append(Origin(self._located(values), parts_of(model), before))
         for name, camera in model.cameras.items():
-            self._cameras.setdefault(name, camera)
+            self._source.cameras.setdefault(name, self._cameras.setdefault(name, camera))
         self._instances.add(str(values["name"]) if "name" in values else None, model)
         return model if table is None or table.visible else Model(meshes=[])
+
+    def _located(self, values: Table) -> Table:
+        """The table of a mesh with an absolute path."""
+        return {**values, "file": (self._path.parent / values["file"]).resolve()} if "file" in values else values
 
     def _others(self, values: Table, own: set[str], where: str) -> dict[str, Material]:
         """What the table writes in the place of the file's `own` materials, by their names."""
@@ -222,7 +237,9 @@ class SceneReader:
         table = self._build(InstanceTable, _one_scale(values), where)
         self.problems += self._instances.problems(values["mesh"], where) if "mesh" in values else []
         repeats = self._repeats(values.get("repeat", ()), f"{where}.repeat")
-        return table and self._tried(self._instances.read, table, repeats, material, where) or []
+        made = table and self._tried(self._instances.read, table, repeats, material, where) or []
+        self._source.instances.append(Origin(values, made, self._instances.materials(table) if table and made else []))
+        return made
 
     def _repeats(self, values: Any, where: str) -> list[Repeat]:
         if not isinstance(values, tuple) or not all(isinstance(entry, dict) for entry in values):

@@ -1,98 +1,270 @@
-"""Write a bare model as a scene file to start from: the same picture, with all that a user may want to change."""
+"""Write a scene as a scene file: the same picture, and the same names, in a file that people may go on with.
+
+What was read from files is referred to where it is still the same (scene.source). What no scene file can say, such as a
+mesh or a sky made in Python, or a picture inside a model of which a material was changed, is written beside it.
+"""
 
 from __future__ import annotations
 
-import json
+import os
 import re
-from collections.abc import Iterator
-from dataclasses import fields
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from .editing import free_name, materials_of
+from .glb_writing import mesh_glb
 from .instancing import meshes_by_id
-from .materials import Material
-from .model import Scene
+from .material import Material
+from .materials import Diffuse
+from .model import Environment, Instance, Mesh, Scene
 from .sky import default_sky
+from .source import Origin, Source, material_of, shape_of
+from .texture_table import TextureTable
+from .textures import Picture, Texture
+from .toml_text import is_plain, toml_key, toml_value
 
 #: Fields that are written even where they have their default, since they are what a user changes first.
-TELLING = {"position", "look_at", "fov_degrees", "size", "spp", "max_depth", "color", "metallic", "roughness"}
+TELLING = {"position", "look_at", "fov_degrees", "size", "spp", "max_depth", "color", "metallic", "roughness", "center",
+           "radius"}
+#: What is written of tables as it was read; materials are those of now.
+ASSIGNED = ("material", "materials")
 #: What the scene file calls the one material of a file that has no names for its own.
 UNNAMED = "model"
 
 
-def scene_text(scene: Scene, file: str) -> str:
-    """The scene file of a model that was loaded from `file`, as the scene file is to name it.
+@dataclass
+class SceneFiles:
+    """A scene file's text, and what belongs beside it, by file names: models, texels (h, w, 4) uint8 for .png and
+    pixels (h, w, 3) float32 for .exr."""
 
-    Its materials are written by the names that the file gives them. Those that the scene file cannot say, such as
-    textures inside the model, and names that stand for several, stay the model's own.
+    text: str = ""
+    models: dict[str, bytes] = field(default_factory=dict)
+    texels: dict[str, NDArray[np.uint8]] = field(default_factory=dict)
+    pixels: dict[str, NDArray[np.float32]] = field(default_factory=dict)
+
+
+def scene_files(scene: Scene, path: Path) -> SceneFiles:
+    """The scene as a scene file that is to be at `path`."""
+    return _Writer(scene, path).files
+
+
+def started(scene: Scene) -> Scene:
+    """A bare model's scene with those of the model's materials named that a scene file can say, for users to change.
+
+    Textures inside the model, and names that stand for several materials, stay the model's own.
     """
-    return "\n".join(_lines(scene, file)) + "\n"
+    named: dict[str, list[Material]] = {}
+    for origin in scene.source.meshes if scene.source else ():
+        for part in origin.parts:
+            mesh = part.mesh if isinstance(part, Instance) else part
+            named.setdefault(mesh.material_name, []).append(mesh.material)
+    clear = {name or UNNAMED: same[0] for name, same in named.items()
+             if len(set(same)) == 1 and _is_plain(same[0]) and not (name == UNNAMED and "" in named)}
+    scene.materials = clear
+    return scene
 
 
-def _lines(scene: Scene, file: str) -> Iterator[str]:
-    yield f"# {file.encode('unicode_escape').decode()} as clrt shows it; change what you like (docs/scene-format.md)."
-    yield from _section("[camera]", scene.camera)
-    for name, camera in scene.cameras.items():
-        if camera != scene.camera:
-            yield f"# or, instead of the lines above: name = {_value(name)}"
-    yield from _section("[render]", scene.render)
-    yield from ("", "[environment]", 'sky = "default"') if _has_default_sky(scene) else ()
-    for light in scene.lights:
-        yield from _section("[[light]]", light, light.kernel)
-    materials, kept = _materials(scene)
-    for name, material in materials.items():
-        yield from _section(f"[materials.{_key(name or UNNAMED)}]", material, material.kernel)
-    yield from ("", "[[mesh]]", f"file = {_value(file)}")
-    if list(materials) == [""] and not kept:
-        yield f"material = {_value(UNNAMED)}"
-    elif materials:
-        yield from ("", "[mesh.materials]  # the file's name = the one above")
-        yield from (f"{_key(name)} = {_value(name or UNNAMED)}" for name in materials)
-    if kept:
-        yield f"# The file's own: {', '.join(map(_value, kept))}"
+class _Writer:
+    """Writes one scene. What is beside the text is noted in `files`."""
+
+    def __init__(self, scene: Scene, path: Path) -> None:
+        self._scene, self._source = scene, scene.source or Source()
+        self._folder, self._stem = path.resolve().parent, path.stem
+        self.files = SceneFiles()
+        self._names = {id(material): name for name, material in materials_of(scene).items()}
+        self._materials = dict(scene.materials)
+        self._pictures: dict[int, str] = {}
+        self._left: dict[tuple[object, ...], list[Mesh | Instance]] = {}
+        self._give_back([*scene.meshes, *scene.instances])
+        self._tables: set[str] = set()
+        objects = [*self._read_meshes(), *self._own_objects(), *self._spheres()]
+        name = scene.name.encode("unicode_escape").decode()
+        head = [f"# {name} as clrt shows it; change what you like (docs/scene-format.md).",
+                *self._section("[camera]", scene.camera), *self._cameras(), *self._section("[render]", scene.render),
+                *self._environment(scene.environment)]
+        for light in scene.lights:
+            head += self._section("[[light]]", light, light.kernel)
+        for name, material in self._materials.items():
+            head += self._section(f"[materials.{toml_key(name)}]", material, material.kernel)
+        self.files.text = "\n".join([*head, *objects]) + "\n"
+
+    def _cameras(self) -> Iterator[str]:
+        """Those by names; model files have theirs themselves."""
+        cameras = self._scene.cameras
+        theirs = [name for name, camera in cameras.items() if self._source.cameras.get(name) == camera]
+        yield from (f"# or, instead of the lines above: name = {toml_value(name)}" for name in theirs
+                    if cameras[name] != self._scene.camera)
+        for name in [name for name in cameras if name not in theirs]:
+            yield from self._section(f"[cameras.{toml_key(name)}]", cameras[name])
+
+    def _environment(self, sky: Environment) -> Iterator[str]:
+        image = sky.image
+        yield from (line for line in self._section("[environment]", sky)
+                    if image is None or not line.startswith("color = "))
+        if image is None:
+            return
+        file = self._source.file_of(image)
+        if file is not None:
+            yield f"image = {toml_value(self._relative(file))}"
+        elif np.array_equal(image, _default_image()):
+            yield 'sky = "default"'
+        else:
+            name = self._beside("sky", ".exr")
+            self.files.pixels[name] = image
+            yield f"image = {toml_value(name)}"
+
+    def _read_meshes(self) -> Iterator[str]:
+        """The tables that were read, as far as they are still the same, and their instances."""
+        shown = {shape_of(mesh): mesh for mesh in meshes_by_id(self._scene.instances).values()}
+        for origin in self._source.meshes:
+            if origin.table.get("visible") is False:
+                parts = [shown.get(shape_of(part), part) for part in origin.parts]
+            else:
+                parts = self._claimed(origin)
+            assigned = self._assigned(origin, parts) if parts else None
+            if assigned is not None:
+                self._tables.add(str(origin.table.get("name")))
+                yield from ("", "[[mesh]]", *self._keys(origin.table), *assigned)
+            elif parts:
+                self._give_back(parts)
+        for origin in self._source.instances:
+            parts = self._claimed(origin) if origin.table["mesh"] in self._tables else []
+            if len({id(part.material) for part in parts}) == 1:
+                yield from ("", "[[instance]]", *self._keys(origin.table))
+                if parts[0].material is not None and parts[0].material is not origin.own[0]:
+                    yield f"material = {toml_value(self._name_of(parts[0].material))}"
+            else:
+                self._give_back(parts)
+
+    def _claimed(self, origin: Origin) -> list[Mesh | Instance]:
+        """The scene's objects that are the origin's parts, maybe in other materials; none where one is missing."""
+        found = [left.pop(0) for part in origin.parts if (left := self._left.get(shape_of(part)))]
+        if len(found) == len(origin.parts):
+            return found
+        self._give_back(found)
+        return []
+
+    def _give_back(self, parts: Iterable[Mesh | Instance]) -> None:
+        for part in parts:
+            self._left.setdefault(shape_of(part), []).append(part)
+
+    def _assigned(self, origin: Origin, parts: Sequence[Mesh | Instance]) -> list[str] | None:
+        """The keys of a table's materials; None where it cannot say which part has which."""
+        groups: dict[str, list[tuple[Material, Material | None]]] = {}
+        for part, own in zip(parts, origin.own):
+            mesh = part.mesh if isinstance(part, Instance) else part
+            groups.setdefault(mesh.material_name, []).append((material_of(part), own))
+        if any(len({material for material, _ in pairs}) > 1 for pairs in groups.values()):
+            return None
+        changed = {name: self._name_of(named[0]) for name, pairs in groups.items()
+                   if (named := [each for each, own in pairs if each != own or self._is_named(each)])}
+        if "file" not in origin.table or list(changed) == list(groups) == [""]:
+            return [f"material = {toml_value(name)}" for name in changed.values()]
+        kept = [name for name in groups if name not in changed]
+        return [*(["", "[mesh.materials]  # the file's name = the one above"] if changed else []),
+                *(f"{toml_key(name)} = {toml_value(other)}" for name, other in changed.items()),
+                *([f"# The file's own: {', '.join(map(toml_value, kept))}"] if changed and kept else [])]
+
+    def _own_objects(self) -> Iterator[str]:
+        """What no table says: each mesh in a file beside, hidden where only its instances are seen."""
+        left = [part for parts in self._left.values() for part in parts]
+        meshes = [part for part in left if isinstance(part, Mesh)]
+        instances = [part for part in left if isinstance(part, Instance)]
+        visible = {id(mesh) for mesh in meshes}
+        names = {}
+        for mesh in {id(mesh): mesh for mesh in (*meshes, *meshes_by_id(instances).values())}.values():
+            names[id(mesh)] = name = free_name(mesh.name, self._tables)
+            self._tables.add(name)
+            file = self._beside(name, ".glb")
+            self.files.models[file] = mesh_glb(mesh)
+            yield from ("", "[[mesh]]", f"name = {toml_value(name)}", f"file = {toml_value(file)}",
+                        f"material = {toml_value(self._name_of(mesh.material))}")
+            yield from () if id(mesh) in visible else ("visible = false",)
+        for each in instances:
+            matrix = tuple(map(tuple, [*each.to_world.tolist(), (0.0, 0.0, 0.0, 1.0)]))
+            yield from ("", "[[instance]]", f"mesh = {toml_value(names[id(each.mesh)])}",
+                        f"name = {toml_value(each.name)}", f"matrix = {toml_value(matrix)}")
+            yield from () if each.material is None else (f"material = {toml_value(self._name_of(each.material))}",)
+
+    def _spheres(self) -> Iterator[str]:
+        for sphere in self._scene.spheres:
+            yield from self._section("[[sphere]]", sphere)
+            if sphere.material != Diffuse() or self._is_named(sphere.material):
+                yield f"material = {toml_value(self._name_of(sphere.material))}"
+
+    def _is_named(self, material: Material) -> bool:
+        return any(each is material for each in self._scene.materials.values())
+
+    def _name_of(self, material: Material) -> str:
+        """Its name, under which it will be written."""
+        name = self._names.get(id(material), "material")
+        if self._materials.get(name) != material:
+            name = next((known for known, each in self._materials.items() if each == material),
+                        free_name(name or UNNAMED, self._materials))
+        self._materials[name] = material
+        return name
+
+    def _keys(self, table: Mapping[str, Any]) -> Iterator[str]:
+        """A table as it was read, without its materials."""
+        for name, value in table.items():
+            if name not in ASSIGNED:
+                yield f"{toml_key(name)} = {toml_value(self._relative(value) if isinstance(value, Path) else value)}"
+
+    def _section(self, title: str, record: Any, kind: str | None = None) -> Iterator[str]:
+        """A table of a dataclass's fields, without those of no interest."""
+        yield from ("", title)
+        if kind is not None:
+            yield f"type = {toml_value(kind)}"
+        for each in fields(record):
+            value = getattr(record, each.name)
+            if isinstance(value, Texture):
+                yield f"{each.name} = {self._texture(value)}"
+            elif is_plain(value) and (each.name in TELLING or value != each.default):
+                yield f"{each.name} = {toml_value(value)}"
+
+    def _texture(self, texture: Texture) -> str:
+        """An inline table."""
+        values = {each.name: getattr(texture, each.name) for each in fields(TextureTable) if each.name != "image"
+                  and getattr(texture, each.name) != each.default}
+        return toml_value({"image": self._picture(texture.picture), **values})
+
+    def _picture(self, picture: Picture) -> str:
+        """The file of a texture's picture, which is to be written beside if there is none."""
+        if (file := self._source.file_of(picture)) is not None:
+            return self._relative(file)
+        if id(picture) not in self._pictures:
+            self._pictures[id(picture)] = name = self._beside(picture.name, ".png")
+            self.files.texels[name] = picture.texels
+        return self._pictures[id(picture)]
+
+    def _beside(self, name: str, suffix: str) -> str:
+        """A file name for something of this name, next to the scene file."""
+        clean = re.sub(r"[^\w-]+", "_", name)[:64].strip("_") or "part"
+        taken = {*self.files.models, *self.files.texels, *self.files.pixels}
+        number, file = 2, f"{self._stem}.{clean}{suffix}"
+        while file in taken:
+            number, file = number + 1, f"{self._stem}.{clean}_{number}{suffix}"
+        return file
+
+    def _relative(self, file: Path) -> str:
+        """How the scene file names another file: relative to its own folder, where there is a way."""
+        try:
+            return Path(os.path.relpath(file, self._folder)).as_posix()
+        except ValueError:  # on another drive
+            return file.as_posix()
 
 
-def _has_default_sky(scene: Scene) -> bool:
+def _default_image() -> NDArray[np.float32]:
     image = default_sky().image
-    return image is not None and scene.environment.image is not None and np.array_equal(image, scene.environment.image)
-
-
-def _materials(scene: Scene) -> tuple[dict[str, Material], list[str]]:
-    """By the file's names the materials that can be written, and the other names."""
-    named: dict[str, set[Material]] = {}
-    for mesh in (*scene.meshes, *meshes_by_id(scene.instances).values()):
-        named.setdefault(mesh.material_name, set()).add(mesh.material)
-    clear = {name: next(iter(same)) for name, same in named.items()
-             if len(same) == 1 and all(map(_is_plain, same)) and not (name == UNNAMED and "" in named)}
-    return clear, [name for name in named if name not in clear]
+    assert image is not None
+    return image
 
 
 def _is_plain(material: Material) -> bool:
-    """Whether the scene file can say all of a material."""
-    return all(isinstance(getattr(material, field.name), bool | int | float | str | tuple | None)
-               for field in fields(material))
-
-
-def _section(title: str, record: Any, kind: str | None = None) -> Iterator[str]:
-    """A table of a dataclass's fields, without those of no interest."""
-    yield from ("", title)
-    if kind is not None:
-        yield f"type = {_value(kind)}"
-    for field in fields(record):
-        value = getattr(record, field.name)
-        if value is not None and (field.name in TELLING or value != field.default):
-            yield f"{field.name} = {_value(value)}"
-
-
-def _value(value: bool | int | float | str | tuple[Any, ...]) -> str:
-    """As TOML writes it; numbers to the last digit."""
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f") if isinstance(value, str) else repr(value)
-
-
-def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _value(name)
+    """Whether a scene file can say all of a material without other files."""
+    return not material.textures()

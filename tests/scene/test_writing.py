@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from clrt.errors import SceneError
 from clrt.rendering.choices import Choices
 from clrt.rendering.identity import facts_of
+from clrt.output.scenes import save_scene
+from clrt.scene.editing import materials_of, with_material
 from clrt.scene.file import load
-from clrt.scene.materials import Diffuse
-from clrt.scene.writing import scene_text
+from clrt.scene.lights import PointLight
+from clrt.scene.materials import Dielectric, Diffuse, Mirror
+from clrt.scene.model import Camera, Environment, Instance, Mesh, Scene, Sphere
+from clrt.scene.textures import Picture, Texture
+from clrt.scene.writing import scene_files, started
 from .glb import Gltf, ball
 from .test_gltf import cameras
 
+SCENES = Path(__file__).parents[2] / "scenes"
 OBJ = "mtllib a.mtl\nv 0 0 0\nv 1 0 0.1\nv 0 0.7 0\nf 1 2 3\n" + "".join(
     f"usemtl {name}\nf 1 2 3\n" for name in ("red", 'odd "name" \\ # é', "lost", "model", "lamp"))
 MTL = """newmtl red
@@ -55,7 +63,7 @@ def test_round_trip(kind: str, tmp_path: Path) -> None:
     else:
         (shaded() if kind == "glb" else cameras()).write(model)
     scene = load(model)
-    text = scene_text(scene, "my models é/a" + model.suffix)
+    text = scene_files(started(scene), tmp_path / "a.toml").text
     (tmp_path / "a.toml").write_text(text, encoding="utf-8")
     again = load(tmp_path / "a.toml")
     assert facts_of(again, Choices()) == facts_of(scene, Choices())
@@ -89,3 +97,83 @@ def test_some_of_a_file_s_materials_are_replaced(tmp_path: Path) -> None:
         f'{scene}: environment.sky: 1 is unknown; write "default"',
         f"{scene}: environment: has a sky and color; keep one of them",
         f'{scene}: mesh[0].materials: 3 is not a table; write {{ "name in the file" = "NAME" }}']
+
+
+def edited(scene: Scene) -> Scene:
+    """With other values of what there is, a view more, and a ball of a material that has no name."""
+    materials = list(materials_of(scene).values())
+    for material in materials[:2]:
+        scene = with_material(scene, material, replace(material, emission=(0.125, 1 / 3, 2.0)))
+    ball = Sphere(center=(0.1, 0.2, 0.3), material=Dielectric(ior=1.25), name="a \"ball\"")
+    return replace(scene, spheres=[*scene.spheres, ball], camera=replace(scene.camera, fov_degrees=33.3),
+                   cameras={**scene.cameras, "from the side": Camera(position=(9.0, 1.0, 0.0))},
+                   environment=replace(scene.environment, strength=0.3),
+                   lights=[*scene.lights, PointLight(position=(1.0, 2.0, 3.0), intensity=(1.0, 0.0, 1e-7))],
+                   render=replace(scene.render, integrator="direct", seed=7))
+
+
+def again(scene: Scene, path: Path) -> Scene:
+    save_scene(scene, path)
+    return load(path)
+
+
+def check_same(scene: Scene, other: Scene) -> None:
+    """In all that makes a picture, and by the same names."""
+    assert facts_of(other, Choices()) == facts_of(scene, Choices())
+    assert other.cameras == scene.cameras and other.render == scene.render
+    plain = {name: material for name, material in scene.materials.items() if not material.textures()}
+    assert plain.items() <= other.materials.items() and scene.materials.keys() <= other.materials.keys()
+    assert [each.name for each in other.spheres] == [each.name for each in scene.spheres]
+    assert [each.name for each in other.meshes] == [each.name for each in scene.meshes]
+    assert [each.name for each in other.instances] == [each.name for each in scene.instances]
+
+
+@pytest.mark.parametrize("name", [path.stem for path in sorted(SCENES.glob("*.toml"))])
+def test_scene_files_are_written_again(name: str, tmp_path: Path) -> None:
+    """All that ship, as they are and edited, in another folder; files that they refer to stay where they are."""
+    scene = load(SCENES / f"{name}.toml")
+    for number, each in enumerate((scene, edited(scene), edited(edited(scene)))):
+        check_same(each, again(each, tmp_path / f"{number}.toml"))
+    assert not [path for path in tmp_path.iterdir() if path.suffix != ".toml"]
+    moved = again(again(edited(scene), tmp_path / "there.toml"), tmp_path / "back.toml")
+    check_same(edited(scene), moved)
+
+
+def test_changed_models_are_written(tmp_path: Path) -> None:
+    """Materials are assigned by the file's names; where these do not tell them apart, by meshes beside."""
+    (tmp_path / "a.mtl").write_text(MTL)
+    (tmp_path / "a.obj").write_text(OBJ)
+    twins = ball()
+    twins.mesh(**twins.document["meshes"][0]["primitives"][0])
+    twins.write(tmp_path / "twins.glb")
+    blue = Diffuse(color=(0.1, 0.2, 0.3))
+    scene = load(tmp_path / "a.obj")
+    scene = with_material(scene, scene.meshes[1].material, blue)
+    check_same(scene, again(scene, tmp_path / "a.toml"))
+    scene = load(tmp_path / "twins.glb")
+    scene = replace(scene, meshes=[scene.meshes[0], replace(scene.meshes[1], material=blue)])
+    check_same(scene, again(scene, tmp_path / "twins.toml"))
+    beside = {path.name for path in tmp_path.iterdir() if path.name not in ("a.mtl", "a.obj", "twins.glb")}
+    assert beside == {"a.toml", "twins.toml", "twins.mesh_0.glb", "twins.mesh_1.glb"}
+
+
+def test_what_no_scene_file_can_say_is_written_beside_it(tmp_path: Path) -> None:
+    """A mesh with all its arrays, instances of one that is not seen itself, a sky and a texture, made in Python."""
+    rng = np.random.default_rng(0)
+    directions = np.array([[0, 0, 1], [0, 1, 0], [1, 0, 0]], np.float32)
+    faces = np.array([[0, 1, 2]], np.int32)
+    picture = Picture(rng.integers(0, 256, (3, 5, 4), np.uint8), "some/wood")
+    wood = Diffuse(color=Texture(picture=picture, scale=(2.0, 3.0), wrap=("mirror", "clamp"), factor=0.7))
+    mesh = Mesh(rng.random((3, 3), np.float32), faces, wood, normals=directions, name="all of it",
+                tangents=np.column_stack([directions[[1, 2, 0]], np.ones(3, np.float32)]),
+                uv=rng.random((3, 2), np.float32), uv1=rng.random((3, 2), np.float32),
+                colors=rng.random((3, 4), np.float32))
+    hidden = Mesh(rng.random((3, 3), np.float32), faces, Mirror(), name="all of it")
+    places = [rng.random((3, 4)) for _ in range(2)]
+    scene = Scene(meshes=[mesh], instances=[Instance(hidden, place, name=f"{i}") for i, place in enumerate(places)],
+                  environment=Environment(image=rng.random((4, 8, 3), np.float32)))
+    written = again(scene, tmp_path / "scene.toml")
+    check_same(scene, written)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "scene.toml", "scene.all_of_it.glb", "scene.all_of_it_2.glb", "scene.some_wood.png", "scene.sky.exr"}
+    check_same(written, again(written, tmp_path / "again.toml"))

@@ -1,0 +1,42 @@
+"""Save scenes as scene files, with what belongs beside them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import OutputError
+from ..scene.model import Scene
+from ..scene.writing import scene_files
+from .files import check_target, replacing
+from .images import write_image, write_texels
+
+
+def save_scene(scene: Scene, path: str | Path) -> list[Path]:
+    """Writes the scene file `path`, last, and what it needs beside it (scene.writing); returns all these files.
+
+    Raises OutputError where one cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".toml":
+        raise OutputError(f"{path}: a scene file ends in .toml; write {path.with_suffix('.toml')}")
+    check_target(path)
+    files = scene_files(scene, path)
+    try:
+        text = files.text.encode()
+    except UnicodeEncodeError:
+        raise OutputError(f"{path}: the name of a file of the scene is no text, so no scene file can name it; rename it"
+                          ) from None
+    written = [path.with_name(name) for name in (*files.models, *files.texels, *files.pixels)]
+    for name, content in files.models.items():
+        _write(path.with_name(name), content)
+    for name, texels in files.texels.items():
+        write_texels(path.with_name(name), texels)
+    for name, pixels in files.pixels.items():
+        write_image(path.with_name(name), pixels)
+    _write(path, text)
+    return [*written, path]
+
+
+def _write(path: Path, content: bytes) -> None:
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
