@@ -16,6 +16,7 @@ import numpy as np
 from ..device.open import name_of
 from ..errors import ClrtError
 from ..output.image import Image
+from ..rendering.features import INTEGRATORS
 from ..rendering.renderer import Renderer, State
 from ..rendering.report import render_report, tree_report
 from ..scene.model import Scene
@@ -49,6 +50,7 @@ class Live:
         self._history = History()
         self._changed = threading.Condition(threading.RLock())
         self._closed = False
+        self._unseen = True     # no picture of what is being rendered was published
         self._studio = Studio(self._begin)
         self._thread = threading.Thread(target=self._work, name="clrt live", daemon=True)
         self._thread.start()
@@ -141,7 +143,8 @@ class Live:
     def _ask(self, **changes: Any) -> None:
         with self._changed:
             self._asked = self._asked._replace(number=self._asked.number + 1, **changes)
-            self._studio.abandon()
+            if not (self._unseen and self._asked.moving):
+                self._studio.abandon()
             self._changed.notify_all()
 
     def _work(self) -> None:
@@ -166,6 +169,7 @@ class Live:
 
     def _show(self, asked: Asked) -> None:
         """Renders it to the end, first a small picture where a whole one would take too long."""
+        self._unseen = True
         quick = self._studio.quick_size(asked)
         if quick != asked.size:
             self._render(asked, quick, asked.settings.samples)
@@ -183,11 +187,23 @@ class Live:
         for state in self._studio.states(asked, size, spp):
             if state.spp >= min(asked.settings.samples, spp):
                 self._publish_picture(asked, state)
+                if self._is_superseded(asked):
+                    raise Superseded
+                if self._is_denoised(asked, size) and (pixels := self._studio.denoised(state)) is not None:
+                    self._publish(denoised=pixels)
         if self._is_superseded(asked):
             raise Superseded
 
+    def _is_denoised(self, asked: Asked, size: tuple[int, int]) -> bool:
+        """Whether this picture is to be: of light, and whole."""
+        light = asked.scene.render.integrator in INTEGRATORS
+        return asked.settings.denoise and light and size == asked.size and not self._is_superseded(asked)
+
     def _is_superseded(self, asked: Asked) -> bool:
-        return self._closed or self._asked is not asked
+        """Whether something newer is to be shown instead; a movement first shows what was begun, or it would show
+        nothing as long as it lasts."""
+        newest = self._asked
+        return self._closed or newest is not asked and not (self._unseen and newest.moving)
 
     def _begin(self, phase: str) -> None:
         if self._is_superseded(self._current):
@@ -199,10 +215,11 @@ class Live:
         assert renderer is not None
         now = time.perf_counter()
         self._times.append(now)
-        whole = renderer.settings.size == asked.size
+        whole, last = renderer.settings.size == asked.size, self._snapshot
+        kept = last.denoised if asked.settings.denoise and whole and last.asked == asked.number else None
         picture = {
             "scene": asked.scene, "settings": asked.settings, "asked": asked.number,
-            "number": self._snapshot.number + 1, "size": asked.size, "pixels": state.pixels, "denoised": None,
+            "number": last.number + 1, "size": asked.size, "pixels": state.pixels, "denoised": kept,
             "spp": state.spp, "seconds": state.seconds, "noise": state.noise, "history": list(renderer.history),
             "error": None, "frames_per_second": float(sum(now - each < 1 for each in self._times)),
             "rays_per_second": state.film.rays / max(state.seconds, 1e-9), "device": name_of(renderer.devices),
@@ -210,6 +227,7 @@ class Live:
             "features": renderer.compiled.features, "programs": self._studio.programs}
         with self._changed:
             self._still = (renderer, state) if whole else None
+            self._unseen = False
             self._publish(**picture)
 
     def _publish(self, **changes: Any) -> None:

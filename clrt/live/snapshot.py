@@ -21,7 +21,8 @@ class Snapshot:
     """The newest picture. Nothing in it changes any more, so it may be kept and read by any thread.
 
     number: how many pictures there were before it. pixels: (height, width, 3) float32, linear Rec. 709, smaller than
-    `size`, (width, height), while things move; denoised: likewise, if there is such. spp: samples a pixel; seconds:
+    `size`, (width, height), while things move; denoised: likewise, of these
+    samples or some before, if there is such. spp: samples a pixel; seconds:
     that they took; noise: estimated √relMSE, or None; history: the same as samples grew, {spp, seconds, noise} each.
     scene, settings: what the picture shows, and `asked` which edit or choice that was (Live.asked); error: why
     what was asked for last is not shown, or None.

@@ -6,11 +6,20 @@ import time
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..device.open import Device, open_devices
+from ..output.denoise import Denoiser
+from ..rendering.guides import render_guides
 from ..rendering.renderer import Renderer, State
 from ..scene.model import Scene
 from .pace import Pace
 from .settings import Selector, Settings
+
+
+#: The part of the time that denoising may take before all samples are there.
+DENOISING = 0.25
 
 
 class Asked(NamedTuple):
@@ -45,6 +54,10 @@ class Studio:
         self.renderer: Renderer | None = None
         #: How often another one was needed than before.
         self.programs = 0
+        self._denoiser: Denoiser | None = None
+        self._guides: dict[str, NDArray[np.float32]] = {}
+        self._guided: Renderer | None = None    # whose guides these are
+        self._denoise_from = 0.0
 
     def quick_size(self, asked: Asked) -> tuple[int, int]:
         """Of a picture that comes in time while things move; the whole one's where that does."""
@@ -55,7 +68,7 @@ class Studio:
         """The picture at more and more samples, up to `spp`."""
         start = time.perf_counter()
         self._open(asked.settings.device)
-        last = self.renderer
+        last, self._guided = self.renderer, None
         self.renderer = renderer = Renderer(asked.scene, device=self._devices, size=size, spp=spp,
                                             on_phase=self._on_phase, before=last, **asked.settings.tracing)
         self.programs += not (last and last.session.scene.program is renderer.session.scene.program)
@@ -70,6 +83,19 @@ class Studio:
         if selector != self._selector:
             self._selector, self.renderer = self, None
             self._devices, self._selector = open_devices(selector), selector
+
+    def denoised(self, state: State) -> NDArray[np.float32] | None:
+        """The state's pixels denoised; None while that would take more of the time than DENOISING."""
+        renderer, now = self.renderer, time.perf_counter()
+        if renderer is None or now < self._denoise_from and not renderer.stop_reason:
+            return None
+        self._denoiser = self._denoiser or Denoiser()
+        if self._guided is not renderer:
+            self._guides, self._guided = render_guides(renderer.session), renderer
+        pixels = self._denoiser(state.pixels, self._guides["albedo"], self._guides["normal"])
+        done = time.perf_counter()
+        self._denoise_from = done + (done - now) / DENOISING
+        return pixels
 
     def abandon(self) -> None:
         """Has `states` end soon; for any thread."""

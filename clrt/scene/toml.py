@@ -63,8 +63,7 @@ class SceneReader:
         return Scene(meshes=meshes, instances=instances, lights=lights, spheres=[each for each in spheres if each],
                      camera=self._named_camera(lens) if "name" in lens else camera, cameras=self._cameras,
                      environment=environment or Environment(), render=render or RenderSettings(), name=self._path.stem,
-                     animation=self._animation(), materials=self._materials,
-                     source=self._sources())
+                     animation=self._animation(), materials=self._materials, source=self._sources())
 
     def _sources(self) -> Source:
         self._source.files += [(picture, (self._path.parent / name).resolve())

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -85,8 +85,8 @@ class _Writer:
         objects = [*self._read_meshes(), *self._own_objects(), *self._spheres()]
         name = scene.name.encode("unicode_escape").decode()
         head = [f"# {name} as clrt shows it; change what you like (docs/scene-format.md).",
-                *self._section("[camera]", scene.camera), *self._cameras(), *self._section("[render]", scene.render),
-                *self._environment(scene.environment)]
+                *self._section("[camera]", scene.camera), *self._cameras(), *self._animation(),
+                *self._section("[render]", scene.render), *self._environment(scene.environment)]
         for light in scene.lights:
             head += self._section("[[light]]", light, light.kernel)
         for name, material in self._materials.items():
@@ -101,6 +101,12 @@ class _Writer:
                     if cameras[name] != self._scene.camera)
         for name in [name for name in cameras if name not in theirs]:
             yield from self._section(f"[cameras.{toml_key(name)}]", cameras[name])
+
+    def _animation(self) -> Iterator[str]:
+        if (animation := self._scene.animation) is not None:
+            yield from self._section("[animation]", replace(animation, keyframes=()))
+            for keyframe in animation.keyframes:
+                yield from self._section("[[keyframe]]", keyframe)
 
     def _environment(self, sky: Environment) -> Iterator[str]:
         image = sky.image
