@@ -101,7 +101,7 @@ class Renderer:
         on_phase("compile")
         planned = None if spp is None else int(spp) * (MOST_TIMES_PLANNED if settings.adaptive else 1)
         self._planned_spp = kept.planned_spp if kept else planned
-        self.session = self._make_picture(before.session.scenes if before else ())
+        self.session: Accumulation = self._make_picture(before.session.scenes if before else ())
         self._begin()
         self._clock = 0.0
         self._interrupted: str | None = None

@@ -13,6 +13,7 @@ from clrt.errors import SceneError
 from clrt.rendering.choices import Choices
 from clrt.rendering.identity import facts_of
 from clrt.output.scenes import save_scene
+from clrt.scene.animation import Animation, Keyframe
 from clrt.scene.editing import materials_of, with_material
 from clrt.scene.file import load
 from clrt.scene.lights import PointLight
@@ -105,7 +106,9 @@ def edited(scene: Scene) -> Scene:
     for material in materials[:2]:
         scene = with_material(scene, material, replace(material, emission=(0.125, 1 / 3, 2.0)))
     ball = Sphere(center=(0.1, 0.2, 0.3), material=Dielectric(ior=1.25), name="a \"ball\"")
-    return replace(scene, spheres=[*scene.spheres, ball], camera=replace(scene.camera, fov_degrees=33.3),
+    keyframes = Keyframe(time=0.5, position=(1.0, 2.0, 3.0)), Keyframe(time=2.0, fov_degrees=12.5)
+    return replace(scene, animation=Animation(fps=12.5, keyframes=keyframes),
+                   spheres=[*scene.spheres, ball], camera=replace(scene.camera, fov_degrees=33.3),
                    cameras={**scene.cameras, "from the side": Camera(position=(9.0, 1.0, 0.0))},
                    environment=replace(scene.environment, strength=0.3),
                    lights=[*scene.lights, PointLight(position=(1.0, 2.0, 3.0), intensity=(1.0, 0.0, 1e-7))],
@@ -120,7 +123,7 @@ def again(scene: Scene, path: Path) -> Scene:
 def check_same(scene: Scene, other: Scene) -> None:
     """In all that makes a picture, and by the same names."""
     assert facts_of(other, Choices()) == facts_of(scene, Choices())
-    assert other.cameras == scene.cameras and other.render == scene.render
+    assert other.cameras == scene.cameras and other.render == scene.render and other.animation == scene.animation
     plain = {name: material for name, material in scene.materials.items() if not material.textures()}
     assert plain.items() <= other.materials.items() and scene.materials.keys() <= other.materials.keys()
     assert [each.name for each in other.spheres] == [each.name for each in scene.spheres]
