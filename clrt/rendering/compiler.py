@@ -27,6 +27,11 @@ class Compiler:
         self._carried = [Carried() for _ in devices]
         self._last: tuple[Scene, list[Choices], list[CompiledScene]] | None = None
 
+    @classmethod
+    def after(cls, last: Compiler | None, devices: Sequence[Device]) -> Compiler:
+        """The last one, if it is for these devices, or another."""
+        return last if last and last.devices == devices else cls(devices)
+
     def compile(self, scene: Scene, choices: list[Choices]) -> list[CompiledScene]:
         """The scene for each device with its choices.
 

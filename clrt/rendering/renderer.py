@@ -27,13 +27,13 @@ from .compile import CompiledScene
 from .compiler import Compiler
 from .crew import make_picture
 from .features import INTEGRATORS, WITH_LIGHT
-from .film import RELATIVE_FLOOR, Film
+from .film import Film
 from .first_hits import first_hits
 from .kept import Kept
 from .noise import NoiseEstimate
 from .on_device import SceneOnDevice
-from .state import State as State
-from .stops import check_step, check_stops, checked_percentile, low_enough, planned_spp
+from .state import State as State, relmse
+from .stops import check_step, check_stops, checked_percentile, low_enough, pass_end, planned_spp
 from .tiles import tile_pixels, tile_sums
 
 #: Between two states at least this long passes, and this many times what making a state costs.
@@ -74,8 +74,8 @@ class Renderer:
                  paths: str | None = None, tree: bool | None = None,
                  on_phase: Callable[[str], None] = lambda phase: None, checkpoint: str | Path | None = None,
                  resume: bool = False, checkpoint_seconds: float = 30.0,
-                 error_percentile: float | None = None, aovs: str | Iterable[str] = (),
-                 before: Renderer | None = None) -> None:
+                 error_percentile: float | None = None, aovs: str | Iterable[str] = (), before: Renderer | None = None,
+                 ) -> None:
         self._aovs = chosen_aovs(aovs)
         self._percentile = checked_percentile(error_percentile)
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
@@ -91,8 +91,7 @@ class Renderer:
                            needs_direct_light(self._aovs), paths or (None if each.packs else "lanes"), tree)
                    for each in self.devices]
         on_phase("build")
-        reused = before is not None and before.devices == self.devices
-        self._compiler: Compiler = before._compiler if before and reused else Compiler(self.devices)
+        self._compiler: Compiler = Compiler.after(before._compiler if before else None, self.devices)
         self._compiled = self._compiler.compile(self.scene, choices)
         if settings.integrator in INTEGRATORS and not {"LIGHTS", "SKY"} & set(self.compiled.features):
             logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
@@ -103,8 +102,7 @@ class Renderer:
         self._planned_spp = kept.planned_spp if kept else planned
         self.session: Accumulation = self._make_picture(before.session.scenes if before else ())
         self._begin()
-        self._clock = 0.0
-        self._interrupted: str | None = None
+        self._clock, self._interrupted, self._abandoned = 0.0, False, False
         self._last: State
         if kept:
             self._noise, self.history, self.seconds = kept.noise, kept.history, kept.seconds
@@ -120,7 +118,8 @@ class Renderer:
     def _begin(self) -> None:
         """A picture without any samples."""
         self._noise = NoiseEstimate(self._planned_spp)
-        self._first_hits = self._seen_first()
+        seen = seen_first(self._aovs)   # now, so that an interrupted picture has them, too
+        self._first_hits = first_hits(self.session, self.scene, seen) if seen else {}
         self.history, self.stop_reason, self.seconds = [], None, 0.0
 
     @property
@@ -173,7 +172,8 @@ class Renderer:
             yield self.state(reference)
         next_state = 0.0
         while self.stop_reason is None:
-            if self._run_pass(spp, time, error) == "abandoned":
+            self._run_pass(spp, time, error)
+            if self._abandoned:
                 return
             now, done = clock.perf_counter(), self.session.samples_done
             if self.stop_reason is None and spp is not None and done >= spp:
@@ -197,11 +197,11 @@ class Renderer:
 
     def interrupt(self) -> None:
         """Has `passes` end after the launches in flight, with a state and a checkpoint; for signal handlers, too."""
-        self._interrupted = "interrupted"
+        self._interrupted = True
 
     def abandon(self) -> None:
         """Has `passes` end after the launch that is being made, with nothing: nobody wants the picture any more."""
-        self._interrupted = "abandoned"
+        self._abandoned = True
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
@@ -210,25 +210,16 @@ class Renderer:
     def _state_of(self, film: Film, reference: NDArray[np.float32] | None) -> State:
         tile_samples = self.session.tile_samples
         self._noise.add(film, tile_samples)
-        relmse = None
-        if reference is not None:
-            expected = reference.astype(np.float64)
-            relmse = float(np.mean((film.mean - expected) ** 2 / (expected**2 + RELATIVE_FLOOR)))
         # The pass that it was interrupted in adds to no estimate: what was known before it is told at once.
         noise = self._noise.at(self._last.film if self._halfway and self.history else film, tile_samples)
         of_tiles = self._noise.of_tiles(tile_samples, self.session.size, self._percentile)
-        self._last = State(self.session.samples_done, self.seconds, noise, relmse, film, of_tiles)
+        self._last = State(self.session.samples_done, self.seconds, noise, relmse(film, reference), film, of_tiles)
         return self._last
 
     def aovs(self, state: State) -> dict[str, NDArray[np.generic]]:
         """The pictures beside the state's, by the names and in the order that they were asked for."""
         made = self._first_hits | film_aovs(state.film, self._aovs)
         return {name: made[name] for name in self._aovs}
-
-    def _seen_first(self) -> dict[str, NDArray[np.generic]]:
-        """AOVs that need no render: they are made before, so that an interrupted one has them, too."""
-        seen = seen_first(self._aovs)
-        return first_hits(self.session, self.scene, seen) if seen else {}
 
     def _reached(self, spp: int | None, time: float | None, error: float | None) -> str | None:
         """The stop reason where an earlier call, or the render it goes on with, came so far already."""
@@ -240,20 +231,20 @@ class Renderer:
         looks = done and error is not None and self._is_check(done) and not self.session.work.parts
         return "error" if looks and low_enough(self.state().stops_by, error) else None
 
-    def _run_pass(self, spp: int | None, time: float | None, error: float | None) -> str | None:
-        """One pass; sets and returns the stop reason where `time` is over or it is interrupted, maybe inside the pass.
-        """
+    def _run_pass(self, spp: int | None, time: float | None, error: float | None) -> None:
+        """One pass; sets the stop reason where `time` is over or it is interrupted, maybe inside the pass."""
         for _ in self._adaptive_pass(spp) if self._adapts else self._even_pass(spp, error):
             self.seconds = clock.perf_counter() - self._clock
+            if self._abandoned:
+                return
             if self._interrupted:
-                self.stop_reason, self._interrupted = self._interrupted, None
-                return self.stop_reason
+                self.stop_reason, self._interrupted = "interrupted", False
+                return
             if time is not None and self.seconds >= time and self.session.samples_done:
                 self.stop_reason = "time"
-                return self.stop_reason
+                return
             if self.session.work.parts:
                 self._keep()
-        return None
 
     @property
     def _adapts(self) -> bool:
@@ -280,9 +271,7 @@ class Renderer:
 
     def _even_pass(self, spp: int | None, error: float | None) -> Iterator[None]:
         done = self.session.samples_done
-        step = check_step(done)
-        ends = [end for end in (spp, None if error is None else done + step - done % step) if end is not None]
-        return self.session.render(self._pass_size(done, min(ends, default=None)))
+        return self.session.render(max(1, min(pass_end(done, spp, error) - done, self.session.pass_limit())))
 
     def _film(self) -> Film:
         """The film with all that was launched, and the time until then."""
@@ -309,9 +298,3 @@ class Renderer:
             write = self._checkpoints.begin if last else self._checkpoints.write
             write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(), self.session.work,
                        self._noise))
-
-    def _pass_size(self, done: int, spp: int | None) -> int:
-        """Samples of the next pass: never past a power of two, so that history has them, nor past the end."""
-        next_power = 1 << done.bit_length()
-        end = next_power if spp is None else min(next_power, spp)
-        return max(1, min(end - done, self.session.pass_limit()))

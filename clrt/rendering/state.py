@@ -9,7 +9,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from .film import Film
+from .film import RELATIVE_FLOOR, Film
 
 
 @dataclass(frozen=True)
@@ -39,3 +39,11 @@ class State:
     def pixels(self) -> NDArray[np.float32]:
         """(height, width, 3) float32, linear Rec. 709."""
         return self.film.mean.astype(np.float32)
+
+
+def relmse(film: Film, reference: NDArray[np.float32] | None) -> float | None:
+    """Of the film's mean against a reference (height, width, 3), if there is one."""
+    if reference is None:
+        return None
+    expected = reference.astype(np.float64)
+    return float(np.mean((film.mean - expected) ** 2 / (expected**2 + RELATIVE_FLOOR)))

@@ -33,6 +33,14 @@ def check_step(done: int) -> int:
     return max(1, (1 << done.bit_length()) // (2 * CHECKS))
 
 
+def pass_end(done: int, spp: int | None, error: float | None) -> int:
+    """The samples at which the pass after `done` ends at the latest: a power of two, so that the history has them, or
+    `spp`, or where a wanted error is looked at."""
+    step = check_step(done)
+    checked = None if error is None else done + step - done % step
+    return min(end for end in (1 << done.bit_length(), spp, checked) if end is not None)
+
+
 def low_enough(noise: float | None, error: float | None) -> bool:
     """Whether the noise, if it is known, is at most the wanted error, if there is one."""
     return noise is not None and error is not None and noise <= error
