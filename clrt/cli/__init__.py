@@ -16,7 +16,7 @@ from ..errors import ClrtError, DeviceError, KernelError
 STARTED = time.perf_counter()
 #: What commands find as their context's object where they have the process to themselves.
 PROGRAM = "clrt"
-COMMANDS = ("render", "info", "convert", "compare", "devices", "bench", "cache", "doctor")
+COMMANDS = ("render", "view", "info", "convert", "compare", "devices", "bench", "cache", "doctor")
 
 
 class _Commands(click.Group):

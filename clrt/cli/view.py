@@ -1,0 +1,51 @@
+"""`clrt view`: a scene in a window, to walk through and to change."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from . import PROGRAM
+from .guard import guarded
+from .interrupt import Interruptible
+from .logs import verbose_option
+from .options import Size
+
+
+@click.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.option("--camera", metavar="NAME", help="A camera in the model file; see `clrt info`.")
+@click.option("--size", type=Size(), help="Picture size in pixels.")
+@click.option("--spp", type=click.IntRange(min=1), help="Rest at this many samples a pixel.")
+@click.option("--depth", "max_depth", type=click.IntRange(1, 1024), help="Path edges.")
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers.")
+@click.option("--device", "devices", multiple=True, metavar="SEL", help="See `clrt devices`. Given twice, both render.")
+@click.option("--integrator", help="What to compute.")
+@click.option("--view", default="srgb", show_default=True, metavar="NAME", help="View transform; see `clrt render`.")
+@click.option("--exposure", default=0.0, metavar="EV", help="In stops.")
+@verbose_option
+def command(scene: Path, camera: str | None, devices: tuple[str, ...], view: str, exposure: float,
+            **given: Any) -> None:
+    """Show SCENE, a .toml scene or a bare model, in a window: walk, edit, see it refine (docs/window.md)."""
+    if click.get_current_context().obj == PROGRAM:
+        guarded(lambda: "")
+    from ..window.needs import check_window
+
+    check_window()
+    from ..live.settings import Settings
+    from ..output.view import view_called
+    from ..scene.file import load
+    from ..window.app import App, Look
+
+    view_called(view)
+    content = load(scene, camera)
+    content.render = replace(content.render, **{name: value for name, value in given.items() if value is not None})
+    app = App(content, Settings(device=devices or None), Look(view, exposure))
+    with Interruptible(app.close) as interruptible:
+        app.run()
+    if interruptible.asked:
+        sys.exit(130)

@@ -1,0 +1,93 @@
+"""The window: where its panels stand, and what runs in every frame. Dear ImGui draws it (imgui-bundle)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from imgui_bundle import hello_imgui, imgui, immapp
+
+from ..device.discover import find_devices
+from ..live.live import Live
+from ..live.settings import Settings
+from ..scene.model import Scene
+from .desk import Desk
+from .developing import Look as Look
+from .needs import no_display
+from .panels import render, statistics
+from .panels.camera import CameraPanel
+from .panels.files import Files
+from .panels.lights import Lights
+from .panels.materials import Materials
+from .panels.spheres import Spheres
+from .viewport import Viewport
+
+SIZE = (1280, 800)
+#: Frames a second: at most, and while nothing happens.
+FASTEST, IDLE = 60.0, 20.0
+ADD_ONS = immapp.AddOnsParams(with_implot=True)
+
+
+class App:
+    """A window on a live session of its own. `params` are what Dear ImGui's runner takes."""
+
+    def __init__(self, scene: Scene, settings: Settings = Settings(), look: Look = Look()) -> None:
+        # Before any OpenGL is loaded: Mesa gives its LLVM to all that come later, and PoCL aborts with another's.
+        devices = [info for info, _ in find_devices() if info.usable]
+        self.live = Live(scene, settings=settings)
+        self.desk, self.viewport = Desk(self.live, look, devices), Viewport()
+        self.params = hello_imgui.RunnerParams()
+        self.params.app_window_params.window_title = f"{scene.name} - clrt"
+        self.params.app_window_params.window_geometry.size = SIZE
+        self.params.renderer_backend_options.open_gl_options.anti_aliasing_samples = 0
+        self.params.fps_idling.fps_max, self.params.fps_idling.fps_idle = FASTEST, IDLE
+        self.params.ini_folder_type = hello_imgui.IniFolderType.app_user_config_folder
+        self.params.ini_filename = "clrt/window.ini"
+        window = self.params.imgui_window_params
+        window.default_imgui_window_type = hello_imgui.DefaultImGuiWindowType.provide_full_screen_dock_space
+        window.show_status_bar, window.show_status_fps = True, False
+        window.show_menu_bar, window.show_menu_app = False, False
+        self.params.callbacks.show_gui = self.desk.frame
+        self.params.callbacks.show_status = self._status
+        self.params.callbacks.before_swap = self.desk.take_screenshot
+        self.params.docking_params.docking_splits = _splits()
+        self.params.docking_params.dockable_windows = self._panels()
+
+    def run(self) -> None:
+        """Shows the window until it is closed."""
+        try:
+            immapp.run(self.params, ADD_ONS)
+        except RuntimeError as fault:  # of the library that opens it
+            if not self.desk.frames:
+                raise no_display(str(fault)) from fault
+            raise
+        finally:
+            self.desk.close()
+            self.live.close()
+
+    def close(self) -> None:
+        """Ends `run`, as closing the window does."""
+        self.params.app_shall_exit = True
+
+    def _panels(self) -> list[hello_imgui.DockableWindow]:
+        places: dict[str, dict[str, Callable[[Desk], None]]] = {
+            "MainDockSpace": {"Picture": self.viewport.show},
+            "Panels": {"Spheres": Spheres().show, "Materials": Materials().show, "Lights": Lights().show,
+                       "Camera": CameraPanel().show, "Render": render.show, "File": Files(self.desk.scene.name).show},
+            "Figures": {"Statistics": statistics.show}}
+        return [self._panel(place, name, show) for place, panels in places.items() for name, show in panels.items()]
+
+    def _panel(self, place: str, name: str, show: Callable[[Desk], None]) -> hello_imgui.DockableWindow:
+        panel = hello_imgui.DockableWindow(name, place, lambda: show(self.desk))
+        panel.can_be_closed = False
+        return panel
+
+    def _status(self) -> None:
+        snapshot = self.desk.snapshot
+        trouble = self.desk.message or snapshot.error
+        imgui.text(trouble or f"{snapshot.spp} samples a pixel, {snapshot.phase}, {snapshot.device}")
+
+
+def _splits() -> list[hello_imgui.DockingSplit]:
+    """The picture on the left; panels on the right, and figures below them."""
+    return [hello_imgui.DockingSplit("MainDockSpace", "Panels", imgui.Dir.right, 0.34),
+            hello_imgui.DockingSplit("Panels", "Figures", imgui.Dir.down, 0.45)]

@@ -1,0 +1,78 @@
+"""Pictures made ready for the display in a thread of its own, so that no view transform holds up the window."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ClrtError
+from ..live.snapshot import Snapshot
+from ..output.data import shown_data
+from ..output.view import to_display
+
+
+@dataclass(frozen=True)
+class Look:
+    """How pictures are shown: a view transform (docs/colour.md) after a gain of 2^exposure."""
+
+    view: str = "srgb"
+    exposure: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Developed:
+    """rgba: (height, width, 4) uint8 of a snapshot as `look` shows it; error: why it is not, and black instead."""
+
+    snapshot: Snapshot
+    look: Look
+    rgba: NDArray[np.uint8]
+    error: str | None = None
+
+
+class Developer:
+    """The thread. What is asked of it last is done next; what came in between is left out."""
+
+    def __init__(self) -> None:
+        self._asked: tuple[Snapshot, Look] | None = None
+        self._changed, self._closed = threading.Condition(), False
+        self.newest: Developed | None = None
+        self._thread = threading.Thread(target=self._run, daemon=True, name="clrt develops")
+        self._thread.start()
+
+    def ask(self, snapshot: Snapshot, look: Look) -> None:
+        """Has a picture developed, if that has not been asked for before."""
+        with self._changed:
+            if self._asked is None or self._asked[0] is not snapshot or self._asked[1] != look:
+                self._asked = snapshot, look
+                self._changed.notify()
+
+    def close(self) -> None:
+        """Ends the thread."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+        self._thread.join()
+
+    def _run(self) -> None:
+        done = None
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closed or self._asked is not done)
+                if self._closed or self._asked is None:
+                    return
+                done = self._asked
+            self.newest = developed(*done)
+
+
+def developed(snapshot: Snapshot, look: Look) -> Developed:
+    """The picture as `clrt render --view --exposure` writes it to a .png."""
+    data, error = shown_data(snapshot.scene.render.integrator, snapshot.pixels), None
+    try:
+        levels = to_display(snapshot.shown, look.view, look.exposure) if data is None else to_display(data, "raw")
+    except ClrtError as problem:
+        levels, error = np.zeros(snapshot.pixels.shape, np.uint8), str(problem)
+    opaque = np.full((*levels.shape[:2], 1), 255, np.uint8)
+    return Developed(snapshot, look, np.concatenate([levels, opaque], axis=2), error)

@@ -1,0 +1,196 @@
+"""Widgets for the fields of dataclasses, chosen by the fields' types and limits: what the scene file knows, the window
+can change, under the same names.
+
+Every function takes a value and returns it, the very same object where nothing was changed. Numbers that were typed or
+dragged are the shortest that are the same in float32.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import fields, replace
+from functools import partial
+from math import inf, isfinite
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+from annotated_types import Ge, Gt, Le, Lt
+from imgui_bundle import imgui
+
+from ..scene.textures import Texture
+
+Value = TypeVar("Value")
+
+#: Of a limited range, what is too wide for a slider.
+WIDEST = 20000
+#: A wider one is logarithmic.
+WIDE = 1000
+#: What a pixel of dragging changes of a number, beside what it changes of a coordinate.
+DRAG = 0.005
+#: What sliders show of a range whose far end is seldom wanted; it can still be typed (Ctrl and a click).
+USUAL = {"max_depth": 64}
+#: The largest int of the widgets.
+LARGEST = 2**31 - 1
+COLOR = imgui.ColorEditFlags_.float.value | imgui.ColorEditFlags_.hdr.value
+
+
+class Limits(NamedTuple):
+    """The least and the most that a number may be."""
+
+    least: float = -inf
+    most: float = inf
+
+    def clamp(self, value: float) -> float:
+        """The nearest number within."""
+        return min(max(value, self.least), self.most)
+
+
+def edit_fields(record: Value, step: float, without: Collection[str] = ()) -> Value:
+    """Widgets for a dataclass's fields, all but some. step: what a pixel of dragging changes in a coordinate."""
+    hints = get_type_hints(type(record), include_extras=True)
+    changed = {}
+    for field in fields(record):  # type: ignore[arg-type]
+        if field.name not in without:
+            value = getattr(record, field.name)
+            new = edit(field.name, hints[field.name], value, step)
+            if new is not value:
+                changed[field.name] = new
+    return replace(record, **changed) if changed else record  # type: ignore[type-var]
+
+
+def edit(label: str, hint: Any, value: Any, step: float) -> Any:
+    """A widget for a value of this type: of those that scenes are made of (see scene.fields)."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if origin in (Union, UnionType):
+        kinds = [part for part in parts if part is not NoneType]
+        if len(kinds) < len(parts):
+            return _edit_optional(label, kinds[0], value, step)
+        return edit(label, next((kind for kind in kinds if _is(kind, value)), kinds[0]), value, step)
+    if hint is Texture:
+        return _edit_texture(label, value, step)
+    if origin is Literal:
+        return choose(label, parts, value)
+    if origin is tuple:
+        return _edit_tuple(label, parts, value, step)
+    widget: Callable[[str, Any], tuple[bool, Any]] = _PLAIN.get(hint, partial(_number, hint, step))
+    changed, new = widget(label, value)
+    return new if changed else value
+
+
+def choose(label: str, choices: Sequence[Value], value: Value, none: str = "none") -> Value:
+    """A list to choose one from; `none` is what it calls None."""
+    names = [none if choice is None else str(choice) for choice in choices]
+    changed, index = imgui.combo(label, choices.index(value) if value in choices else -1, names)
+    return choices[index] if changed else value
+
+
+def _edit_optional(label: str, kind: Any, value: Any, step: float) -> Any:
+    """Something that may be None: a choice more, or a mark whether it is given."""
+    if get_origin(kind) is Literal:
+        return choose(label, (None, *get_args(kind)), value)
+    if kind is Texture and value is None:
+        imgui.text_disabled(f"{label}: none")
+        return None
+    changed, given = imgui.checkbox(f"##{label} given", value is not None)
+    imgui.same_line()
+    if changed:
+        value = _initial(kind) if given else None
+    if value is None:
+        imgui.text_disabled(f"{label}: not given")
+        return None
+    return edit(label, kind, value, step)
+
+
+def _edit_texture(label: str, texture: Texture, step: float) -> Texture:
+    if imgui.tree_node_ex(f"{label}: {texture.picture.name}###{label}"):
+        texture = edit_fields(texture, step, without={"picture"})
+        imgui.tree_pop()
+    return texture
+
+
+def _edit_tuple(label: str, kinds: tuple[Any, ...], value: tuple[Any, ...], step: float) -> tuple[Any, ...]:
+    """Colours where all numbers are from 0 on, vectors, or widgets one by one."""
+    limits = [limits_of(kind) for kind in kinds]
+    if limits[0] is None:
+        new = tuple(edit(f"{label}[{i}]", kind, part, step) for i, (kind, part) in enumerate(zip(kinds, value)))
+        return new if any(a is not b for a, b in zip(new, value)) else value
+    if _base(kinds[0]) is int:
+        changed, parts = getattr(imgui, f"drag_int{len(kinds)}")(label, value)
+    elif len(kinds) == 3 and limits[0] in (Limits(0, 1), Limits(0)):
+        changed, parts = imgui.color_edit3(label, value, COLOR)
+    else:
+        drag = getattr(imgui, f"drag_float{len(kinds)}")
+        changed, parts = drag(label, value, _speed(max(map(abs, value)), step), format="%.5g")
+    if not changed:
+        return value
+    return tuple(old if part == np.float32(old) else _shortest(limit.clamp(part), kind)
+                 for part, old, limit, kind in zip(parts, value, limits, kinds) if limit is not None)
+
+
+def _number(hint: Any, step: float, label: str, value: float) -> tuple[bool, float]:
+    """A slider where the type has limits, something to drag where it has not."""
+    limits = limits_of(hint) or Limits()
+    least, most = limits.least, USUAL.get(label, limits.most)
+    slides, whole = isfinite(least) and most - least <= WIDEST, _base(hint) is int
+    flags = imgui.SliderFlags_.logarithmic.value if most - least > WIDE else 0
+    new: float
+    if whole and slides:
+        changed, new = imgui.slider_int(label, int(value), int(least), int(most), "%d", flags)
+    elif whole:
+        changed, new = imgui.drag_int(label, min(int(value), LARGEST))
+    elif slides:
+        changed, new = imgui.slider_float(label, value, least, most, "%.4g", flags)
+    else:
+        changed, new = imgui.drag_float(label, value, _speed(abs(value), step), format="%.5g")
+    return changed, _shortest(limits.clamp(new), hint)
+
+
+def limits_of(hint: Any) -> Limits | None:
+    """The limits of a number's type; None for what is no number."""
+    if _base(hint) not in (int, float):
+        return None
+    limits = Limits()
+    for bound in getattr(hint, "__metadata__", ()):
+        number = getattr(bound, type(bound).__name__.lower())
+        if isinstance(bound, Ge | Gt):
+            limits = limits._replace(least=number if isinstance(bound, Ge) else _next(number, inf, hint))
+        elif isinstance(bound, Le | Lt):
+            limits = limits._replace(most=number if isinstance(bound, Le) else _next(number, -inf, hint))
+    return limits
+
+
+def _next(bound: float, towards: float, hint: Any) -> float:
+    """The number beside one that is excluded."""
+    whole = bound + (1 if towards > bound else -1)
+    return whole if _base(hint) is int else float(np.nextafter(np.float32(bound), np.float32(towards)))
+
+
+_PLAIN: dict[Any, Any] = {bool: imgui.checkbox, str: imgui.input_text}
+
+
+def _initial(hint: Any) -> Any:
+    """What a field that was not given begins with: 1, or the nearest that is allowed."""
+    if get_origin(hint) is tuple:
+        return tuple(map(_initial, get_args(hint)))
+    return _shortest((limits_of(hint) or Limits()).clamp(1), hint)
+
+
+def _is(kind: Any, value: Any) -> bool:
+    """Whether a value is of one of the types of a union."""
+    base = get_origin(_base(kind)) or _base(kind)
+    return isinstance(value, (float, int) if base is float else base)
+
+
+def _base(hint: Any) -> Any:
+    """A type without its limits."""
+    return get_args(hint)[0] if get_origin(hint) is Annotated else hint
+
+
+def _speed(size: float, step: float) -> float:
+    return max(DRAG * size, step)
+
+
+def _shortest(number: float, hint: Any) -> float:
+    """The number with the fewest digits that float32 takes for the same."""
+    return int(number) if _base(hint) is int else float(str(np.float32(number)))

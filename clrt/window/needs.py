@@ -1,0 +1,27 @@
+"""Whether a window can be opened here."""
+
+from __future__ import annotations
+
+import os
+import sys
+from importlib.util import find_spec
+
+from ..errors import OutputError, UsageError
+
+NO_DISPLAY = ("no window can be opened: {}. Run it on a desktop, through `ssh -X`, or on a virtual one "
+              "(`xvfb-run -s '-screen 0 1280x800x24' clrt view SCENE`); `clrt render` needs none")
+
+
+def check_window() -> None:
+    """Raise UsageError unless what `clrt[view]` installs is there, OutputError where there is no display."""
+    for package in ("imgui_bundle", "OpenGL"):
+        if find_spec(package) is None:
+            raise UsageError("the window needs the packages imgui-bundle and PyOpenGL: install them with "
+                             "`pip install 'clrt[view]'`")
+    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise no_display("there is no display, as neither DISPLAY nor WAYLAND_DISPLAY is set")
+
+
+def no_display(fault: str) -> OutputError:
+    """The error that says why no window can be opened, and what to do."""
+    return OutputError(NO_DISPLAY.format(fault))

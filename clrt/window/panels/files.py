@@ -1,0 +1,38 @@
+"""What is written: the picture, the scene, the window itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from imgui_bundle import imgui
+
+from ..desk import Desk
+
+
+class Files:
+    """The panel; `names` are the files that it writes, by what it writes to them."""
+
+    def __init__(self, stem: str) -> None:
+        self.names = {"picture": f"{stem}.png", "scene": f"{stem}.edited.toml", "screenshot": f"{stem}.window.png"}
+
+    def show(self, desk: Desk) -> None:
+        """Draws it."""
+        actions: dict[str, Callable[[Path], None]] = {"picture": desk.save_picture, "scene": desk.save_scene,
+                                                      "screenshot": desk.save_screenshot}
+        for what, write in actions.items():
+            imgui.push_id(what)
+            _, self.names[what] = imgui.input_text("##file", self.names[what])
+            imgui.same_line()
+            if imgui.button(f"save {what}"):
+                write(Path(self.names[what]))
+            imgui.pop_id()
+        imgui.separator_text("Steps")
+        live = desk.live
+        for name, can, take in (("undo", live.can_undo, live.undo), ("redo", live.can_redo, live.redo)):
+            imgui.begin_disabled(not can)
+            if imgui.button(name):
+                take()
+            imgui.end_disabled()
+            imgui.same_line()
+        imgui.new_line()

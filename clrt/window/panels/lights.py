@@ -1,0 +1,67 @@
+"""Lights: those without a surface, and the environment."""
+
+from __future__ import annotations
+
+import numpy as np
+from imgui_bundle import imgui
+
+from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
+from ...scene.model import Camera, Environment
+from ..desk import ROUND, Desk
+from ..fields import edit_fields
+from ..lists import change, pick
+from ..navigation import distance
+
+#: Irradiance that a new light gives to what the camera looks at.
+BRIGHT = 3.0
+
+
+class Lights:
+    """The panel; `chosen` is the light that it edits."""
+
+    def __init__(self) -> None:
+        self.chosen = 0
+
+    def show(self, desk: Desk) -> None:
+        """Draws it."""
+        scene = desk.scene
+        self.chosen = pick("##lights", [light.kernel for light in scene.lights], self.chosen)
+        lights, self.chosen = change(scene.lights, self.chosen, _new(scene.camera))
+        if lights:
+            imgui.push_id("light")
+            lights[self.chosen] = self._edited(desk, lights[self.chosen])
+            imgui.pop_id()
+        if len(lights) != len(scene.lights) or any(new is not old for new, old in zip(lights, scene.lights)):
+            desk.edit(lights=lights)
+        imgui.separator_text("Environment")
+        imgui.push_id("environment")
+        environment = _edited_sky(desk.scene.environment, desk.step)
+        imgui.pop_id()
+        if environment is not desk.scene.environment:
+            desk.edit(environment=environment)
+
+    def _edited(self, desk: Desk, light: Light) -> Light:
+        light = edit_fields(light, desk.step)
+        if isinstance(light, DirectionalLight):
+            return light
+        changed, moves = imgui.checkbox("moves", desk.moving_light == self.chosen)
+        imgui.set_item_tooltip(f"It circles round what the camera looks at, once in {ROUND:g} seconds.")
+        if changed:
+            desk.moving_light = self.chosen if moves else None
+        return light
+
+
+def _new(camera: Camera) -> dict[str, Light]:
+    """Lights to add: above what the camera looks at, as far as the camera is from it."""
+    far = distance(camera)
+    up = np.asarray(camera.up) / np.linalg.norm(camera.up)
+    position, down = np.add(camera.look_at, far * up).tolist(), (-up).tolist()
+    intensity = (BRIGHT * far**2,) * 3
+    return {"point": PointLight(position=position, intensity=intensity),
+            "spot": SpotLight(position=position, direction=down, intensity=intensity),
+            "directional": DirectionalLight(direction=down, irradiance=(BRIGHT,) * 3)}
+
+
+def _edited_sky(environment: Environment, step: float) -> Environment:
+    """Its color does nothing where it has an image."""
+    return edit_fields(environment, step, without={"image"} | ({"color"} if environment.image is not None else set()))

@@ -1,0 +1,89 @@
+"""Materials: of every type that there is, with every parameter and preset it has (scene.materials)."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from inspect import getdoc
+from typing import Any, get_args, get_type_hints
+
+from imgui_bundle import imgui
+
+from ...scene.material import SHARED, Material
+from ...scene.materials import MATERIALS
+from ..desk import Desk
+from ..fields import choose, edit_fields
+
+TYPES = {kind.kernel: kind for kind in MATERIALS}
+
+
+class Materials:
+    """The panel; `chosen` is the name of the material that it edits."""
+
+    def __init__(self) -> None:
+        self.chosen = ""
+
+    def show(self, desk: Desk) -> None:
+        """Draws it."""
+        materials = desk.materials
+        if not materials:
+            imgui.text_disabled("nothing in the scene has one")
+            return
+        names = list(materials)
+        self.chosen = choose("##material", names, self.chosen if self.chosen in names else names[0])
+        old = materials[self.chosen]
+        imgui.push_id("material")
+        new = _edited(old, desk.step)
+        imgui.pop_id()
+        if new is not old:
+            desk.repaint(old, new)
+
+
+def _edited(material: Material, step: float) -> Material:
+    """First what the type has of its own, then what all have."""
+    material = _of_type(material, choose("type", list(TYPES), material.kernel))
+    imgui.set_item_tooltip(getdoc(type(material)) or "")
+    substance = choose("substance", [*_substances()], None)
+    if substance is not None:
+        kind, preset = _substances()[substance]
+        material = replace(_of_type(material, kind), preset=preset)  # type: ignore[call-arg]
+    own = _together(material, edit_fields(material, step, without=SHARED))
+    if imgui.tree_node_ex("emission, normal map, opacity"):
+        own = edit_fields(own, step, without={field.name for field in fields(own)} - SHARED)
+        imgui.tree_pop()
+    return own
+
+
+def _of_type(material: Material, kernel: str) -> Material:
+    """A material of another type, with what both types know."""
+    kind = TYPES[kernel]
+    if type(material) is kind:
+        return material
+    hints, own = get_type_hints(kind, include_extras=True), get_type_hints(type(material), include_extras=True)
+    return kind(**{field.name: getattr(material, field.name) for field in fields(kind)
+                   if field.name in own and own[field.name] == hints[field.name]})
+
+
+def _substances() -> dict[str, tuple[str, str]]:
+    """Type and preset, by what a list calls them."""
+    found = {}
+    for kind in MATERIALS:
+        if "preset" in get_type_hints(kind):
+            for preset in _words(get_type_hints(kind)["preset"]):
+                found[f"{preset} ({kind.kernel})"] = (kind.kernel, preset)
+    return found
+
+
+def _words(hint: Any) -> list[str]:
+    """Those of a Literal, which may be a part of a union."""
+    return [word for part in get_args(hint) for word in ([part] if isinstance(part, str) else _words(part))]
+
+
+def _together(old: Material, new: Material) -> Material:
+    """Where fields only go together, as a metal's eta and k, all are given, or none."""
+    if new is old or not new.conflicts():
+        return new
+    optional = [field.name for field in fields(new) if field.default is None and field.name not in SHARED]
+    taken = any(getattr(old, name) is not None and getattr(new, name) is None for name in optional)
+    known = {} if taken else old.parameters()
+    given: dict[str, Any] = {name: known.get(name) for name in optional if taken or getattr(new, name) is None}
+    return replace(new, **given)

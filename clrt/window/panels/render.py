@@ -1,0 +1,65 @@
+"""How the picture is rendered, on what, and how it is shown."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Annotated, Any
+
+from annotated_types import Ge, Le
+from imgui_bundle import imgui
+
+from ...accel.kernels import BUILDER_NAMES, TREES, TRIANGLE_TESTS
+from ...live.settings import Settings
+from ...output.view import VIEWS
+from ..desk import Desk
+from ..developing import Look
+from ..fields import choose, edit, edit_fields
+
+#: The settings that are one of these, by name; None is the one that suits device and scene.
+CHOICES: dict[str, list[Any]] = {"tree": [None, True, False], "builder": [None, *BUILDER_NAMES],
+                                 "layout": [None, *TREES], "triangle": [*TRIANGLE_TESTS]}
+#: The others, and what they may be (live.settings).
+NUMBERS: dict[str, Any] = {"samples": Annotated[int, Ge(1), Le(64)], "scale": Annotated[float, Ge(0.05), Le(4)],
+                           "frame_rate": Annotated[float, Ge(0), Le(120)], "denoise": bool}
+
+
+def show(desk: Desk) -> None:
+    """Draws the panel."""
+    imgui.push_id("render")
+    render = edit_fields(desk.scene.render, desk.step)
+    if render is not desk.scene.render:
+        desk.edit(render=render)
+    imgui.separator_text("Tracing")
+    settings = _edited(desk, desk.settings)
+    if settings is not desk.settings:
+        desk.choose(settings)
+    imgui.separator_text("Display")
+    desk.look = Look(choose("view", [*VIEWS, "aces"], desk.look.view),
+                     edit("exposure", Annotated[float, Ge(-10), Le(10)], desk.look.exposure, desk.step))
+    imgui.pop_id()
+
+
+def _edited(desk: Desk, settings: Settings) -> Settings:
+    changed: dict[str, Any] = {}
+    for field in fields(settings):
+        name, old = field.name, getattr(settings, field.name)
+        if name == "device":
+            new = _device(desk, old)
+        elif name in CHOICES:
+            new = choose(name, CHOICES[name], old, "automatic")
+        else:
+            new = edit(name, NUMBERS[name], old, desk.step)
+        if new is not old:
+            changed[name] = new
+    return replace(settings, **changed) if changed else settings
+
+
+def _device(desk: Desk, selector: Any) -> Any:
+    """A list of devices, the one at work chosen. Several that render together are none of them."""
+    names = [f"{info.name} ({info.platform})" for info in desk.devices]
+    ids = [info.id for info in desk.devices]
+    now = next((i for i, info in enumerate(desk.devices) if selector in (info.id, info.index)), -1)
+    if selector is None:
+        now = next((i for i, info in enumerate(desk.devices) if info.chosen), -1)
+    changed, chosen = imgui.combo("device", now, names)
+    return ids[chosen] if changed else selector

@@ -1,0 +1,51 @@
+"""Spheres: where they are, how large and of what; more of them, and fewer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from imgui_bundle import imgui
+
+from ...scene.materials import Diffuse
+from ...scene.model import Sphere
+from ..desk import Desk
+from ..fields import choose, edit_fields
+from ..lists import change, pick
+from ..navigation import distance
+
+#: A new sphere's radius over the camera's distance.
+NEW = 0.1
+
+
+class Spheres:
+    """The panel; `chosen` is the sphere that it edits."""
+
+    def __init__(self) -> None:
+        self.chosen = 0
+
+    def show(self, desk: Desk) -> None:
+        """Draws it."""
+        scene = desk.scene
+        self.chosen = pick("##spheres", [sphere.name for sphere in scene.spheres], self.chosen)
+        material = scene.spheres[self.chosen].material if scene.spheres else Diffuse()
+        new = Sphere(center=scene.camera.look_at, radius=NEW * distance(scene.camera), material=material)
+        spheres, self.chosen = change(scene.spheres, self.chosen, {"sphere": new})
+        if spheres != scene.spheres:
+            desk.edit(spheres=spheres)
+        elif spheres:
+            old = spheres[self.chosen]
+            imgui.push_id("sphere")
+            spheres[self.chosen] = self._edited(desk, old)
+            imgui.pop_id()
+            if spheres[self.chosen] is not old:
+                desk.edit(spheres=spheres)
+
+    def _edited(self, desk: Desk, sphere: Sphere) -> Sphere:
+        sphere = edit_fields(sphere, desk.step, without={"material"})
+        materials = desk.materials
+        name = next(name for name, material in materials.items() if material is sphere.material)
+        chosen = choose("material", list(materials), name)
+        sphere = sphere if chosen == name else replace(sphere, material=materials[chosen])
+        if imgui.button("its own material"):
+            sphere = replace(sphere, material=replace(sphere.material))
+        return sphere

@@ -1,0 +1,62 @@
+"""What the picture costs, and how near it is to the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from imgui_bundle import hello_imgui, imgui, implot
+
+from ...live.snapshot import Snapshot
+from ..desk import Desk
+
+#: The plot's height in lines of text.
+LINES = 11
+
+
+def show(desk: Desk) -> None:
+    """Draws the panel."""
+    snapshot = desk.snapshot
+    if imgui.begin_table("figures", 2):
+        for name, value in _figures(snapshot):
+            imgui.table_next_column()
+            imgui.text_disabled(name)
+            imgui.table_next_column()
+            imgui.text_wrapped(value)
+        imgui.end_table()
+    _noise(snapshot)
+
+
+def _figures(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
+    yield "window", f"{hello_imgui.frame_rate():.0f} frames/s"
+    yield "pictures", f"{snapshot.frames_per_second:.1f} /s"
+    yield "rays", f"{snapshot.rays_per_second / 1e6:.2f} million/s"
+    height, width = snapshot.pixels.shape[:2]
+    yield "resolution", f"{width} x {height}" + ("" if (width, height) == snapshot.size else " for now")
+    yield "samples", f"{snapshot.spp} of {snapshot.scene.render.spp} a pixel in {snapshot.seconds:.2f} s"
+    yield "noise", "-" if snapshot.noise is None else f"{100 * snapshot.noise:.2f} %"
+    yield "state", snapshot.phase
+    yield "device", snapshot.device
+    yield "memory there", f"{snapshot.device_bytes / 2**20:.1f} MiB"
+    tree = snapshot.tree
+    if tree:
+        yield "tree", f"{tree['layout']} by {tree['builder'] or 'none'}, {tree['nodes']} nodes, {tree['bytes']} bytes"
+        yield "", f"{tree['triangles']} triangles, {tree['spheres']} spheres, {tree['instances']} instances"
+        yield "built in", f"{1000 * tree['build_seconds']:.1f} ms"
+    yield "programs built", str(snapshot.programs)
+    yield "features", " ".join(snapshot.features)
+
+
+def _noise(snapshot: Snapshot) -> None:
+    """The estimated error over time, both logarithmic."""
+    points = np.array([(entry["seconds"], entry["noise"]) for entry in snapshot.history
+                       if entry["noise"] and entry["seconds"] > 0], np.float64).reshape(-1, 2)
+    if implot.begin_plot("noise over time", (-1, LINES * imgui.get_text_line_height_with_spacing()),
+                         implot.Flags_.no_legend.value | implot.Flags_.no_mouse_text.value):
+        fit = implot.AxisFlags_.auto_fit.value
+        implot.setup_axes("seconds", "√relMSE", fit, fit)
+        implot.setup_axis_scale(implot.ImAxis_.x1.value, implot.Scale_.log10.value)
+        implot.setup_axis_scale(implot.ImAxis_.y1.value, implot.Scale_.log10.value)
+        if len(points):
+            implot.plot_line("noise", np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1]))
+        implot.end_plot()

@@ -1,0 +1,46 @@
+"""The picture in the window, as large as fits, and the hands that move its camera."""
+
+from __future__ import annotations
+
+from math import floor
+
+from imgui_bundle import ImVec2, hello_imgui, imgui
+
+from .desk import Desk
+from .developing import Developed
+
+#: Up to this, pixels are shown as squares of whole pixels of the window, where there is room.
+ANY_BUTTON = (imgui.ButtonFlags_.mouse_button_left.value | imgui.ButtonFlags_.mouse_button_middle.value
+              | imgui.ButtonFlags_.mouse_button_right.value)
+
+
+class Viewport:
+    """The panel. shown: what it shows; corner and size: where that is in the window, in its pixels."""
+
+    def __init__(self) -> None:
+        self.shown: Developed | None = None
+        self.corner, self.size = (0, 0), (1, 1)
+        self._texture: hello_imgui.TextureGpu | None = None
+
+    def show(self, desk: Desk) -> None:
+        """Draws it, and moves the camera as keys and mouse ask."""
+        newest = desk.developer.newest
+        if newest is not None and newest is not self.shown:
+            self.shown, self._texture = newest, hello_imgui.create_texture_gpu_from_rgba_data(newest.rgba)
+        self._place(desk.scene.render.size)
+        imgui.invisible_button("picture", self.size, ANY_BUTTON)
+        if self._texture is not None:
+            end = self.corner[0] + self.size[0], self.corner[1] + self.size[1]
+            imgui.get_window_draw_list().add_image(imgui.ImTextureRef(self._texture.texture_id()), self.corner, end)
+        camera = desk.hands.move(desk.scene.camera, self.size[1])
+        if camera is not desk.scene.camera:
+            desk.walk(camera)
+
+    def _place(self, size: tuple[int, int]) -> None:
+        """Whole pixels of the window in the middle of its room, for a picture of this shape."""
+        start, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
+        factor = max(min(room.x / size[0], room.y / size[1]), 1 / min(size))
+        self.size = max(1, floor(size[0] * factor)), max(1, floor(size[1] * factor))
+        self.corner = (floor(start.x + max(room.x - self.size[0], 0) / 2),
+                       floor(start.y + max(room.y - self.size[1], 0) / 2))
+        imgui.set_cursor_screen_pos(ImVec2(*self.corner))
