@@ -48,14 +48,18 @@ class App:
         window.show_menu_bar, window.show_menu_app = False, False
         self.params.callbacks.show_gui = self.desk.frame
         self.params.callbacks.show_status = self._status
+        self.params.callbacks.before_exit = self.viewport.release
         self.params.callbacks.before_swap = self.desk.take_screenshot
         self.params.docking_params.docking_splits = _splits()
         self.params.docking_params.dockable_windows = self._panels()
 
-    def run(self) -> None:
-        """Shows the window until it is closed."""
+    def run(self, runner: Callable[..., None] = immapp.run) -> None:
+        """Shows the window until it is closed. runner: what drives it, with the arguments of immapp.run.
+
+        OutputError where no window can be opened.
+        """
         try:
-            immapp.run(self.params, ADD_ONS)
+            runner(runner_params=self.params, add_ons_params=ADD_ONS)
         except RuntimeError as fault:  # of the library that opens it
             if not self.desk.frames:
                 raise no_display(str(fault)) from fault

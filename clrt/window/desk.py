@@ -136,6 +136,14 @@ class Desk:
         if self._dragging and not imgui.is_any_item_active():
             self._show(self.scene)
         self._move_light()
+        if not imgui.get_io().want_text_input:
+            self._shortcuts()
+
+    def _shortcuts(self) -> None:
+        if imgui.is_key_chord_pressed(imgui.Key.mod_ctrl | imgui.Key.z):
+            self.live.undo()
+        if imgui.is_key_chord_pressed(imgui.Key.mod_ctrl | imgui.Key.y):
+            self.live.redo()
 
     def _show(self, scene: Scene) -> None:
         self._dragging = imgui.is_any_item_active()

@@ -30,6 +30,8 @@ WIDE = 1000
 DRAG = 0.005
 #: What sliders show of a range whose far end is seldom wanted; it can still be typed (Ctrl and a click).
 USUAL = {"max_depth": 64}
+#: Lines of a list before it scrolls.
+LINES = 20
 #: The largest int of the widgets.
 LARGEST = 2**31 - 1
 COLOR = imgui.ColorEditFlags_.float.value | imgui.ColorEditFlags_.hdr.value
@@ -81,7 +83,7 @@ def edit(label: str, hint: Any, value: Any, step: float) -> Any:
 def choose(label: str, choices: Sequence[Value], value: Value, none: str = "none") -> Value:
     """A list to choose one from; `none` is what it calls None."""
     names = [none if choice is None else str(choice) for choice in choices]
-    changed, index = imgui.combo(label, choices.index(value) if value in choices else -1, names)
+    changed, index = imgui.combo(label, choices.index(value) if value in choices else -1, names, LINES)
     return choices[index] if changed else value
 
 

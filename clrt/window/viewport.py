@@ -9,7 +9,6 @@ from imgui_bundle import ImVec2, hello_imgui, imgui
 from .desk import Desk
 from .developing import Developed
 
-#: Up to this, pixels are shown as squares of whole pixels of the window, where there is room.
 ANY_BUTTON = (imgui.ButtonFlags_.mouse_button_left.value | imgui.ButtonFlags_.mouse_button_middle.value
               | imgui.ButtonFlags_.mouse_button_right.value)
 
@@ -35,6 +34,10 @@ class Viewport:
         camera = desk.hands.move(desk.scene.camera, self.size[1])
         if camera is not desk.scene.camera:
             desk.walk(camera)
+
+    def release(self) -> None:
+        """Gives back what lies on the display's device, which must be done while the window is there."""
+        self._texture = None
 
     def _place(self, size: tuple[int, int]) -> None:
         """Whole pixels of the window in the middle of its room, for a picture of this shape."""

@@ -9,7 +9,8 @@ from typing import Any, get_args, get_type_hints
 from imgui_bundle import imgui
 
 from ...scene.material import SHARED, Material
-from ...scene.materials import MATERIALS
+from ...scene.editing import free_name
+from ...scene.materials import MATERIALS, Diffuse
 from ..desk import Desk
 from ..fields import choose, edit_fields
 
@@ -25,12 +26,15 @@ class Materials:
     def show(self, desk: Desk) -> None:
         """Draws it."""
         materials = desk.materials
-        if not materials:
-            imgui.text_disabled("nothing in the scene has one")
-            return
         names = list(materials)
-        self.chosen = choose("##material", names, self.chosen if self.chosen in names else names[0])
-        old = materials[self.chosen]
+        self.chosen = choose("##material", names, self.chosen if self.chosen in names else names[0]) if names else ""
+        imgui.same_line()
+        if imgui.button("add"):
+            self.chosen = free_name("material", names)
+            desk.edit(materials={**desk.scene.materials, self.chosen: Diffuse()})
+        if self.chosen not in desk.materials:
+            return
+        old = desk.materials[self.chosen]
         imgui.push_id("material")
         new = _edited(old, desk.step)
         imgui.pop_id()

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from ...scene.materials import Diffuse
+from ...scene.editing import free_name
+from ...scene.materials import Diffuse, Material
 from ...scene.model import Sphere
 from ..desk import Desk
 from ..fields import choose, edit_fields
@@ -33,19 +34,23 @@ class Spheres:
         if spheres != scene.spheres:
             desk.edit(spheres=spheres)
         elif spheres:
-            old = spheres[self.chosen]
             imgui.push_id("sphere")
-            spheres[self.chosen] = self._edited(desk, old)
+            new, named = _edited(desk, spheres[self.chosen])
             imgui.pop_id()
-            if spheres[self.chosen] is not old:
-                desk.edit(spheres=spheres)
+            if new is not spheres[self.chosen]:
+                spheres[self.chosen] = new
+                desk.edit(spheres=spheres, materials=named)
 
-    def _edited(self, desk: Desk, sphere: Sphere) -> Sphere:
-        sphere = edit_fields(sphere, desk.step, without={"material"})
-        materials = desk.materials
-        name = next(name for name, material in materials.items() if material is sphere.material)
-        chosen = choose("material", list(materials), name)
-        sphere = sphere if chosen == name else replace(sphere, material=materials[chosen])
-        if imgui.button("its own material"):
-            sphere = replace(sphere, material=replace(sphere.material))
-        return sphere
+
+def _edited(desk: Desk, sphere: Sphere) -> tuple[Sphere, dict[str, Material]]:
+    """The sphere, and the scene's named materials, to which its own may have come."""
+    sphere = edit_fields(sphere, desk.step, without={"material"})
+    materials, named = desk.materials, desk.scene.materials
+    name = next(name for name, material in materials.items() if material is sphere.material)
+    chosen = choose("material", list(materials), name)
+    if chosen != name:
+        sphere = replace(sphere, material=materials[chosen])
+    if imgui.button("its own material"):
+        sphere = replace(sphere, material=replace(sphere.material))
+        named = {**named, free_name(sphere.name, materials): sphere.material}
+    return sphere, named

@@ -1,0 +1,99 @@
+"""Hands and eyes of the window's tests: ImGui's test engine drives it, pictures of it are read back."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from imgui_bundle import hello_imgui, imgui
+from imgui_bundle.immapp import testing
+from numpy.typing import NDArray
+
+from clrt.live.settings import Settings
+from clrt.live.snapshot import Snapshot
+from clrt.scene.pictures import read_texels
+from clrt.scene.model import Scene
+from clrt.window.app import App
+
+Levels = NDArray[np.int16]
+#: Seconds that anything may take on a busy machine.
+PATIENCE = 60.0
+
+
+class Driver:
+    """A window while a test runs in it. Items are named as in ImGui's test engine: PANEL/ITEM."""
+
+    def __init__(self, app: App, context: imgui.test_engine.TestContext, folder: Path) -> None:
+        self.app, self.live, self.context, self._folder = app, app.live, context, folder
+        self._pictures = 0
+
+    def until(self, holds: Callable[[], bool], what: str) -> None:
+        """Lets the window run until that holds."""
+        end = time.monotonic() + PATIENCE
+        while not holds():
+            assert time.monotonic() < end, f"{what}: not in {PATIENCE:g} s"
+            assert not self.context.is_error(), "the test engine missed something; its log is below"
+            self.context.yield_()
+
+    def rest(self) -> Snapshot:
+        """The picture with all samples of what was asked for last, once that is in the window."""
+        live, viewport = self.live, self.app.viewport
+
+        def shown() -> bool:
+            snapshot = live.snapshot()
+            whole = snapshot.pixels.shape[1::-1] == snapshot.size and snapshot.spp >= snapshot.scene.render.spp
+            done = whole and snapshot.phase == "rest" and snapshot.asked == live.asked
+            return done and viewport.shown is not None and viewport.shown.snapshot.number == snapshot.number
+
+        self.until(shown, "a picture at rest")
+        self.context.yield_(2)
+        return live.snapshot()
+
+    def panel(self, name: str) -> None:
+        """Brings a panel to the front; items without a panel are its own from now on."""
+        self.context.window_focus(f"//{name}")
+        self.context.set_ref(f"//{name}")
+
+    def choose(self, item: str, choice: str) -> None:
+        """Opens a list and takes one of its lines."""
+        self.context.item_click(item)
+        popup = self.context.get_window_by_ref("//$FOCUSED").name
+        self.context.item_click(f"//{popup}/**/{choice}")
+
+    def window(self) -> Levels:
+        """(height, width, 3): what the whole window looks like, the mouse out of the way."""
+        path = self._folder / f"{self._pictures:02}.png"
+        self._pictures += 1
+        self.context.mouse_move_to_pos((1, 1))
+        self.context.yield_(2)
+        self.app.desk.save_screenshot(path)
+        self.until(path.exists, f"the screenshot {path}")
+        return read_texels(path)[..., :3].astype(np.int16)
+
+    def picture(self) -> Levels:
+        """The part of the window that is the picture."""
+        (x, y), (width, height) = self.app.viewport.corner, self.app.viewport.size
+        return self.window()[y:y + height, x:x + width]
+
+
+def drive(scene: Scene, test: Callable[[Driver], None], folder: Path, settings: Settings = Settings()) -> None:
+    """Opens a window on the scene, runs the test in it, and closes it. Pictures of the window go to the folder."""
+    app = App(scene, settings)
+    app.params.ini_disable = True
+    # The engine takes this signal for a crash. Python ignores it, and has an error for it.
+    app.params.callbacks.before_imgui_render = lambda: _ignore(signal.SIGPIPE)
+
+    def run(context: imgui.test_engine.TestContext) -> None:
+        engine = hello_imgui.get_imgui_test_engine()
+        imgui.test_engine.get_io(engine).config_watchdog_kill_test = 10 * PATIENCE
+        test(Driver(app, context, folder))
+
+    app.run(partial(testing.run, test_function=run))
+
+
+def _ignore(number: signal.Signals) -> None:
+    signal.signal(number, signal.SIG_IGN)
