@@ -21,6 +21,7 @@ from ..scene.material import Material
 from ..scene.model import Camera, Scene
 from ..scene.editing import materials_of, with_material
 from ..output.images import write_image
+from ..output.scenes import save_scene
 from .developing import Developer, Look
 from .hands import Hands
 from .navigation import around, distance
@@ -95,7 +96,9 @@ class Desk:
         self._save(path, lambda: self.live.image().save(path, view=look.view, exposure=look.exposure))
 
     def save_scene(self, path: Path) -> None:
-        """Writes the scene as a file."""
+        """Writes the scene as a scene file, with what belongs beside it."""
+        scene = self.scene
+        self._save(path, lambda: save_scene(scene, path))
 
     def save_screenshot(self, path: Path) -> None:
         """Writes the window as it looks, once this frame is drawn."""

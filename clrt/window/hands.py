@@ -8,7 +8,7 @@ from math import radians
 from imgui_bundle import imgui
 
 from ..scene.model import Camera
-from .navigation import approached, distance, orbited, shifted, turned, walked
+from .navigation import approached, distance, has_axes, orbited, shifted, turned, walked
 
 #: Keys, and which way they walk: right, up, forward.
 KEYS = {imgui.Key.d: (1, 0, 0), imgui.Key.a: (-1, 0, 0), imgui.Key.e: (0, 1, 0), imgui.Key.q: (0, -1, 0),
@@ -32,6 +32,8 @@ class Hands:
     def move(self, camera: Camera, height: float) -> Camera:
         """The camera after this frame's keys and mouse; the same object if it was not moved. ImGui's last item is the
         picture, `height` pixels high."""
+        if not has_axes(camera):
+            return camera
         if imgui.is_item_hovered() or imgui.is_item_active():
             camera = self._mouse(camera, height)
         typing = imgui.get_io().want_text_input

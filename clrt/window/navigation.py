@@ -33,7 +33,7 @@ def turned(camera: Camera, right: float, down: float) -> Camera:
 
 def orbited(camera: Camera, right: float, down: float) -> Camera:
     """The camera moved around what it looks at, as if that was turned by hand to the right and down."""
-    return replace(camera, position=_vector(camera.look_at - _swung(camera, -right, down)))
+    return replace(camera, position=_vector(camera.look_at - _swung(camera, right, down)))
 
 
 def shifted(camera: Camera, right: float, up: float) -> Camera:
@@ -53,7 +53,7 @@ def approached(camera: Camera, factor: float) -> Camera:
 
 def around(point: Vector, camera: Camera, turn: float) -> Vector:
     """The point turned about the axis that stands upright in what the camera looks at."""
-    _, _, up = _axes(camera)
+    up = np.asarray(camera.up) / np.linalg.norm(camera.up)
     away = np.subtract(point, camera.look_at)
     along = (away @ up) * up
     return _vector(camera.look_at + along + cos(turn) * (away - along) + sin(turn) * np.cross(up, away))
@@ -62,6 +62,11 @@ def around(point: Vector, camera: Camera, turn: float) -> Vector:
 def distance(camera: Camera) -> float:
     """From the camera to what it looks at."""
     return float(np.linalg.norm(np.subtract(camera.look_at, camera.position)))
+
+
+def has_axes(camera: Camera) -> bool:
+    """Whether it looks anywhere, and not along its `up`; else it cannot be moved."""
+    return bool(np.cross(np.subtract(camera.look_at, camera.position), camera.up).any())
 
 
 def _axes(camera: Camera) -> tuple[Doubles, Doubles, Doubles]:

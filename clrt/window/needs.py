@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from importlib.util import find_spec
 
 from ..errors import OutputError, UsageError
 
@@ -14,10 +13,12 @@ NO_DISPLAY = ("no window can be opened: {}. Run it on a desktop, through `ssh -X
 
 def check_window() -> None:
     """Raise UsageError unless what `clrt[view]` installs is there, OutputError where there is no display."""
-    for package in ("imgui_bundle", "OpenGL"):
-        if find_spec(package) is None:
-            raise UsageError("the window needs the packages imgui-bundle and PyOpenGL: install them with "
-                             "`pip install 'clrt[view]'`")
+    try:
+        import imgui_bundle  # noqa: F401
+        import OpenGL  # noqa: F401
+    except ImportError as fault:
+        raise UsageError(f"the window needs the packages imgui-bundle and PyOpenGL ({fault}): install them with "
+                         "`pip install 'clrt[view]'`") from fault
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise no_display("there is no display, as neither DISPLAY nor WAYLAND_DISPLAY is set")
 

@@ -1,4 +1,4 @@
-"""A scene for the window's tests: a red ball on the left, a golden one on the right, a floor, a lamp in front, a sky."""
+"""A scene for the window's tests: a red ball on the left, a golden one on the right, a floor, a light, a sky."""
 
 from __future__ import annotations
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import fields
 from pathlib import Path
 
@@ -10,9 +13,12 @@ import pytest
 from imgui_bundle import imgui
 from numpy.typing import NDArray
 
+from clrt.output.images import read_image
 from clrt.output.view import to_display
+from clrt.scene.file import load
 from clrt.scene.material import SHARED
 from clrt.scene.materials import MATERIALS
+from clrt.scene.pictures import read_texels
 
 from .driver import Driver, Levels, drive
 from .scenes import SKY, two_balls
@@ -211,3 +217,83 @@ def test_integrators_are_switched(tmp_path: Path) -> None:
         assert at(window.picture(), 80, 5) == pytest.approx(expected.tolist(), abs=1)
 
     drive(two_balls(), test, tmp_path)
+
+
+def test_devices_are_switched(tmp_path: Path) -> None:
+    program = f"import sys; sys.path.append('.'); from tests.window.two_devices import main; main({str(tmp_path)!r})"
+    done = subprocess.run([sys.executable, "-P", "-c", program], cwd=Path(__file__).parents[2], capture_output=True,
+                          text=True, env=os.environ | {"POCL_DEVICES": "pthread basic"})
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_what_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The picture of an edited scene is to the last bit what `clrt render` makes of the scene that was saved with it,
+    with as many samples."""
+    monkeypatch.chdir(tmp_path)
+
+    def test(window: Driver) -> None:
+        window.rest()
+        window.panel("Spheres")
+        window.context.item_input_value("sphere/radius", 0.4)
+        window.panel("Camera")
+        window.context.item_click("keep")
+        window.context.item_input_value("camera/position/$$0", 1.5)
+        window.panel("Render")
+        window.context.item_input_value("render/spp", 12)
+        window.rest()
+        window.picture()
+        window.panel("File")
+        for what, name in (("picture", "saved.exr"), ("scene", "saved.toml"), ("screenshot", "window.png")):
+            window.context.item_input_value(f"{what}/##file", name)
+            window.context.item_click(f"{what}/save {what}")
+            window.until(lambda: window.app.desk.message == f"{name} is written", name)
+        window.context.item_input_value("picture/##file", "saved.gif")
+        window.context.item_click("picture/save picture")
+        window.until(lambda: "unknown picture format .gif" in window.app.desk.message, "a complaint")
+
+    drive(two_balls(integrator="path"), test, tmp_path)
+    done = subprocess.run([sys.executable, "-m", "clrt", "render", "saved.toml", "--spp", "12", "-o", "again.exr"],
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert read_image(tmp_path / "saved.exr").tobytes() == read_image(tmp_path / "again.exr").tobytes()
+    scene = load(tmp_path / "saved.toml")
+    kept, camera = scene.cameras["bookmark"], scene.camera
+    assert [kept.position, camera.position] == [(0, 1, 5), (1.5, 1, 5)] and scene.spheres[0].radius == 0.4
+    assert list(scene.materials) == ["red", "gold", "floor"]
+    assert read_texels(tmp_path / "window.png").shape == (800, 1280, 4)
+
+
+@pytest.mark.parametrize("block, environment, code, message", [
+    ("", {"DISPLAY": ""}, 6, "neither DISPLAY nor WAYLAND_DISPLAY is set"),
+    ("", {"DISPLAY": ":4711"}, 6, "no window can be opened"),
+    ("sys.modules['imgui_bundle'] = None; ", {}, 2, "pip install 'clrt[view]'")], ids=["none", "dead", "extra"])
+def test_what_is_missing_is_said(tmp_path: Path, block: str, environment: dict[str, str], code: int,
+                                 message: str) -> None:
+    (tmp_path / "ball.toml").write_text('[materials.a]\ntype = "diffuse"\n[[sphere]]\nmaterial = "a"\n')
+    program = f"import sys; {block}from clrt.cli import main; main(['view', 'ball.toml'])"
+    done = subprocess.run([sys.executable, "-P", "-c", program], cwd=tmp_path, capture_output=True, text=True,
+                          env=os.environ | environment)
+    assert done.returncode == code and message in done.stderr and "Traceback" not in done.stderr, done.stderr
+
+
+INTERRUPTED = """
+import os, signal
+from clrt.cli import main
+from clrt.window.desk import Desk
+frame = Desk.frame
+def with_interrupt(desk):
+    frame(desk)
+    if desk.frames == 5:
+        os.kill(os.getpid(), signal.SIGINT)
+Desk.frame = with_interrupt
+main(["view", "ball.toml", "--spp", "2", "--depth", "3", "--view", "agx", "--exposure", "1"])
+"""
+
+
+def test_the_command_ends_with_an_interrupt(tmp_path: Path) -> None:
+    (tmp_path / "ball.toml").write_text('[render]\nsize = [32, 24]\n[materials.a]\ntype = "diffuse"\n[[sphere]]\n'
+                                        'material = "a"\n[environment]\ncolor = [1, 1, 1]\n')
+    done = subprocess.run([sys.executable, "-P", "-c", INTERRUPTED], cwd=tmp_path, capture_output=True, text=True,
+                          env=os.environ | {"HOME": str(tmp_path), "XDG_CONFIG_HOME": str(tmp_path / ".config")})
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+    assert (tmp_path / ".config" / "clrt" / "window.ini").is_file(), "where its panels are is remembered"

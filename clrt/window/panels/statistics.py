@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from imgui_bundle import hello_imgui, imgui, implot
@@ -11,23 +11,32 @@ from ...live.snapshot import Snapshot
 from ..desk import Desk
 
 #: The plot's height in lines of text.
-LINES = 11
+LINES = 9
+#: Its marks, on both axes.
+TICKS = [step * 10.0**power for power in range(-5, 5) for step in (1, 2, 5)]
 
 
 def show(desk: Desk) -> None:
     """Draws the panel."""
     snapshot = desk.snapshot
-    if imgui.begin_table("figures", 2):
-        for name, value in _figures(snapshot):
-            imgui.table_next_column()
-            imgui.text_disabled(name)
-            imgui.table_next_column()
-            imgui.text_wrapped(value)
-        imgui.end_table()
+    _table("progress", _progress(snapshot))
     _noise(snapshot)
+    _table("means", _means(snapshot))
 
 
-def _figures(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
+def _table(name: str, rows: Iterable[tuple[str, str]]) -> None:
+    if imgui.begin_table(name, 2):
+        imgui.table_setup_column("", imgui.TableColumnFlags_.width_fixed.value)
+        for row in rows:
+            imgui.table_next_column()
+            imgui.text_disabled(row[0])
+            imgui.table_next_column()
+            imgui.text_wrapped(row[1])
+        imgui.end_table()
+
+
+def _progress(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
+    """How fast it comes, and how far it is."""
     yield "window", f"{hello_imgui.frame_rate():.0f} frames/s"
     yield "pictures", f"{snapshot.frames_per_second:.1f} /s"
     yield "rays", f"{snapshot.rays_per_second / 1e6:.2f} million/s"
@@ -36,6 +45,10 @@ def _figures(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
     yield "samples", f"{snapshot.spp} of {snapshot.scene.render.spp} a pixel in {snapshot.seconds:.2f} s"
     yield "noise", "-" if snapshot.noise is None else f"{100 * snapshot.noise:.2f} %"
     yield "state", snapshot.phase
+
+
+def _means(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
+    """By what it is rendered."""
     yield "device", snapshot.device
     yield "memory there", f"{snapshot.device_bytes / 2**20:.1f} MiB"
     tree = snapshot.tree
@@ -51,12 +64,13 @@ def _noise(snapshot: Snapshot) -> None:
     """The estimated error over time, both logarithmic."""
     points = np.array([(entry["seconds"], entry["noise"]) for entry in snapshot.history
                        if entry["noise"] and entry["seconds"] > 0], np.float64).reshape(-1, 2)
-    if implot.begin_plot("noise over time", (-1, LINES * imgui.get_text_line_height_with_spacing()),
+    if implot.begin_plot("##noise", (-1, LINES * imgui.get_text_line_height_with_spacing()),
                          implot.Flags_.no_legend.value | implot.Flags_.no_mouse_text.value):
         fit = implot.AxisFlags_.auto_fit.value
-        implot.setup_axes("seconds", "√relMSE", fit, fit)
-        implot.setup_axis_scale(implot.ImAxis_.x1.value, implot.Scale_.log10.value)
-        implot.setup_axis_scale(implot.ImAxis_.y1.value, implot.Scale_.log10.value)
+        implot.setup_axes("seconds", "noise", fit, fit)
+        for axis in (implot.ImAxis_.x1.value, implot.ImAxis_.y1.value):
+            implot.setup_axis_scale(axis, implot.Scale_.log10.value)
+            implot.setup_axis_ticks(axis, TICKS, [f"{tick:g}" for tick in TICKS])
         if len(points):
             implot.plot_line("noise", np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1]))
         implot.end_plot()
