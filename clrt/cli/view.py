@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from ..errors import UsageError
 from . import PROGRAM
 from .guard import guarded
 from .interrupt import Interruptible
@@ -38,12 +39,17 @@ def command(scene: Path, camera: str | None, devices: tuple[str, ...], view: str
     check_window()
     from ..live.settings import Settings
     from ..output.view import view_called
+    from ..scene.fields import field_problems
     from ..scene.file import load
+    from ..scene.model import RenderSettings
     from ..window.app import App, Look
 
     view_called(view)
+    chosen = {name: value for name, value in given.items() if value is not None}
+    if problems := field_problems(RenderSettings, chosen, "render"):
+        raise UsageError("\n".join(problems))
     content = load(scene, camera)
-    content.render = replace(content.render, **{name: value for name, value in given.items() if value is not None})
+    content.render = replace(content.render, **chosen)
     app = App(content, Settings(device=devices or None), Look(view, exposure))
     with Interruptible(app.close) as interruptible:
         app.run()

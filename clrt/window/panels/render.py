@@ -58,8 +58,7 @@ def _device(desk: Desk, selector: Any) -> Any:
     """A list of devices, the one at work chosen. Several that render together are none of them."""
     names = [f"{info.name} ({info.platform})" for info in desk.devices]
     ids = [info.id for info in desk.devices]
-    now = next((i for i, info in enumerate(desk.devices) if selector in (info.id, info.index)), -1)
-    if selector is None:
-        now = next((i for i, info in enumerate(desk.devices) if info.chosen), -1)
+    at_work = selector if selector in ids else desk.snapshot.device
+    now = next((i for i, info in enumerate(desk.devices) if at_work in (info.id, info.name)), -1)
     changed, chosen = imgui.combo("device", now, names)
     return ids[chosen] if changed else selector
