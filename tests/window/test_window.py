@@ -263,14 +263,16 @@ def test_what_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert read_texels(tmp_path / "window.png").shape == (800, 1280, 4)
 
 
-@pytest.mark.parametrize("block, environment, code, message", [
-    ("", {"DISPLAY": ""}, 6, "neither DISPLAY nor WAYLAND_DISPLAY is set"),
-    ("", {"DISPLAY": ":4711"}, 6, "no window can be opened"),
-    ("sys.modules['imgui_bundle'] = None; ", {}, 2, "pip install 'clrt[view]'")], ids=["none", "dead", "extra"])
-def test_what_is_missing_is_said(tmp_path: Path, block: str, environment: dict[str, str], code: int,
-                                 message: str) -> None:
+@pytest.mark.parametrize("before, options, environment, code, message", [
+    ("", [], {"DISPLAY": ""}, 6, "neither DISPLAY nor WAYLAND_DISPLAY is set"),
+    ("", [], {"DISPLAY": ":4711"}, 6, "no window can be opened"),
+    ("sys.modules['imgui_bundle'] = None; ", [], {}, 2, "pip install 'clrt[view]'"),
+    ("", ["--integrator", "pth"], {}, 2, 'did you mean "path"?'),
+    ("", ["--view", "agy"], {}, 2, "did you mean agx?")], ids=["none", "dead", "extra", "integrator", "view"])
+def test_what_is_missing_or_wrong_is_said(tmp_path: Path, before: str, options: list[str], environment: dict[str, str],
+                                          code: int, message: str) -> None:
     (tmp_path / "ball.toml").write_text('[materials.a]\ntype = "diffuse"\n[[sphere]]\nmaterial = "a"\n')
-    program = f"import sys; {block}from clrt.cli import main; main(['view', 'ball.toml'])"
+    program = f"import sys; {before}from clrt.cli import main; main(['view', 'ball.toml', *{options}])"
     done = subprocess.run([sys.executable, "-P", "-c", program], cwd=tmp_path, capture_output=True, text=True,
                           env=os.environ | environment)
     assert done.returncode == code and message in done.stderr and "Traceback" not in done.stderr, done.stderr

@@ -68,7 +68,7 @@ def _noise(snapshot: Snapshot) -> None:
                          implot.Flags_.no_legend.value | implot.Flags_.no_mouse_text.value):
         fit = implot.AxisFlags_.auto_fit.value
         implot.setup_axes("seconds", "noise", fit, fit)
-        for axis in (implot.ImAxis_.x1.value, implot.ImAxis_.y1.value):
+        for axis in (implot.ImAxis_.x1.value, implot.ImAxis_.y1.value) if len(points) else ():
             implot.setup_axis_scale(axis, implot.Scale_.log10.value)
             implot.setup_axis_ticks(axis, TICKS, [f"{tick:g}" for tick in TICKS])
         if len(points):
