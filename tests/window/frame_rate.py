@@ -45,7 +45,8 @@ def main(scene: str, seconds: float = 10.0, frame_rate: float = 20.0) -> dict[st
 def _walk(window: Driver, seconds: float) -> dict[str, Any]:
     """S and W in turns, each for half a second, so that the scene stays in sight."""
     seen: dict[int, Snapshot] = {}
-    latencies, frames, start = [], 0, time.perf_counter()
+    latencies: list[float] = []
+    frames, start = 0, time.perf_counter()
     while time.perf_counter() < start + seconds:
         key = imgui.Key.s if len(latencies) % 2 else imgui.Key.w
         before, pressed, answered = window.live.asked, time.perf_counter(), False

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,8 +18,10 @@ from clrt.output.images import read_image
 from clrt.output.view import to_display
 from clrt.scene.file import load
 from clrt.scene.material import SHARED
-from clrt.scene.materials import MATERIALS
+from clrt.scene.materials import MATERIALS, Diffuse
 from clrt.scene.pictures import read_texels
+from clrt.scene.presets import CONDUCTORS
+from clrt.scene.textures import WHITE, Texture
 
 from .driver import Driver, Levels, drive
 from .scenes import SKY, two_balls
@@ -154,6 +157,42 @@ def test_every_parameter_can_be_edited(tmp_path: Path) -> None:
                 assert found or field.name == "normal_map", f"{kind.kernel}.{field.name}"
 
     drive(two_balls(), test, tmp_path)
+
+
+def test_what_need_not_be_given(tmp_path: Path) -> None:
+    """Numbers that go together come together, from the preset, and go together; a texture has its own fields."""
+    def test(window: Driver) -> None:
+        def gold() -> Any:
+            return window.live.scene.materials["gold"]
+
+        def tick(item: str) -> None:
+            window.context.item_click(item)
+            window.context.yield_(2)
+
+        window.rest()
+        window.panel("Materials")
+        window.choose("##material", "gold")
+        window.choose("material/substance", "copper (conductor)")
+        tick("material/##eta given")
+        assert (gold().eta, gold().k) == CONDUCTORS["copper"]
+        tick("material/##k given")
+        assert gold().eta is gold().k is None and gold().preset == "copper"
+        tick("material/##eta given")
+        window.context.item_input_value("material/eta/$$1", 0.25)
+        assert gold().eta == (CONDUCTORS["copper"][0][0], 0.25, CONDUCTORS["copper"][0][2])
+
+        window.choose("##material", "floor")
+        window.context.item_open("material/color")
+        window.context.item_input_value("material/color/scale/$$0", 3)
+        window.choose("material/color/wrap[1]", "clamp")
+        color = window.live.scene.meshes[0].material.color  # type: ignore[attr-defined]
+        assert (color.scale, color.wrap, color.picture) == ((3, 1), ("repeat", "clamp"), WHITE)
+
+    scene = two_balls(integrator="normals", spp=1)
+    floor = Diffuse(color=Texture(picture=WHITE))
+    scene.meshes[0].uv, scene.meshes[0].material = np.zeros((4, 2), np.float32), floor
+    scene.materials["floor"] = floor
+    drive(scene, test, tmp_path)
 
 
 def test_the_light_moves(tmp_path: Path) -> None:

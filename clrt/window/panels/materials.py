@@ -83,11 +83,12 @@ def _words(hint: Any) -> list[str]:
 
 
 def _together(old: Material, new: Material) -> Material:
-    """Where fields only go together, as a metal's eta and k, all are given, or none."""
+    """Where fields only go together, as a metal's eta and k, all are given, as they were in effect before, or none."""
     if new is old or not new.conflicts():
         return new
     optional = [field.name for field in fields(new) if field.default is None and field.name not in SHARED]
     taken = any(getattr(old, name) is not None and getattr(new, name) is None for name in optional)
-    known = {} if taken else old.parameters()
-    given: dict[str, Any] = {name: known.get(name) for name in optional if taken or getattr(new, name) is None}
+    known = old.parameters()
+    given: dict[str, Any] = {name: None if taken else known.get(name, getattr(new, name)) for name in optional
+                             if taken or getattr(old, name) is None}
     return replace(new, **given)
