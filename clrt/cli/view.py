@@ -37,6 +37,7 @@ def command(scene: Path, camera: str | None, devices: tuple[str, ...], view: str
     from ..window.needs import check_window
 
     check_window()
+    from ..device.discover import select
     from ..live.settings import Settings
     from ..output.view import view_called
     from ..scene.fields import field_problems
@@ -45,6 +46,8 @@ def command(scene: Path, camera: str | None, devices: tuple[str, ...], view: str
     from ..window.app import App, Look
 
     view_called(view)
+    for selector in devices or (None,):
+        select(selector)
     chosen = {name: value for name, value in given.items() if value is not None}
     if problems := field_problems(RenderSettings, chosen, "render"):
         raise UsageError("\n".join(problems))

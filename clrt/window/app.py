@@ -87,7 +87,8 @@ class App:
 
     def _status(self) -> None:
         snapshot = self.desk.snapshot
-        trouble = self.desk.message or snapshot.error
+        shown = self.viewport.shown
+        trouble = self.desk.message or snapshot.error or (shown and shown.error)
         imgui.text(trouble or f"{snapshot.spp} samples a pixel, {snapshot.phase}, {snapshot.device}")
 
 

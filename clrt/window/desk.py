@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -27,6 +28,7 @@ from .hands import Hands
 from .navigation import around, distance
 from .screenshot import screenshot
 
+_log = logging.getLogger(__name__)
 #: What a pixel of dragging a coordinate moves, over the camera's distance.
 STEP = 1 / 500
 #: Seconds that a moving light takes for its circle.
@@ -114,8 +116,12 @@ class Desk:
     def _save(self, path: Path, write: Callable[[], object]) -> None:
         """Has a file written without waiting for it."""
         def work() -> None:
-            self.attempt(write)
-            self.message = self.message or f"{path} is written"
+            try:
+                self.attempt(write)
+                self.message = self.message or f"{path} is written"
+            except Exception as error:  # a mistake of ours must not pass for a file
+                _log.exception("%s was not written", path)
+                self.message = f"{path}: {type(error).__name__}: {error}"
 
         self._writer.submit(work)
 

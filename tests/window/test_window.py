@@ -307,7 +307,9 @@ def test_what_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ("", [], {"DISPLAY": ":4711"}, 6, "no window can be opened"),
     ("sys.modules['imgui_bundle'] = None; ", [], {}, 2, "pip install 'clrt[view]'"),
     ("", ["--integrator", "pth"], {}, 2, 'did you mean "path"?'),
-    ("", ["--view", "agy"], {}, 2, "did you mean agx?")], ids=["none", "dead", "extra", "integrator", "view"])
+    ("", ["--view", "agy"], {}, 2, "did you mean agx?"),
+    ("", ["--device", "abacus"], {}, 4, "no usable device matches")],
+    ids=["none", "dead", "extra", "integrator", "view", "device"])
 def test_what_is_missing_or_wrong_is_said(tmp_path: Path, before: str, options: list[str], environment: dict[str, str],
                                           code: int, message: str) -> None:
     (tmp_path / "ball.toml").write_text('[materials.a]\ntype = "diffuse"\n[[sphere]]\nmaterial = "a"\n')
