@@ -237,6 +237,11 @@ def test_integrators_are_switched(tmp_path: Path) -> None:
         towards = [127.5 * (1 + part / np.hypot(1.2, 5)) for part in (-1.2, 0, 5)]
         assert at(normals, 119.6, 60) == pytest.approx(towards, abs=3), "the middle of a ball's is towards the camera"
 
+        window.choose("render/integrator", "raster")
+        window.rest()
+        raster = window.picture()
+        assert changed(local, raster).mean() < 0.02, "rays see the same, but for edges"
+
         window.choose("render/integrator", "path")
         window.rest()
         path = window.picture()
