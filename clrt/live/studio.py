@@ -72,11 +72,12 @@ class Studio:
         self.renderer = renderer = Renderer(asked.scene, device=self._devices, size=size, spp=spp,
                                             on_phase=self._on_phase, before=last, **asked.settings.tracing)
         self.programs += not (last and last.session.scene.program is renderer.session.scene.program)
-        preparation = time.perf_counter() - start - renderer.session.build_seconds
+        begun = time.perf_counter()
         self._on_phase("render")
         for first, state in enumerate(renderer.passes(spp=spp)):
             if first == 0:
-                self._pace.note(size, state.spp, preparation, renderer.seconds)
+                preparation = begun - start - renderer.session.build_seconds
+                self._pace.note(size, state.spp, preparation, time.perf_counter() - begun)
             yield state
 
     def _open(self, selector: Selector) -> None:

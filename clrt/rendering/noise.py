@@ -54,10 +54,10 @@ class NoiseEstimate:
         due = tile_samples == 2 ** (self._level + 1)
         if not due.any():
             return
-        before = self._mean
-        change = np.concatenate(in_bands(
-            len(mean), lambda rows: tile_sums((mean[rows] - before[rows]) ** 2 / film.relative_to(rows))))
-        level = self._level[due]
+        before, level = self._mean, self._level[due]
+        if level.max() >= 0:    # the first sample is no change
+            change = np.concatenate(in_bands(
+                len(mean), lambda rows: tile_sums((mean[rows] - before[rows]) ** 2 / film.relative_to(rows))))
         self._changes += [np.full(due.shape, np.nan) for _ in range(max(level) + 1 - len(self._changes))]
         for k in np.unique(level[level >= 0]):
             at_k = due & (self._level == k)
