@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from .output.data import check_denoisable
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
-from .rendering.guides import render_guides
 from .rendering.renderer import Renderer
 from .rendering.report import render_report
 from .rendering.stops import planned_spp
@@ -60,7 +59,7 @@ def _rendered(renderer: Renderer, denoiser: Denoiser | None, reference: NDArray[
               **stops: Any) -> Image:
     if denoiser:
         check_denoisable(renderer.settings.integrator)
-    guides = render_guides(renderer.session) if denoiser else {}
+    guides = renderer.guides() if denoiser else {}
     state = None
     for state in renderer.passes(reference=reference, **stops):
         pass

@@ -22,6 +22,9 @@ from .work import Work
 class Accumulation(ABC):
     """The samples of one compiled scene at one size. Nothing depends on how the work is cut, or on who does it."""
 
+    #: Its number in the scene's whole picture.
+    first_tile = 0
+
     def __init__(self, size: tuple[int, int]) -> None:
         self.size = size
         self.work = Work(np.zeros(tiles_of(size), np.int64))
@@ -58,6 +61,10 @@ class Accumulation(ABC):
     def _busy(self) -> bool:
         """Whether there is work in hand."""
         return bool(self.work.parts)
+
+    def work_left(self) -> Work:
+        """The work as a checkpoint keeps it, beside the film as it is now."""
+        return self.work
 
     def _begin_work(self) -> None:
         """Hears that other work is in hand."""

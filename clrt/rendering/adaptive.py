@@ -11,10 +11,26 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .film import Film
+from .tiles import tile_pixels, tile_sums
+
 #: Samples that all pixels get before any tile gets more than others.
 FLOOR_SPP = 16
 #: By what part of all samples so far a round adds to them.
 GROWTH = 0.5
+
+
+def tiles_to_double(film: Film, tile_samples: NDArray[np.int64], errors: NDArray[np.float64],
+                    spp: int | None) -> NDArray[np.intp]:
+    """The tiles of a round, by number; none where `spp` samples a pixel are reached. tile_samples, errors: (rows,
+    columns), of each tile's pixels and of all its values."""
+    height, width = film.pixels.shape
+    samples = tile_samples * tile_pixels((width, height))
+    done = int(samples.sum())
+    most = max(GROWTH * done, samples.max())    # of few tiles at least the dearest, else none may ever fit
+    if spp is not None:
+        most = min(most, spp * film.pixels.size - done)
+    return worth_doubling(errors, tile_sums(film.pixels["rays"]), samples, most)
 
 
 def worth_doubling(errors: NDArray[np.float64], rays: NDArray[np.float64], samples: NDArray[np.int64],

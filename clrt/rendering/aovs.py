@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
+from .features import WITH_LIGHT
 from .film import Film
 from .first_hits import MEANS, OF_THE_MIDDLE
 
@@ -32,6 +33,13 @@ def chosen_aovs(names: str | Iterable[str]) -> tuple[str, ...]:
 def needs_direct_light(names: Iterable[str]) -> bool:
     """Whether the film has to keep direct light apart for them."""
     return not set(LIGHT).isdisjoint(names)
+
+
+def check_light(names: Iterable[str], integrator: str) -> None:
+    """UsageError where they are of light, and the integrator is not."""
+    if needs_direct_light(names) and integrator not in WITH_LIGHT:
+        raise UsageError(f"the AOVs {' and '.join(LIGHT)} are of light, and the integrator is {integrator}; choose "
+                         f"{' or '.join(WITH_LIGHT)}")
 
 
 def seen_first(names: Iterable[str]) -> tuple[str, ...]:

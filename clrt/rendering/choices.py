@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..accel.kernels import BUILDER_NAMES, TREELESS, TREES, HitTests
+from ..device.open import Device
 from ..errors import UsageError
 from .records import PIXEL, PIXEL_WITH_DIRECT
 
@@ -61,3 +62,8 @@ class Choices:
     def pixel(self) -> np.dtype[Any]:
         """The record of a pixel of the film."""
         return PIXEL_WITH_DIRECT if self.direct_light else PIXEL
+
+
+def choices_on(device: Device, asked: Choices, lanes: int | None) -> Choices:
+    """What was asked for, and for the rest what suits the device."""
+    return replace(asked, lanes=lanes or device.lanes, paths=asked.paths or (None if device.packs else "lanes"))

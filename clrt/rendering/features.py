@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable
 
 from ..accel.kernels import tree_defines, tree_features, tree_files
 from ..device.preamble import defines, scene_struct, type_list, typedefs
 from ..scene.materials import MATERIALS, Material
+from ..scene.model import Scene
 from ..scene.textures import Texture
 from .camera import camera_file
 from .choices import OFFSETS, Choices
@@ -23,6 +25,12 @@ LARGEST_UNIT = 2.0**127
 WITH_LIGHT = ("path", "direct")
 INTEGRATORS = {"path": "path.cl", "direct": "path.cl", "local": "whitted.cl",
                "raster": "whitted.cl"}
+
+
+def warn_of_darkness(scene: Scene, features: Iterable[str]) -> None:
+    """Warns where nothing shines among what is compiled in."""
+    if scene.render.integrator in INTEGRATORS and not {"LIGHTS", "SKY"} & set(features):
+        logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
 
 
 def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:

@@ -27,7 +27,8 @@ def render_pixels(session: Accumulation, source: str, name: str, record: np.dtyp
     kernel = make_kernel(device, build(device, WINDOWS + source), name)
     order = scattered(session.tile_samples.size).astype(np.uint32)
     most = max(1, min(len(order), min(WINDOW, device.info.max_alloc_bytes) // (TILE_PIXELS * record.itemsize)))
-    tiles, window = resident(device, order), empty_array(device, record, most * TILE_PIXELS)
+    tiles = resident(device, order + np.uint32(session.first_tile))
+    window = empty_array(device, record, most * TILE_PIXELS)
     pixels = np.zeros((len(order), TILE_PIXELS), record)
     first = min(FIRST_LAUNCH_SAMPLES, first_launch_samples(session.compiled))
     launch, launches, done = session.launch.copy(), Launches(first), 0

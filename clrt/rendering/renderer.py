@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import time as clock
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -18,23 +17,25 @@ from ..errors import UsageError
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validate import validate
 from .accumulation import Accumulation
-from .adaptive import FLOOR_SPP, GROWTH, worth_doubling
-from .aovs import LIGHT, chosen_aovs, film_aovs, needs_direct_light, seen_first
+from .adaptive import FLOOR_SPP, tiles_to_double
+from .aovs import check_light, chosen_aovs, film_aovs, needs_direct_light, seen_first
 from .camera import camera_file
 from .checkpoint import open_checkpoints
-from .choices import Choices
+from .choices import WAVE_LANES, Choices, choices_on
 from .compile import CompiledScene
 from .compiler import Compiler
 from .crew import make_picture
-from .features import INTEGRATORS, WITH_LIGHT
+from .features import warn_of_darkness
 from .film import Film
 from .first_hits import first_hits
+from .guides import render_guides
 from .kept import Kept
+from .machine import machine_report
 from .noise import NoiseEstimate
 from .on_device import SceneOnDevice
+from .session import depth_of
 from .state import State as State, relmse
 from .stops import check_step, check_stops, checked_percentile, low_enough, pass_end, planned_spp
-from .tiles import tile_pixels, tile_sums
 
 #: Between two states at least this long passes, and this many times what making a state costs.
 STATE_SECONDS = 0.5
@@ -82,21 +83,12 @@ class Renderer:
                                  "shadows": shadows, "sampler": sampler, "filter": filter, "adaptive": adaptive}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
-        self.devices = open_devices(device)
-        self.device = self.devices[0]
-        if needs_direct_light(self._aovs) and settings.integrator not in WITH_LIGHT:
-            raise UsageError(f"the AOVs {' and '.join(LIGHT)} are of light, and the integrator is "
-                             f"{settings.integrator}; choose {' or '.join(WITH_LIGHT)}")
-        choices = [Choices(lanes or each.lanes, layout, builder, HitTests(triangle, box, sphere), offset,
-                           needs_direct_light(self._aovs), paths or (None if each.packs else "lanes"), tree)
-                   for each in self.devices]
-        on_phase("build")
-        self._compiler: Compiler = Compiler.after(before._compiler if before else None, self.devices)
-        self._compiled = self._compiler.compile(self.scene, choices)
-        if settings.integrator in INTEGRATORS and not {"LIGHTS", "SKY"} & set(self.compiled.features):
-            logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
-        self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene,
-                                                   self.compiled.choices, name_of(self.devices))
+        check_light(self._aovs, settings.integrator)
+        self.choices = Choices(lanes or WAVE_LANES, layout, builder, HitTests(triangle, box, sphere), offset,
+                               needs_direct_light(self._aovs), paths, tree)
+        self._open(device, lanes, on_phase, before)
+        self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene, self.choices,
+                                                   self.name)
         on_phase("compile")
         planned = None if spp is None else int(spp) * (MOST_TIMES_PLANNED if settings.adaptive else 1)
         self._planned_spp = kept.planned_spp if kept else planned
@@ -109,18 +101,43 @@ class Renderer:
             self.session.restore(kept.film, kept.work)
             self.state()
 
+    def _open(self, device: str | int | Device | Sequence[str | int | Device] | None, lanes: int | None,
+              on_phase: Callable[[str], None], before: Renderer | None) -> None:
+        """Opens the devices, and compiles the scene for them; without `lanes` with as many as suit each."""
+        self.device, *_ = self.devices = open_devices(device)
+        on_phase("build")
+        self._compiler: Compiler = Compiler.after(before._compiler if before else None, self.devices)
+        self._compiled = self._compiler.compile(self.scene, [choices_on(each, self.choices, lanes)
+                                                             for each in self.devices])
+        warn_of_darkness(self.scene, self.compiled.features)
+
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
         settings = self.settings
-        depth = min(settings.max_depth, 2) if settings.integrator == "direct" else settings.max_depth
-        return make_picture(self.devices, self._compiled, settings.size, depth, settings.seed, self._planned_spp,
-                            before)
+        return make_picture(self.devices, self._compiled, settings.size, depth_of(settings), settings.seed,
+                            self._planned_spp, before)
+
+    @property
+    def name(self) -> str:
+        """Of all that render."""
+        return name_of(self.devices)
+
+    def machine(self) -> dict[str, Any]:
+        """What a report says of all that render."""
+        return machine_report(self.devices, self.session)
+
+    def guides(self) -> dict[str, NDArray[np.float32]]:
+        """What guides a denoiser: see `render_guides`."""
+        return render_guides(self.session)
 
     def _begin(self) -> None:
         """A picture without any samples."""
         self._noise = NoiseEstimate(self._planned_spp)
         seen = seen_first(self._aovs)   # now, so that an interrupted picture has them, too
-        self._first_hits = first_hits(self.session, self.scene, seen) if seen else {}
+        self._first_hits = self._seen(seen) if seen else {}
         self.history, self.stop_reason, self.seconds = [], None, 0.0
+
+    def _seen(self, names: tuple[str, ...]) -> dict[str, NDArray[np.generic]]:
+        return first_hits(self.session, self.scene, names)
 
     @property
     def compiled(self) -> CompiledScene:
@@ -257,17 +274,11 @@ class Renderer:
 
     def _adaptive_pass(self, spp: int | None) -> Iterator[None]:
         """Doubles the samples of those tiles where that takes most error away; ends the render at `spp`."""
-        session, film = self.session, self._last.film
-        samples = session.tile_samples * tile_pixels(session.size)
-        done = int(samples.sum())
-        most = max(GROWTH * done, samples.max())    # of few tiles at least the dearest, else none may ever fit
-        if spp is not None:
-            most = min(most, spp * film.pixels.size - done)
-        tiles = worth_doubling(self._noise.tile_errors(session.tile_samples), tile_sums(film.pixels["rays"]), samples,
-                               most)
+        tile_samples = self.session.tile_samples
+        tiles = tiles_to_double(self._last.film, tile_samples, self._noise.tile_errors(tile_samples), spp)
         if len(tiles) == 0:
             self.stop_reason = "spp"
-        yield from session.double(tiles)
+        yield from self.session.double(tiles)
 
     def _even_pass(self, spp: int | None, error: float | None) -> Iterator[None]:
         done = self.session.samples_done
@@ -296,5 +307,5 @@ class Renderer:
         """Writes a checkpoint where one is due, or begins to write the last one; film: as it is now, if it is known."""
         if self._checkpoints is not None and (last or self._checkpoints.due):
             write = self._checkpoints.begin if last else self._checkpoints.write
-            write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(), self.session.work,
+            write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(), self.session.work_left(),
                        self._noise))

@@ -14,6 +14,7 @@ from ..device.arrays import on_device
 from ..device.launch import Launches, calling, wait_for
 from ..device.open import Device
 from ..errors import NoRoomError
+from ..scene.model import RenderSettings
 from .accumulation import Accumulation
 from .camera import launch_record
 from .compile import CompiledScene
@@ -134,3 +135,8 @@ def block_bits(planned_spp: int | None) -> int:
     The least power of two for all `planned_spp`; 32, without an end, where it is not known how many there will be.
     """
     return 32 if planned_spp is None else (planned_spp - 1).bit_length()
+
+
+def depth_of(settings: RenderSettings) -> int:
+    """Edges of a path, as the integrator counts them."""
+    return min(settings.max_depth, 2) if settings.integrator == "direct" else settings.max_depth

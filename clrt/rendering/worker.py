@@ -31,9 +31,13 @@ class Window(NamedTuple):
 
 
 class Share(NamedTuple):
-    """What a worker is at. pixels: (tiles, TILE_PIXELS), as they were before it, and once it has ended after it."""
+    """What a worker is at: tiles of the picture, and the rows that they are of the film.
+
+    pixels: (tiles, TILE_PIXELS), as they were before it, and once it has ended after it.
+    """
 
     part: Part
+    rows: NDArray[np.uint32]
     tiles: NDArray[np.uint32]
     pixels: NDArray[Any]
 

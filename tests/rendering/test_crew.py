@@ -29,7 +29,7 @@ def crew(device: Device, count: int = 2, **options: Any) -> Renderer:
 @pytest.fixture
 def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
     """So that a pass is many of them."""
-    monkeypatch.setattr("clrt.rendering.crew.FEWEST_TILES", 5)
+    monkeypatch.setattr("clrt.rendering.team.FEWEST_TILES", 5)
     monkeypatch.setattr("clrt.rendering.session.FEWEST_TILES", 5)
     monkeypatch.setattr("clrt.device.launch.TARGET_SECONDS", 1e-9)
 
