@@ -1,0 +1,148 @@
+"""A picture too large for the client's memory: bands of it are rendered by a worker each, and kept in a file until all
+are there.
+
+What the client holds is the band that just came. The file has the picture's rows, 12 bytes a pixel, each at its place;
+a manifest beside it says which are there, and a render that was cut off goes on with the others.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import OutputError
+from ..output.rows import BLOCK_ROWS, write_rows
+from ..rendering.identity import facts_of
+from ..rendering.tiles import TILE, tiles_of
+from ..scene.validate import validate
+from .cluster import Cluster
+from .manifest import Manifest
+from .orders import PictureOrder
+from .wholes import Wholes
+
+#: Pixels from which on a picture is rendered in bands: all below fit the client, film and estimates (some 350 bytes a
+#: pixel) included.
+HUGE = 1 << 23
+#: Pixels of a band, about. A worker has its film, which takes as much a pixel there.
+BAND_PIXELS = 1 << 20
+BYTES = 12
+
+
+@dataclass
+class Banded:
+    """A picture in bands. order: of the whole picture; path: of the manifest, beside which the rows are kept."""
+
+    order: PictureOrder
+    path: Path
+    band_pixels: int = BAND_PIXELS
+    reports: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height)."""
+        return self.order.settled.render.size
+
+    @property
+    def rows_path(self) -> Path:
+        """Where the rows are."""
+        return Path(f"{self.path}.rows")
+
+    def render(self, cluster: Cluster, resume: bool = False) -> Iterator[tuple[int, int]]:
+        """Has all bands rendered that are not there yet; yields how many there are, and of how many, at least every
+        tenth of a second. Raises ClrtErrors."""
+        validate(self.order.settled)
+        bands = self._bands()
+        manifest = Manifest(self.path, self._facts(), resume)
+        try:
+            flags = os.O_RDWR | os.O_CREAT | (0 if manifest.done else os.O_TRUNC)
+            file = os.open(self.rows_path, flags, 0o600)
+        except OSError as error:
+            raise OutputError(f"{self.rows_path}: cannot be written ({error.strerror})") from error
+        try:
+            self.reports = {name: about["report"] for name, about in manifest.done.items()
+                            if name in bands and self._is_there(file, bands[name], about)}
+            names = [name for name in bands if name not in self.reports]
+            wholes = Wholes(cluster, names, lambda name: replace(self.order, band=bands[name]),
+                            tuple(self.order.options.get("device") or ()))
+            for result in wholes.results():
+                if result is not None:
+                    self._keep(file, manifest, bands[result[0]], *result)
+                yield len(self.reports), len(bands)
+        finally:
+            os.close(file)
+            manifest.close()
+
+    def save(self, path: Path, view: str, exposure: float, metadata: dict[str, str]) -> Path:
+        """Writes the picture, once all bands are there. OutputError."""
+        write_rows(path, self.size, self._pieces(), metadata=metadata, view=view, exposure=exposure)
+        return path
+
+    def forget(self) -> None:
+        """Removes what was kept."""
+        self.rows_path.unlink(missing_ok=True)
+        self.path.unlink(missing_ok=True)
+
+    def summary(self) -> dict[str, Any]:
+        """What all bands' reports say together: samples, rays, and noise; time is the workers', added."""
+        reports = list(self.reports.values())
+        added = {name: sum(report[name] for report in reports)
+                 for name in ("samples", "rays", "nonfinite_samples", "seconds")}
+        squares = [report["samples"] / report["spp"] * report["noise"] ** 2 for report in reports if report["noise"]]
+        pixels = self.size[0] * self.size[1]
+        first = reports[0] if reports else {}
+        return {**first, "width": self.size[0], "height": self.size[1], "bands": len(reports),
+                "samples": added["samples"], "rays": added["rays"], "nonfinite_samples": added["nonfinite_samples"],
+                "worker_seconds": added["seconds"], "spp": round(added["samples"] / pixels),
+                "noise": float(np.sqrt(sum(squares) / pixels)) if len(squares) == len(reports) else None}
+
+    def _bands(self) -> dict[str, tuple[int, int]]:
+        """Rows of tiles of each band, by its name; all begin where a block of an .exr does."""
+        rows, each = tiles_of(self.size)[0], BLOCK_ROWS // TILE
+        step = each * max(1, self.band_pixels // (self.size[0] * BLOCK_ROWS))
+        return {f"rows {first * TILE} to {min((first + step) * TILE, self.size[1])}": (first, min(rows, first + step))
+                for first in range(0, rows, step)}
+
+    def _facts(self) -> dict[str, str]:
+        """Of which render the bands are: with where it stops, for each stops by itself."""
+        order = self.order
+        stops = {"spp": order.spp, "time": order.time, "error": order.error, "band_pixels": self.band_pixels,
+                 "error_percentile": order.options.get("error_percentile")}
+        return {**facts_of(order.settled, order.choices), **{name: str(value) for name, value in stops.items()}}
+
+    def _span(self, band: tuple[int, int]) -> tuple[int, int]:
+        """Where a band begins in the file, and its bytes."""
+        width, height = self.size
+        first, end = band[0] * TILE, min(band[1] * TILE, height)
+        return first * width * BYTES, (end - first) * width * BYTES
+
+    def _keep(self, file: int, manifest: Manifest, band: tuple[int, int], name: str, result: dict[str, Any]) -> None:
+        at, _ = self._span(band)
+        content = np.ascontiguousarray(result["pixels"], np.float32).tobytes()
+        try:
+            if os.pwrite(file, content, at) != len(content):
+                raise OSError(0, "the disk is full")
+            os.fsync(file)
+        except OSError as error:
+            raise OutputError(f"{self.rows_path}: cannot be written ({error.strerror})") from error
+        report = {key: value for key, value in result["report"].items() if key != "history"}
+        manifest.add(name, {"sha256": hashlib.sha256(content).hexdigest(), "report": report})
+        self.reports[name] = report
+
+    def _is_there(self, file: int, band: tuple[int, int], about: dict[str, Any]) -> bool:
+        """Whether the file has what the manifest says."""
+        at, count = self._span(band)
+        return hashlib.sha256(os.pread(file, count, at)).hexdigest() == about.get("sha256")
+
+    def _pieces(self) -> Iterator[NDArray[np.float32]]:
+        width, _ = self.size
+        with open(self.rows_path, "rb") as file:
+            for band in self._bands().values():
+                content = file.read(self._span(band)[1])
+                yield np.frombuffer(content, np.float32).reshape(-1, width, 3)

@@ -1,0 +1,263 @@
+"""Gives tasks to the workers of a cluster until none is left, whoever comes, goes, fails or sleeps meanwhile.
+
+Each worker has the next task at hand before it has ended one. What a dead worker was at is given to another, as is,
+once nothing else is left, what a slow one should have ended long ago: the result that comes first counts, and no other.
+A task that ends several workers, or fails on several, is given up, and with it the render.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import CancelledError
+from uuid import uuid4
+
+from ..errors import ClrtError, DeviceError, HungError, SceneError
+from .cluster import Cluster, Result
+from .members import BadResult, Member, Run, Source, Task
+
+#: Seconds between two looks at who is there, and so many times what one takes; and the wait for results.
+LOOK, LOOK_COST, TICK = 0.5, 50, 0.1
+#: A task is given up after so many deaths of workers, or failures.
+MOST_DEATHS, MOST_FAILURES = 4, 3
+#: A run is overdue after so many times what it should take, and so many seconds.
+SLOW, SLACK = 2.0, 0.5
+#: Seconds without any worker that is ready before that is told, and before it is given up; and without a scheduler.
+LONELY, HOPELESS, GONE = 20.0, 600.0, 120.0
+#: What was lost on its way, with its worker or the scheduler.
+LOST = (CancelledError, TimeoutError, ConnectionError)
+_log = logging.getLogger(__name__)
+
+
+class Dispatch:
+    """The workers of a cluster, and what they are at for one source. DeviceError where none is left that may."""
+
+    def __init__(self, cluster: Cluster, source: Source) -> None:
+        self.cluster, self._source = cluster, source
+        self.members: dict[str, Member] = {}
+        self.former: list[Member] = []
+        self.tasks: list[Task] = []
+        self._again: deque[Task] = deque()
+        self._runs: dict[str, Run] = {}
+        self._meeting: dict[str, Member] = {}
+        self._next_look = self._alone_since = 0.0
+        self._told_alone = False
+        #: Tasks that were sent.
+        self.sent = 0
+
+    def run(self) -> Iterator[None]:
+        """Until the source has nothing left; yields at least every TICK."""
+        while self.tasks or self._source.left():
+            if not self.cluster.alive:
+                yield from self._find_scheduler()
+            self._look()
+            self._hand_out()
+            for key, result in self.cluster.hear(TICK):
+                self._hear(key, result)
+            yield
+
+    def drain(self, seconds: float) -> list[Task]:
+        """Waits for what is in flight, for so long at most; the tasks that were not done by then, which it forgets."""
+        end = time.perf_counter() + seconds
+        while any(task.runs for task in self.tasks) and self.cluster.alive and time.perf_counter() < end:
+            for key, result in self.cluster.hear(TICK):
+                self._hear(key, result)
+        forgotten, self.tasks = self.tasks, []
+        self._again.clear()
+        for task in forgotten:
+            task.runs.clear()
+        return forgotten
+
+    def wait_for(self, count: int = 1) -> list[Member]:
+        """The workers that are ready, once there are so many."""
+        while True:
+            if len(ready := self.ready()) >= count:
+                return ready
+            if not self.cluster.alive:
+                for _ in self._find_scheduler():
+                    pass
+            self._look()
+            for key, result in self.cluster.hear(TICK):
+                self._hear(key, result)
+
+    def everyone(self) -> list[Member]:
+        """Its workers, also those that are gone."""
+        return [*self.members.values(), *self.former]
+
+    def ready(self) -> list[Member]:
+        """Those that may be given work, with least first."""
+        return sorted((member for member in self.members.values() if member.ready), key=lambda each: each.load)
+
+    def _look(self) -> None:
+        """Meets new workers, and gives what those that are gone were at to others."""
+        now = time.perf_counter()
+        if now < self._next_look:
+            return
+        there = self.cluster.workers()
+        self._next_look = now + max(LOOK, LOOK_COST * (time.perf_counter() - now))
+        for address in self.members.keys() - there.keys():
+            self._part_with(self.members.pop(address))
+        for address in there.keys() - self.members.keys():
+            member = self.members[address] = Member(address, there[address])
+            function, arguments = self._source.introduction()
+            key = f"clrt-meet-{uuid4().hex}"
+            self._meeting[key] = member
+            self.cluster.send(address, key, function, *arguments)
+        self._check_alone(now)
+
+    def _check_alone(self, now: float) -> None:
+        """Warns where there is nobody to work, and gives up where that will not change."""
+        hopes = [member for member in self.members.values() if not member.refused]
+        if any(member.facts for member in hopes):
+            self._alone_since = 0.0
+        elif not hopes and (refused := list(dict.fromkeys(each.refused for each in self.everyone() if each.refused))):
+            raise DeviceError(f"no worker of {self.cluster.address} can be used: {'; '.join(refused)}")
+        elif not self._alone_since:
+            self._alone_since = now
+        elif now - self._alone_since > HOPELESS:
+            raise DeviceError(f"{self.cluster.address} has had no worker for {HOPELESS:g} s that answers; start some "
+                              f"with `dask worker {self.cluster.address}`, where the same clrt is installed")
+        elif now - self._alone_since > LONELY and not self._told_alone:
+            self._told_alone = True
+            _log.warning("%s has %s; waiting", self.cluster.address,
+                         "workers, none of which is ready" if hopes else "no worker")
+
+    def _part_with(self, member: Member) -> None:
+        """It is gone: what it had begun may be why."""
+        member.gone = True
+        self.former.append(member)
+        self._meeting = {key: other for key, other in self._meeting.items() if other is not member}
+        runs = [run for run in self._runs.values() if run.member is member and run in run.task.runs]
+        for place, run in enumerate(runs):
+            run.task.runs.remove(run)
+            run.task.deaths += place == 0
+            if run.task.deaths >= MOST_DEATHS:
+                raise DeviceError(f"{run.task.name} has ended {run.task.deaths} workers, at last {member.name}"
+                                  f"{self.cluster.last_words()}; their logs may tell more, and `clrt devices --check` "
+                                  "there whether their devices work")
+            self._repeat(run.task)
+        for key in [key for key, run in self._runs.items() if run.member is member]:
+            del self._runs[key]
+            self.cluster.forget(key)
+        if runs:
+            _log.warning("%s is gone; others do again what it was at", member.name)
+
+    def _hand_out(self) -> None:
+        """Gives each worker what it should have at hand, in turns; and then those without any what is overdue."""
+        ready = self.ready()
+        for load in range(self._source.ahead(len(ready))):
+            for member in ready:
+                if member.load == load and (task := self._again.popleft() if self._again
+                                            else self._source.next(member)):
+                    if task not in self.tasks:
+                        self.tasks.append(task)
+                    self._begin(task, member)
+        idle = [member for member in ready if not member.load]
+        for member, run in zip(idle, self._overdue() if idle else []):
+            _log.info("%s is slow; %s does again what it is at", run.member.name, member.name)
+            self._begin(run.task, member)
+
+    def _overdue(self) -> list[Run]:
+        """What should have been done long ago, and no other worker is at; the oldest first."""
+        rates = [member.rate for member in self.everyone() if member.rate]
+        if not rates:
+            return []
+        usual, now = sum(rates) / len(rates), time.perf_counter()
+        alone = [task.runs[0] for task in self.tasks if len(task.runs) == 1]
+        return sorted((run for run in alone
+                       if now - run.began > SLOW * run.ahead / (run.member.rate or usual) + SLACK),
+                      key=lambda run: run.began)
+
+    def _begin(self, task: Task, member: Member) -> None:
+        key = f"clrt-{uuid4().hex}"
+        self.cluster.send(member.address, key, task.function, *task.arguments())
+        self.sent += 1
+        member.load += 1
+        member.work += task.work
+        run = Run(task, member, time.perf_counter(), member.work)
+        task.runs.append(run)
+        self._runs[key] = run
+
+    def _repeat(self, task: Task) -> None:
+        """Has it done again, unless another worker is at it."""
+        if not task.runs and task in self.tasks and task not in self._again:
+            self._again.append(task)
+
+    def _hear(self, key: str, result: Result) -> None:
+        """Takes in how something ended."""
+        if key in self._meeting:
+            self._met(self._meeting.pop(key), result)
+        elif key in self._runs:
+            self._ended(self._runs.pop(key), result)
+
+    def _met(self, member: Member, result: Result) -> None:
+        try:
+            member.facts = result.result().result()
+            self._source.meet(member)
+        except LOST:
+            self.members.pop(member.address, None)    # to be met again, if it is still there
+        except SceneError:
+            raise
+        except Exception as error:   # whatever it is, it is the worker's
+            self._refuse(member, error)
+
+    def _refuse(self, member: Member, error: Exception) -> None:
+        known = isinstance(error, ClrtError | BadResult | RuntimeError)
+        told = str(error) if known else f"{type(error).__name__}: {error}"
+        if not member.refused:
+            _log.warning("%s is left out: %s", member.name, told)
+        member.refused = f"{member.name}: {told}"
+
+    def _ended(self, run: Run, result: Result) -> None:
+        task, member = run.task, run.member
+        member.load -= 1
+        member.work -= task.work
+        member.silent = False
+        if run not in task.runs:
+            return     # another worker was faster, or nobody asks any more
+        task.runs.remove(run)
+        try:
+            found, seconds = result.result().result()
+            self._source.accept(task, found, member)
+        except LOST:
+            self._repeat(task)
+        except SceneError:
+            raise
+        except Exception as error:
+            self._failed(task, member, error)
+        else:
+            member.ran(task.work, seconds)
+            for other in task.runs:
+                other.member.silent = True
+            task.runs.clear()
+            self.tasks.remove(task)
+
+    def _failed(self, task: Task, member: Member, error: Exception) -> None:
+        """A worker that fails is left out, and its task given to others, if it may not be what fails."""
+        task.failures += 1
+        if not isinstance(error, LookupError):
+            self._refuse(member, error)
+        else:
+            del self.members[member.address]     # it has a new process behind its address, or forgot the scene
+            self.former.append(member)
+        if task.failures >= MOST_FAILURES and not isinstance(error, HungError):
+            raise DeviceError(f"{task.name} has failed on {task.failures} workers: {error}") from error
+        self._repeat(task)
+
+    def _find_scheduler(self) -> Iterator[None]:
+        """Waits until the scheduler answers again: what is done is here, and what was in flight is done again."""
+        _log.warning("%s does not answer any more; waiting for it for up to %g s", self.cluster.address, GONE)
+        self.former += self.members.values()
+        self.members, self._runs, self._meeting = {}, {}, {}
+        for task in self.tasks:
+            task.runs.clear()
+            self._repeat(task)
+        end = time.perf_counter() + GONE
+        while not self.cluster.reconnect():
+            if time.perf_counter() > end:
+                raise DeviceError(f"the scheduler at {self.cluster.address} has not answered for {GONE:g} s")
+            yield
+        _log.warning("%s answers again", self.cluster.address)
+        self._next_look = 0.0

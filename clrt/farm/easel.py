@@ -1,0 +1,71 @@
+"""A scene on a worker, ready to take shares of its picture."""
+
+from __future__ import annotations
+
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rendering.choices import choices_on
+from ..rendering.compile import compile_for_all
+from ..rendering.crew import Crew, make_team
+from ..rendering.first_hits import first_hits
+from ..rendering.guides import render_guides
+from ..rendering.machine import machine_report
+from ..rendering.session import depth_of
+from ..rendering.tiles import TILE_PIXELS, scattered
+from ..rendering.work import Part, Work
+from .orders import Order
+from .remote import about, opened
+
+#: Devices do one thing at a time.
+_at_work = Lock()
+#: Tiles of a proof, and of a share at most.
+PROOF_TILES, MOST_TILES = 16, 2048
+
+
+class Easel:
+    """The order's scene, compiled for this worker's devices. DeviceError, KernelError, NoRoomError."""
+
+    def __init__(self, order: Order) -> None:
+        self.scene, self.selectors = order.scene, order.devices
+        settings = order.scene.render
+        devices = opened(order.devices)
+        compiled = compile_for_all(order.scene, [choices_on(each, order.asked, order.lanes) for each in devices],
+                                   devices)
+        self._team = make_team(devices, compiled, settings.size, depth_of(settings), settings.seed, order.planned_spp)
+        self._picture = Crew(self._team, settings.size)    # whose film takes no memory as long as nothing is in it
+        self._pixel = compiled[0].choices.pixel
+
+    def share(self, tiles: NDArray[np.uint32], first: int, more: int, pixels: NDArray[Any] | None) -> NDArray[Any]:
+        """See `remote.render_share`."""
+        count = len(tiles)
+        film = np.zeros((count, TILE_PIXELS), self._pixel) if pixels is None else np.array(pixels)
+        work = Work(np.full((1, count), first, np.int64))
+        work.take(np.arange(count), [Part(0, count, first, more)])
+        with _at_work:
+            for _ in self._team.run(work, film, tiles):
+                pass
+        return film
+
+    def proof(self) -> NDArray[Any]:
+        """A few tiles from all over the picture with one sample: what others can compare theirs with."""
+        tiles = scattered(self._picture.tile_samples.size).astype(np.uint32)
+        return self.share(np.sort(tiles[::max(1, len(tiles) // PROOF_TILES)][:PROOF_TILES]), 0, 1, None)
+
+    def drawn(self, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
+        """See `remote.draw`."""
+        with _at_work:
+            if names is None:
+                return {**render_guides(self._picture)}
+            return {**first_hits(self._picture, self.scene, names)}
+
+    def introduction(self) -> dict[str, Any]:
+        """What the worker is."""
+        return about(opened(self.selectors))
+
+    def report(self) -> dict[str, Any]:
+        """The machine's part of a report."""
+        return machine_report(opened(self.selectors), self._picture)

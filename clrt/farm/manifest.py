@@ -1,0 +1,70 @@
+"""What of many pictures is done: a file that grows by a line each, so that a render that was cut off goes on.
+
+The first line says of which render it is, each other one names a picture and the SHA-256 of what was kept of it. A line
+that is not whole, the last one of a process that was killed, counts for nothing.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from ..errors import CheckpointError, OutputError
+from ..rendering.identity import differences
+
+VERSION = "clrt manifest 1"
+
+
+class Manifest:
+    """The pictures that are done, by name, with what is to be known of each. facts: of the render, see
+    `identity.facts_of`. CheckpointError where the file is of another one, OutputError where it cannot be written."""
+
+    def __init__(self, path: Path, facts: dict[str, str], resume: bool) -> None:
+        self.path = path
+        self.done: dict[str, dict[str, Any]] = {}
+        whole = self._read(facts) if resume and path.exists() else 0
+        try:
+            self._file = open(path, "r+b" if whole else "wb")
+            self._file.truncate(whole)
+            self._file.seek(whole)
+            if not whole:
+                self._write({"manifest": VERSION, "facts": facts})
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
+
+    def add(self, name: str, about: dict[str, Any]) -> None:
+        """Notes that a picture is done; on disk when it returns."""
+        self._write({"name": name, "about": about})
+        self.done[name] = about
+
+    def close(self) -> None:
+        """Ends writing."""
+        self._file.close()
+
+    def _write(self, entry: dict[str, Any]) -> None:
+        try:
+            self._file.write(json.dumps(entry).encode() + b"\n")
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise OutputError(f"{self.path}: cannot be written ({error.strerror})") from error
+
+    def _read(self, facts: dict[str, str]) -> int:
+        """Takes in what is whole, and tells how many bytes that is."""
+        content = self.path.read_bytes()
+        lines = content[:content.rfind(b"\n") + 1].splitlines(keepends=True)
+        try:
+            first, *entries = [json.loads(line) for line in lines]
+            found = first["facts"] if first["manifest"] == VERSION else None
+            self.done = {str(entry["name"]): dict(entry["about"]) for entry in entries}
+        except (ValueError, TypeError, LookupError):
+            found = None
+        if not isinstance(found, dict):
+            raise CheckpointError(f"{self.path}: is no list of pictures that this version of clrt can read; name "
+                                  "another file, or leave out --resume to begin anew")
+        if others := differences(found, facts):
+            raise CheckpointError(f"{self.path}: is of another render ({', '.join(others)}); ask for that one to go "
+                                  "on, name another file, or leave out --resume to begin anew")
+        return sum(map(len, lines))

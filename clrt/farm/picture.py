@@ -1,0 +1,215 @@
+"""A picture rendered by the workers of a cluster. The film lies here, on the client.
+
+A task is some tiles, their pixels as they are, and which samples to add: what a device of a crew gets
+(rendering/team.py), only larger. A tile is in one task at a time, and the pixels that come back replace the film's. So
+each pixel's samples are added one after another in their own order: nothing depends on who did what, or when, the sums
+are those of one machine to the last bit, and what is rendered twice counts once.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.memory import check_host
+from ..errors import ClrtError
+from ..rendering.accumulation import Accumulation
+from ..rendering.film import Film
+from ..rendering.on_device import SceneOnDevice
+from ..rendering.session import FEWEST_TILES
+from ..rendering.tiles import TILE_PIXELS, row_by_row, tile_by_tile
+from ..rendering.work import Work
+from .cluster import Cluster
+from .dispatch import Dispatch
+from .members import BadResult, Member, Task
+from .orders import Order
+from .parcels import pack
+from .proofs import Proofs
+from .remote import draw, identity, prepare, render_share
+
+#: Seconds that a task should take, of few workers; of many as much more as keeps the client and the scheduler at so
+#: many tasks a second.
+TASK_SECONDS, TASKS_A_SECOND = 1.0, 64
+#: Samples of the first task of a worker whose speed is not known.
+FIRST_SAMPLES = 1 << 17
+#: The smallest task is such a part of a full one. Tiles of one at most: what is sent with a task should be below 10 MB.
+SMALLEST, MOST_TILES = 4, 2048
+#: Tasks that a worker has at hand; and of a pass, for each.
+AHEAD, PASS_TASKS = 2, 12
+#: A pass takes so many times as long as workers wait between two, while the client estimates the picture's error.
+GAP_COST = 100
+#: How long the end of a render waits for what is in flight, in times of a task.
+DRAIN = 2.5
+#: A worker that drops a larger part of its samples is not believed.
+MOST_DROPPED = 0.5
+_log = logging.getLogger(__name__)
+
+
+class FarmPicture(Accumulation):
+    """Samples of the order's scene. pixel: the film's record."""
+
+    def __init__(self, cluster: Cluster, order: Order, pixel: np.dtype[Any]) -> None:
+        super().__init__(order.scene.render.size)
+        tiles = self.work.samples.size
+        check_host(tiles * TILE_PIXELS * pixel.itemsize, *self.size)
+        self._film = np.zeros((tiles, TILE_PIXELS), pixel)
+        self._inside = _inside(self.size)
+        self._parcel = pack(order)
+        self._proofs, self._drops = Proofs(), False
+        self._doubted: dict[Task, tuple[Member, NDArray[Any]]] = {}
+        self._ended = self._gap = 0.0
+        #: Of pixels and tiles' numbers, to workers and back.
+        self.moved_bytes = 0
+        self.dispatch = Dispatch(cluster, self)
+
+    def drawn(self, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
+        """Pictures of what is seen first, by one worker (see `remote.draw`)."""
+        member = self.dispatch.wait_for()[0]
+        cluster = self.dispatch.cluster
+        pictures: dict[str, NDArray[Any]] = cluster.call(
+            member.address, f"clrt-draw-{self._parcel.key}-{names}", draw, self._parcel.key, names)
+        return pictures
+
+    def introduction(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        """Workers get the scene, and compile it."""
+        key, text, arrays = self._parcel.key, self._parcel.text, self._parcel.arrays
+        return prepare, (identity(), key, text, list(arrays), *self.dispatch.cluster.put(arrays))
+
+    def meet(self, member: Member) -> None:
+        """Compares its proof with the others'."""
+        self._proofs.compare(member)
+
+    def left(self) -> bool:
+        """Whether there is work in hand."""
+        return bool(self.work.parts)
+
+    def ahead(self, members: int) -> int:
+        """One that it is at, and the next."""
+        return AHEAD
+
+    def next(self, member: Member) -> Task | None:
+        """As much as fills its time, and less near the end, so that all end together."""
+        rates = [each.rate for each in self.dispatch.ready() if each.rate]
+        rate = member.rate or (sum(rates) / len(rates) if rates else 0.0)
+        size = rate * self._task_seconds or FIRST_SAMPLES
+        fair = self.work.left * TILE_PIXELS / max(1, len(self.dispatch.ready())) / 2
+        most = min(size, max(fair, size / SMALLEST)) / TILE_PIXELS
+        busy = [task.what[0] for task in self.dispatch.tasks]
+        part = self.work.cut(int(most), FEWEST_TILES, MOST_TILES, None, busy)
+        if part is None:
+            return None
+        tiles = self.work.tiles[part.first:part.end]
+        pixels = self._film[tiles] if part.samples else None
+        self.moved_bytes += tiles.nbytes + (0 if pixels is None else pixels.nbytes)
+        name = f"a task of {len(tiles)} tiles, samples {part.samples} to {part.samples + part.more}"
+        return Task((part, tiles), name,
+                    len(tiles) * TILE_PIXELS * part.more, render_share,
+                    lambda: (self._parcel.key, tiles, part.samples, part.more, pixels))
+
+    def accept(self, task: Task, result: NDArray[Any], member: Member) -> None:
+        """Takes the pixels into the film, if they can be right."""
+        part, tiles = task.what
+        dropped = check_pixels(result, self._film[tiles], self._inside[tiles], part.more)
+        if dropped > MOST_DROPPED * task.work and not self._drops:
+            self._doubt(task, result, member)
+        self._film[tiles] = result
+        self.moved_bytes += result.nbytes
+
+    def _doubt(self, task: Task, result: NDArray[Any], member: Member) -> None:
+        """BadResult for one who drops most samples, unless another one did the same: then it is the scene's way."""
+        other, found = self._doubted.pop(task, (None, None))
+        if other is None or found is None or found.tobytes() != result.tobytes():
+            self._doubted[task] = member, result
+            raise BadResult("it returned NaN or infinity for most samples")
+        self._drops, other.refused = True, ""
+
+    def _work(self) -> Iterator[None]:
+        if self._ended:
+            self._gap = perf_counter() - self._ended
+        yield from self.dispatch.run()
+        self.work.settle()
+        self._ended = perf_counter()
+
+    @property
+    def _busy(self) -> bool:
+        return bool(self.work.parts or self.dispatch.tasks)
+
+    @property
+    def _task_seconds(self) -> float:
+        return TASK_SECONDS * max(1.0, len(self.dispatch.members) / TASKS_A_SECOND)
+
+    def _clear(self) -> None:
+        self._film.fill(0)
+
+    def wait(self) -> None:
+        """Waits for what is in flight, but not for slow workers: what they are at is in hand again."""
+        for task in self.dispatch.drain(DRAIN * self._task_seconds):
+            self.work.give_back(task.what[0])
+        self.work.settle()
+
+    def work_left(self) -> Work:
+        """The work with what is in flight in hand."""
+        kept = Work(self.work.samples)
+        kept.then, kept.tiles, kept.parts = self.work.then, self.work.tiles, self.work.parts.copy()
+        for task in self.dispatch.tasks:
+            kept.give_back(task.what[0])
+        return kept
+
+    def pass_limit(self) -> int:
+        """As many samples a pixel as keep all busy for some tasks, and for much longer than they wait for the next."""
+        rates = sum(each.rate for each in self.dispatch.ready())
+        seconds = max(PASS_TASKS * self._task_seconds, GAP_COST * self._gap)
+        return max(1, int(rates * seconds / (self.size[0] * self.size[1])))
+
+    def film(self) -> Film:
+        """The film so far, without what is in flight."""
+        return Film(row_by_row(self._film, self.size))
+
+    def restore(self, film: Film, work: Work) -> None:
+        """Goes on from a film of this size and the work that it was rendered by."""
+        self.work, self._film = work, tile_by_tile(film.pixels)
+
+    def shares(self) -> list[dict[str, Any]]:
+        """What each worker did, and how fast it is."""
+        return [{"worker": each.name, "device": (each.facts or {}).get("name"), "samples": each.done,
+                 "samples_per_second": each.rate, "lost": each.gone or bool(each.refused)}
+                for each in self.dispatch.everyone() if each.facts]
+
+    @property
+    def scene(self) -> SceneOnDevice:
+        """There is none here."""
+        raise ClrtError("the scene of a farm is on its workers alone")
+
+    @property
+    def device_bytes(self) -> int:
+        """Memory of all buffers, on the worker that has most."""
+        return max((each.facts["report"]["peak_device_bytes"] for each in self.dispatch.everyone() if each.facts),
+                   default=0)
+
+    @property
+    def longest_launch(self) -> float:
+        """That is for each worker to know."""
+        return 0.0
+
+
+def _inside(size: tuple[int, int]) -> NDArray[np.bool_]:
+    """(tiles, TILE_PIXELS): which of the tiles' pixels are in the picture."""
+    width, height = size
+    return np.asarray(tile_by_tile(np.ones((height, width), bool)))
+
+
+def check_pixels(found: NDArray[Any], before: NDArray[Any], inside: NDArray[np.bool_], more: int) -> int:
+    """BadResult unless these can be the pixels with so many more samples; how many of them were dropped."""
+    if not isinstance(found, np.ndarray) or found.shape != before.shape or found.dtype != before.dtype:
+        raise BadResult("it returned something that is no pixels")
+    if not all(np.isfinite(found[name]).all() for name in ("sum", "sum_error", "square", "square_error")):
+        raise BadResult("it returned pixels that are no finite numbers")
+    kept, dropped = (found[name].astype(np.int64) - before[name] for name in ("count", "dropped"))
+    if ((kept + dropped)[inside] != more).any():
+        raise BadResult(f"it returned pixels without all of their {more} samples")
+    return int(dropped.sum())

@@ -1,0 +1,168 @@
+"""What workers do. Imported by schedulers, too, so nothing heavy is before it is used.
+
+A worker keeps the scenes that it was prepared for, compiled, with their trees, on its devices. These do one thing at a
+time, whatever Dask gives it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, wraps
+from threading import Lock
+from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec
+
+from .. import errors
+from ..errors import DeviceError
+from .parcels import unpack
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..device.open import Device
+    from .easel import Easel
+    from .orders import Order
+    from .simulated import Simulation
+
+P = ParamSpec("P")
+#: Scenes that a worker keeps; the one that was used longest ago goes first.
+MOST_KEPT = 2
+_easels: dict[str, Easel | Simulation] = {}
+_starting = Lock()
+
+
+def identity() -> dict[str, str]:
+    """What must be the same on the client and on all workers: the version, and the kernels' digest."""
+    from importlib.metadata import version
+
+    from ..device.sources import kernel_digest
+
+    return {"version": version("clrt"), "kernels": kernel_digest()[:16]}
+
+
+class Answer(NamedTuple):
+    """What a function returned, or what it raised: an error's class, of clrt.errors or builtins, and its text. Errors
+    travel as text, since not everything in them can be sent."""
+
+    value: Any
+    error: str = ""
+    text: str = ""
+
+    def result(self) -> Any:
+        """The value, or raises the error."""
+        if not self.error:
+            return self.value
+        kind = getattr(errors, self.error, None)
+        if kind is None:
+            raise LookupError(self.text) if self.error == "LookupError" else RuntimeError(f"{self.error}: {self.text}")
+        raise kind(self.text)
+
+
+def answering(function: Callable[P, Any]) -> Callable[P, Answer]:
+    """The function with an Answer."""
+    @wraps(function)
+    def answer(*arguments: P.args, **named: P.kwargs) -> Answer:
+        try:
+            return Answer(function(*arguments, **named))
+        except Exception as error:  # whatever it is, it is the client that must know
+            return Answer(None, type(error).__name__, str(error))
+
+    return answer
+
+
+def as_it_is(value: Any) -> Any:
+    """A task whose result is sent with it."""
+    return value
+
+
+@answering
+def introduce(client: dict[str, str], devices: tuple[str | int, ...]) -> dict[str, Any]:
+    """What a worker is: its devices' names, platforms and drivers. DeviceError where it cannot render."""
+    _check_identity(client)
+    with _starting:
+        return about(opened(devices))
+
+
+@answering
+def prepare(client: dict[str, str], key: str, text: bytes, digests: list[str], *arrays: NDArray[Any]) -> dict[str, Any]:
+    """Compiles what was sent (see `Easel`) and keeps it under `key`. What a worker is, the machine's part of the
+    report, and its proof (`Easel.proof`). DeviceError, KernelError, SceneError."""
+    _check_identity(client)
+    with _starting:
+        if key not in _easels:
+            while len(_easels) >= MOST_KEPT:
+                del _easels[next(iter(_easels))]
+            _easels[key] = _made(unpack(text, dict(zip(digests, arrays))))
+        easel = _easels[key]
+        return {**easel.introduction(), "report": easel.report(), "proof": easel.proof()}
+
+
+@answering
+def render_share(key: str, tiles: NDArray[Any], first: int, more: int,
+                 pixels: NDArray[Any] | None) -> tuple[NDArray[Any], float]:
+    """The pixels (tiles, TILE_PIXELS) of these tiles with samples first … first + more − 1 added, and the seconds that
+    took; pixels: as they were before, None without samples. DeviceError where no device can go on."""
+    start = time.perf_counter()
+    return _easel(key).share(tiles, first, more, pixels), time.perf_counter() - start
+
+
+@answering
+def draw(key: str, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
+    """Pictures of what is seen first: AOVs by their names, or, without, what guides a denoiser."""
+    return _easel(key).drawn(names)
+
+
+@answering
+def render_whole(client: dict[str, str], key: str, text: bytes, part: bytes, digests: list[str],
+                 *arrays: NDArray[Any]) -> tuple[dict[str, Any], float]:
+    """A whole picture, or a band of one, with what was asked for beside it, and the seconds that took (see
+    `studio.render`). text: the order, known by its key; part: its camera and its band."""
+    _check_identity(client)
+    from .studio import render
+
+    with _starting:
+        start = time.perf_counter()
+        camera, band = unpack(part, {})
+        order = replace(unpack(text, dict(zip(digests, arrays))), camera=camera, band=band)
+        return render(key, order), time.perf_counter() - start
+
+
+@cache
+def opened(selectors: tuple[str | int, ...]) -> list[Device]:
+    """The devices of this worker that are meant, opened once."""
+    from ..device.open import open_devices
+
+    return open_devices(selectors)
+
+
+def about(devices: list[Device]) -> dict[str, Any]:
+    """Devices' names, platforms and drivers, each once."""
+    return {name: " + ".join(dict.fromkeys(getattr(device.info, name) for device in devices))
+            for name in ("name", "platform", "platform_version", "driver")}
+
+
+def _made(order: Order) -> Easel | Simulation:
+    if order.simulated is not None:
+        from .simulated import Simulation
+
+        return Simulation(order)
+    from .easel import Easel
+
+    return Easel(order)
+
+
+def _check_identity(client: dict[str, str]) -> None:
+    """DeviceError where clrt is another one than the client's: pictures could differ, or records not fit."""
+    own = identity()
+    if own != client:
+        told = [f"clrt {each['version']} with the kernels {each['kernels']}" for each in (own, client)]
+        raise DeviceError(f"it has {told[0]}, this client {told[1]}; install the same clrt on both")
+
+
+def _easel(key: str) -> Easel | Simulation:
+    easel = _easels.pop(key, None)
+    if easel is None:
+        raise LookupError(f"this worker was not prepared for {key}")
+    _easels[key] = easel
+    return easel

@@ -1,0 +1,68 @@
+"""Workers without a device, each with a fixed speed: what a farm costs beside the work itself, measured on one machine.
+
+    python -m clrt.farm.simulated SCHEDULER COUNT
+
+runs so many workers in one process until it is ended. They sleep as long as a device would work, and what they send and
+get are pixels as large as real ones.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rendering.tiles import TILE_PIXELS
+from .orders import Order
+
+PROOF_TILES = 16
+
+
+class Simulation:
+    """In the place of an `Easel`."""
+
+    selectors = None
+
+    def __init__(self, order: Order) -> None:
+        assert order.simulated is not None
+        self._speed, self._pixel = order.simulated, order.asked.pixel
+
+    def share(self, tiles: NDArray[np.uint32], first: int, more: int, pixels: NDArray[Any] | None) -> NDArray[Any]:
+        """The pixels with so many more samples, all black, after as long as those take."""
+        start = time.perf_counter()
+        film = np.zeros((len(tiles), TILE_PIXELS), self._pixel) if pixels is None else np.array(pixels)
+        film["count"] += more
+        time.sleep(max(0.0, film.size * more / self._speed - (time.perf_counter() - start)))
+        return film
+
+    def drawn(self, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
+        """Nothing is seen."""
+        return {}
+
+    def proof(self) -> NDArray[Any]:
+        """Pixels that all agree on."""
+        return np.zeros((PROOF_TILES, TILE_PIXELS), self._pixel)
+
+    def introduction(self) -> dict[str, Any]:
+        """What it is."""
+        return {name: "simulated" for name in ("name", "platform", "platform_version", "driver")}
+
+    def report(self) -> dict[str, Any]:
+        """Nothing was built."""
+        return {"bvh": {}, "kernel": {"features": ["LIGHTS"]}, "peak_device_bytes": 0}
+
+
+async def _run(address: str, count: int) -> None:
+    from distributed import Worker
+
+    workers = [Worker(address, nthreads=1, memory_limit=0, host="127.0.0.1", dashboard=False) for _ in range(count)]
+    await asyncio.gather(*workers)
+    await asyncio.gather(*(worker.finished() for worker in workers))
+
+
+if __name__ == "__main__":
+    asyncio.run(_run(sys.argv[1], int(sys.argv[2])))

@@ -1,0 +1,74 @@
+"""Whole pictures, or bands of large ones, on a worker."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..output.denoise import Denoiser, denoised
+from ..output.image import Image
+from ..rendering.accumulation import Accumulation
+from ..rendering.crew import Crew, make_team
+from ..rendering.renderer import Renderer
+from ..rendering.report import render_report
+from ..rendering.session import depth_of
+from ..rendering.stops import planned_spp
+from ..rendering.team import Team
+from ..rendering.tiles import TILE, tiles_of
+from .orders import PictureOrder
+
+
+#: The renderer of the last order: frames and bands of one scene need its tree and program once.
+_kept: dict[str, Renderer] = {}
+
+
+class BandRenderer(Renderer):
+    """Some rows of the tiles of a picture, as if they were all of it: the size in pixels is the session's."""
+
+    _team: Team | None = None
+    _band = (0, 1)
+
+    def show(self, band: tuple[int, int]) -> None:
+        """Begins with rows first … end − 1."""
+        self._band = band
+        self.session = self._make_picture()
+        self._begin()
+
+    def _make_picture(self) -> Accumulation:
+        settings, (first, end) = self.settings, self._band
+        (width, height), columns = settings.size, tiles_of(settings.size)[1]
+        self._team = self._team or make_team(self.devices, self._compiled, settings.size, depth_of(settings),
+                                             settings.seed, self._planned_spp)
+        return Crew(self._team, (width, min(end * TILE, height) - first * TILE), first * columns)
+
+
+def render(key: str, order: PictureOrder) -> dict[str, Any]:
+    """The picture's pixels, report, and so on, as the fields of `Image`. key: of all in the order but camera and band.
+    Raises ClrtErrors."""
+    denoiser = Denoiser() if order.denoise else None
+    renderer = _renderer(key, order)
+    guides = renderer.guides() if denoiser else {}
+    state = None
+    for state in renderer.passes(spp=order.spp, time=order.time, error=order.error):
+        pass
+    assert state is not None    # there is at least one
+    image = Image(state.pixels, render_report(renderer, state), aovs=renderer.aovs(state))
+    if denoiser is not None:
+        image = denoised(image, denoiser, guides)
+    return {"pixels": np.ascontiguousarray(image.pixels), "report": image.report, "raw": image.raw, "aovs": image.aovs}
+
+
+def _renderer(key: str, order: PictureOrder) -> Renderer:
+    """One that begins with the order's picture."""
+    if key not in _kept:
+        _kept.clear()
+        planned = planned_spp(order.scene.render, order.spp, order.time, order.error)
+        kind = Renderer if order.band is None else BandRenderer
+        _kept[key] = kind(order.scene, spp=planned, **order.options)
+    renderer = _kept[key]
+    if isinstance(renderer, BandRenderer) and order.band is not None:
+        renderer.show(order.band)
+    else:
+        renderer.look(order.camera or order.scene.camera)
+    return renderer

@@ -1,0 +1,134 @@
+"""What a farm does and costs, measured on one machine: `clrt bench farm`."""
+
+from __future__ import annotations
+
+import random
+import resource
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from threading import Event, Thread
+from typing import Any
+
+from ..rendering.renderer import Renderer, State
+from ..scene.model import RenderSettings, Scene
+from .bands import Banded
+from .cluster import connect, local_cluster
+from .orders import PictureOrder
+from .processes import Processes
+from .renderer import FarmRenderer
+
+#: Samples a second of a worker that only sleeps: what two cores make of the Cornell box.
+SPEED = 4e6
+#: Workers that only sleep, in one process.
+IN_PROCESS = 16
+Row = dict[str, Any]
+
+
+@contextmanager
+def farm(workers: int = 0, simulated: int = 0) -> Iterator[Processes]:
+    """A scheduler and workers as processes of their own."""
+    with tempfile.TemporaryDirectory() as folder, Processes(Path(folder)) as processes:
+        processes.add_workers(workers)
+        for first in range(0, simulated, IN_PROCESS):
+            processes.add_simulated(min(IN_PROCESS, simulated - first))
+        yield processes
+
+
+def equality(scenes: list[Scene], spp: int) -> Iterator[Row]:
+    """Each scene by one process, by two of --local-cluster, and by four of a scheduler: are the films the same?"""
+    with local_cluster(2) as two, farm(4) as processes, connect(processes.address) as four:
+        for scene in scenes:
+            alone = Renderer(scene, spp=spp)
+            last = _run(alone, spp)
+            for name, cluster, count in (("--local-cluster 2", two, 2), ("4 processes", four, 4)):
+                together = FarmRenderer(scene, cluster, spp=spp)
+                together.session.dispatch.wait_for(count)
+                found = _run(together, spp)
+                yield {"trial": "equality", "scene": scene.name, "workers": name, "spp": spp,
+                       "equal": same_film(last, found), "same_noise": last.noise == found.noise,
+                       "seconds": together.seconds, "seconds_alone": alone.seconds,
+                       "bytes_a_sample": together.session.moved_bytes / found.film.samples}
+
+
+def kills(scene: Scene, spp: int, every: float) -> Iterator[Row]:
+    """Four workers, one of which is killed every so many seconds and replaced, and the same in peace."""
+    alone = _run(Renderer(scene, spp=spp), spp)
+    with farm(4) as processes, connect(processes.address) as cluster:
+        for killing in (False, True):
+            together = FarmRenderer(scene, cluster, spp=spp)
+            together.session.dispatch.wait_for(4)
+            stop, killed = Event(), list[int]()
+
+            def kill() -> None:
+                chance = random.Random(1)
+                while not stop.wait(every):
+                    killed.append(1)
+                    processes.kill(chance.choice(processes.workers))
+                    processes.add_workers(1)
+
+            killer = Thread(target=kill)
+            if killing:
+                killer.start()
+            found = _run(together, spp)
+            stop.set()
+            if killing:
+                killer.join()
+            yield {"trial": "kills", "scene": scene.name, "killed": len(killed), "seconds": together.seconds,
+                   "equal": same_film(alone, found), "same_noise": alone.noise == found.noise}
+
+
+def overhead(scene: Scene, workers: int, seconds: float) -> Row:
+    """Workers that only sleep, at a fixed speed: how far they are from so many times one, what is moved, and what the
+    client needs for it."""
+    width, height = scene.render.size
+    spp = int(workers * SPEED * seconds / (width * height))
+    with farm(simulated=workers) as processes, connect(processes.address) as cluster:
+        together = FarmRenderer(scene, cluster, spp=spp, simulated=SPEED)
+        together.session.dispatch.wait_for(workers)
+        start = time.process_time()
+        film = _run(together, spp).film
+        return {"trial": "overhead", "workers": workers, "spp": spp, "seconds": together.seconds,
+                "efficiency": film.samples / (workers * SPEED * together.seconds),
+                "bytes_a_sample": together.session.moved_bytes / film.samples,
+                "tasks": together.session.dispatch.sent,
+                "client_seconds": time.process_time() - start, "client_bytes": peak_bytes()}
+
+
+def huge(scene: Scene, size: tuple[int, int], spp: int, workers: int) -> Row:
+    """A picture in bands, and what the client took for it at most."""
+    with tempfile.TemporaryDirectory(dir=".") as folder, local_cluster(workers) as cluster:
+        banded = Banded(PictureOrder(scene, {"size": size}, spp=spp), Path(folder) / "huge.bands")
+        start = time.perf_counter()
+        for _ in banded.render(cluster):
+            pass
+        rendered = time.perf_counter() - start
+        path = banded.save(Path(folder) / "huge.exr", "srgb", 0.0, {})
+        return {"trial": "huge", "size": f"{size[0]}x{size[1]}", "spp": spp, "workers": workers, "seconds": rendered,
+                "writing_seconds": time.perf_counter() - start - rendered, "file_bytes": path.stat().st_size,
+                "samples": banded.summary()["samples"], "client_bytes": peak_bytes()}
+
+
+def peak_bytes() -> int:
+    """The most memory that this process had so far."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+def sized(scene: Scene, size: tuple[int, int]) -> Scene:
+    """The scene with a picture of this size."""
+    settings: RenderSettings = replace(scene.render, size=size)
+    return replace(scene, render=settings)
+
+
+def same_film(one: State, other: State) -> bool:
+    """Whether two films are the same to the last bit."""
+    return one.film.pixels.tobytes() == other.film.pixels.tobytes()
+
+
+def _run(renderer: Renderer, spp: int) -> State:
+    *_, last = renderer.passes(spp=spp)
+    return last

@@ -1,0 +1,56 @@
+"""Pictures larger than memory, written some rows at a time from top to bottom."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import OutputError
+from .files import replacing
+from .images import check_writable, rgbe_rounded
+from .view import to_display, view_called
+
+#: Rows of a block of an .exr that is packed as a whole: every piece but the last must have a multiple of it.
+BLOCK_ROWS = 16
+#: As `write_image` has them.
+ATTRIBUTES: dict[str, dict[str, str | int]] = {".exr": {"compression": "zip"}, ".png": {"png:compressionLevel": 3}}
+
+
+def write_rows(path: Path, size: tuple[int, int], pieces: Iterable[NDArray[np.float32]], *,
+               metadata: Mapping[str, str] | None = None, view: str = "srgb", exposure: float = 0.0) -> None:
+    """Writes a picture of (width, height) whose pieces (rows, width, 3) follow each other, as `write_image` would, in
+    one step. All pieces but the last have a multiple of BLOCK_ROWS rows. Raises OutputError."""
+    import OpenImageIO as oiio
+
+    check_writable(path)
+    view_called(view)
+    kind, (width, height) = path.suffix.lower(), size
+    spec = oiio.ImageSpec(width, height, 3, "uint8" if kind == ".png" else "float")
+    for name, value in {**(metadata or {}), **ATTRIBUTES.get(kind, {})}.items():
+        spec.attribute(name, value)
+    row = 0
+    with replacing(path) as temporary:
+        output = oiio.ImageOutput.create(str(temporary))
+        if output is None or not output.open(str(temporary), spec):
+            raise OSError((output or oiio).geterror() or "the writer gave no reason")
+        for piece in pieces:
+            samples = _samples(piece, kind, view, exposure)
+            if not output.write_scanlines(row, row + len(samples), 0, samples):
+                break
+            row += len(samples)
+        closed, complaint = output.close(), output.geterror()
+        if complaint or not closed:
+            raise OSError(complaint.splitlines()[0] if complaint else "the writer gave no reason")
+    if row != height:
+        raise OutputError(f"{path}: has {row} of its {height} rows")
+
+
+def _samples(piece: NDArray[np.float32], kind: str, view: str, exposure: float) -> NDArray[Any]:
+    """The piece as the file of this kind has it."""
+    if kind == ".png":
+        return to_display(piece, view, exposure)
+    return np.ascontiguousarray(rgbe_rounded(piece) if kind == ".hdr" else piece)
