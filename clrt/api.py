@@ -59,7 +59,7 @@ def _rendered(renderer: Renderer, denoiser: Denoiser | None, reference: NDArray[
               **stops: Any) -> Image:
     if denoiser:
         check_denoisable(renderer.settings.integrator)
-    guides = renderer.guides() if denoiser else {}
+    guides = renderer.session.guides() if denoiser else {}
     state = None
     for state in renderer.passes(reference=reference, **stops):
         pass

@@ -7,6 +7,7 @@ import click
 from .bench_agree import agree_command
 from .bench_build import build_command
 from .bench_converge import converge_command
+from .bench_farm import farm_command
 from .bench_hits import hits_command
 from .bench_numerics import numerics_command
 from .bench_peers import peers_command
@@ -16,9 +17,9 @@ from .bench_theses import theses_command
 
 @click.group()
 def command() -> None:
-    """Measure this machine: rays, build, hits, peers, converge, agree, numerics, theses."""
+    """Measure this machine: rays, build, hits, peers, converge, agree, numerics, theses, farm."""
 
 
 for each in (rays_command, build_command, hits_command, peers_command, converge_command, agree_command,
-             numerics_command, theses_command):
+             numerics_command, theses_command, farm_command):
     command.add_command(each)

@@ -16,7 +16,7 @@ from ..errors import UsageError
 from .outputs import Outputs
 
 if TYPE_CHECKING:
-    from ..rendering.renderer import Renderer
+    from ..rendering.choices import Choices
     from ..scene.model import Camera, Scene
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -84,12 +84,12 @@ class Sequence:
         return replace(self.outputs, pictures=tuple(numbered(path, number) for path in self.outputs.pictures),
                        report=report)
 
-    def left(self, renderer: Renderer, goal: object) -> Iterator[tuple[Outputs, Camera]]:
+    def left(self, scene: Scene, choices: Choices, goal: object) -> Iterator[tuple[Outputs, Camera]]:
         """Outputs and camera of each frame that is still to be made. Of a picture is known what it was made of."""
         from ..output.images import metadata_of
         from ..rendering.identity import facts_of
 
-        facts = {**facts_of(renderer.scene, renderer.compiled.choices), "camera": ""}
+        facts = {**facts_of(scene, choices), "camera": ""}
         asked = self.outputs
         for number, camera in self._stills.items():
             made_of = repr((sorted(facts.items()), camera, goal, asked.denoise, asked.view, asked.exposure, asked.aovs))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from ..errors import OutputError, UsageError
 from . import STARTED
 
 if TYPE_CHECKING:
+    from ..farm.bands import Banded
     from ..output.image import Image
     from ..rendering.renderer import Renderer
 
@@ -89,6 +90,31 @@ class Outputs:
             if self._write(lambda: image.save(path, view=self.view, exposure=self.exposure)):
                 for other in files_beside(path, image.aovs).values():
                     click.echo(str(other))
+
+    def save_rows(self, banded: Banded) -> None:
+        """Writes pictures and report of a picture that is kept in bands; OutputError at the end."""
+        from ..output.report import write_report
+
+        told = {**banded.summary(), "total_seconds": time.perf_counter() - STARTED}
+        about = {f"clrt:{key}": str(value) for key, value in told.items() if isinstance(value, (str, int, float))}
+        for path in self.pictures:
+            self._write(lambda: banded.save(path, self.view, self.exposure, about))
+        if (report := self.report) is not None:
+            self._write(lambda: write_report(report, told))
+        if self._errors:
+            raise OutputError("; ".join(map(str, self._errors)))
+
+    def save_frame(self, image: Image) -> None:
+        """Writes the pictures of a frame, also the raw ones, and its report; OutputError at the end."""
+        from ..output.report import write_report
+
+        if image.raw is not None:
+            self.save(replace(image, pixels=image.raw, raw=None, aovs={}), raw=True)
+        self.save(image)
+        if (report := self.report) is not None:
+            self._write(lambda: write_report(report, image.report))
+        if self._errors:
+            raise OutputError("; ".join(map(str, self._errors)))
 
     def save_measures(self, renderer: Renderer, image: Image) -> None:
         """Writes report and plot, and then raises OutputError where anything could not be written."""

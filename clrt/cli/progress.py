@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ..rendering.renderer import State
 
-PHASES = {"load": "loading the scene", "build": "building the tree", "compile": "compiling the kernel",
-          "render": "rendering", "write": "writing", "denoise": "denoising"}
+PHASES = {"connect": "starting the workers", "load": "loading the scene", "build": "building the tree",
+          "compile": "compiling the kernel", "render": "rendering", "write": "writing", "denoise": "denoising"}
 
 
 class Progress:
@@ -22,13 +22,19 @@ class Progress:
 
     def __init__(self) -> None:
         self._pace = Pace()
+        self._workers: list[dict[str, Any]] = []
+        self._bands = -1
+
+    def workers(self, shares: list[dict[str, Any]]) -> None:
+        """What each of several workers did so far (`Picture.shares`)."""
+        self._workers = [share for share in shares if "worker" in share]
 
     def _left(self, state: State, goal: Goal) -> float | None:
         self._pace.add(state.seconds, state.film.samples)
         return time_left(state, goal, self._pace.rate)
 
     def _told(self, state: State, goal: Goal) -> str:
-        return f"{goal.percent(state)}{describe(state, self._pace.rate)}"
+        return f"{goal.percent(state)}{describe(state, self._pace.rate)}{describe_workers(self._workers)}"
 
     def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
         """A phase of PHASES begins; "render" on a device, with so much of its memory."""
@@ -39,6 +45,9 @@ class Progress:
 
     def state(self, state: State, goal: Goal) -> None:
         """A state was reached on the way to the goal."""
+
+    def bands(self, done: int, count: int) -> None:
+        """So many of a large picture's bands are there."""
 
     def __enter__(self) -> Progress:
         return self
@@ -62,6 +71,11 @@ class PlainProgress(Progress):
         left = self._left(state, goal)
         _say(self._told(state, goal) + (f"  about {left:.0f} s left" if left is not None else ""))
 
+    def bands(self, done: int, count: int) -> None:
+        if done != self._bands:
+            _say(f"{done} of {count} bands")
+        self._bands = done
+
 
 class JsonProgress(Progress):
     """One JSON object a line, with `phase`; in the phase "render" also the state."""
@@ -78,7 +92,14 @@ class JsonProgress(Progress):
         values: dict[str, Any] = {"phase": "render", "spp": state.spp, "seconds": state.seconds, "noise": state.noise,
                                   "relmse": state.relmse, "samples_per_second": self._pace.rate,
                                   "seconds_left": left}
+        if self._workers:
+            values["workers"] = self._workers
         _say(json.dumps(values))
+
+    def bands(self, done: int, count: int) -> None:
+        if done != self._bands:
+            _say(json.dumps({"phase": "render", "bands": done, "of": count}))
+        self._bands = done
 
 
 class BarProgress(Progress):
@@ -105,6 +126,9 @@ class BarProgress(Progress):
         left = self._left(state, goal)
         status = self._told(state, goal) + (f"  {left:.0f} s left" if left is not None else "")
         self._bar.update(self._task, total=1.0, completed=goal.done(state), status=status)
+
+    def bands(self, done: int, count: int) -> None:
+        self._bar.update(self._task, total=count, completed=done, status=f"{done} of {count} bands")
 
     def __enter__(self) -> Progress:
         self._bar.start()
@@ -192,6 +216,14 @@ def describe(state: State, rate: float) -> str:
     if state.relmse is not None:
         error += f"  relMSE {state.relmse:.3g}"
     return f"{state.spp} spp  {state.seconds:.1f} s  {rate / 1e6:.2f} Msamples/s{error}"
+
+
+def describe_workers(workers: list[dict[str, Any]]) -> str:
+    """How many are at work, and how fast the slowest and the fastest of them are."""
+    rates = [worker["samples_per_second"] / 1e6 for worker in workers if not worker["lost"]]
+    if not rates:
+        return ""
+    return f"  {len(rates)} workers, {min(rates):.2f} to {max(rates):.2f} Msamples/s each"
 
 
 def _say(line: str) -> None:

@@ -16,6 +16,7 @@ import click
 
 from ..errors import DeviceError, UsageError
 from . import PROGRAM
+from .farm import cluster_for, farm_options, is_huge, make_renderer, render_frames, render_huge
 from .frames import Sequence, frame_options, make_sequence
 from .guard import guarded
 from .interrupt import Interruptible
@@ -72,6 +73,7 @@ RIGHT = 1.2
 @click.option("--print-kernel", is_flag=True, help="Print the program that would run, and stop.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no warnings.")
 @frame_options
+@farm_options
 @verbose_option
 @tracing_options
 def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tuple[int, int] | None, spp: int | None,
@@ -81,7 +83,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             adaptive: bool | None, reference: Path | None, report: Path | None, plot: Path | None,
             aovs: tuple[str, ...], denoise: bool, checkpoint: Path | None, checkpoint_every: float, resume: bool,
             view: str, exposure: float, progress_kind: str | None, print_kernel: bool, quiet: bool,
-            frames: str | None, turntable: int | None, fps: float | None, **tracing: Any) -> None:
+            frames: str | None, turntable: int | None, fps: float | None, scheduler: str | None,
+            local_cluster: int | None, **tracing: Any) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
     def advice() -> str:
         kept = checkpoint is not None and checkpoint.exists()
@@ -92,7 +95,6 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     from ..output.data import check_denoisable
     from ..output.denoise import Denoiser
     from ..rendering.aovs import chosen_aovs
-    from ..rendering.renderer import Renderer
     from ..rendering.stops import check_stops, planned_spp
     from ..scene.file import load
 
@@ -119,7 +121,10 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         "integrator": integrator, "shadows": shadows, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
         "checkpoint": None if print_kernel else checkpoint, "resume": resume and not (print_kernel or sequence),
         "checkpoint_seconds": checkpoint_every, "error_percentile": error_percentile, "aovs": beside, **tracing}
-    with make_progress(progress_kind, quiet) as progress:
+    if print_kernel:
+        scheduler = local_cluster = None
+    with (make_progress(progress_kind, quiet) as progress,
+          cluster_for(scheduler, local_cluster, progress) as cluster):
         progress.phase("load")
         content = load(scene, camera)
         if sequence is not None:
@@ -128,7 +133,16 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         planned = planned_spp(content.render, spp, seconds, error)
         if denoiser is not None:
             check_denoisable(integrator or content.render.integrator)
-        renderer = Renderer(content, spp=planned, on_phase=progress.phase, **options)
+        if cluster and sequence:
+            goal = Goal(planned, seconds, error)
+            if not render_frames(cluster, content, options, goal, sequence, progress):
+                sys.exit(130)
+            return
+        if cluster and is_huge(size or content.render.size):
+            if not render_huge(cluster, content, options, Goal(planned, seconds, error), results, progress):
+                sys.exit(130)
+            return
+        renderer = make_renderer(cluster, content, spp=planned, on_phase=progress.phase, **options)
         if print_kernel:
             click.echo(renderer.compiled.source)
             return
@@ -148,7 +162,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
 def _render_frames(renderer: Renderer, sequence: Sequence, goal: Goal, denoiser: Denoiser | None,
                    progress: Progress) -> None:
     """Renders the frames that are still to be made, each to the goal, and joins all to videos."""
-    shots = list(sequence.left(renderer, goal))
+    shots = list(sequence.left(renderer.scene, renderer.choices, goal))
     for done, (results, camera) in enumerate(shots):
         progress.frame(results.header["frame"], done, len(shots))
         renderer.look(camera)
@@ -161,13 +175,11 @@ def _render_frames(renderer: Renderer, sequence: Sequence, goal: Goal, denoiser:
 def _render(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, denoiser: Denoiser | None,
             progress: Progress) -> None:
     """Renders to the goal, or until it is interrupted, and writes the results; of an interrupted frame none."""
-    from ..device.open import name_of
-    from ..rendering.guides import render_guides
-
-    guides = render_guides(renderer.session) if denoiser else {}
-    progress.phase("render", device=name_of(renderer.devices), device_bytes=renderer.session.device_bytes)
+    guides = renderer.session.guides() if denoiser else {}
+    progress.phase("render", device=renderer.name, device_bytes=renderer.session.device_bytes)
     results.prepare()
     for state in renderer.passes(spp=goal.spp, time=goal.seconds, error=goal.error, reference=expected):
+        progress.workers(renderer.session.shares())
         progress.state(state, goal)
         unfinished = results.header and renderer.stop_reason == "interrupted"
         if renderer.stop_reason is not None and not unfinished:    # its last checkpoint is written at the same time

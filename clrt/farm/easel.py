@@ -9,11 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..rendering.choices import choices_on
-from ..rendering.compile import compile_for_all
+from ..rendering.compiler import Compiler
 from ..rendering.crew import Crew, make_team
-from ..rendering.first_hits import first_hits
-from ..rendering.guides import render_guides
-from ..rendering.machine import machine_report
 from ..rendering.session import depth_of
 from ..rendering.tiles import TILE_PIXELS, scattered
 from ..rendering.work import Part, Work
@@ -33,8 +30,8 @@ class Easel:
         self.scene, self.selectors = order.scene, order.devices
         settings = order.scene.render
         devices = opened(order.devices)
-        compiled = compile_for_all(order.scene, [choices_on(each, order.asked, order.lanes) for each in devices],
-                                   devices)
+        compiled = Compiler(devices).compile(order.scene,
+                                             [choices_on(each, order.asked, order.lanes) for each in devices])
         self._team = make_team(devices, compiled, settings.size, depth_of(settings), settings.seed, order.planned_spp)
         self._picture = Crew(self._team, settings.size)    # whose film takes no memory as long as nothing is in it
         self._pixel = compiled[0].choices.pixel
@@ -59,8 +56,8 @@ class Easel:
         """See `remote.draw`."""
         with _at_work:
             if names is None:
-                return {**render_guides(self._picture)}
-            return {**first_hits(self._picture, self.scene, names)}
+                return {**self._picture.guides()}
+            return {**self._picture.first_hits(self.scene, names)}
 
     def introduction(self) -> dict[str, Any]:
         """What the worker is."""
@@ -68,4 +65,4 @@ class Easel:
 
     def report(self) -> dict[str, Any]:
         """The machine's part of a report."""
-        return machine_report(opened(self.selectors), self._picture)
+        return self._picture.machine(opened(self.selectors))

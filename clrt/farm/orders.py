@@ -55,4 +55,4 @@ class PictureOrder:
                            in (("triangle", "watertight"), ("box", "robust"), ("sphere", "robust"))))
         return Choices(options.get("lanes") or WAVE_LANES, options.get("layout"), options.get("builder"), tests,
                        options.get("offset", "bound"), needs_direct_light(options.get("aovs", ())),
-                       options.get("paths"))
+                       options.get("paths"), options.get("tree"))

@@ -9,7 +9,7 @@ are those of one machine to the last bit, and what is rendered twice counts once
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from time import perf_counter
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..device.memory import check_host
+from ..device.open import Device
 from ..errors import ClrtError
 from ..rendering.accumulation import Accumulation
 from ..rendering.film import Film
@@ -24,6 +25,7 @@ from ..rendering.on_device import SceneOnDevice
 from ..rendering.session import FEWEST_TILES
 from ..rendering.tiles import TILE_PIXELS, row_by_row, tile_by_tile
 from ..rendering.work import Work
+from ..scene.model import Scene
 from .cluster import Cluster
 from .dispatch import Dispatch
 from .members import BadResult, Member, Task
@@ -67,7 +69,25 @@ class FarmPicture(Accumulation):
         self.moved_bytes = 0
         self.dispatch = Dispatch(cluster, self)
 
-    def drawn(self, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
+    def machine(self, devices: Sequence[Device]) -> dict[str, Any]:
+        """What a report says of the workers; of what they built, what one of them did."""
+        reports = [each.facts["report"] for each in self.dispatch.everyone() if each.facts]
+        return {**reports[0], "platform": self.told("platform"), "driver": self.told("driver"),
+                "moved_bytes": self.moved_bytes, "devices": self.shares()}
+
+    def told(self, what: str) -> str:
+        """What all workers said of themselves, each thing once."""
+        return " + ".join(dict.fromkeys(str(each.facts[what]) for each in self.dispatch.everyone() if each.facts))
+
+    def guides(self) -> dict[str, NDArray[np.float32]]:
+        """See `render_guides`."""
+        return self._drawn(None)
+
+    def first_hits(self, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
+        """See `first_hits`."""
+        return {**self._drawn(tuple(names))}
+
+    def _drawn(self, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
         """Pictures of what is seen first, by one worker (see `remote.draw`)."""
         member = self.dispatch.wait_for()[0]
         cluster = self.dispatch.cluster

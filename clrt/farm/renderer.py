@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DeviceError
-from ..rendering.aovs import seen_first
+from ..device.open import Device
+from ..errors import DeviceError, UsageError
 from ..rendering.features import warn_of_darkness
+from ..rendering.on_device import SceneOnDevice
 from ..rendering.renderer import Renderer, State
 from ..scene.model import Camera, Scene
 from ..scene.validate import validate
@@ -47,14 +48,17 @@ class FarmRenderer(Renderer):
                 self._checkpoints.wait()
             raise
 
-    def _open(self, device: str | int | Sequence[str | int] | None, lanes: int | None,
-              on_phase: Callable[[str], None]) -> None:
+    def _open(self, device: str | int | Device | Sequence[str | int | Device] | None, lanes: int | None,
+              on_phase: Callable[[str], None], before: Renderer | None) -> None:
         validate(self.scene)
-        selectors = () if device is None else (device,) if isinstance(device, str | int) else tuple(device)
+        given = [device] if device is None or isinstance(device, str | int | Device) else list(device)
+        selectors = tuple(each for each in given if isinstance(each, str | int))
+        if len(selectors) < len(given) - (given == [None]):
+            raise UsageError("a farm's devices are those of its workers; name them, instead of opening any")
         self.devices = []
         self._lanes, self._selectors = lanes, selectors
 
-    def _make_picture(self) -> FarmPicture:
+    def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> FarmPicture:
         order = Order(self.scene, self.choices, self._lanes, self._planned_spp, self._selectors,
                       self._simulated)
         picture = FarmPicture(self._cluster, order, self.choices.pixel)
@@ -72,25 +76,4 @@ class FarmRenderer(Renderer):
     @property
     def name(self) -> str:
         """Of all devices that render."""
-        return self._told("name") or FARM
-
-    def machine(self) -> dict[str, Any]:
-        """What a report says of the workers; of what they built, what one of them did."""
-        reports = [each.facts["report"] for each in self.session.dispatch.everyone() if each.facts]
-        return {**reports[0], "platform": self._told("platform"), "driver": self._told("driver"),
-                "moved_bytes": self.session.moved_bytes, "devices": self.session.shares()}
-
-    def guides(self) -> dict[str, NDArray[np.float32]]:
-        """See `render_guides`."""
-        return self.session.drawn(None)
-
-    def _seen_first(self) -> dict[str, NDArray[np.generic]]:
-        seen = seen_first(self._aovs)
-        return {**self.session.drawn(seen)} if seen else {}
-
-    def _told(self, what: str) -> str:
-        """What all workers said of themselves, each thing once."""
-        if not hasattr(self, "session"):
-            return ""
-        return " + ".join(dict.fromkeys(str(each.facts[what]) for each in self.session.dispatch.everyone()
-                                        if each.facts))
+        return (self.session.told("name") if hasattr(self, "session") else "") or FARM

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from ..output.denoise import Denoiser, denoised
 from ..output.image import Image
 from ..rendering.accumulation import Accumulation
 from ..rendering.crew import Crew, make_team
+from ..rendering.on_device import SceneOnDevice
 from ..rendering.renderer import Renderer
 from ..rendering.report import render_report
 from ..rendering.session import depth_of
@@ -35,7 +37,7 @@ class BandRenderer(Renderer):
         self.session = self._make_picture()
         self._begin()
 
-    def _make_picture(self) -> Accumulation:
+    def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
         settings, (first, end) = self.settings, self._band
         (width, height), columns = settings.size, tiles_of(settings.size)[1]
         self._team = self._team or make_team(self.devices, self._compiled, settings.size, depth_of(settings),
@@ -48,7 +50,7 @@ def render(key: str, order: PictureOrder) -> dict[str, Any]:
     Raises ClrtErrors."""
     denoiser = Denoiser() if order.denoise else None
     renderer = _renderer(key, order)
-    guides = renderer.guides() if denoiser else {}
+    guides = renderer.session.guides() if denoiser else {}
     state = None
     for state in renderer.passes(spp=order.spp, time=order.time, error=order.error):
         pass

@@ -223,7 +223,7 @@ class Live:
             "spp": state.spp, "seconds": state.seconds, "noise": state.noise, "history": list(renderer.history),
             "error": None, "frames_per_second": float(sum(now - each < 1 for each in self._times)),
             "rays_per_second": state.film.rays / max(state.seconds, 1e-9), "device": name_of(renderer.devices),
-            "device_bytes": renderer.session.device_bytes, "tree": tree_report(renderer),
+            "device_bytes": renderer.session.device_bytes, "tree": tree_report(renderer.compiled),
             "features": renderer.compiled.features, "programs": self._studio.programs}
         with self._changed:
             self._still = (renderer, state) if whole else None

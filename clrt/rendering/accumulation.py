@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from ..device.open import Device
-from ..scene.model import Camera
+from ..scene.model import Camera, Scene
 from .compile import CompiledScene
 from .film import Film
 from .on_device import SceneOnDevice
@@ -134,6 +134,24 @@ class Accumulation(ABC):
     def shares(self) -> list[dict[str, Any]]:
         """What each of several devices did, for the report."""
         return []
+
+    def machine(self, devices: Sequence[Device]) -> dict[str, Any]:
+        """What a report says of these devices, which were to render it, and of what they built."""
+        from .machine import machine_report    # like the next two it takes a whole Accumulation
+
+        return machine_report(devices, self)
+
+    def guides(self) -> dict[str, NDArray[np.float32]]:
+        """What guides a denoiser: see `render_guides`."""
+        from .guides import render_guides
+
+        return render_guides(self)
+
+    def first_hits(self, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
+        """What is seen first of the scene that this is of: see `first_hits`."""
+        from .first_hits import first_hits
+
+        return first_hits(self, scene, names)
 
     @property
     def device(self) -> Device:

@@ -27,10 +27,7 @@ from .compiler import Compiler
 from .crew import make_picture
 from .features import warn_of_darkness
 from .film import Film
-from .first_hits import first_hits
-from .guides import render_guides
 from .kept import Kept
-from .machine import machine_report
 from .noise import NoiseEstimate
 from .on_device import SceneOnDevice
 from .session import depth_of
@@ -121,23 +118,12 @@ class Renderer:
         """Of all that render."""
         return name_of(self.devices)
 
-    def machine(self) -> dict[str, Any]:
-        """What a report says of all that render."""
-        return machine_report(self.devices, self.session)
-
-    def guides(self) -> dict[str, NDArray[np.float32]]:
-        """What guides a denoiser: see `render_guides`."""
-        return render_guides(self.session)
-
     def _begin(self) -> None:
         """A picture without any samples."""
         self._noise = NoiseEstimate(self._planned_spp)
         seen = seen_first(self._aovs)   # now, so that an interrupted picture has them, too
-        self._first_hits = self._seen(seen) if seen else {}
+        self._first_hits = self.session.first_hits(self.scene, seen) if seen else {}
         self.history, self.stop_reason, self.seconds = [], None, 0.0
-
-    def _seen(self, names: tuple[str, ...]) -> dict[str, NDArray[np.generic]]:
-        return first_hits(self.session, self.scene, names)
 
     @property
     def compiled(self) -> CompiledScene:
@@ -307,5 +293,5 @@ class Renderer:
         """Writes a checkpoint where one is due, or begins to write the last one; film: as it is now, if it is known."""
         if self._checkpoints is not None and (last or self._checkpoints.due):
             write = self._checkpoints.begin if last else self._checkpoints.write
-            write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(), self.session.work_left(),
-                       self._noise))
+            write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(),
+                       self.session.work_left(), self._noise))

@@ -1,0 +1,59 @@
+"""`clrt bench farm`: whether a farm's picture is one machine's, and what the farm costs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .options import Size
+
+TRIALS = ("equality", "kills", "overhead", "huge")
+SCENES = Path(__file__).parents[2] / "scenes"
+
+
+@click.command("farm")
+@click.argument("trials", nargs=-1, type=click.Choice(TRIALS))
+@click.option("--scene", "scenes", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
+              help="Scenes; default: cornell, glass and materials, where they are.")
+@click.option("--spp", type=click.IntRange(min=1), help="Samples a pixel; default: 64, of kills 1024, of huge 1.")
+@click.option("--every", default=4.0, show_default=True, metavar="SECONDS", help="Of kills: between two.")
+@click.option("--workers", default=64, show_default=True, type=click.IntRange(min=1),
+              help="Of overhead: workers that only sleep; their client's memory is told.")
+@click.option("--seconds", default=300.0, show_default=True, help="Of overhead: what the work itself takes.")
+@click.option("--size", type=Size(), default="16384x16384", show_default=True, help="Of huge: the picture.")
+@click.option("--quick", is_flag=True, help="Small pictures, and less of everything.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+def farm_command(trials: tuple[str, ...], scenes: tuple[Path, ...], spp: int | None, every: float, workers: int,
+                 seconds: float, size: tuple[int, int], quick: bool, json_file: Path | None) -> None:
+    """Trials of a farm on this machine: is its picture that of one process to the last bit, also where workers are
+    killed; how far are 64 workers from 64 times one; and what memory does a client take for a picture of 16k x 16k."""
+    from ..farm import trials as trial
+    from ..output.report import write_report
+    from ..scene.file import load
+
+    paths = scenes or tuple(SCENES / f"{name}.toml" for name in ("cornell", "glass", "materials"))
+    pictures = [trial.sized(load(path), (128, 128) if quick else (512, 512)) for path in paths]
+    rows: list[dict[str, Any]] = []
+
+    def told(row: dict[str, Any]) -> None:
+        rows.append(row)
+        click.echo("  ".join(f"{name} {value:.4g}" if isinstance(value, float) else f"{name} {value}"
+                             for name, value in row.items()))
+
+    for name in trials or TRIALS:
+        match name:
+            case "equality":
+                for row in trial.equality(pictures, spp or (16 if quick else 64)):
+                    told(row)
+            case "kills":
+                for row in trial.kills(pictures[0], spp or (256 if quick else 1024), every):
+                    told(row)
+            case "overhead":
+                told(trial.overhead(pictures[0], 8 if quick else workers, 10 if quick else seconds))
+            case _:
+                told(trial.huge(pictures[0], (2048, 4608) if quick else size, spp or 1, 2))
+    if json_file is not None:
+        write_report(json_file, {"trials": rows})
+        click.echo(str(json_file))

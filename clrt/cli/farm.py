@@ -1,0 +1,129 @@
+"""`clrt render --scheduler` and `--local-cluster`: the same command on the workers of a cluster (docs/farm.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from ..errors import UsageError
+from .frames import Sequence
+from .interrupt import Interruptible
+from .outputs import Outputs
+from .progress import Goal, Progress
+
+if TYPE_CHECKING:
+    from ..farm.cluster import Cluster
+    from ..rendering.renderer import Renderer
+    from ..scene.model import Scene
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def farm_options(command: F) -> F:
+    """Who renders, beside this machine's devices."""
+    for option in [
+        click.option("--local-cluster", type=click.IntRange(min=1), metavar="N",
+                     help="Render with N processes on this machine; needs clrt[farm]."),
+        click.option("--scheduler", metavar="ADDRESS",
+                     help="Render on the workers of a Dask scheduler, tcp://… or tls://…; --device is of theirs."),
+    ]:
+        command = option(command)
+    return command
+
+
+@contextmanager
+def cluster_for(scheduler: str | None, local: int | None, progress: Progress) -> Iterator[Cluster | None]:
+    """The cluster that was asked for, while it is needed; None where this machine's devices render."""
+    if scheduler is None and local is None:
+        yield None
+        return
+    if scheduler is not None and local is not None:
+        raise UsageError("--scheduler and --local-cluster name two clusters; keep one of them")
+    from ..farm.cluster import connect, local_cluster
+
+    progress.phase("connect")
+    with connect(scheduler) if scheduler is not None else local_cluster(local or 1) as cluster:
+        yield cluster
+
+
+def make_renderer(cluster: Cluster | None, scene: Scene, **options: Any) -> Renderer:
+    """A renderer on the cluster, or on this machine's devices."""
+    if cluster is None:
+        from ..rendering.renderer import Renderer
+
+        return Renderer(scene, **options)
+    from ..farm.renderer import FarmRenderer
+
+    return FarmRenderer(scene, cluster, **options)
+
+
+def is_huge(size: tuple[int, int]) -> bool:
+    """Whether a picture is rendered in bands, as the client would not have it in memory."""
+    from ..farm.bands import HUGE
+
+    return size[0] * size[1] > HUGE
+
+
+def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: Goal, results: Outputs,
+                progress: Progress) -> bool:
+    """Renders in bands, to the goal each, and writes the results; False where it was interrupted."""
+    from ..farm.bands import Banded
+    from ..farm.orders import PictureOrder
+
+    for name, value in {"--time": goal.seconds, "--aov": options["aovs"] or None, "--plot": results.plot,
+                        "--denoise": results.denoise or None}.items():
+        if value is not None:
+            raise UsageError(f"{name}: a picture of more than 8 million pixels is rendered in bands, each by a worker, "
+                             "which does not go with it; leave it out, or choose a smaller --size")
+    checkpoint, resume = options["checkpoint"], options["resume"]
+    of_farm = ("checkpoint", "resume", "checkpoint_seconds", "aovs")
+    chosen = {name: value for name, value in options.items() if name not in of_farm}
+    banded = Banded(PictureOrder(scene, chosen, spp=goal.spp, error=goal.error),
+                    checkpoint or Path(f"{results.pictures[0]}.bands"))
+    interrupted: list[bool] = []
+    with Interruptible(lambda: interrupted.append(True)):
+        for done, count in banded.render(cluster, resume):
+            progress.bands(done, count)
+            if interrupted:
+                break
+    if not interrupted:
+        progress.phase("write")
+        results.save_rows(banded)
+    if not interrupted or checkpoint is None:
+        banded.forget()
+    return not interrupted
+
+
+def render_frames(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: Goal, sequence: Sequence,
+                  progress: Progress) -> bool:
+    """Renders the frames that are still to be made, each by a worker, and joins all to videos; False where it was
+    interrupted."""
+    from ..farm.orders import PictureOrder
+    from ..farm.wholes import Wholes
+    from ..output.image import Image
+
+    of_client = ("checkpoint", "resume", "checkpoint_seconds")
+    chosen = {name: value for name, value in options.items() if name not in of_client}
+    order = PictureOrder(scene, chosen, goal.spp, goal.seconds, goal.error, sequence.outputs.denoise)
+    shots = {f"frame {results.header['frame']}": (results, camera)
+             for results, camera in sequence.left(order.settled, order.choices, goal)}
+    wholes = Wholes(cluster, list(shots), lambda name: replace(order, camera=shots[name][1]),
+                    tuple(options["device"] or ()))
+    interrupted, done = list[bool](), 0
+    progress.phase("render")
+    with Interruptible(lambda: interrupted.append(True)):
+        for found in wholes.results():
+            if found is not None:
+                results, image = shots[found[0]][0], Image(**found[1])
+                progress.frame(results.header["frame"], done, len(shots))
+                done += 1
+                results.save_frame(replace(image, report=image.report | results.header))
+            if interrupted:
+                return False
+    sequence.join()
+    return True

@@ -1,0 +1,229 @@
+"""A farm's picture is one machine's to the last bit, whoever renders it, dies, sleeps or lies meanwhile.
+
+Scheduler and workers are processes of their own, started once; what a test kills it replaces.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clrt
+from clrt.errors import DeviceError
+from clrt.farm import dispatch
+from clrt.farm.bands import Banded
+from clrt.farm.cluster import Cluster, connect
+from clrt.farm.orders import PictureOrder
+from clrt.farm.processes import Processes
+from clrt.farm.renderer import FarmRenderer
+from clrt.farm.wholes import Wholes
+from clrt.output.images import read_image
+from clrt.rendering.renderer import Renderer
+from clrt.scene.model import Scene
+
+from ..rendering.checkpoints import run, same
+from ..rendering.test_noise import room
+
+FAULTS = Path(__file__).with_name("faulty.py")
+SIZE = (93, 70)
+SCENES = Path(__file__).parents[2] / "scenes"
+
+
+@pytest.fixture(scope="module")
+def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
+    with Processes(tmp_path_factory.mktemp("farm")) as started:
+        started.add_workers(4)
+        yield started
+
+
+@pytest.fixture
+def cluster(processes: Processes) -> Iterator[Cluster]:
+    with connect(processes.address) as connected:
+        yield connected
+
+
+@pytest.fixture
+def small_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that a pass is many of them."""
+    monkeypatch.setattr("clrt.farm.picture.TASK_SECONDS", 0.02)
+    monkeypatch.setattr("clrt.farm.picture.FIRST_SAMPLES", 1 << 12)
+    monkeypatch.setattr("clrt.farm.picture.FEWEST_TILES", 5)
+
+
+def alone(scene: Scene, **options: Any) -> Renderer:
+    """One process; twice the same device, so that it has the program that workers have, which is compiled once."""
+    return Renderer(scene, device=[0, 0], **{"size": SIZE, "seed": 1, "spp": 24, **options})
+
+
+def together(cluster: Cluster, scene: Scene, count: int = 4, **options: Any) -> FarmRenderer:
+    """Once so many workers are ready."""
+    made = FarmRenderer(scene, cluster, device=0, **{"size": SIZE, "seed": 1, "spp": 24, **options})
+    made.session.dispatch.wait_for(count)
+    return made
+
+
+def at_pass(running: Renderer, number: int, event: Callable[[], Any], **stops: float) -> None:
+    """Renders to the end; the event comes in the middle of a pass."""
+    passes, work = 0, running.session._work
+
+    def disturbed() -> Iterator[None]:
+        nonlocal passes
+        passes += 1
+        for turn, _ in enumerate(work()):
+            if passes == number and turn == 1:
+                event()
+            yield
+
+    running.session._work = disturbed  # type: ignore[method-assign]
+    run(running, **stops)
+    assert passes > number
+
+
+@pytest.mark.parametrize("scene", [room(), clrt.load(SCENES / "cornell.toml"), clrt.load(SCENES / "spheres.toml")],
+                         ids=lambda scene: scene.name)
+def test_same_picture(cluster: Cluster, small_tasks: None, scene: Scene) -> None:
+    """Film, estimate and history; all four took part."""
+    expected = alone(scene)
+    run(expected, spp=40)
+    found = together(cluster, scene)
+    run(found, spp=40)
+    assert same(expected, found) and sum(share["samples"] > 0 for share in found.session.shares()) == 4
+    assert found.session.moved_bytes < 300 * found.session.film().samples
+
+
+@pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
+def test_it_ends_at_the_same_error(cluster: Cluster, small_tasks: None, adaptive: bool) -> None:
+    expected, found = alone(room(), adaptive=adaptive), together(cluster, room(), adaptive=adaptive)
+    run(expected, error=0.1)
+    run(found, error=0.1)
+    assert found.stop_reason == "error" and same(expected, found)
+
+
+def test_pictures_beside_it(cluster: Cluster) -> None:
+    """AOVs and guides come from a worker."""
+    names = ["direct", "albedo", "depth"]
+    expected, found = alone(room(), aovs=names), together(cluster, room(), 1, aovs=names)
+    for name, picture in expected.aovs(run(expected, spp=4)).items():
+        np.testing.assert_array_equal(picture, found.aovs(run(found, spp=4))[name])
+    for name, guide in expected.session.guides().items():
+        np.testing.assert_array_equal(guide, found.session.guides()[name])
+
+
+def test_workers_that_are_killed(processes: Processes, cluster: Cluster, small_tasks: None,
+                                 caplog: pytest.LogCaptureFixture) -> None:
+    """Two of four, in the middle of a pass, and another joins: nothing is lost, or counted twice."""
+    def event() -> None:
+        for _ in range(2):
+            processes.kill(processes.workers[0])
+        processes.add_workers(2)
+
+    expected, found = alone(room()), together(cluster, room())
+    run(expected, spp=128)
+    at_pass(found, 6, event, spp=128)
+    assert same(expected, found) and "is gone" in caplog.text
+
+
+def test_one_that_sleeps(processes: Processes, cluster: Cluster, small_tasks: None) -> None:
+    """Its tasks are done by others; it wakes up, and its late results count for nothing."""
+    expected, found = alone(room()), together(cluster, room())
+    run(expected, spp=128)
+    sleeper = processes.workers[-1]
+    try:
+        at_pass(found, 6, lambda: os.kill(sleeper.pid, signal.SIGSTOP), spp=64)
+    finally:
+        os.kill(sleeper.pid, signal.SIGCONT)
+    run(found, spp=128)
+    assert same(expected, found)
+
+
+def test_those_that_lie_are_left_out(processes: Processes, cluster: Cluster, small_tasks: None,
+                                     caplog: pytest.LogCaptureFixture) -> None:
+    """One with another version, one whose pixels are NaN: both are named with what is wrong."""
+    processes.add_workers(1, FAULTS, CLRT_TEST_FAULT="version")
+    processes.add_workers(1, FAULTS, CLRT_TEST_FAULT="nan")
+    liars = processes.workers[-2:]
+    expected, found = alone(room()), together(cluster, room(), 5)
+    run(expected, spp=40)
+    run(found, spp=40)
+    for liar in liars:
+        processes.kill(liar)
+    assert same(expected, found)
+    assert "it has clrt 0.0.1 with the kernels" in caplog.text
+    assert f"this client clrt {clrt.__version__} with the kernels" in caplog.text
+    assert "it returned pixels that are no finite numbers" in caplog.text
+
+
+def test_frames(cluster: Cluster) -> None:
+    """24 of them, each by one worker, are those of one process, and all four took part."""
+    def frame(name: str) -> PictureOrder:
+        scene = room()
+        moved = replace(scene.camera, position=tuple(np.add(scene.camera.position, (0, 0, int(name) / 100)).tolist()))
+        return PictureOrder(replace(scene, camera=moved), {"size": (32, 24), "device": 0}, spp=8)
+
+    names = [str(number) for number in range(24)]
+    wholes = Wholes(cluster, names, frame)
+    wholes.dispatch.wait_for(4)
+    found = dict(filter(None, wholes.results()))
+    assert sorted(found) == sorted(names)
+    assert sum(member.done > 0 for member in wholes.dispatch.everyone()) == 4
+    for name in names:
+        order = frame(name)
+        expected = clrt.render(order.scene, spp=order.spp, **order.options)
+        np.testing.assert_array_equal(found[name]["pixels"], expected.pixels)
+
+
+def test_bands(cluster: Cluster, tmp_path: Path) -> None:
+    """Interrupted, with one band damaged since, a picture in bands is that of one process, in a file of any kind."""
+    order = PictureOrder(room(), {"size": (90, 100), "device": 0, "seed": 3}, spp=4)
+    banded = Banded(order, tmp_path / "a.bands", band_pixels=90 * 16)
+    for done, _ in banded.render(cluster):
+        if done >= 3:
+            break
+    with open(banded.rows_path, "r+b") as file:
+        file.seek(min(int(name.split()[1]) for name in banded.reports) * 90 * 12)
+        file.write(b"damaged")
+    kept = len(banded.reports)
+    again = Banded(order, tmp_path / "a.bands", band_pixels=90 * 16)
+    counts = [done for done, _ in again.render(cluster, resume=True)]
+    assert counts[0] < kept and counts[-1] == 7
+    expected = clrt.render(room(), size=(90, 100), seed=3, spp=4, device=0)
+    for name in ("a.exr", "b.hdr", "c.png"):
+        expected.save(tmp_path / name)
+        again.save(tmp_path / f"of_{name}", "srgb", 0.0, {})
+        np.testing.assert_array_equal(read_image(tmp_path / f"of_{name}"), read_image(tmp_path / name))
+    assert again.summary()["samples"] == 4 * 90 * 100
+    assert again.summary()["noise"] == pytest.approx(expected.report["noise"], rel=0.1)
+
+
+def test_a_scheduler_that_is_killed(processes: Processes, cluster: Cluster, small_tasks: None, tmp_path: Path,
+                                    monkeypatch: pytest.MonkeyPatch) -> None:
+    """The render ends with what it has in its checkpoint, which one machine goes on with."""
+    monkeypatch.setattr(dispatch, "GONE", 1.0)
+    found = together(cluster, room(), checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e6)
+    with pytest.raises(DeviceError, match="has not answered for 1 s"):
+        at_pass(found, 6, lambda: processes.kill(processes.scheduler), spp=128)
+    expected, resumed = alone(room()), alone(room(), checkpoint=tmp_path / "a.ck", resume=True)
+    assert 0 < resumed.session.samples_done < 128
+    run(expected, spp=128)
+    run(resumed, spp=128)
+    assert same(expected, resumed)
+
+
+def test_a_task_that_kills(processes: Processes, small_tasks: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another scheduler at the same place is found, and what ends two workers is given up, and named."""
+    monkeypatch.setattr(dispatch, "MOST_DEATHS", 2)
+    for worker in list(processes.workers):
+        processes.kill(worker)
+    processes.scheduler = processes.start_scheduler()
+    processes.add_workers(2, FAULTS, CLRT_TEST_FAULT="crash")
+    with connect(processes.address) as cluster:
+        found = together(cluster, room(), 2)
+        with pytest.raises(DeviceError, match=r"a task of \d+ tiles, samples \d+ to \d+ has ended 2 workers, at last"):
+            run(found, spp=8)

@@ -1,0 +1,90 @@
+"""What is sent to workers: everything that a scene is, each array once, and nothing that could open a file."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clrt
+from clrt.errors import SceneError
+from clrt.farm.parcels import LARGE, pack, unpack
+from clrt.rendering.identity import scene_hash
+from clrt.scene.model import Instance, Mesh, Scene
+from clrt.scene.textures import Picture, Texture
+
+SCENES = Path(__file__).parents[2] / "scenes"
+
+
+@pytest.mark.parametrize("name", ["cornell", "glass", "instances", "materials", "furnace"])
+def test_what_arrives_is_what_was_sent(name: str) -> None:
+    scene = clrt.load(SCENES / f"{name}.toml")
+    parcel = pack(scene)
+    text, arrays = parcel.text, parcel.arrays
+    arrived = unpack(text, arrays)
+    assert scene_hash(arrived) == scene_hash(scene) and arrived.render == scene.render
+    assert len(text) < 64 * LARGE and all(array.nbytes >= LARGE for array in arrays.values())
+
+
+def test_an_array_travels_once() -> None:
+    """However many meshes share it, and however many frames: another camera makes no other arrays."""
+    rng = np.random.default_rng(1)
+    vertices = rng.random((LARGE, 3), np.float32)
+    faces = rng.integers(0, LARGE, (LARGE, 3), np.int32)
+    texels = rng.integers(0, 255, (128, 128, 4), np.uint8)
+    material = clrt.Diffuse(color=Texture(picture=Picture(texels)))
+    meshes = [Mesh(vertices.copy(), faces, material, uv=vertices[:, :2].copy()) for _ in range(3)]
+    scene = Scene(meshes=meshes, instances=[Instance(meshes[0])])
+    parcel = pack(scene)
+    text, arrays = parcel.text, parcel.arrays
+    assert sorted(array.nbytes for array in arrays.values()) == sorted(
+        [vertices.nbytes, faces.nbytes, texels.nbytes, vertices[:, :2].nbytes])
+    arrived = unpack(text, arrays)
+    assert arrived.instances[0].mesh is arrived.meshes[0] and arrived.meshes[1].material is arrived.meshes[0].material
+    moved = pack(replace(scene, camera=clrt.Camera(position=(1, 2, 3))))
+    assert moved.arrays.keys() == arrays.keys() and moved.key != pack(scene).key
+
+
+class Escape:
+    """Has its reader call something."""
+
+    def __init__(self, function: Any, *arguments: Any) -> None:
+        self.called = function, arguments
+
+    def __reduce__(self) -> Any:
+        return self.called
+
+
+@pytest.mark.parametrize("escape", [
+    Escape(open, "/etc/passwd"), Escape(os.system, "true"), Escape(eval, "1"), Escape(clrt.load, "x.toml"),
+    Escape(np.load, "x.npy"), Escape(pickle.loads, b"N.")], ids=lambda escape: escape.called[0].__name__)
+def test_a_text_calls_nothing(escape: Escape) -> None:
+    """It names the classes of scenes, and arrays; whatever else it names is refused before it is called."""
+    with pytest.raises(SceneError, match="no scene is made of"):
+        unpack(pickle.dumps(escape), {})
+
+
+def test_reading_a_parcel_opens_no_file() -> None:
+    """Not even those that the scene was made of: their pictures and meshes are in what was sent."""
+    parcel = pack(clrt.load(SCENES / "materials.toml"))
+    text, arrays = parcel.text, parcel.arrays
+    unpack(text, arrays)     # modules are loaded
+    opened: list[str] = []
+    listening = [True]
+    sys.addaudithook(lambda event, arguments: opened.append(event) if listening and event in ("open", "os.open")
+                     else None)
+    unpack(text, arrays)
+    listening.clear()
+    assert not opened
+
+
+def test_an_array_that_is_not_there() -> None:
+    parcel = pack(np.zeros(LARGE))
+    with pytest.raises(SceneError, match=f"lacks an array .{next(iter(parcel.arrays))}"):
+        unpack(parcel.text, {})
