@@ -93,7 +93,6 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     if click.get_current_context().obj == PROGRAM:
         guarded(advice)
     from ..output.data import check_denoisable
-    from ..output.denoise import Denoiser
     from ..rendering.aovs import chosen_aovs
     from ..rendering.stops import check_stops, planned_spp
     from ..scene.file import load
@@ -112,7 +111,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     check_stops(spp, seconds, error)
     if error_percentile is not None and error is None:
         raise UsageError("--error-percentile says of how much of the picture --error is asked; name that, too")
-    denoiser = Denoiser() if denoise else None
+    denoiser = _denoiser() if denoise else None
     if quiet:
         silence()
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's end is Ctrl-C, too
@@ -157,6 +156,11 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
                 raise type(failure)(f"{failure}{advice()}") from failure
     if interruptible.asked:
         sys.exit(130)
+
+
+def _denoiser() -> Denoiser:
+    from ..output.denoise import Denoiser
+    return Denoiser()
 
 
 def _render_frames(renderer: Renderer, sequence: Sequence, goal: Goal, denoiser: Denoiser | None,

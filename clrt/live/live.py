@@ -18,7 +18,8 @@ from ..errors import ClrtError
 from ..output.image import Image
 from ..rendering.features import INTEGRATORS
 from ..rendering.renderer import Renderer, State
-from ..rendering.report import render_report, tree_report
+from ..rendering.machine import tree_report
+from ..rendering.report import render_report
 from ..scene.model import Scene
 from .history import History
 from .settings import Selector, Settings
