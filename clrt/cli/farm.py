@@ -12,9 +12,10 @@ import click
 
 from ..errors import UsageError
 from .frames import Sequence
+from .goal import Goal
 from .interrupt import Interruptible
 from .outputs import Outputs
-from .progress import Goal, Progress
+from .progress import Progress
 
 if TYPE_CHECKING:
     from ..farm.cluster import Cluster

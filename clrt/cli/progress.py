@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
+import logging
 import sys
-from collections import deque
-from dataclasses import dataclass
-from math import floor
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
+
+from .goal import Goal, Pace, time_left
 
 if TYPE_CHECKING:
     from ..rendering.renderer import State
@@ -78,9 +78,27 @@ class PlainProgress(Progress):
 
 
 class JsonProgress(Progress):
-    """One JSON object a line, with `phase`; in the phase "render" also the state."""
+    """One JSON object a line, with `phase`; in the phase "render" also the state. Warnings are such lines, too."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._phase = "load"
+        self._log = JsonLog(self)
+
+    def warning(self, message: str) -> None:
+        """Something was logged."""
+        _say(json.dumps({"phase": self._phase, "warning": message}))
+
+    def __enter__(self) -> Progress:
+        logging.getLogger().addHandler(self._log)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        logging.getLogger().removeHandler(self._log)
 
     def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
+        self._phase = name
         _say(json.dumps({"phase": name, **({"device": device, "device_bytes": device_bytes} if device else {})}))
 
     def frame(self, number: int, done: int, count: int) -> None:
@@ -100,6 +118,18 @@ class JsonProgress(Progress):
         if done != self._bands:
             _say(json.dumps({"phase": "render", "bands": done, "of": count}))
         self._bands = done
+
+
+class JsonLog(logging.Handler):
+    """Has a display show what is logged."""
+
+    def __init__(self, progress: JsonProgress) -> None:
+        super().__init__()
+        self._progress = progress
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """See logging."""
+        self._progress.warning(self.format(record))
 
 
 class BarProgress(Progress):
@@ -145,62 +175,6 @@ def make_progress(kind: str | None, quiet: bool) -> Progress:
         return Progress()
     kind = kind or ("bar" if sys.stderr.isatty() else "plain")
     return {"bar": BarProgress, "plain": PlainProgress, "json": JsonProgress}[kind]()
-
-
-class Pace:
-    """How fast a render is of late: speeds change with other programs, and with where samples go."""
-
-    WINDOW = 10.0
-
-    def __init__(self) -> None:
-        self._seen: deque[tuple[float, int]] = deque()
-
-    def add(self, seconds: float, samples: int) -> None:
-        """So many samples, of all pixels, were there after so many seconds."""
-        self._seen.append((seconds, samples))
-        while len(self._seen) > 2 and seconds - self._seen[1][0] >= self.WINDOW:
-            self._seen.popleft()
-
-    @property
-    def rate(self) -> float:
-        """Samples a second in the last WINDOW seconds, or since the last time before; at first since the start."""
-        (start, before), (end, samples) = self._seen[0], self._seen[-1]
-        if end <= start or samples <= before:
-            start, before = 0.0, 0
-        return (samples - before) / max(end - start, 1e-9)
-
-
-@dataclass(frozen=True)
-class Goal:
-    """Where a render will stop, as far as that is known."""
-
-    spp: int | None
-    seconds: float | None
-    error: float | None
-
-    def done(self, state: State) -> float:
-        """The part that is done, 0 to 1."""
-        parts = [state.spp / self.spp] if self.spp else []
-        parts += [state.seconds / self.seconds] if self.seconds else []
-        parts += [(self.error / state.stops_by) ** 2] if self.error and state.stops_by else []
-        return min(1.0, max(parts, default=0.0))
-
-    def percent(self, state: State) -> str:
-        """What is done for certain, rounded down: 100 % is the end, and nothing else."""
-        return f"{floor(100 * self.done(state)):3} %  "
-
-
-def time_left(state: State, goal: Goal, rate: float) -> float | None:
-    """Seconds until the render, at so many samples a second, stops by what comes first; None where that is not known.
-
-    Noise² falls as 1/samples.
-    """
-    ends = [] if goal.seconds is None else [goal.seconds - state.seconds]
-    if goal.spp is not None:
-        ends.append((goal.spp * state.film.pixels.size - state.film.samples) / rate)
-    if goal.error is not None and state.stops_by:
-        ends.append(((state.stops_by / goal.error) ** 2 - 1) * state.film.samples / rate)
-    return max(0.0, min(ends)) if ends else None
 
 
 def where(device: str, device_bytes: int) -> str:

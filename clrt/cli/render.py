@@ -18,12 +18,13 @@ from ..errors import DeviceError, UsageError
 from . import PROGRAM
 from .farm import cluster_for, farm_options, is_huge, make_renderer, render_frames, render_huge
 from .frames import Sequence, frame_options, make_sequence
+from .goal import Goal
 from .guard import guarded
 from .interrupt import Interruptible
 from .logs import silence, verbose_option
 from .options import Size, tracing_options
 from .outputs import Outputs
-from .progress import Goal, Progress, make_progress
+from .progress import Progress, make_progress
 
 if TYPE_CHECKING:
     from ..output.denoise import Denoiser

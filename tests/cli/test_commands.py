@@ -80,6 +80,15 @@ def test_command_line_overrides_the_scene_and_measures_against_a_reference(scene
     assert list(dict.fromkeys(phases)) == ["load", "build", "compile", "render", "write"]
 
 
+def test_warnings_are_json_where_progress_is(scene: Path) -> None:
+    scene.write_text(SCENE.replace("color = [0.5, 0.6, 0.7]", "color = [0, 0, 0]"))
+    result = clrt("render", scene, "--progress", "json", cwd=scene.parent)
+    lines = [json.loads(line) for line in result.stderr.splitlines()]
+    assert all("phase" in line for line in lines)
+    assert [line["warning"] for line in lines if "warning" in line] == [
+        "ball: nothing shines in this scene, so the picture is black"]
+
+
 def test_time_and_error_end_a_render(scene: Path) -> None:
     clrt("render", scene, "--time", "0.3", "--report", "t.json", cwd=scene.parent)
     clrt("render", scene, "--error", "0.01", "--report", "e.json", cwd=scene.parent)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clrt.cli.progress import Goal, Pace, time_left
+from clrt.cli.goal import Goal, Pace, time_left
 from clrt.rendering.film import Film
 from clrt.rendering.records import PIXEL
 from clrt.rendering.renderer import State
