@@ -96,7 +96,7 @@ def test_the_whole_generation_outlives_the_damaged_one(device: Device, kept: Pat
     """It is not replaced by what cannot be read; and it is found where a crash left it alone."""
     whole = older(kept).read_bytes()
     kept.write_bytes(b"damaged")
-    running = renderer(device, checkpoint=kept, resume=True)
+    running = renderer(device, checkpoint=kept, resume=True, checkpoint_seconds=60.0)    # so at its end alone
     run(running, spp=24)
     assert older(kept).read_bytes() == whole and same(running, renderer(device, checkpoint=kept, resume=True))
     kept.unlink()
