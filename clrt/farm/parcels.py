@@ -13,6 +13,7 @@ import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass, is_dataclass
 from functools import cached_property
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ from ..errors import SceneError
 
 #: Bytes from which on an array travels by itself.
 LARGE = 1 << 14
+#: In the place of where a file lies on the client, which means nothing elsewhere: it arrives as None.
+HERE = "a file"
 #: What a text may name: the dataclasses of some modules, and single names.
 ROOMS = ("clrt.scene.", "clrt.accel.kernels", "clrt.rendering.choices", "clrt.farm.orders")
 NAMES = {("numpy", "ndarray"), ("numpy", "dtype"), ("collections", "OrderedDict"), ("builtins", "complex"),
@@ -76,6 +79,8 @@ class _Pickler(pickle.Pickler):
     digests: dict[int, str]
 
     def persistent_id(self, value: object) -> str | None:
+        if isinstance(value, PurePath):
+            return HERE
         if not isinstance(value, np.ndarray) or value.nbytes < LARGE or value.dtype.hasobject:
             return None
         digest = self.digests.get(id(value)) or digest_of(value)
@@ -87,7 +92,9 @@ class _Pickler(pickle.Pickler):
 class _Unpickler(pickle.Unpickler):
     arrays: Mapping[str, NDArray[Any]]
 
-    def persistent_load(self, digest: Any) -> NDArray[Any]:
+    def persistent_load(self, digest: Any) -> NDArray[Any] | None:
+        if digest == HERE:
+            return None
         if digest not in self.arrays:
             raise SceneError(f"what was sent lacks an array ({digest})")
         return self.arrays[digest]

@@ -17,8 +17,8 @@ from ..device.open import name_of
 from ..errors import ClrtError
 from ..output.image import Image
 from ..rendering.features import INTEGRATORS
-from ..rendering.renderer import Renderer, State
 from ..rendering.machine import tree_report
+from ..rendering.renderer import Renderer, State
 from ..rendering.report import render_report
 from ..scene.model import Scene
 from .history import History
