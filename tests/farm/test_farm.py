@@ -125,8 +125,8 @@ def test_workers_that_are_killed(processes: Processes, cluster: Cluster, small_t
         processes.add_workers(2)
 
     expected, found = alone(room()), together(cluster, room())
-    run(expected, spp=128)
-    at_pass(found, 6, event, spp=128)
+    run(expected, spp=512)
+    at_pass(found, 6, event, spp=512)
     assert same(expected, found) and "is gone" in caplog.text
 
 
