@@ -174,9 +174,11 @@ class Cluster:
 
 def _give_memory_back() -> None:
     """Has the C library give large arrays back to the system once they are freed: it would keep ever more of them for
-    each of the threads that fetch results (glibc's mallopt, M_MMAP_THRESHOLD; others have no such function)."""
+    each of the threads that fetch results (glibc's mallopt, M_MMAP_THRESHOLD and
+    M_ARENA_MAX; others have no such function)."""
     with suppress(OSError, AttributeError, TypeError):
-        ctypes.CDLL(None).mallopt(-3, 1 << 18)
+        ctypes.CDLL(None).mallopt(-3, 1 << 16)
+        ctypes.CDLL(None).mallopt(-8, 2)
 
 
 def connect(address: str) -> Cluster:

@@ -42,7 +42,7 @@ FIRST_SAMPLES = 1 << 17
 #: The smallest task is such a part of a full one. Tiles of one at most: what is sent with a task should be below 10 MB.
 SMALLEST, MOST_TILES = 4, 2048
 #: Tasks that a worker has at hand; and of a pass, for each.
-AHEAD, PASS_TASKS = 2, 12
+AHEAD, PASS_TASKS = 2, 36
 #: A pass takes so many times as long as workers wait between two, while the client estimates the picture's error.
 GAP_COST = 100
 #: How long the end of a render waits for what is in flight, in times of a task.
