@@ -18,8 +18,9 @@ def verbose_option(command: F) -> F:
 
 
 def silence() -> None:
-    """No warnings, the libraries' either."""
+    """No warnings, the libraries' either, as long as the command runs."""
     logging.disable(logging.WARNING)
+    click.get_current_context().call_on_close(lambda: logging.disable(logging.NOTSET))
 
 
 def _show_more(context: click.Context, parameter: click.Parameter, count: int) -> None:

@@ -103,7 +103,8 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     used |= set(files_of(turns_source()))
     for file in probe.FILES:
         used |= set(files_of(probe.source(file, device.lanes)))
-    used |= set(files_of(compose("", "check/turns.cl", {})))
+    for entry in ("check/turns.cl", "fma.cl"):
+        used |= set(files_of(compose("", entry, {})))
     for shape in SHAPES.values():
         used |= set(files_of(program_source(shape, True, True, True)))
     for layout in ("bvh8", "bvh2", "cwbvh", "list"):
@@ -125,7 +126,7 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     for scene in (painted(everything()), planted(everything()), shelf(), *(sight for _, sight in sights(everything()))):
         used |= set(compile_scene(scene, Choices()).files)
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
-    for entry in ("guides.cl", "study/probe.cl"):
+    for entry in ("guides.cl", "raster/outline.cl", "study/probe.cl", "study/raster_hits.cl"):
         used |= set(compile_scene(everything(), Choices(), entry).files)
     assert sorted(used) == FILES
 
