@@ -105,7 +105,7 @@ def render_frames(cluster: Cluster, scene: Scene, options: dict[str, Any], goal:
     """Renders the frames that are still to be made, each by a worker, and joins all to videos; False where it was
     interrupted."""
     from ..farm.orders import PictureOrder
-    from ..farm.wholes import Wholes
+    from ..farm.whole_pictures import WholePictures
     from ..output.image import Image
 
     of_client = ("checkpoint", "resume", "checkpoint_seconds")
@@ -113,12 +113,12 @@ def render_frames(cluster: Cluster, scene: Scene, options: dict[str, Any], goal:
     order = PictureOrder(scene, chosen, goal.spp, goal.seconds, goal.error, sequence.outputs.denoise)
     shots = {f"frame {results.header['frame']}": (results, camera)
              for results, camera in sequence.left(order.settled, order.choices, goal)}
-    wholes = Wholes(cluster, list(shots), lambda name: replace(order, camera=shots[name][1]),
-                    tuple(options["device"] or ()))
+    pictures = WholePictures(cluster, list(shots), lambda name: replace(order, camera=shots[name][1]),
+                             tuple(options["device"] or ()))
     interrupted, done = list[bool](), 0
     progress.phase("render")
     with Interruptible(lambda: interrupted.append(True)):
-        for found in wholes.results():
+        for found in pictures.results():
             if found is not None:
                 results, image = shots[found[0]][0], Image(**found[1])
                 progress.frame(results.header["frame"], done, len(shots))

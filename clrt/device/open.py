@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 import platform
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import pyopencl as cl

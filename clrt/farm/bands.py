@@ -25,7 +25,7 @@ from ..scene.validate import validate
 from .cluster import Cluster
 from .manifest import Manifest
 from .orders import PictureOrder
-from .wholes import Wholes
+from .whole_pictures import WholePictures
 
 #: Pixels from which on a picture is rendered in bands: all below fit the client, film and estimates (some 350 bytes a
 #: pixel) included.
@@ -69,9 +69,9 @@ class Banded:
             self.reports = {name: about["report"] for name, about in manifest.done.items()
                             if name in bands and self._is_there(file, bands[name], about)}
             names = [name for name in bands if name not in self.reports]
-            wholes = Wholes(cluster, names, lambda name: replace(self.order, band=bands[name]),
-                            tuple(self.order.options.get("device") or ()))
-            for result in wholes.results():
+            pictures = WholePictures(cluster, names, lambda name: replace(self.order, band=bands[name]),
+                                     tuple(self.order.options.get("device") or ()))
+            for result in pictures.results():
                 if result is not None:
                     self._keep(file, manifest, bands[result[0]], *result)
                 yield len(self.reports), len(bands)

@@ -174,8 +174,8 @@ class Cluster:
 
 def _give_memory_back() -> None:
     """Has the C library give large arrays back to the system once they are freed: it would keep ever more of them for
-    each of the threads that fetch results (glibc's mallopt, M_MMAP_THRESHOLD and
-    M_ARENA_MAX; others have no such function)."""
+    each of the threads that fetch results (glibc's mallopt, M_MMAP_THRESHOLD and M_ARENA_MAX; others have no such
+    function)."""
     with suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).mallopt(-3, 1 << 16)
         ctypes.CDLL(None).mallopt(-8, 2)
@@ -209,12 +209,11 @@ def local_cluster(count: int) -> Cluster:
 
 def _check_dask() -> None:
     try:
-        import cryptography
+        import cryptography  # noqa: F401
         import dask
         import distributed  # noqa: F401
     except ImportError:
         raise UsageError("a farm needs Dask: pip install 'clrt[farm]'") from None
-    assert cryptography
     # Else each connection keeps its last thousand messages, with all that was in them.
     dask.config.set({"distributed.admin.low-level-log-length": LOG_LENGTH})
     logging.getLogger("distributed").setLevel(logging.CRITICAL)

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..device.open import Device
-    from .easel import Easel
+    from .share_renderer import ShareRenderer
     from .orders import Order
     from .simulated import Simulation
 
 P = ParamSpec("P")
 #: Scenes that a worker keeps; the one that was used longest ago goes first.
 MOST_KEPT = 2
-_easels: dict[str, Easel | Simulation] = {}
+_renderers: dict[str, ShareRenderer | Simulation] = {}
 _starting = Lock()
 
 
@@ -86,16 +86,16 @@ def introduce(client: dict[str, str], devices: tuple[str | int, ...]) -> dict[st
 
 @answering
 def prepare(client: dict[str, str], key: str, text: bytes, digests: list[str], *arrays: NDArray[Any]) -> dict[str, Any]:
-    """Compiles what was sent (see `Easel`) and keeps it under `key`. What a worker is, the machine's part of the
-    report, and its proof (`Easel.proof`). DeviceError, KernelError, SceneError."""
+    """Compiles what was sent (see `ShareRenderer`) and keeps it under `key`. What a worker is, the machine's part of
+    the report, and its proof (`ShareRenderer.proof`). DeviceError, KernelError, SceneError."""
     _check_identity(client)
     with _starting:
-        if key not in _easels:
-            while len(_easels) >= MOST_KEPT:
-                del _easels[next(iter(_easels))]
-            _easels[key] = _made(unpack(text, dict(zip(digests, arrays))))
-        easel = _easels[key]
-        return {**easel.introduction(), "report": easel.report(), "proof": easel.proof()}
+        if key not in _renderers:
+            while len(_renderers) >= MOST_KEPT:
+                del _renderers[next(iter(_renderers))]
+            _renderers[key] = _made(unpack(text, dict(zip(digests, arrays))))
+        renderer = _renderers[key]
+        return {**renderer.introduction(), "report": renderer.report(), "proof": renderer.proof()}
 
 
 @answering
@@ -104,22 +104,22 @@ def render_share(key: str, tiles: NDArray[Any], first: int, more: int,
     """The pixels (tiles, TILE_PIXELS) of these tiles with samples first … first + more − 1 added, and the seconds that
     took; pixels: as they were before, None without samples. DeviceError where no device can go on."""
     start = time.perf_counter()
-    return _easel(key).share(tiles, first, more, pixels), time.perf_counter() - start
+    return _renderer(key).share(tiles, first, more, pixels), time.perf_counter() - start
 
 
 @answering
 def draw(key: str, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
     """Pictures of what is seen first: AOVs by their names, or, without, what guides a denoiser."""
-    return _easel(key).drawn(names)
+    return _renderer(key).drawn(names)
 
 
 @answering
 def render_whole(client: dict[str, str], key: str, text: bytes, part: bytes, digests: list[str],
                  *arrays: NDArray[Any]) -> tuple[dict[str, Any], float]:
     """A whole picture, or a band of one, with what was asked for beside it, and the seconds that took (see
-    `studio.render`). text: the order, known by its key; part: its camera and its band."""
+    `band_renderer.render`). text: the order, known by its key; part: its camera and its band."""
     _check_identity(client)
-    from .studio import render
+    from .band_renderer import render
 
     with _starting:
         start = time.perf_counter()
@@ -142,14 +142,14 @@ def about(devices: list[Device]) -> dict[str, Any]:
             for name in ("name", "platform", "platform_version", "driver")}
 
 
-def _made(order: Order) -> Easel | Simulation:
+def _made(order: Order) -> ShareRenderer | Simulation:
     if order.simulated is not None:
         from .simulated import Simulation
 
         return Simulation(order)
-    from .easel import Easel
+    from .share_renderer import ShareRenderer
 
-    return Easel(order)
+    return ShareRenderer(order)
 
 
 def _check_identity(client: dict[str, str]) -> None:
@@ -160,9 +160,9 @@ def _check_identity(client: dict[str, str]) -> None:
         raise DeviceError(f"it has {told[0]}, this client {told[1]}; install the same clrt on both")
 
 
-def _easel(key: str) -> Easel | Simulation:
-    easel = _easels.pop(key, None)
-    if easel is None:
+def _renderer(key: str) -> ShareRenderer | Simulation:
+    renderer = _renderers.pop(key, None)
+    if renderer is None:
         raise LookupError(f"this worker was not prepared for {key}")
-    _easels[key] = easel
-    return easel
+    _renderers[key] = renderer
+    return renderer

@@ -67,7 +67,7 @@ class FarmRenderer(Renderer):
         return picture
 
     def look(self, camera: Camera) -> None:
-        """Begins another picture. Of many, each is better rendered by one worker (wholes.py)."""
+        """Begins another picture. Of many, each is better rendered by one worker (whole_pictures.py)."""
         validate(Scene(camera=camera, render=self.settings))
         self.scene = replace(self.scene, camera=camera)
         self.session = self._make_picture()

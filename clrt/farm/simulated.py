@@ -23,7 +23,7 @@ PROOF_TILES = 16
 
 
 class Simulation:
-    """In the place of an `Easel`."""
+    """In the place of a `ShareRenderer`."""
 
     selectors = None
 

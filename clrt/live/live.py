@@ -24,7 +24,7 @@ from ..scene.model import Scene
 from .history import History
 from .settings import Selector, Settings
 from .snapshot import Snapshot
-from .studio import Asked, Studio, Superseded
+from .live_renderer import Asked, LiveRenderer, Superseded
 
 #: A movement without anything new for so many seconds has ended.
 SETTLED = 0.2
@@ -52,7 +52,7 @@ class Live:
         self._changed = threading.Condition(threading.RLock())
         self._closed = False
         self._unseen = True     # no picture of what is being rendered was published
-        self._studio = Studio(self._begin)
+        self._renderer = LiveRenderer(self._begin)
         self._thread = threading.Thread(target=self._work, name="clrt live", daemon=True)
         self._thread.start()
 
@@ -130,7 +130,7 @@ class Live:
         """Ends the work and waits for that."""
         with self._changed:
             self._closed = True
-            self._studio.abandon()
+            self._renderer.abandon()
             self._changed.notify_all()
         self._thread.join()
 
@@ -145,7 +145,7 @@ class Live:
         with self._changed:
             self._asked = self._asked._replace(number=self._asked.number + 1, **changes)
             if not (self._unseen and self._asked.moving):
-                self._studio.abandon()
+                self._renderer.abandon()
             self._changed.notify_all()
 
     def _work(self) -> None:
@@ -171,7 +171,7 @@ class Live:
     def _show(self, asked: Asked) -> None:
         """Renders it to the end, first a small picture where a whole one would take too long."""
         self._unseen = True
-        quick = self._studio.quick_size(asked)
+        quick = self._renderer.quick_size(asked)
         if quick != asked.size:
             self._render(asked, quick, asked.settings.samples)
             if asked.moving:
@@ -185,12 +185,12 @@ class Live:
         if self._is_superseded(asked):
             raise Superseded
         self._current, self._still = asked, None
-        for state in self._studio.states(asked, size, spp):
+        for state in self._renderer.states(asked, size, spp):
             if state.spp >= min(asked.settings.samples, spp):
                 self._publish_picture(asked, state)
                 if self._is_superseded(asked):
                     raise Superseded
-                if self._is_denoised(asked, size) and (pixels := self._studio.denoised(state)) is not None:
+                if self._is_denoised(asked, size) and (pixels := self._renderer.denoised(state)) is not None:
                     self._publish(denoised=pixels)
         if self._is_superseded(asked):
             raise Superseded
@@ -212,7 +212,7 @@ class Live:
         self._publish(phase=phase)
 
     def _publish_picture(self, asked: Asked, state: State) -> None:
-        renderer = self._studio.renderer
+        renderer = self._renderer.renderer
         assert renderer is not None
         now = time.perf_counter()
         self._times.append(now)
@@ -225,7 +225,7 @@ class Live:
             "error": None, "frames_per_second": float(sum(now - each < 1 for each in self._times)),
             "rays_per_second": state.film.rays / max(state.seconds, 1e-9), "device": name_of(renderer.devices),
             "device_bytes": renderer.session.device_bytes, "tree": tree_report(renderer.compiled),
-            "features": renderer.compiled.features, "programs": self._studio.programs}
+            "features": renderer.compiled.features, "programs": self._renderer.programs}
         with self._changed:
             self._still = (renderer, state) if whole else None
             self._unseen = False

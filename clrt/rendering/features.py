@@ -23,8 +23,7 @@ LARGEST_UNIT = 2.0**127
 #: Integrators that follow paths, and the kernel files of those of light; others show what is seen first
 #: (kernels/picture.cl).
 WITH_LIGHT = ("path", "direct")
-INTEGRATORS = {"path": "path.cl", "direct": "path.cl", "local": "whitted.cl",
-               "raster": "whitted.cl"}
+INTEGRATORS = {"path": "path.cl", "direct": "path.cl", "local": "whitted.cl", "raster": "whitted.cl"}
 
 
 def warn_of_darkness(scene: Scene, features: Iterable[str]) -> None:

@@ -10,8 +10,8 @@ from ..device.discover import find_devices
 from ..live.live import Live
 from ..live.settings import Settings
 from ..scene.model import Scene
-from .desk import Desk
-from .developing import Look as Look
+from .editor import Editor
+from .tone_mapping import Look as Look
 from .needs import no_display
 from .panels import render, statistics
 from .panels.camera import CameraPanel
@@ -34,7 +34,7 @@ class App:
         # Before any OpenGL is loaded: Mesa gives its LLVM to all that come later, and PoCL aborts with another's.
         devices = [info for info, _ in find_devices() if info.usable]
         self.live = Live(scene, settings=settings)
-        self.desk, self.viewport = Desk(self.live, look, devices), Viewport()
+        self.editor, self.viewport = Editor(self.live, look, devices), Viewport()
         self.params = hello_imgui.RunnerParams()
         self.params.app_window_params.window_title = f"{scene.name} - clrt"
         self.params.app_window_params.window_geometry.size = SIZE
@@ -46,10 +46,10 @@ class App:
         window.default_imgui_window_type = hello_imgui.DefaultImGuiWindowType.provide_full_screen_dock_space
         window.show_status_bar, window.show_status_fps = True, False
         window.show_menu_bar, window.show_menu_app = False, False
-        self.params.callbacks.show_gui = self.desk.frame
+        self.params.callbacks.show_gui = self.editor.frame
         self.params.callbacks.show_status = self._status
         self.params.callbacks.before_exit = self.viewport.release
-        self.params.callbacks.before_swap = self.desk.take_screenshot
+        self.params.callbacks.before_swap = self.editor.take_screenshot
         self.params.docking_params.docking_splits = _splits()
         self.params.docking_params.dockable_windows = self._panels()
 
@@ -61,11 +61,11 @@ class App:
         try:
             runner(runner_params=self.params, add_ons_params=ADD_ONS)
         except RuntimeError as fault:  # of the library that opens it
-            if not self.desk.frames:
+            if not self.editor.frames:
                 raise no_display(str(fault)) from fault
             raise
         finally:
-            self.desk.close()
+            self.editor.close()
             self.live.close()
 
     def close(self) -> None:
@@ -73,22 +73,22 @@ class App:
         self.params.app_shall_exit = True
 
     def _panels(self) -> list[hello_imgui.DockableWindow]:
-        places: dict[str, dict[str, Callable[[Desk], None]]] = {
+        places: dict[str, dict[str, Callable[[Editor], None]]] = {
             "MainDockSpace": {"Picture": self.viewport.show},
             "Panels": {"Spheres": Spheres().show, "Materials": Materials().show, "Lights": Lights().show,
-                       "Camera": CameraPanel().show, "Render": render.show, "File": Files(self.desk.scene.name).show},
+                       "Camera": CameraPanel().show, "Render": render.show, "File": Files(self.editor.scene.name).show},
             "Figures": {"Statistics": statistics.show}}
         return [self._panel(place, name, show) for place, panels in places.items() for name, show in panels.items()]
 
-    def _panel(self, place: str, name: str, show: Callable[[Desk], None]) -> hello_imgui.DockableWindow:
-        panel = hello_imgui.DockableWindow(name, place, lambda: show(self.desk))
+    def _panel(self, place: str, name: str, show: Callable[[Editor], None]) -> hello_imgui.DockableWindow:
+        panel = hello_imgui.DockableWindow(name, place, lambda: show(self.editor))
         panel.can_be_closed = False
         return panel
 
     def _status(self) -> None:
-        snapshot = self.desk.snapshot
+        snapshot = self.editor.snapshot
         shown = self.viewport.shown
-        trouble = self.desk.message or snapshot.error or (shown and shown.error)
+        trouble = self.editor.message or snapshot.error or (shown and shown.error)
         imgui.text(trouble or f"{snapshot.spp} samples a pixel, {snapshot.phase}, {snapshot.device}")
 
 

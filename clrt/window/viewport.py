@@ -1,4 +1,4 @@
-"""The picture in the window, as large as fits, and the hands that move its camera."""
+"""The picture in the window, as large as fits, and what moves its camera."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from math import floor
 
 from imgui_bundle import ImVec2, hello_imgui, imgui
 
-from .desk import Desk
-from .developing import Developed
+from .editor import Editor
+from .tone_mapping import ToneMapped
 
 ANY_BUTTON = (imgui.ButtonFlags_.mouse_button_left.value | imgui.ButtonFlags_.mouse_button_middle.value
               | imgui.ButtonFlags_.mouse_button_right.value)
@@ -17,23 +17,23 @@ class Viewport:
     """The panel. shown: what it shows; corner and size: where that is in the window, in its pixels."""
 
     def __init__(self) -> None:
-        self.shown: Developed | None = None
+        self.shown: ToneMapped | None = None
         self.corner, self.size = (0, 0), (1, 1)
         self._texture: hello_imgui.TextureGpu | None = None
 
-    def show(self, desk: Desk) -> None:
+    def show(self, editor: Editor) -> None:
         """Draws it, and moves the camera as keys and mouse ask."""
-        newest = desk.developer.newest
+        newest = editor.tone_mapper.newest
         if newest is not None and newest is not self.shown:
             self.shown, self._texture = newest, hello_imgui.create_texture_gpu_from_rgba_data(newest.rgba)
-        self._place(desk.scene.render.size)
+        self._place(editor.scene.render.size)
         imgui.invisible_button("picture", self.size, ANY_BUTTON)
         if self._texture is not None:
             end = self.corner[0] + self.size[0], self.corner[1] + self.size[1]
             imgui.get_window_draw_list().add_image(imgui.ImTextureRef(self._texture.texture_id()), self.corner, end)
-        camera = desk.hands.move(desk.scene.camera, self.size[1])
-        if camera is not desk.scene.camera:
-            desk.walk(camera)
+        camera = editor.controls.move(editor.scene.camera, self.size[1])
+        if camera is not editor.scene.camera:
+            editor.walk(camera)
 
     def release(self) -> None:
         """Gives back what lies on the display's device, which must be done while the window is there."""

@@ -23,7 +23,7 @@ from clrt.farm.cluster import Cluster, connect
 from clrt.farm.orders import PictureOrder
 from clrt.farm.processes import Processes
 from clrt.farm.renderer import FarmRenderer
-from clrt.farm.wholes import Wholes
+from clrt.farm.whole_pictures import WholePictures
 from clrt.output.images import read_image
 from clrt.rendering.renderer import Renderer
 from clrt.scene.model import Scene
@@ -167,11 +167,11 @@ def test_frames(cluster: Cluster) -> None:
         return PictureOrder(replace(scene, camera=moved), {"size": (32, 24), "device": 0}, spp=8)
 
     names = [str(number) for number in range(24)]
-    wholes = Wholes(cluster, names, frame)
-    wholes.dispatch.wait_for(4)
-    found = dict(filter(None, wholes.results()))
+    pictures = WholePictures(cluster, names, frame)
+    pictures.dispatch.wait_for(4)
+    found = dict(filter(None, pictures.results()))
     assert sorted(found) == sorted(names)
-    assert sum(member.done > 0 for member in wholes.dispatch.everyone()) == 4
+    assert sum(member.done > 0 for member in pictures.dispatch.everyone()) == 4
     for name in names:
         order = frame(name)
         expected = clrt.render(order.scene, spp=order.spp, **order.options)

@@ -70,7 +70,7 @@ class Driver:
         self._pictures += 1
         self.context.mouse_move_to_pos((1, 1))
         self.context.yield_(2)
-        self.app.desk.save_screenshot(path)
+        self.app.editor.save_screenshot(path)
         self.until(path.exists, f"the screenshot {path}")
         return read_texels(path)[..., :3].astype(np.int16)
 

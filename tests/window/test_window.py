@@ -290,10 +290,10 @@ def test_what_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         for what, name in (("picture", "saved.exr"), ("scene", "saved.toml"), ("screenshot", "window.png")):
             window.context.item_input_value(f"{what}/##file", name)
             window.context.item_click(f"{what}/save {what}")
-            window.until(lambda: window.app.desk.message == f"{name} is written", name)
+            window.until(lambda: window.app.editor.message == f"{name} is written", name)
         window.context.item_input_value("picture/##file", "saved.gif")
         window.context.item_click("picture/save picture")
-        window.until(lambda: "unknown picture format .gif" in window.app.desk.message, "a complaint")
+        window.until(lambda: "unknown picture format .gif" in window.app.editor.message, "a complaint")
 
     drive(two_balls(integrator="path"), test, tmp_path)
     done = subprocess.run([sys.executable, "-m", "clrt", "render", "saved.toml", "--spp", "12", "-o", "again.exr"],
@@ -327,13 +327,13 @@ def test_what_is_missing_or_wrong_is_said(tmp_path: Path, before: str, options: 
 INTERRUPTED = """
 import os, signal
 from clrt.cli import main
-from clrt.window.desk import Desk
-frame = Desk.frame
-def with_interrupt(desk):
-    frame(desk)
-    if desk.frames == 5:
+from clrt.window.editor import Editor
+frame = Editor.frame
+def with_interrupt(editor):
+    frame(editor)
+    if editor.frames == 5:
         os.kill(os.getpid(), signal.SIGINT)
-Desk.frame = with_interrupt
+Editor.frame = with_interrupt
 main(["view", "ball.toml", "--spp", "2", "--depth", "3", "--view", "agx", "--exposure", "1"])
 """
 

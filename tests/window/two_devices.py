@@ -15,7 +15,7 @@ def main(folder: str) -> None:
     """Raises AssertionError where something is not as it should be."""
     def test(window: Driver) -> None:
         first = window.rest()
-        before, devices = window.picture(), [info for info in window.app.desk.devices if info.type == "cpu"]
+        before, devices = window.picture(), [info for info in window.app.editor.devices if info.type == "cpu"]
         assert len(devices) == 2
         other = next(info for info in devices if info.name != first.device)
         window.panel("Render")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from imgui_bundle import imgui
 
-from ..desk import Desk
+from ..editor import Editor
 
 
 class Files:
@@ -16,10 +16,10 @@ class Files:
     def __init__(self, stem: str) -> None:
         self.names = {"picture": f"{stem}.png", "scene": f"{stem}.edited.toml", "screenshot": f"{stem}.window.png"}
 
-    def show(self, desk: Desk) -> None:
+    def show(self, editor: Editor) -> None:
         """Draws it."""
-        actions: dict[str, Callable[[Path], None]] = {"picture": desk.save_picture, "scene": desk.save_scene,
-                                                      "screenshot": desk.save_screenshot}
+        actions: dict[str, Callable[[Path], None]] = {"picture": editor.save_picture, "scene": editor.save_scene,
+                                                      "screenshot": editor.save_screenshot}
         for what, write in actions.items():
             imgui.push_id(what)
             _, self.names[what] = imgui.input_text("##file", self.names[what])
@@ -28,7 +28,7 @@ class Files:
                 write(Path(self.names[what]))
             imgui.pop_id()
         imgui.separator_text("Steps")
-        live = desk.live
+        live = editor.live
         for name, can, take in (("undo", live.can_undo, live.undo), ("redo", live.can_redo, live.redo)):
             imgui.begin_disabled(not can)
             if imgui.button(name):

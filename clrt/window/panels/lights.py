@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 
 from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ...scene.model import Camera, Environment
-from ..desk import ROUND, Desk
+from ..editor import ROUND, Editor
 from ..fields import edit_fields
 from ..lists import change, pick
 from ..navigation import distance
@@ -22,32 +22,32 @@ class Lights:
     def __init__(self) -> None:
         self.chosen = 0
 
-    def show(self, desk: Desk) -> None:
+    def show(self, editor: Editor) -> None:
         """Draws it."""
-        scene = desk.scene
+        scene = editor.scene
         self.chosen = pick("##lights", [light.kernel for light in scene.lights], self.chosen)
         lights, self.chosen = change(scene.lights, self.chosen, _new(scene.camera))
         if lights:
             imgui.push_id("light")
-            lights[self.chosen] = self._edited(desk, lights[self.chosen])
+            lights[self.chosen] = self._edited(editor, lights[self.chosen])
             imgui.pop_id()
         if len(lights) != len(scene.lights) or any(new is not old for new, old in zip(lights, scene.lights)):
-            desk.edit(lights=lights)
+            editor.edit(lights=lights)
         imgui.separator_text("Environment")
         imgui.push_id("environment")
-        environment = _edited_sky(desk.scene.environment, desk.step)
+        environment = _edited_sky(editor.scene.environment, editor.step)
         imgui.pop_id()
-        if environment is not desk.scene.environment:
-            desk.edit(environment=environment)
+        if environment is not editor.scene.environment:
+            editor.edit(environment=environment)
 
-    def _edited(self, desk: Desk, light: Light) -> Light:
-        light = edit_fields(light, desk.step)
+    def _edited(self, editor: Editor, light: Light) -> Light:
+        light = edit_fields(light, editor.step)
         if isinstance(light, DirectionalLight):
             return light
-        changed, moves = imgui.checkbox("moves", desk.moving_light == self.chosen)
+        changed, moves = imgui.checkbox("moves", editor.moving_light == self.chosen)
         imgui.set_item_tooltip(f"It circles round what the camera looks at, once in {ROUND:g} seconds.")
         if changed:
-            desk.moving_light = self.chosen if moves else None
+            editor.moving_light = self.chosen if moves else None
         return light
 
 

@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 from ...scene.material import SHARED, Material
 from ...scene.editing import free_name
 from ...scene.materials import MATERIALS, Diffuse
-from ..desk import Desk
+from ..editor import Editor
 from ..fields import choose, edit_fields
 
 TYPES = {kind.kernel: kind for kind in MATERIALS}
@@ -23,23 +23,23 @@ class Materials:
     def __init__(self) -> None:
         self.chosen = ""
 
-    def show(self, desk: Desk) -> None:
+    def show(self, editor: Editor) -> None:
         """Draws it."""
-        materials = desk.materials
+        materials = editor.materials
         names = list(materials)
         self.chosen = choose("##material", names, self.chosen if self.chosen in names else names[0]) if names else ""
         imgui.same_line()
         if imgui.button("add"):
             self.chosen = free_name("material", names)
-            desk.edit(materials={**desk.scene.materials, self.chosen: Diffuse()})
-        if self.chosen not in desk.materials:
+            editor.edit(materials={**editor.scene.materials, self.chosen: Diffuse()})
+        if self.chosen not in editor.materials:
             return
-        old = desk.materials[self.chosen]
+        old = editor.materials[self.chosen]
         imgui.push_id("material")
-        new = _edited(old, desk.step)
+        new = _edited(old, editor.step)
         imgui.pop_id()
         if new is not old:
-            desk.repaint(old, new)
+            editor.repaint(old, new)
 
 
 def _edited(material: Material, step: float) -> Material:

@@ -11,8 +11,8 @@ from imgui_bundle import imgui
 from ...accel.kernels import BUILDER_NAMES, TREES, TRIANGLE_TESTS
 from ...live.settings import Settings
 from ...output.view import VIEWS
-from ..desk import Desk
-from ..developing import Look
+from ..editor import Editor
+from ..tone_mapping import Look
 from ..fields import choose, edit, edit_fields
 
 #: The settings that are one of these, by name; None is the one that suits device and scene.
@@ -23,42 +23,42 @@ NUMBERS: dict[str, Any] = {"samples": Annotated[int, Ge(1), Le(64)], "scale": An
                            "frame_rate": Annotated[float, Ge(0), Le(120)], "denoise": bool}
 
 
-def show(desk: Desk) -> None:
+def show(editor: Editor) -> None:
     """Draws the panel."""
     imgui.push_id("render")
-    render = edit_fields(desk.scene.render, desk.step)
-    if render is not desk.scene.render:
-        desk.edit(render=render)
+    render = edit_fields(editor.scene.render, editor.step)
+    if render is not editor.scene.render:
+        editor.edit(render=render)
     imgui.separator_text("Tracing")
-    settings = _edited(desk, desk.settings)
-    if settings is not desk.settings:
-        desk.choose(settings)
+    settings = _edited(editor, editor.settings)
+    if settings is not editor.settings:
+        editor.choose(settings)
     imgui.separator_text("Display")
-    desk.look = Look(choose("view", [*VIEWS, "aces"], desk.look.view),
-                     edit("exposure", Annotated[float, Ge(-10), Le(10)], desk.look.exposure, desk.step))
+    editor.look = Look(choose("view", [*VIEWS, "aces"], editor.look.view),
+                       edit("exposure", Annotated[float, Ge(-10), Le(10)], editor.look.exposure, editor.step))
     imgui.pop_id()
 
 
-def _edited(desk: Desk, settings: Settings) -> Settings:
+def _edited(editor: Editor, settings: Settings) -> Settings:
     changed: dict[str, Any] = {}
     for field in fields(settings):
         name, old = field.name, getattr(settings, field.name)
         if name == "device":
-            new = _device(desk, old)
+            new = _device(editor, old)
         elif name in CHOICES:
             new = choose(name, CHOICES[name], old, "automatic")
         else:
-            new = edit(name, NUMBERS[name], old, desk.step)
+            new = edit(name, NUMBERS[name], old, editor.step)
         if new is not old:
             changed[name] = new
     return replace(settings, **changed) if changed else settings
 
 
-def _device(desk: Desk, selector: Any) -> Any:
+def _device(editor: Editor, selector: Any) -> Any:
     """A list of devices, the one at work chosen. Several that render together are none of them."""
-    names = [f"{info.name} ({info.platform})" for info in desk.devices]
-    ids = [info.id for info in desk.devices]
-    at_work = selector if selector in ids else desk.snapshot.device
-    now = next((i for i, info in enumerate(desk.devices) if at_work in (info.id, info.name)), -1)
+    names = [f"{info.name} ({info.platform})" for info in editor.devices]
+    ids = [info.id for info in editor.devices]
+    at_work = selector if selector in ids else editor.snapshot.device
+    now = next((i for i, info in enumerate(editor.devices) if at_work in (info.id, info.name)), -1)
     changed, chosen = imgui.combo("device", now, names)
     return ids[chosen] if changed else selector

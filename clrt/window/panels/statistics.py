@@ -8,7 +8,7 @@ import numpy as np
 from imgui_bundle import hello_imgui, imgui, implot
 
 from ...live.snapshot import Snapshot
-from ..desk import Desk
+from ..editor import Editor
 
 #: The plot's height in lines of text.
 LINES = 9
@@ -16,9 +16,9 @@ LINES = 9
 TICKS = [step * 10.0**power for power in range(-5, 5) for step in (1, 2, 5)]
 
 
-def show(desk: Desk) -> None:
+def show(editor: Editor) -> None:
     """Draws the panel."""
-    snapshot = desk.snapshot
+    snapshot = editor.snapshot
     _table("progress", _progress(snapshot))
     _noise(snapshot)
     _table("means", _means(snapshot))

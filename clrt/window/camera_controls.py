@@ -22,7 +22,7 @@ LONGEST = 0.1
 
 
 @dataclass
-class Hands:
+class CameraControls:
     """mode: what dragging does, "look" or "orbit"; pace: what a second of walking covers of the distance to what the
     camera looks at."""
 

@@ -23,8 +23,8 @@ from .remote import identity, introduce, render_whole
 PLENTY = 3
 
 
-class Wholes:
-    """Pictures by name. order: what a worker is to render for a name; a result is `studio.render`'s."""
+class WholePictures:
+    """Pictures by name. order: what a worker is to render for a name; a result is `band_renderer.render`'s."""
 
     def __init__(self, cluster: Cluster, names: Sequence[str], order: Callable[[str], PictureOrder],
                  devices: tuple[str | int, ...] = ()) -> None:

@@ -40,7 +40,7 @@ class Superseded(Exception):
     """Something else was asked for meanwhile."""
 
 
-class Studio:
+class LiveRenderer:
     """Keeps what the next picture can use of the last one.
 
     on_phase: hears what begins, and raises Superseded where that has become useless.

@@ -17,16 +17,16 @@ from ..errors import ClrtError
 from ..live.live import Live
 from ..live.settings import Settings
 from ..live.snapshot import Snapshot
+from ..output.images import write_image
+from ..output.scenes import save_scene
+from ..scene.editing import materials_of, with_material
 from ..scene.lights import DirectionalLight
 from ..scene.material import Material
 from ..scene.model import Camera, Scene
-from ..scene.editing import materials_of, with_material
-from ..output.images import write_image
-from ..output.scenes import save_scene
-from .developing import Developer, Look
-from .hands import Hands
+from .camera_controls import CameraControls
 from .navigation import around, distance
 from .screenshot import screenshot
+from .tone_mapping import Look, ToneMapper
 
 _log = logging.getLogger(__name__)
 #: What a pixel of dragging a coordinate moves, over the camera's distance.
@@ -35,13 +35,13 @@ STEP = 1 / 500
 ROUND = 8.0
 
 
-class Desk:
+class Editor:
     """The scene and the settings are the session's own. message: what could not be done last, or was done; frames: how
     many were drawn; moving_light: the number of the one that circles round what the camera looks at."""
 
     def __init__(self, live: Live, look: Look, devices: Sequence[DeviceInfo]) -> None:
         self.live, self.look, self.devices = live, look, devices
-        self.developer, self.hands = Developer(), Hands()
+        self.tone_mapper, self.controls = ToneMapper(), CameraControls()
         self.message, self.frames = "", 0
         self.moving_light: int | None = None
         self._dragging = False
@@ -128,7 +128,7 @@ class Desk:
     def close(self) -> None:
         """Ends its threads, once files are written."""
         self._writer.shutdown()
-        self.developer.close()
+        self.tone_mapper.close()
 
     def attempt(self, do: Callable[[], object]) -> None:
         """Does something that may be refused; says why if it is."""
@@ -141,7 +141,7 @@ class Desk:
     def frame(self) -> None:
         """What is to be done in every frame, before the panels are drawn."""
         self.frames += 1
-        self.developer.ask(self.snapshot, self.look)
+        self.tone_mapper.ask(self.snapshot, self.look)
         if self._dragging and not imgui.is_any_item_active():
             self._show(self.scene)
         self._move_light()

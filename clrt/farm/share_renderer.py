@@ -23,7 +23,7 @@ _at_work = Lock()
 PROOF_TILES, MOST_TILES = 16, 2048
 
 
-class Easel:
+class ShareRenderer:
     """The order's scene, compiled for this worker's devices. DeviceError, KernelError, NoRoomError."""
 
     def __init__(self, order: Order) -> None:

@@ -23,7 +23,7 @@ class Look:
 
 
 @dataclass(frozen=True, eq=False)
-class Developed:
+class ToneMapped:
     """rgba: (height, width, 4) uint8 of a snapshot as `look` shows it; error: why it is not, and black instead."""
 
     snapshot: Snapshot
@@ -32,18 +32,18 @@ class Developed:
     error: str | None = None
 
 
-class Developer:
+class ToneMapper:
     """The thread. What is asked of it last is done next; what came in between is left out."""
 
     def __init__(self) -> None:
         self._asked: tuple[Snapshot, Look] | None = None
         self._changed, self._closed = threading.Condition(), False
-        self.newest: Developed | None = None
+        self.newest: ToneMapped | None = None
         self._thread = threading.Thread(target=self._run, daemon=True, name="clrt develops")
         self._thread.start()
 
     def ask(self, snapshot: Snapshot, look: Look) -> None:
-        """Has a picture developed, if that has not been asked for before."""
+        """Has a picture tone mapped, if that has not been asked for before."""
         with self._changed:
             if self._asked is None or self._asked[0] is not snapshot or self._asked[1] != look:
                 self._asked = snapshot, look
@@ -64,10 +64,10 @@ class Developer:
                 if self._closed or self._asked is None:
                     return
                 done = self._asked
-            self.newest = developed(*done)
+            self.newest = tone_mapped(*done)
 
 
-def developed(snapshot: Snapshot, look: Look) -> Developed:
+def tone_mapped(snapshot: Snapshot, look: Look) -> ToneMapped:
     """The picture as `clrt render --view --exposure` writes it to a .png."""
     data, error = shown_data(snapshot.scene.render.integrator, snapshot.pixels), None
     try:
@@ -75,4 +75,4 @@ def developed(snapshot: Snapshot, look: Look) -> Developed:
     except ClrtError as problem:
         levels, error = np.zeros(snapshot.pixels.shape, np.uint8), str(problem)
     opaque = np.full((*levels.shape[:2], 1), 255, np.uint8)
-    return Developed(snapshot, look, np.concatenate([levels, opaque], axis=2), error)
+    return ToneMapped(snapshot, look, np.concatenate([levels, opaque], axis=2), error)
