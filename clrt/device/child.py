@@ -25,13 +25,14 @@ def end_child(child: subprocess.Popen[str]) -> None:
         child.wait(1.0)
 
 
-def cpu_seconds(child: subprocess.Popen[str]) -> float:
-    """The processor time that it took so far; 0 where that is not known (it has ended, or this is not Linux)."""
+def activity(child: subprocess.Popen[str]) -> tuple[float, bool]:
+    """The processor time that it took so far, and whether it wants more, or waits for a disk; (0, False) where that is
+    not known (it has ended, or this is not Linux)."""
     try:
         fields = Path(f"/proc/{child.pid}/stat").read_text(errors="replace").rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"), fields[0] in "RD"
     except (OSError, IndexError, ValueError):
-        return 0.0
+        return 0.0, False
 
 
 def told_end(code: int) -> str:

@@ -14,13 +14,14 @@ import time
 from collections.abc import Sequence
 from typing import IO
 
-from .child import cpu_seconds, end_child, last_line, start_child, told_end
+from .child import activity, end_child, last_line, start_child, told_end
 from .describe import describe, size_of
 from .loader import devices_of, load
 
 #: Seconds that all probes together may take. A slow start of many GPUs is no hang.
 LIMIT = 7.0
-#: On a busy machine they may take longer: so many times, as long as a probe computes in so many seconds at least once.
+#: On a busy machine they may take longer: so many times, as long as a probe computes, or waits for a processor or a
+#: disk, in so many seconds at least once.
 PATIENCE, IDLE = 10.0, 2.0
 
 
@@ -41,13 +42,13 @@ def probe(libraries: Sequence[str], limit: float = LIMIT) -> list[str]:
 def _wait(children: Sequence[subprocess.Popen[str]], limit: float) -> None:
     """Until all have ended, or those that have not do nothing, or have had the time of all for themselves."""
     start = time.monotonic()
-    busy = {child: (0.0, start) for child in children}     # the processor time that each took, and when that last grew
+    busy = {child: (0.0, start) for child in children}     # the processor time of each, and when it last did anything
     while busy:
         time.sleep(0.02)
         now = time.monotonic()
         for child, (before, since) in list(busy.items()):
-            seconds = cpu_seconds(child)
-            busy[child] = before, since = (seconds, now) if seconds > before else (before, since)
+            seconds, waits = activity(child)
+            busy[child] = before, since = (seconds, now) if seconds > before or waits else (before, since)
             late = now - start > limit and (now - since > min(IDLE, limit) or before > limit)
             if child.poll() is not None or late or now - start > PATIENCE * limit:
                 del busy[child]

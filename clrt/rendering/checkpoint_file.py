@@ -14,7 +14,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from math import prod
 from pathlib import Path
@@ -46,12 +47,11 @@ def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, k
     line = json.dumps({"header": header, "shapes": shapes}).encode() + b"\n"
     try:
         with open(temporary, "wb") as file:
-            digest = hashlib.sha256()
             pieces: list[bytes | memoryview] = [MAGIC, line, *map(_bytes, arrays.values())]
-            for piece in pieces:
-                digest.update(piece)
-                file.write(piece)
-            file.write(digest.digest())
+            with ThreadPoolExecutor(1) as other:    # both take their time, and neither needs Python's lock
+                digest = other.submit(_digest, pieces)
+                file.writelines(pieces)
+                file.write(digest.result())
             file.flush()
             os.fsync(file.fileno())
         if keep_older:
@@ -100,6 +100,13 @@ def _header(line: bytes, kinds: Mapping[str, np.dtype[Any]]) -> tuple[dict[str, 
     if not good:
         raise ValueError("is damaged: its header makes no sense")
     return header, shapes
+
+
+def _digest(pieces: Iterable[bytes | memoryview]) -> bytes:
+    digest = hashlib.sha256()
+    for piece in pieces:
+        digest.update(piece)
+    return digest.digest()
 
 
 def _bytes(array: NDArray[Any]) -> memoryview:

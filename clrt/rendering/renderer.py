@@ -170,6 +170,7 @@ class Renderer:
     def _passes(self, spp: int | None, time: float | None, error: float | None,
                 reference: NDArray[np.float32] | None) -> Iterator[State]:
         self._clock = clock.perf_counter() - self.seconds
+        self._catch_up()
         self.stop_reason = self._reached(spp, time, error)
         if self.stop_reason is not None:
             yield self.state(reference)
@@ -181,20 +182,21 @@ class Renderer:
             now, done = clock.perf_counter(), self.session.samples_done
             if self.stop_reason is None and spp is not None and done >= spp:
                 self.stop_reason = "spp"
+            self._heed_interrupt()
             looks = error is not None and self._is_check(done)
             due = now >= next_state or done & (done - 1) == 0 or looks or self._adapts
             if self.stop_reason is None and not due:
                 continue
             film = self._film()
-            if self._halfway:
-                self._keep(film, last=True)     # at once: history and estimate have nothing of this pass
+            in_haste = self._in_haste
+            if in_haste:
+                self._keep(film, last=True)
             state = self._record_state(film, reference)
             if self.stop_reason is None and looks and low_enough(state.stops_by, error):
                 self.stop_reason = "error"
-            if self.stop_reason is None and self._interrupted:    # while it made this state
-                self.stop_reason, self._interrupted = "interrupted", False
+            self._heed_interrupt()    # while it made this state
             next_state = now + max(STATE_SECONDS, STATE_COST * (clock.perf_counter() - now))
-            if not self._halfway:
+            if not in_haste:
                 self._keep(film, last=self.stop_reason is not None)
             yield state
 
@@ -212,9 +214,9 @@ class Renderer:
 
     def _state_of(self, film: Film, reference: NDArray[np.float32] | None) -> State:
         tile_samples = self.session.tile_samples
-        self._noise.add(film, tile_samples)
-        # The pass that it was interrupted in adds to no estimate: what was known before it is told at once.
-        noise = self._noise.at(self._last.film if self._halfway and self.history else film, tile_samples)
+        if not self._in_haste:
+            self._noise.add(film, tile_samples)
+        noise = self._noise.at(self._last.film if self._in_haste and self.history else film, tile_samples)
         of_tiles = self._noise.of_tiles(tile_samples, self.session.size, self._percentile)
         self._last = State(self.session.samples_done, self.seconds, noise, relmse(film, reference), film, of_tiles)
         return self._last
@@ -240,8 +242,8 @@ class Renderer:
             self.seconds = clock.perf_counter() - self._clock
             if self._abandoned:
                 return
-            if self._interrupted:
-                self.stop_reason, self._interrupted = "interrupted", False
+            self._heed_interrupt()
+            if self._in_haste:
                 return
             if time is not None and self.seconds >= time and self.session.samples_done:
                 self.stop_reason = "time"
@@ -276,16 +278,28 @@ class Renderer:
         self.seconds = clock.perf_counter() - self._clock
         return self.session.film()
 
+    def _heed_interrupt(self) -> None:
+        if self.stop_reason is None and self._interrupted:
+            self.stop_reason, self._interrupted = "interrupted", False
+
     @property
-    def _halfway(self) -> bool:
-        """Whether it was interrupted inside a pass, which may be gone on with."""
-        return self.stop_reason == "interrupted" and bool(self.session.work.parts)
+    def _in_haste(self) -> bool:
+        """Whether it was interrupted: then checkpoint, estimate and history have nothing of the last pass, which takes
+        time, until it is gone on with."""
+        return self.stop_reason == "interrupted"
+
+    def _catch_up(self) -> None:
+        """Does what was left out in haste, if the pass was whole."""
+        self.stop_reason = None
+        done = self.session.samples_done
+        if done and not self.session.work.parts and done != (self.history[-1]["spp"] if self.history else 0):
+            self._record_state(self.session.film(), None)
 
     def _record_state(self, film: Film, reference: NDArray[np.float32] | None) -> State:
-        """The state, and its entry in the history, unless it is of a pass that will be gone on with."""
+        """The state, and its entry in the history, unless that will be made up for."""
         state = self._state_of(film, reference)
         entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
-        if not self._halfway:
+        if not self._in_haste:
             self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
         return state
 
