@@ -24,14 +24,14 @@ from .checkpoint import open_checkpoints
 from .choices import WAVE_LANES, Choices, choices_on
 from .compile import CompiledScene
 from .compiler import Compiler
+from .convergence import Convergence
 from .crew import make_picture
 from .features import warn_of_darkness
 from .film import Film
 from .kept import Kept
-from .noise import NoiseEstimate
 from .on_device import SceneOnDevice
 from .session import depth_of
-from .state import State as State, relmse
+from .state import State as State
 from .stops import check_step, check_stops, checked_percentile, low_enough, pass_end, planned_spp
 
 #: Between two states at least this long passes, and this many times what making a state costs.
@@ -59,7 +59,6 @@ class Renderer:
     Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
 
-    history: list[dict[str, Any]]
     stop_reason: str | None
     seconds: float
 
@@ -92,10 +91,10 @@ class Renderer:
         self.session: Accumulation = self._make_picture(before.session.scenes if before else ())
         self._begin()
         self._clock, self._interrupted, self._abandoned = 0.0, False, False
-        self._last: State
         if kept:
-            self._noise, self.history, self.seconds = kept.noise, kept.history, kept.seconds
+            self._convergence.restore(kept)
             self.session.restore(kept.film, kept.work)
+            self.seconds = kept.seconds
             self.state()
 
     def _open(self, device: str | int | Device | Sequence[str | int | Device] | None, lanes: int | None,
@@ -120,10 +119,15 @@ class Renderer:
 
     def _begin(self) -> None:
         """A picture without any samples."""
-        self._noise = NoiseEstimate(self._planned_spp)
+        self._convergence = Convergence(self._planned_spp, self._percentile)
         seen = seen_first(self._aovs)   # now, so that an interrupted picture has them, too
         self._first_hits = self.session.first_hits(self.scene, seen) if seen else {}
-        self.history, self.stop_reason, self.seconds = [], None, 0.0
+        self.stop_reason, self.seconds = None, 0.0
+
+    @property
+    def history(self) -> list[dict[str, Any]]:
+        """See `Convergence`."""
+        return self._convergence.history
 
     @property
     def compiled(self) -> CompiledScene:
@@ -170,7 +174,7 @@ class Renderer:
     def _passes(self, spp: int | None, time: float | None, error: float | None,
                 reference: NDArray[np.float32] | None) -> Iterator[State]:
         self._clock = clock.perf_counter() - self.seconds
-        self._catch_up()
+        self._convergence.catch_up(self.session, self.seconds)
         self.stop_reason = self._reached(spp, time, error)
         if self.stop_reason is not None:
             yield self.state(reference)
@@ -191,7 +195,7 @@ class Renderer:
             in_haste = self._in_haste
             if in_haste:
                 self._keep(film, last=True)
-            state = self._record_state(film, reference)
+            state = self._convergence.record(film, self.session, self.seconds, reference, in_haste)
             if self.stop_reason is None and looks and low_enough(state.stops_by, error):
                 self.stop_reason = "error"
             self._heed_interrupt()    # while it made this state
@@ -210,16 +214,7 @@ class Renderer:
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
-        return self._state_of(self.session.film(), reference)
-
-    def _state_of(self, film: Film, reference: NDArray[np.float32] | None) -> State:
-        tile_samples = self.session.tile_samples
-        if not self._in_haste:
-            self._noise.add(film, tile_samples)
-        noise = self._noise.at(self._last.film if self._in_haste and self.history else film, tile_samples)
-        of_tiles = self._noise.of_tiles(tile_samples, self.session.size, self._percentile)
-        self._last = State(self.session.samples_done, self.seconds, noise, relmse(film, reference), film, of_tiles)
-        return self._last
+        return self._convergence.state(self.session.film(), self.session, self.seconds, reference, self._in_haste)
 
     def aovs(self, state: State) -> dict[str, NDArray[np.generic]]:
         """The pictures beside the state's, by the names and in the order that they were asked for."""
@@ -253,7 +248,7 @@ class Renderer:
 
     @property
     def _adapts(self) -> bool:
-        """Whether the next pass goes by the error of the tiles; the picture so far is `_last` then."""
+        """Whether the next pass goes by the error of the tiles; the picture so far is the newest state then."""
         return self.settings.adaptive and self.session.samples_done >= FLOOR_SPP
 
     def _is_check(self, done: int) -> bool:
@@ -263,7 +258,8 @@ class Renderer:
     def _adaptive_pass(self, spp: int | None) -> Iterator[None]:
         """Doubles the samples of those tiles where that takes most error away; ends the render at `spp`."""
         tile_samples = self.session.tile_samples
-        tiles = tiles_to_double(self._last.film, tile_samples, self._noise.tile_errors(tile_samples), spp)
+        tiles = tiles_to_double(self._convergence.last.film, tile_samples,
+                                self._convergence.noise.tile_errors(tile_samples), spp)
         if len(tiles) == 0:
             self.stop_reason = "spp"
         yield from self.session.double(tiles)
@@ -288,24 +284,9 @@ class Renderer:
         time, until it is gone on with."""
         return self.stop_reason == "interrupted"
 
-    def _catch_up(self) -> None:
-        """Does what was left out in haste, if the pass was whole."""
-        self.stop_reason = None
-        done = self.session.samples_done
-        if done and not self.session.work.parts and done != (self.history[-1]["spp"] if self.history else 0):
-            self._record_state(self.session.film(), None)
-
-    def _record_state(self, film: Film, reference: NDArray[np.float32] | None) -> State:
-        """The state, and its entry in the history, unless that will be made up for."""
-        state = self._state_of(film, reference)
-        entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
-        if not self._in_haste:
-            self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
-        return state
-
     def _keep(self, film: Film | None = None, last: bool = False) -> None:
         """Writes a checkpoint where one is due, or begins to write the last one; film: as it is now, if it is known."""
         if self._checkpoints is not None and (last or self._checkpoints.due):
             write = self._checkpoints.begin if last else self._checkpoints.write
             write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(),
-                       self.session.work_left(), self._noise))
+                       self.session.work_left(), self._convergence.noise))

@@ -28,5 +28,5 @@ def same(a: Renderer, b: Renderer) -> bool:
     """Whether film, samples, estimate and what the history says of powers of two are the same bit for bit."""
     histories = [{entry["spp"]: entry["noise"] for entry in r.history if entry["spp"] & (entry["spp"] - 1) == 0}
                  for r in (a, b)]
-    films = [(r.session.film().pixels, r.session.tile_samples, *r._noise.arrays()) for r in (a, b)]
+    films = [(r.session.film().pixels, r.session.tile_samples, *r._convergence.noise.arrays()) for r in (a, b)]
     return histories[0] == histories[1] and all(x.tobytes() == y.tobytes() for x, y in zip(*films))

@@ -1,0 +1,55 @@
+"""How a picture converges: its states as it grows, their estimated errors, and their history."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .accumulation import Accumulation
+from .film import Film
+from .kept import Kept
+from .noise import NoiseEstimate
+from .state import State, relmse
+
+
+class Convergence:
+    """Of one picture. history: entries of "spp", "seconds", "noise" and, with a reference, "relmse"; last: the newest
+    state. planned_spp: see `NoiseEstimate`; percentile: see `State.tile_noise`."""
+
+    last: State
+
+    def __init__(self, planned_spp: int | None, percentile: float | None) -> None:
+        self.noise, self._percentile = NoiseEstimate(planned_spp), percentile
+        self.history: list[dict[str, Any]] = []
+
+    def restore(self, kept: Kept) -> None:
+        """Goes on from what was kept."""
+        self.noise, self.history = kept.noise, kept.history
+
+    def state(self, film: Film, picture: Accumulation, seconds: float, reference: NDArray[np.float32] | None,
+              in_haste: bool) -> State:
+        """Of the picture's film after so many seconds; in haste the estimate leaves out what it does not know yet."""
+        tile_samples = picture.tile_samples
+        if not in_haste:
+            self.noise.add(film, tile_samples)
+        noise = self.noise.at(self.last.film if in_haste and self.history else film, tile_samples)
+        of_tiles = self.noise.of_tiles(tile_samples, picture.size, self._percentile)
+        self.last = State(picture.samples_done, seconds, noise, relmse(film, reference), film, of_tiles)
+        return self.last
+
+    def record(self, film: Film, picture: Accumulation, seconds: float, reference: NDArray[np.float32] | None = None,
+               in_haste: bool = False) -> State:
+        """The state, which enters the history unless it was made in haste."""
+        state = self.state(film, picture, seconds, reference, in_haste)
+        entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
+        if not in_haste:
+            self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
+        return state
+
+    def catch_up(self, picture: Accumulation, seconds: float) -> None:
+        """Records what a picture has that was last seen in haste, unless it is in the middle of a pass."""
+        done = picture.samples_done
+        if done and not picture.work.parts and done != (self.history[-1]["spp"] if self.history else 0):
+            self.record(picture.film(), picture, seconds)
