@@ -11,7 +11,7 @@ from .findings import Findings
 from .integers import check_integers
 from .masks import check_masks
 from .memory import check_memory
-from .pictures import check_furnace, check_lamp, check_room
+from .pictures import check_ball, check_furnace, check_lamp, check_room
 from .rays import check_binary_tree, check_rays, check_tree_builder
 from .samples import check_random_numbers, check_sums
 
@@ -28,5 +28,6 @@ PARTS: dict[str, Callable[[Device, Findings], None]] = {
     "tree builder": check_tree_builder,
     "furnace": check_furnace,
     "lamp": check_lamp,
+    "ball": check_ball,
     "room": check_room,
 }

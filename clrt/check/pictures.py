@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from ..device.open import Device
 from ..rendering.film import Film
 from ..rendering.renderer import Renderer
-from ..scene.lights import PointLight
+from ..scene.lights import DirectionalLight, PointLight
 from ..scene.materials import Diffuse, Material, Mirror
 from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
 from .effort import effort, share
@@ -60,6 +60,27 @@ def check_lamp(device: Device, findings: Findings) -> None:
     inside = (least * (1 - 1e-5) <= film.mean) & (film.mean <= most * (1 + 1e-5))
     findings.expect(inside.ravel(), "light of a lamp on a floor", ("gave", film.mean.ravel()),
                     ("not between", least.ravel()), ("and", most.ravel()))
+
+
+def check_ball(device: Device, findings: Findings) -> None:
+    """A ball that shines, in the sun: e + color/π · E · cos θ of some point that is seen, without any noise.
+
+    So it must be known at each of its points that the ball itself, from which lights are chosen, too, brings nothing
+    there: a difference that rounding leaves on either side of 0, on each device in its way.
+    """
+    color, shine, sun, radius = (0.8, 0.5, 0.2), (0.1, 0.2, 0.3), (3.0, 2.0, 1.0), 0.7
+    center, towards, distance = np.array([0.3, -0.2, 0.1]), np.array([0.36, 0.48, 0.8]), 7.0
+    x, y, z = (center + distance * towards).tolist()
+    corner = np.arcsin(0.3 * radius / distance)    # of the picture, from the middle of the view
+    film = _film(device, findings, Scene(
+        spheres=[Sphere(center=(0.3, -0.2, 0.1), radius=radius, material=Diffuse(color=color, emission=shine))],
+        lights=[DirectionalLight(direction=(-0.36, -0.48, -0.8), irradiance=sun)],
+        camera=Camera(position=(x, y, z), look_at=(0.3, -0.2, 0.1),
+                      fov_degrees=float(np.degrees(2 * np.arctan(np.tan(corner) / np.sqrt(2)))))), spp=16, max_depth=2)
+    light, least_cosine = np.multiply(color, sun) / np.pi, np.cos(np.arcsin(0.3) - corner)
+    inside = (shine + least_cosine * light <= film.mean * (1 + 1e-5)) & (film.mean <= (shine + light) * (1 + 1e-5))
+    findings.expect(inside.reshape(-1, 3).all(axis=1), "light of the sun on a ball that shines",
+                    ("gave", film.mean.reshape(-1, 3)))
 
 
 def check_room(device: Device, findings: Findings) -> None:

@@ -15,6 +15,8 @@ Doubles = NDArray[np.float64]
 #: By how much the cones of spots are widened, in radians and in the cosine, since float32 rounds what they are compared
 #: with.
 WIDER, LESS = 1e-3, 2e-6
+#: By how much balls are made smaller, over the size of their coordinates: by more than what rounding adds to them.
+SMALLER = 2.0**-20
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +49,16 @@ def flat_lights(corners: Doubles, normal: Doubles, intensity: Doubles) -> LightG
 
 
 def round_lights(center: Doubles, radius: Doubles, intensity: Doubles) -> LightGroups:
-    """Balls, (n, 3) and (n,), that shine everywhere."""
+    """Balls, (n, 3) and (n,), that shine everywhere, or points.
+
+    A ball brings nothing to its own surface. There that hangs on the last digit of a difference, which compilers round
+    in their own ways, so balls are taken for a little smaller: where one rises above the horizon by no more than that,
+    its light is left to paths that meet it by chance.
+    """
     around = radius[:, None]
     everywhere = -np.ones(len(center))
-    return LightGroups(center - around, center + around, radius, np.zeros_like(center), everywhere, intensity,
+    smaller = np.maximum(radius - SMALLER * (np.linalg.norm(center, axis=1) + radius), 0)
+    return LightGroups(center - around, center + around, smaller, np.zeros_like(center), everywhere, intensity,
                        0 * everywhere)
 
 

@@ -33,6 +33,8 @@ SABOTAGES = {
     "paint that swallows light": ("furnace", r"sample.weight = (m->color);",
                                   r"sample.weight = scale(\1, (real)(0.999999f));"),
     "light that does not fade": ("lamp", r"inverse \* inverse", "inverse"),
+    "balls that light themselves": ("ball", r"best_cosine\(dot3\(n, d\), distance, r\)",
+                                    "best_cosine(dot3(n, d), distance, 1.0001f * r)"),
     "weights that sum to two": ("room", r"return 1.0f / \(1.0f \+ ratio \* ratio\);", "return ONE;"),
     "a density off by a tenth": ("room", r"return t \* t / \(absolute", "return 1.1f * t * t / (absolute"),
 }

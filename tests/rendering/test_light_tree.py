@@ -13,6 +13,7 @@ from clrt.rendering.compile import compile_scene
 from clrt.scene.lights import PointLight
 from clrt.scene.materials import Diffuse
 from clrt.scene.model import Mesh, Scene, Sphere
+from clrt.study.cases.subject import unit_vectors
 from clrt.study.probe import Probe, choices
 from clrt.study.significance import chi2_test, sidak
 
@@ -95,6 +96,21 @@ def test_no_light_that_can_be_seen_is_left_out(device: Device, count: int) -> No
         assert np.all(mass[seen] > 0)
         left += int(np.sum(mass == 0))
     assert left > 0.1 * count * 50     # about half are below the horizon
+
+
+def test_balls_bring_nothing_to_their_own_surface(device: Device) -> None:
+    """However the point is rounded; where the normal is turned by a tenth, some of the ball is above the horizon."""
+    rng = np.random.default_rng(5)
+    centers, radii, shining = rng.normal(size=(20, 3)), 10 ** rng.uniform(-2, 0, 20), Diffuse(emission=(1.0, 1.0, 1.0))
+    probe = Probe(device, Scene(spheres=[Sphere(center=(x, y, z), radius=radius, material=shining)
+                                         for (x, y, z), radius in zip(centers.tolist(), radii.tolist())]))
+    own = np.arange(1, 20).repeat(100)    # not the first, which is chosen where none brings anything
+    normals = unit_vectors(rng, len(own))
+    points = probe.compiled.frame.points(centers[own] + radii[own, None] * normals)
+    aside = normals + 0.1 * np.cross(normals, unit_vectors(rng, len(own)))
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    assert not np.any(probe("light_probability", 1, points, normals, own))
+    assert np.mean(probe("light_probability", 1, points, aside, own) > 0) > 0.98
 
 
 def test_few_lights_are_chosen_by_what_they_bring(device: Device) -> None:
