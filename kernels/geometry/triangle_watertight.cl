@@ -119,11 +119,12 @@ static inline ShearedHit intersect_sheared(const wide p0[3], const wide p1[3], c
     result.hit.t = weighted(u, v, w, ta, tb, tc) * result.inverse_det;
     result.hit.u = v * result.inverse_det;
     result.hit.v = w * result.inverse_det;
-    wide_mask inside = result.hit.hit;
-    wide_mask thin = WIDE_ABS(u + v + w) < THIN * wide_max3(WIDE_ABS(edges.u1), WIDE_ABS(edges.v1), WIDE_ABS(edges.w1));
-    wide_mask ahead = inside & (result.hit.t > 0.0f), possible = ahead | (inside & thin);
+    wide_mask ahead = result.hit.hit & (result.hit.t > 0.0f);
+    wide_mask beside = result.hit.hit & (wide_min3(ta, tb, tc) <= 0.0f) & (wide_max3(ta, tb, tc) >= 0.0f);
     result.hit.hit = ahead & (result.hit.t <= t_max);
-    wide_mask beside = possible & (wide_min3(ta, tb, tc) <= 0.0f) & (wide_max3(ta, tb, tc) >= 0.0f);
+    if (!WIDE_ANY(beside)) return result;
+    wide_mask thin = WIDE_ABS(u + v + w) < THIN * wide_max3(WIDE_ABS(edges.u1), WIDE_ABS(edges.v1), WIDE_ABS(edges.w1));
+    beside = beside & (ahead | thin);
     if (!WIDE_ANY(beside)) return result;
     wide reach = wide_max3(wide_far(a.x, a.y), wide_far(b.x, b.y), wide_far(c.x, c.y));
     wide depth = wide_max3(WIDE_ABS(a.z), WIDE_ABS(b.z), WIDE_ABS(c.z));
