@@ -6,6 +6,7 @@ is as it should be.
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import tempfile
@@ -24,8 +25,8 @@ def outcome(file: Path, picture: Path) -> tuple[str, str]:
         done = subprocess.run([*command, "--progress", "json"], capture_output=True, text=True, timeout=LIMIT)
     except subprocess.TimeoutExpired:
         return "hang", ""
-    said = [line.replace(f"{file}: ", "").removeprefix("error: ") for line in done.stderr.splitlines()
-            if not line.startswith("{")]
+    told = [json.loads(line).get("warning") if line.startswith("{") else line for line in done.stderr.splitlines()]
+    said = [line.replace(f"{file}: ", "").removeprefix("error: ") for line in told if line]
     kinds = {0: "picture", 3: "error"}
     kind = "traceback" if "Traceback" in done.stderr else kinds.get(done.returncode, f"code {done.returncode}")
     return kind, "; ".join(said)

@@ -81,9 +81,9 @@ class TwoLevels:
         device, form = self._device, self._form
         first_node = form.room(len(self._mesh)) + _starts([len(tree.buffers["nodes"]) for tree in trees])
         first_leaf = _starts([len(tree.buffers.get(form.leaves, ())) for tree in trees])
-        buffers = {"nodes": room_for(device, form.node, first_node[-1])}
+        buffers = {"nodes": room_for(device, form.node, int(first_node[-1]))}
         if leaves := [tree.buffers[form.leaves] for tree in trees if form.leaves in tree.buffers]:
-            buffers[form.leaves] = room_for(device, leaves[0].dtype, first_leaf[-1])
+            buffers[form.leaves] = room_for(device, leaves[0].dtype, int(first_leaf[-1]))
         for tree, node, leaf in zip(trees, first_node, first_leaf):
             nodes = (on_host(device, tree.buffers["nodes"]) if device else tree.buffers["nodes"]).copy()
             form.shift(nodes, node, leaf)

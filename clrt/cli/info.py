@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 from collections import Counter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .options import tracing_options
+
+if TYPE_CHECKING:
+    from ..device.open import Device
 
 
 @click.command()
@@ -17,10 +20,12 @@ from .options import tracing_options
 @click.option("--materials", "list_materials", is_flag=True, help="List all types of material and presets instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @click.option("--aov", "aovs", multiple=True, metavar="NAME,...", help="With what these pictures beside it need.")
+@click.option("--device", "selector", metavar="SEL",
+              help="For which device; see `clrt devices`. Default: the best, or a CPU where there is none.")
 @tracing_options
-def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple[str, ...], lanes: int | None,
-            paths: str | None, triangle: str, box: str, sphere: str, offset: str, builder: str | None,
-            layout: str | None, tree: bool | None) -> None:
+def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple[str, ...], selector: str | None,
+            lanes: int | None, paths: str | None, triangle: str, box: str, sphere: str, offset: str,
+            builder: str | None, layout: str | None, tree: bool | None) -> None:
     """Show what SCENE contains and what is compiled for it; renders nothing and needs no device."""
     if list_materials:
         from .material_list import material_lines
@@ -32,16 +37,17 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
         raise click.UsageError("Missing argument 'SCENE'; write a scene file or a model, or --materials")
     from ..accel.kernels import HitTests
     from ..rendering.aovs import chosen_aovs, needs_direct_light, seen_first
-    from ..rendering.choices import Choices
+    from ..rendering.choices import WAVE_LANES, Choices, choices_on
     from ..rendering.compile import compile_scene
     from ..rendering.first_hits import first_hit_program
     from ..scene.file import load
 
     names = chosen_aovs(",".join(aovs)) if aovs else ()
     content = load(scene)
-    choices = Choices(lanes or 8, layout, builder, HitTests(triangle, box, sphere), offset, needs_direct_light(names),
-                      paths, tree)
-    compiled = compile_scene(content, choices)
+    choices = Choices(lanes or WAVE_LANES, layout, builder, HitTests(triangle, box, sphere), offset,
+                      needs_direct_light(names), paths, tree)
+    device = _device(selector)
+    compiled = compile_scene(content, choices_on(device, choices, lanes) if device else choices, device=device)
     built = compiled.tree
     materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}
     materials |= {instance.material or instance.mesh.material for instance in content.instances}
@@ -75,6 +81,16 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
         elif isinstance(value, list):
             value = " ".join(value) or "none"
         click.echo(f"{name:13} {_short(value)}")
+
+
+def _device(selector: str | None) -> Device | None:
+    """The device that would render; None where there is none and none is asked for."""
+    from ..device.discover import find_devices
+    from ..device.open import open_device
+
+    if selector is None and not any(info.chosen for info, _ in find_devices()):
+        return None
+    return open_device(selector)
 
 
 def _short(value: Any) -> str:

@@ -59,6 +59,14 @@ def on_device(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
     return cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=array)
 
 
+def lent(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
+    """A buffer to read from only: on a CPU the numpy array itself, which must not change then; elsewhere `on_device`.
+    """
+    if isinstance(array, DeviceArray) or device.info.type != "cpu" or not array.flags.c_contiguous:
+        return on_device(device, array)
+    return cl.Buffer(device.context, cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR, hostbuf=array)
+
+
 def resident(device: Device, array: NDArray[Any] | DeviceArray) -> DeviceArray:
     """The device array itself, or a new one with a copy of a numpy array."""
     return array if isinstance(array, DeviceArray) else DeviceArray(on_device(device, array), array.dtype, len(array))

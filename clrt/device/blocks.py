@@ -9,6 +9,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 
+from .arrays import lent
 from .loops import loop_turns
 from .open import Device
 from .pages import advise_huge_pages
@@ -63,10 +64,9 @@ class Blocks:
 
     def lend(self, values: NDArray[Any]) -> cl.Buffer:
         """What kernels may read `values` from until `finish`: on a CPU the array itself, elsewhere a copy."""
-        if self.device.info.type != "cpu" or not values.size:
+        if not values.size:
             return self.upload(values)
-        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
-        return self._counted(cl.Buffer(self.device.context, flags, hostbuf=np.ascontiguousarray(values)))
+        return self._counted(lent(self.device, np.ascontiguousarray(values)))
 
     def finish(self) -> None:
         """Waits for all that was asked for."""

@@ -11,7 +11,7 @@ from ..accel.build import build_tree
 from ..accel.layouts import Layout
 from ..accel.two_level import TwoLevels
 from ..device.open import Device
-from ..scene.model import Environment
+from ..scene.model import Environment, Mesh
 from .environment import Sky, pack_sky
 from .placements import Placements
 
@@ -37,11 +37,12 @@ class Carried:
             self._sky, self._environment = pack_sky(environment), environment
         return self._sky
 
-    def tree(self, device: Device | None, layout: str, builder: str | None, triangles: FloatArray, spheres: FloatArray,
-             test: str, placements: Placements) -> Layout:
-        """The tree over triangles (m, 3, 3) and spheres (s, 4), and over instances if there are any."""
-        names = layout, builder, test, len(placements.materials)
-        arrays = [triangles, spheres, placements.mesh, placements.starts]
+    def tree(self, device: Device | None, layout: str, builder: str | None, meshes: list[Mesh], triangles: FloatArray,
+             spheres: FloatArray, test: str, placements: Placements) -> Layout:
+        """The tree over the meshes' triangles (m, 3, 3) and spheres (s, 4), and over instances if there are any."""
+        names = layout, builder, test, len(placements.materials), len(meshes)
+        arrays = [spheres, placements.mesh, placements.starts]  # meshes' own arrays are half as large as triangles
+        arrays += [array for mesh in meshes for array in (mesh.vertices, mesh.faces)]
         same = names == self._names and all(map(np.array_equal, arrays, self._arrays))
         if not (self._tree and same):
             self._names, self._arrays, self._levels = names, arrays, None

@@ -11,7 +11,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ..device.arrays import on_device, on_host, same_content
+from ..device.arrays import lent, on_host, same_content
 from ..device.background import in_background
 from ..device.launch import calling, wait_for
 from ..device.memory import array_bytes, check_memory, part_count, part_records, parts, size
@@ -74,9 +74,9 @@ class SceneOnDevice:
 
     def _uploaded(self, array: Any) -> list[cl.Buffer]:
         if self.compiled.part_bytes is None:
-            return [on_device(self.device, array)]
+            return [lent(self.device, array)]
         values = on_host(self.device, array)
-        return [on_device(self.device, part) for part in parts(values, self.compiled.part_bytes)]
+        return [lent(self.device, part) for part in parts(values, self.compiled.part_bytes)]
 
     def _buffer(self, name: str, array: Any) -> list[cl.Buffer] | None:
         """The buffer of this name, if it holds the same as an array."""

@@ -61,7 +61,8 @@ class Shapes:
         in_tree, test = self.spheres[:0] if self.lone else self.spheres, choices.tests.triangle
         layout = choices.layout or fitting_layout(device, len(self.triangles), len(in_tree), test,
                                                   bool(self.scene.instances), choices.tree)
-        return carried.tree(device, layout, choices.builder, self.triangles, in_tree, test, self.placements)
+        return carried.tree(device, layout, choices.builder, self.scene.meshes, self.triangles, in_tree, test,
+                            self.placements)
 
     def buffers(self, codes: NDArray[np.int32], emitters: Emitters) -> dict[str, tuple[str, Any]]:
         """What surfaces are made of; codes: of the users' materials."""

@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 from clrt.accel.kernels import BOX_TESTS, BUILDER_NAMES, SPHERE_TESTS, TREES, TRIANGLE_TESTS
 from clrt.cli import bench_rays, info, render
+from clrt.errors import DeviceError
 from clrt.rendering.choices import OFFSETS
 
 KNOWN: dict[str, Iterable[str]] = {"triangle": TRIANGLE_TESTS, "box": BOX_TESTS, "sphere": SPHERE_TESTS,
@@ -40,3 +41,15 @@ def test_what_is_chosen_is_compiled(tmp_path: Path) -> None:
     for file in ("geometry/triangle_precomputed.cl", "geometry/box_plain.cl", "geometry/sphere_textbook.cl",
                  "offset/ulp.cl"):
         assert file in json.loads(listed.stdout)["files"] and f'"{file}"' in printed.stdout
+
+
+def test_info_is_of_the_device_that_would_render(tmp_path: Path) -> None:
+    """Without a device the builder sah stands in for ploc; one that is not there is refused."""
+    scene = tmp_path / "two.toml"
+    scene.write_text("[[mesh]]\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]]\n"
+                     "faces = [[0, 1, 2], [1, 3, 2]]\n")
+    options = [str(scene), "--json", "--builder", "ploc", "--layout", "bvh2"]
+    listed = CliRunner().invoke(info.command, options, catch_exceptions=False)
+    assert json.loads(listed.stdout)["tree"]["builder"] == "ploc"
+    refused = CliRunner().invoke(info.command, [*options, "--device", "no such device"])
+    assert isinstance(refused.exception, DeviceError)
