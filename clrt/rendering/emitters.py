@@ -22,7 +22,7 @@ from .triangle_lights import pack_triangle_lights
 #: chosen by pack_sky.
 TYPES = ("triangle", "sphere", "point", "spot", "directional", "sky")
 SURFACES = ("triangle", "sphere")
-#: Over no less in its cosine does a spot fall off: its inverse is a number of float32.
+#: Over no less does a spot fall off in its cosine, or a range in its square: its inverse is a number of float32.
 STEEPEST = 1e-30
 
 
@@ -87,6 +87,7 @@ def _point_lights(scene: Scene) -> NDArray[Any]:
     records = np.zeros(len(lamps), POINT_LIGHT)
     for record, lamp in zip(records, lamps):
         record["position"], record["intensity"] = lamp.position, lamp.intensity
+        record["per_range2"] = _per_range2(lamp)
     return records
 
 
@@ -99,7 +100,12 @@ def _spot_lights(scene: Scene) -> NDArray[Any]:
         record["position"], record["intensity"] = lamp.position, lamp.intensity
         record["axis"] = np.asarray(lamp.direction) / np.linalg.norm(lamp.direction)
         record["outer"], record["slope"] = outer, 1 / max(outer - inner, STEEPEST)
+        record["per_range2"] = _per_range2(lamp)
     return records
+
+
+def _per_range2(lamp: PointLight | SpotLight) -> float:
+    return 0.0 if lamp.range is None else 1 / max(lamp.range**2, STEEPEST)
 
 
 def _directional_lights(scene: Scene) -> NDArray[Any]:

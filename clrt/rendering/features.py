@@ -51,6 +51,7 @@ def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
            "OPACITY": bool(materials.with_value("opacity")),
            "SKY": packed.sky.kernel is not None, "LIGHTS": emitters.count > 0, "LIGHT_TREE": emitters.choice.tree,
            "EMITTERS": any(t in SURFACES for t in emitters.types),
+           "LIGHT_RANGES": any(getattr(light, "range", None) for light in scene.lights),
            "LOCAL": local, "NO_SHADOWS": local and not scene.render.shadows,
            "RASTER": scene.render.integrator == "raster", "PIXEL_MIDDLE": scene.render.integrator == "depth",
            "DIRECT_LIGHT": choices.direct_light, "LOOP_LIMIT": loop_limit}

@@ -29,9 +29,10 @@ LIGHT_PLACE = np.dtype([("group", "i4")])
 TRIANGLE_LIGHT = record(p0="3f4", area="f4", e1="3f4", parallelogram="i4", e2="3f4", texture="i4", normal="3f4",
                         primitive="i4", radiance="3f4", pad="i4")
 SPHERE_LIGHT = record(center="3f4", radius="f4", radiance="3f4", texture="i4")
-POINT_LIGHT = record(position="3f4", pad0="i4", intensity="3f4", pad1="i4")
+#: per_range2: 1 over the square of its range, 0 without one.
+POINT_LIGHT = record(position="3f4", pad="i4", intensity="3f4", per_range2="f4")
 #: outer: 1 − the cosine of the outer cone's angle; slope: 1 over what the inner one's is less.
-SPOT_LIGHT = record(position="3f4", outer="f4", axis="3f4", slope="f4", intensity="3f4", pad="i4")
+SPOT_LIGHT = record(position="3f4", outer="f4", axis="3f4", slope="f4", intensity="3f4", per_range2="f4")
 DIRECTIONAL_LIGHT = record(towards="3f4", pad0="i4", irradiance="3f4", pad1="i4")
 
 ENVIRONMENT = record(color="3f4", pad="f4", width="i4", height="i4", rotation_cos="f4", rotation_sin="f4")

@@ -186,7 +186,6 @@ def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
         "skins": any(node.skin is not None for node in document.nodes),
         "morph targets": any(primitive.targets for primitive in primitives),
         "points and lines": any(primitive.mode < TRIANGLES for primitive in primitives),
-        "ranges of lights": any(light.range for light in document.extensions.KHR_lights_punctual.lights),
     }
     names = [name for name, present in left_out.items() if present]
     names += sorted(f"the extension {name}" for name in set(document.extensionsUsed) - gltf.EXTENSIONS)

@@ -1,7 +1,6 @@
 """The lights of a glTF file (Khronos, KHR_lights_punctual).
 
-Its photometric units are taken for ours one to one, as its renderers do: candela for W/sr, lux for W/m². A light's
-`range` is not followed: light falls off with the square of the distance, without an end.
+Its photometric units are taken for ours one to one, as its renderers do: candela for W/sr, lux for W/m².
 """
 
 from __future__ import annotations
@@ -27,8 +26,9 @@ def read_lights(document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix
         x, y, z = matrix[:3, 3].tolist()
         to_x, to_y, to_z = unit(-matrix[:3, 2]).tolist()
         red, green, blue = (source.intensity * part for part in source.color)
+        reach = source.range if source.range is not None and source.range > 0 else None
         if source.type == "point":
-            yield PointLight(position=(x, y, z), intensity=(red, green, blue))
+            yield PointLight(position=(x, y, z), intensity=(red, green, blue), range=reach)
         elif not (to_x or to_y or to_z):
             continue    # squeezed to nothing, it shines nowhere
         elif source.type == "directional":
@@ -37,4 +37,4 @@ def read_lights(document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix
             outer = min(degrees(source.spot.outerConeAngle), 90.0)
             yield SpotLight(position=(x, y, z), direction=(to_x, to_y, to_z), intensity=(red, green, blue),
                             inner_degrees=min(degrees(source.spot.innerConeAngle), WIDEST_INNER * outer),
-                            outer_degrees=outer)
+                            outer_degrees=outer, range=reach)

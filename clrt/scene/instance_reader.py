@@ -16,7 +16,7 @@ from .fields import show, unknown
 from .materials import Material
 from .model import Instance, Model
 from .placing import Placing
-from .transform import Matrix, transform_camera, transform_faults, transform_mesh
+from .transform import Matrix, transform_camera, transform_faults, transform_light, transform_mesh
 
 
 #: That one table may make.
@@ -95,7 +95,8 @@ def placed(model: Model, matrix: Matrix, material: Material | None, others: dict
     instances = [replace(moved(each, matrix), material=others.get(each.mesh.material_name, material or each.material))
                  for each in model.instances]
     cameras = {name: transform_camera(camera, matrix) for name, camera in model.cameras.items()}
-    return Model(meshes=meshes, instances=instances, cameras=cameras)
+    return Model(meshes=meshes, instances=instances, cameras=cameras,
+                 lights=[transform_light(light, matrix) for light in model.lights])
 
 
 def moved(instance: Instance, matrix: Matrix) -> Instance:

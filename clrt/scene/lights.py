@@ -9,14 +9,18 @@ from annotated_types import Ge, Gt, Le, Lt
 
 from .material import Radiance, tuples_for_lists
 
+Length = Annotated[float, Gt(0)]
+
 
 @dataclass(frozen=True, kw_only=True)
 class PointLight:
-    """`intensity`: W/sr in every direction from `position`."""
+    """`intensity`: W/sr in every direction from `position`. `range`: from that far on it lights nothing, before that by
+    a part (distance/range)⁴ less (KHR_lights_punctual); None for light as it is."""
 
     kernel: ClassVar[str] = "point"
     position: tuple[float, float, float]
     intensity: Radiance
+    range: Length | None = None
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)
@@ -37,7 +41,7 @@ class DirectionalLight:
 @dataclass(frozen=True, kw_only=True)
 class SpotLight:
     """A point that shines in a cone around `direction`: `intensity` W/sr up to `inner_degrees` from it, then less, and
-    nothing from `outer_degrees` on (KHR_lights_punctual of glTF, its falloff)."""
+    nothing from `outer_degrees` on (KHR_lights_punctual of glTF, its falloff). `range`: as PointLight's."""
 
     kernel: ClassVar[str] = "spot"
     position: tuple[float, float, float]
@@ -45,6 +49,7 @@ class SpotLight:
     intensity: Radiance
     inner_degrees: Annotated[float, Ge(0), Lt(90)] = 0.0
     outer_degrees: Annotated[float, Gt(0), Le(90)] = 45.0
+    range: Length | None = None
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)

@@ -36,6 +36,7 @@ class MeshTable(Placing):
     materials: Mapping[str, str] | None = None
     normals: Normals = "file"
     crease_degrees: Annotated[float, Ge(0), Le(180)] | None = None
+    lights: bool = False
     visible: bool = True
 
     def read(self, folder: Path, where: str) -> Model:

@@ -131,4 +131,5 @@ def _light(light: Light, frame: Frame) -> Light:
     if isinstance(light, DirectionalLight):
         return light
     red, green, blue = (value * frame.unit**2 for value in light.intensity)
-    return replace(light, position=frame.point(light.position), intensity=(red, green, blue))
+    return replace(light, position=frame.point(light.position), intensity=(red, green, blue),
+                   range=light.range and light.range * frame.unit)

@@ -56,6 +56,7 @@ class SceneReader:
         lights: list[Light] = [self._typed(LIGHTS, values, f"light[{i}]") or SUN  # keeps the later ones' numbers
                                for i, values in enumerate(self._tables("light"))]
         models = [self._mesh(values, f"mesh[{i}]") for i, values in enumerate(self._tables("mesh"))]
+        lights += [light for model in models for light in model.lights]
         meshes = [mesh for model in models for mesh in model.meshes]
         instances = [instance for model in models for instance in model.instances]
         instances += [one for i, values in enumerate(self._tables("instance"))
@@ -209,7 +210,8 @@ class SceneReader:
         for name, camera in model.cameras.items():
             self._source.cameras.setdefault(name, self._cameras.setdefault(name, camera))
         self._instances.add(str(values["name"]) if "name" in values else None, model)
-        return model if table is None or table.visible else Model(meshes=[])
+        shown = model if table is None or table.visible else Model(meshes=[])
+        return replace(shown, lights=model.lights if table and table.lights else [])
 
     def _located(self, values: Table) -> Table:
         """The table of a mesh with an absolute path."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .lights import DirectionalLight, Light, PointLight
 from .model import Camera, Mesh, Vector
 
 Matrix = NDArray[np.float64]
@@ -85,6 +86,19 @@ def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
     focus, height = (length and length * stretch for length in (camera.focus_distance, camera.view_height))
     return replace(camera, position=position, look_at=look_at, up=up, focus_distance=focus, view_height=height,
                    aperture_radius=camera.aperture_radius * stretch)
+
+
+def transform_light(light: Light, matrix: Matrix) -> Light:
+    """The light under an affine `matrix`, which moves and turns it; its strength and range stay, as in glTF."""
+    turned: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    if not isinstance(light, PointLight):
+        x, y, z = unit(matrix[:3, :3] @ light.direction).tolist()
+        turned = x, y, z
+        if isinstance(light, DirectionalLight):
+            return replace(light, direction=turned)
+    x, y, z = (matrix[:3] @ [*light.position, 1.0]).tolist()
+    moved = replace(light, position=(x, y, z))
+    return moved if isinstance(moved, PointLight) else replace(moved, direction=turned)
 
 
 def transform_faults(to_world: NDArray[np.float64]) -> dict[str, NDArray[np.bool_]]:

@@ -31,8 +31,8 @@ from .toml_text import is_plain, toml_key, toml_value
 #: Fields that are written even where they have their default, since they are what a user changes first.
 TELLING = {"position", "look_at", "fov_degrees", "size", "spp", "max_depth", "color", "metallic", "roughness", "center",
            "radius"}
-#: What is written of tables as it was read; materials are those of now.
-ASSIGNED = ("material", "materials")
+#: What is not written of tables as it was read: materials and lights are those of now.
+ASSIGNED = ("material", "materials", "lights")
 #: What the scene file calls the one material of a file that has no names for its own.
 UNNAMED = "model"
 
@@ -216,7 +216,7 @@ class _Writer:
         return name
 
     def _keys(self, table: Mapping[str, Any]) -> Iterator[str]:
-        """A table as it was read, without its materials."""
+        """A table as it was read, without its materials and lights."""
         for name, value in table.items():
             if name not in ASSIGNED:
                 yield f"{toml_key(name)} = {toml_value(self._relative(value) if isinstance(value, Path) else value)}"

@@ -41,8 +41,8 @@ def check_scene(scene: Scene) -> None:
                              'scattering and smith = "height_correlated"')
         if isinstance(owner.material, Dielectric) and owner.material.features() != {"TRANSMISSION"}:
             raise UsageError(f"{owner.name}: Cycles can draw dielectric that is smooth, not thin, and absorbs nothing")
-    if any(isinstance(light, SpotLight) for light in scene.lights):
-        raise UsageError(f"{scene.name}: Cycles is not told of spot lights, which fall off otherwise there")
+    if any(isinstance(light, SpotLight) or getattr(light, "range", None) for light in scene.lights):
+        raise UsageError(f"{scene.name}: Cycles is not told of ranges and spot lights, which fall off otherwise there")
     if scene.camera.projection != "perspective" or scene.camera.aperture_radius:
         raise UsageError(f"{scene.name}: Cycles is told of pinholes only")
     if scene.render.integrator == "local":

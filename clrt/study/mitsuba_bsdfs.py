@@ -40,7 +40,9 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
         if isinstance(owner, Mesh) and owner.colors is not None:
             plugin = _painted(plugin, material)
         if material.normal_map is not None:
-            plugin = {"type": "normalmap", "normalmap": _bend(material.normal_map), "bsdf": plugin}
+            # Neither its shadows of bumps (Estevez et al. 2019) nor its flipped normals are ours.
+            plugin = {"type": "normalmap", "normalmap": _bend(material.normal_map), "bsdf": plugin,
+                      "use_shadowing_function": False, "flip_invalid_normals": False}
         plugin = plugin if isinstance(material, Dielectric) else {"type": "twosided", "front": plugin}
         if material.one_sided:
             raise ValueError("surfaces with one side")

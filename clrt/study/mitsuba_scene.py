@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..scene.instancing import unfolded
-from ..scene.lights import Light, PointLight, SpotLight
+from ..scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ..scene.materials import Dielectric
 from ..scene.model import Environment, Mesh, Scene, Sphere
 from ..scene.textures import Texture
@@ -109,6 +109,8 @@ def _sphere(sphere: Sphere) -> Plugin:
 
 
 def _light(light: Light) -> Plugin:
+    if not isinstance(light, DirectionalLight) and light.range is not None:
+        raise UsageError("light: Mitsuba is not told of ranges")
     if isinstance(light, PointLight):
         return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
     if isinstance(light, SpotLight):

@@ -20,6 +20,14 @@ typedef struct {
     ireal infinite, delta;
 } LightSample;
 
+#if LIGHT_RANGES
+// What a light's range leaves at the squared distance d2: 1 − (d/range)⁴, and nothing beyond (KHR_lights_punctual).
+static inline real within_range(real d2, real per_range2) {
+    real share = d2 * per_range2;
+    return maximum(1.0f - share * share, ZERO);
+}
+#endif
+
 // A point q of a light's surface, moved towards p beyond the rounding of a ray between the two.
 static inline real3 shadow_target(real3 p, real3 q, real3 n) {
     real distance = dot3(absolute3(n), scale(add(absolute3(p), absolute3(q)), (real)(GAMMA(16))));

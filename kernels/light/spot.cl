@@ -8,13 +8,16 @@ static inline LightSample spot_light_sample(const Scene *scene, ireal index, rea
     LightSample s;
     s.target = GATHER3(scene->spot_lights, index, .position);
     real3 d = sub(s.target, p);
-    real inverse = rsqrt(dot3(d, d));
+    real d2 = dot3(d, d), inverse = rsqrt(d2);
     s.wi = scale(d, inverse);
     real3 off_axis = add(s.wi, GATHER3(scene->spot_lights, index, .axis));
     real height = 0.5f * dot3(off_axis, off_axis);
     real f = (GATHER(real, scene->spot_lights, index, .outer) - height) * GATHER(real, scene->spot_lights, index, .slope);
     f = minimum(maximum(f, ZERO), ONE) * inverse;
     s.radiance = scale(GATHER3(scene->spot_lights, index, .intensity), f * f);
+#if LIGHT_RANGES
+    s.radiance = scale(s.radiance, within_range(d2, GATHER(real, scene->spot_lights, index, .per_range2)));
+#endif
     s.pdf = ONE;
     s.infinite = NO_LANES;
     s.delta = ALL_LANES;

@@ -69,6 +69,31 @@ def test_irradiance(device: Device, inner: float, outer: float) -> None:
     assert not mean[[5, 11]].any() and mean[[0, 6]] == pytest.approx(expected[[0, 6]], rel=1e-5)
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e4])
+def test_ranges_end_light(device: Device, unit: float) -> None:
+    """I/d²·max(1 − (d/range)⁴, 0), the attenuation that KHR_lights_punctual recommends; beside lights that have none,
+    and in a scene of any size. The integrator asks every light."""
+    reach = 2.0 * unit
+    lights: list[Light] = [
+        PointLight(position=(0.0, 0.0, 0.0), intensity=(3.0, 2.0, 1.0), range=reach),
+        SpotLight(position=(0.0, 0.0, 0.0), direction=(0.0, -1.0, 0.0), intensity=(1.0, 2.0, 3.0), range=reach / 2),
+        PointLight(position=(0.0, 0.0, 0.0), intensity=(0.1, 0.1, 0.1))]
+    size, heights = 9.0 * unit, np.array([0.3, 0.9, 0.99, 1.2, 1.9, 1.99, 2.1, 8.0]) * unit
+    for height in heights.tolist():
+        camera = Camera(position=(0.0, 0.5 * -height, 0.0), look_at=(0.0, -height, 0.0), up=(0.0, 0.0, 1.0),
+                        fov_degrees=0.01)
+        floor = quad([(-size, -height, size), (size, -height, size), (size, -height, -size), (-size, -height, -size)],
+                     Diffuse(color=(1.0, 1.0, 1.0)))
+        expected = np.zeros(3)
+        for light in lights:
+            assert not isinstance(light, DirectionalLight)
+            left = 1.0 if light.range is None else max(1 - (height / light.range) ** 4, 0.0)
+            expected += np.array(light.intensity) * left / (np.pi * height**2)
+        settings = RenderSettings(size=(1, 1), max_depth=2, integrator="local")
+        scene = Scene(meshes=[floor], lights=lights, camera=camera, render=settings)
+        np.testing.assert_allclose(film(device, scene, 4).mean[0, 0], expected, rtol=1e-5)
+
+
 def test_picture_of_a_spot(device: Device) -> None:
     """A floor in a slanted cone: ρ/pi times the irradiance, pixel by pixel; nothing of it comes through a lid."""
     light = SpotLight(position=(1.0, 3.0, 0.5), direction=(-0.3, -1.0, 0.1), intensity=(60.0, 50.0, 40.0),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 
 from clrt.errors import SceneError
+from clrt.output.scenes import save_scene
 from clrt.scene.file import load
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from clrt.scene.sky import SUN
@@ -71,13 +71,36 @@ def test_cones_of_one_width_are_sharp(tmp_path: Path) -> None:
     assert isinstance(spot, SpotLight) and 89.9 < spot.inner_degrees < spot.outer_degrees == 90
 
 
-def test_ranges_are_left_out_and_said_so(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    gltf = lit({"type": "point", "range": 4.0})
-    gltf.node(extensions=held(0), scale=[0, 0, 0])
-    path = gltf.write(tmp_path / "near.glb")
-    with caplog.at_level(logging.WARNING):
-        assert len(load(path).lights) == 1
-    assert [record.getMessage() for record in caplog.records] == [f"{path}: left out: ranges of lights"]
+def test_ranges_are_those_of_the_file(tmp_path: Path) -> None:
+    """Scales do not change them; a sun has none."""
+    gltf = lit({"type": "point", "range": 4.0}, {"type": "spot", "range": 0.5}, {"type": "directional", "range": 1.0})
+    for index in range(3):
+        gltf.node(extensions=held(index), scale=[9, 9, 9])
+    point, spot, sun = load(gltf.write(tmp_path / "near.glb")).lights
+    assert isinstance(point, PointLight) and isinstance(spot, SpotLight) and isinstance(sun, DirectionalLight)
+    assert (point.range, spot.range) == (4.0, 0.5)
+
+
+def test_a_scene_file_asks_for_a_models_lights(tmp_path: Path) -> None:
+    """They go where the mesh goes, and are written once."""
+    gltf = lit({"type": "point", "range": 4.0}, {"type": "spot"}, {"type": "directional"})
+    for index in range(3):
+        gltf.node(translation=[1, 0, 0], extensions=held(index))
+    gltf.write(tmp_path / "lamps.glb")
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[[mesh]]\nfile = "lamps.glb"\nlights = true\n'
+                     'scale = 2\nrotate_degrees = [0, 90, 0]\ntranslate = [0, 5, 0]\n')
+    point, spot, sun = load(scene).lights
+    assert isinstance(point, PointLight) and isinstance(spot, SpotLight) and isinstance(sun, DirectionalLight)
+    np.testing.assert_allclose(point.position, (0, 5, -2), atol=1e-6)   # a quarter turn about +y takes +x to −z
+    np.testing.assert_allclose(spot.position, (0, 5, -2), atol=1e-6)
+    for light in (spot, sun):
+        np.testing.assert_allclose(light.direction, (-1, 0, 0), atol=1e-6)
+    assert (point.range, point.intensity) == (4.0, (1.0, 1.0, 1.0))
+    save_scene(load(scene), tmp_path / "again.toml")
+    assert load(tmp_path / "again.toml").lights == [point, spot, sun]
+    scene.write_text('[[mesh]]\nfile = "lamps.glb"\n')
+    assert load(scene).lights == []
 
 
 @pytest.mark.parametrize(("light", "words"), [
