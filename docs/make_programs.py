@@ -13,8 +13,8 @@ EVERYWHERE = {"PRIMITIVES", "IN_TREE", "TRIANGLES", "SPHERES", "LIGHTS"}
 
 TEXT = """# What is compiled for each scene
 
-The program of a scene contains what that scene uses and nothing else. `clrt info SCENE` lists its features and files, and
-`clrt render SCENE --print-kernel` prints it. For the scenes of this repository, in waves for CPUs (`python
+The program of a scene contains what that scene uses and nothing else. `clrt info SCENE` lists its features and files,
+and `clrt render SCENE --print-kernel` prints it. For the scenes of this repository, in waves for CPUs (`python
 docs/make_programs.py` wrote this):
 
 | scene | kB of text | files | features |

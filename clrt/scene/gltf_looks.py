@@ -82,6 +82,7 @@ class Clearcoat(Part):
     clearcoatTexture: TextureInfo | None = None
     clearcoatRoughnessFactor: float = 0.0
     clearcoatRoughnessTexture: TextureInfo | None = None
+    clearcoatNormalTexture: NormalTextureInfo | None = None
 
 
 class Ior(Part):
@@ -92,6 +93,7 @@ class Sheen(Part):
     sheenColorFactor: Vec3 = (0.0, 0.0, 0.0)
     sheenColorTexture: TextureInfo | None = None
     sheenRoughnessFactor: float = 0.0
+    sheenRoughnessTexture: TextureInfo | None = None
 
 
 class Specular(Part):

@@ -91,6 +91,14 @@ def test_layers_and_glass(tmp_path: Path) -> None:
         color=(1, 0.5, 1), ior=1.4, roughness=0.5, attenuation_color=(0.5, 1, 1), attenuation_distance=2)
 
 
+def test_what_layers_lack_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    texture = {"index": 0}
+    textured((255, 255, 255), tmp_path, extensions={
+        "KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatNormalTexture": texture},
+        "KHR_materials_sheen": {"sheenColorFactor": [1, 1, 1], "sheenRoughnessTexture": texture}})
+    assert "left out: normal maps of coats, textures of sheen's roughness" in caplog.text
+
+
 def test_missing_texture_is_grey_with_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     gltf = ball()
     gltf.document |= {"images": [{"uri": "lost.png"}], "textures": [{"source": 0}],
