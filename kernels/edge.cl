@@ -119,9 +119,13 @@ static inline real3 light_along(const Scene *scene, const ShadowRay *ray, ireal 
 }
 #endif
 
-// 3. On in a direction drawn from the material: which paths do go on.
+// 3. On in a direction drawn from the material: which paths do go on. None does on a last edge where nothing glows that it
+// could meet.
 static inline ireal go_on(Path *path, const Surface *surface, const Shading *shading, ireal active, int depth,
-                          Sampler *sampler) {
+                          int max_depth, Sampler *sampler) {
+#if !(EMITTERS || SKY)
+    if (depth + 1 >= max_depth) return NO_LANES;
+#endif
     real2 u = next_2d(sampler), choice = next_2d(sampler);
     BsdfSample sample = bsdf_sample(&shading->bsdf, shading->wo, u, choice.x);
     path->wi = to_world(shading->frame, sample.wi);

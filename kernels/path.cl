@@ -27,7 +27,7 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
         *rays += sent ? (ureal)(1) : (ureal)(0);
         if (ANY(sent)) L = add(L, light_along(scene, &shadow, sent));
 #endif
-        active = go_on(&path, &surface, &shading, active, depth, sampler);
+        active = go_on(&path, &surface, &shading, active, depth, launch->max_depth, sampler);
 #endif
     }
 }

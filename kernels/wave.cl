@@ -159,7 +159,7 @@ __attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int coun
         ireal sends = aim_at_light(scene, path, &surface, &shading, active, &sampler, &shadow.ray);
         if (ANY(sends)) PACK(shadow, sends, w->shadows, *sent)
 #endif
-        ireal goes = go_on(path, &surface, &shading, active, depth, &sampler);
+        ireal goes = go_on(path, &surface, &shading, active, depth, w->launch->max_depth, &sampler);
         if (ANY(goes)) PACK(a.travel, goes, w->arrivals, going)
         dimension = sampler.dimension;
     }
