@@ -9,14 +9,17 @@ from typing import TypeVar
 
 from .tiles import TILE
 
-#: So few that what is made of them, of the widest screens, is taken from memory that is there: larger arrays come anew
-#: from the system each time, which took longer than all sums. And no tile is in two bands.
-ROWS = TILE
+#: Pixels of a band, about: so few that what is made of them is taken from memory that is there. Larger arrays come anew
+#: from the system each time, which took longer than all sums.
+PIXELS = 1 << 15
 T = TypeVar("T")
 
 
-def in_bands(height: int, work: Callable[[slice], T]) -> list[T]:
-    """What `work` returns for the rows of each band, from the top down; several run at a time."""
-    bands = [slice(first, min(first + ROWS, height)) for first in range(0, height, ROWS)]
+def in_bands(size: tuple[int, ...], work: Callable[[slice], T]) -> list[T]:
+    """What `work` returns for the rows of each band of a picture, (height, width, …), from the top down; several run at
+    a time. No tile is in two bands."""
+    height, width = size[:2]
+    step = max(1, PIXELS // (width * TILE)) * TILE
+    bands = [slice(first, min(first + step, height)) for first in range(0, height, step)]
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(work, bands))

@@ -38,13 +38,13 @@ class Film:
             total = pixels[name].astype(np.float64) + pixels[f"{name}_error"]
             mean[rows] = total / np.maximum(pixels["count"], 1)[..., None]
 
-        in_bands(len(mean), fill)
+        in_bands(mean.shape, fill)
         return mean
 
     @property
     def variance(self) -> NDArray[np.float64]:
         """(height, width, 3): of the mean, the sample variance over n; NaN of fewer than two samples."""
-        return np.concatenate(in_bands(len(self.mean), self._variance))
+        return np.concatenate(in_bands(self.mean.shape, self._variance))
 
     def _variance(self, rows: slice) -> NDArray[np.float64]:
         """Where squares were too large to be summed (kernels/film.cl) it is taken as mean², the most it can be."""
@@ -56,22 +56,15 @@ class Film:
             variance = np.where(summed, np.maximum(squares - most, 0) / (count - 1), most)
         return np.where(count < 2, np.nan, variance)
 
-    def relative_to(self, rows: slice) -> NDArray[np.float64]:
-        """(rows, width, 3): what squared errors are divided by in relMSE, expected² + 0.01, as far as it is known.
+    @property
+    def relative_to(self) -> NDArray[np.float32]:
+        """(height, width, 3): what errors are divided by in relMSE, √(expected² + 0.01), as far as it is known.
 
         What is expected of a pixel is the mean of the eight around it, so that one bright by chance does not count
         itself; and from there on towards its own as far as its variance cannot explain the difference (James and Stein
         1961).
         """
-        own, variance = self.mean[rows], self._variance(rows)
-        first, edges = max(rows.start - 1, 0), (int(rows.start == 0), int(rows.stop == len(self.mean)))
-        padded = np.pad(self.mean[first:rows.stop + 1], (edges, (1, 1), (0, 0)), mode="edge")
-        sums = padded[:-2] + padded[1:-1] + padded[2:]
-        around = (sums[:, :-2] + sums[:, 1:-1] + sums[:, 2:] - own) / 8
-        difference = own - around
-        with np.errstate(divide="ignore", invalid="ignore"):
-            towards_own = np.nan_to_num(np.maximum(1 - variance / difference**2, 0))
-        return np.asarray((around + towards_own * difference) ** 2 + RELATIVE_FLOOR)
+        return self._judged[0]
 
     @cached_property
     def noise(self) -> float | None:
@@ -82,8 +75,27 @@ class Film:
         count = self.pixels["count"]
         if not count.size or count.min() < 2:
             return None
-        sums = in_bands(len(self.mean), lambda rows: float(np.sum(self._variance(rows) / self.relative_to(rows))))
-        return float(np.sqrt(sum(sums) / self.mean.size))
+        return float(np.sqrt(self._judged[1] / self.mean.size))
+
+    @cached_property
+    def _judged(self) -> tuple[NDArray[np.float32], float]:
+        """`relative_to`, and the sum of the variances over that: the same is needed for both."""
+        relative = np.empty(self.mean.shape, np.float32)
+
+        def judge(rows: slice) -> float:
+            own, variance = self.mean[rows], self._variance(rows)
+            first, edges = max(rows.start - 1, 0), (int(rows.start == 0), int(rows.stop == len(self.mean)))
+            padded = np.pad(self.mean[first:rows.stop + 1], (edges, (1, 1), (0, 0)), mode="edge")
+            sums = padded[:-2] + padded[1:-1] + padded[2:]
+            around = (sums[:, :-2] + sums[:, 1:-1] + sums[:, 2:] - own) / 8
+            difference = own - around
+            with np.errstate(divide="ignore", invalid="ignore"):
+                towards_own = np.fmax(1 - variance / difference**2, 0)   # 0 for NaN, too
+            squared = (around + towards_own * difference) ** 2 + RELATIVE_FLOOR
+            relative[rows] = np.sqrt(squared)
+            return float(np.sum(variance / squared))
+
+        return relative, sum(in_bands(self.mean.shape, judge))
 
     @property
     def samples(self) -> int:

@@ -56,10 +56,11 @@ class NoiseEstimate:
             return
         before, level = self._mean, self._level[due]
         if level.max() >= 0:    # the first sample is no change
+            relative = film.relative_to
             change = np.concatenate(in_bands(
-                len(mean), lambda rows: tile_sums((mean[rows] - before[rows]) ** 2 / film.relative_to(rows))))
+                mean.shape, lambda rows: tile_sums(((mean[rows] - before[rows]) / relative[rows]) ** 2)))
         self._changes += [np.full(due.shape, np.nan) for _ in range(max(level) + 1 - len(self._changes))]
-        for k in np.unique(level[level >= 0]):
+        for k in sorted({*level.tolist()} - {-1}):
             at_k = due & (self._level == k)
             self._changes[k][at_k] = change[at_k]
         self._level[due] += 1
