@@ -50,7 +50,8 @@ def smooth_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
         sums[:, axis] = np.bincount(corners.ravel(), weighted[:, axis], count)
     cancelled = np.linalg.norm(sums, axis=1) < 1e-9
     if cancelled.any():
-        sums[cancelled] = _some_normal(corners, unit(weighted[::3]), count)[cancelled]
+        around = cancelled[corners].any(axis=1)
+        sums[cancelled] = _some_normal(corners[around], unit(weighted[::3][around]), count)[cancelled]
     return unit(sums).astype(np.float32)[points]
 
 
@@ -59,7 +60,7 @@ def corner_normals(vertices: FloatArray, faces: IntArray) -> NDArray[np.float64]
     positions = [vertices[faces[:, corner]].astype(np.float64) for corner in range(3)]
     edges = [positions[(corner + 1) % 3] - positions[corner] for corner in range(3)]
     areas = np.cross(edges[0], edges[1])
-    doubled_area, normals = np.linalg.norm(areas, axis=1), unit(areas)
+    doubled_area, normals = np.sqrt(np.einsum("ij,ij->i", areas, areas)), unit(areas)
     weighted = np.empty((len(faces), 3, 3))
     for corner in range(3):
         # atan2 is exact for needles too, unlike the arc cosine; |a x b| is the same at all three corners.

@@ -35,9 +35,12 @@ def read_radiance(path: Path) -> NDArray[np.float32] | None:
         if planes is None:
             return None
         row.reshape(-1)[:] = np.frombuffer(planes, np.uint8)
-    mantissas, exponent = rows[:, :3], rows[:, 3:].astype(np.int32)
-    colours = np.ldexp(mantissas.astype(np.float32), np.where(exponent > 0, exponent - 136, -1000))
-    return np.ascontiguousarray(colours.transpose(0, 2, 1))
+    exponents = np.arange(256)
+    scale = np.ldexp(np.float32(1), np.where(exponents > 0, exponents - 136, -1000))[rows[:, 3]]
+    colours = np.empty((height, width, 3), np.float32)
+    for channel in range(3):
+        np.multiply(rows[:, channel], scale, out=colours[..., channel])
+    return colours
 
 
 def _row(content: bytes, start: int, size: int) -> tuple[bytes | None, int]:

@@ -234,8 +234,8 @@ def _environment_problems(environment: Environment) -> list[str]:
     if image.ndim != 3 or image.shape[2] != 3 or 0 in image.shape:
         return [f"{where}: has shape {image.shape}; it must be (height, width, 3) with at least one pixel"]
     for bad, fault in ((~np.isfinite(image), "not finite"), (image < 0, "negative")):
-        pixels = bad.any(axis=2)
-        if pixels.any():
+        if bad.any():
+            pixels = bad.any(axis=2)
             row, column = np.argwhere(pixels)[0]
             problems.append(f"{where}: {np.count_nonzero(pixels)} pixels are {fault}, the first in row {row}, "
                             f"column {column}: {_row(image[row, column])}; repair the picture")
