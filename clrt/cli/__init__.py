@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 import time
@@ -16,6 +17,8 @@ from ..errors import ClrtError, DeviceError, KernelError
 STARTED = time.perf_counter()
 #: What commands find as their context's object where they have the process to themselves.
 PROGRAM = "clrt"
+#: After so many new objects garbage is looked for.
+OBJECTS = 100_000
 COMMANDS = ("render", "view", "info", "convert", "compare", "devices", "bench", "cache", "doctor")
 
 
@@ -42,6 +45,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Runs a command and exits: 0 done, 2 usage, 3 scene, 4 device, 5 kernel, 6 output, 130 interrupted."""
     # numpy's OpenBLAS starts a thread a core as it is loaded, and these spin for a while. No command has work for them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Python looks for garbage after every 700 new objects, a tenth of the time until all modules are there.
+    gc.set_threshold(OBJECTS)
     try:
         commands.main(arguments, prog_name="clrt", standalone_mode=False, obj=PROGRAM)
     except click.exceptions.Exit as stop:
