@@ -8,6 +8,7 @@ import logging
 import signal
 import sys
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +28,7 @@ from .outputs import Outputs
 from .progress import Progress, make_progress
 
 if TYPE_CHECKING:
+    from ..device.open import Device
     from ..output.denoise import Denoiser
     from ..rendering.renderer import Renderer, State
 
@@ -94,12 +96,11 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     if click.get_current_context().obj == PROGRAM:
         guarded(advice)
     from ..output.data import check_denoisable
-    from ..rendering.aovs import chosen_aovs
     from ..rendering.stops import check_stops, planned_spp
     from ..scene.file import load
 
     atexit.register(gc.freeze)  # else Python, as it ends, searches all modules' objects for garbage, in 0.05 s
-    beside = chosen_aovs(",".join(aovs)) if aovs else ()
+    beside = _chosen_aovs(aovs) if aovs else ()
     results = Outputs(outputs or (Path(f"{scene.stem}.png"),), beside, denoise, view, exposure, report, plot)
     sequence = make_sequence(results, frames, resume, {"checkpoint": checkpoint, "reference": reference, "plot": plot}
                              ) if frames or turntable else None
@@ -124,7 +125,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     if print_kernel:
         scheduler = local_cluster = None
     with (make_progress(progress_kind, quiet) as progress,
-          cluster_for(scheduler, local_cluster, progress) as cluster):
+          cluster_for(scheduler, local_cluster, progress) as cluster, ThreadPoolExecutor(1) as meanwhile):
+        opening = None if cluster else meanwhile.submit(_open, options["device"])
         progress.phase("load")
         content = load(scene, camera)
         if sequence is not None:
@@ -142,6 +144,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             if not render_huge(cluster, content, options, Goal(planned, seconds, error), results, progress):
                 sys.exit(130)
             return
+        if opening is not None:
+            options["device"] = opening.result()
         renderer = make_renderer(cluster, content, spp=planned, on_phase=progress.phase, **options)
         if print_kernel:
             click.echo(renderer.compiled.source)
@@ -157,6 +161,19 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
                 raise type(failure)(f"{failure}{advice()}") from failure
     if interruptible.asked:
         sys.exit(130)
+
+
+def _chosen_aovs(names: tuple[str, ...]) -> tuple[str, ...]:
+    from ..rendering.aovs import chosen_aovs
+    return chosen_aovs(",".join(names))
+
+
+def _open(selectors: tuple[str, ...] | None) -> list[Device]:
+    """The devices, and all that renders on them loaded: half of it is waiting for files, and needs no scene."""
+    from ..device.open import open_devices
+    from ..rendering import renderer  # noqa: F401
+
+    return open_devices(selectors)
 
 
 def _denoiser() -> Denoiser:
