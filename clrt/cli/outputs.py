@@ -77,10 +77,10 @@ class Outputs:
             raise UsageError(f"{checkpoint}: is named for something else, too; name another --checkpoint")
 
     def prepare(self) -> None:
-        """Loads what writes pictures while the first samples are rendered, so that nothing waits for it in the end."""
+        """Loads what writes pictures while a compiler is at work, so that nothing waits for it in the end."""
         from ..output.images import load_writer
 
-        threading.Thread(target=load_writer, daemon=True).start()
+        threading.Thread(target=load_writer).start()
 
     def save(self, image: Image, raw: bool = False) -> None:
         """Writes the pictures, or the raw ones."""

@@ -146,7 +146,13 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             return
         if opening is not None:
             options["device"] = opening.result()
-        renderer = make_renderer(cluster, content, spp=planned, on_phase=progress.phase, **options)
+
+        def begin(phase: str) -> None:
+            progress.phase(phase)
+            if phase == "compile":
+                results.prepare()
+
+        renderer = make_renderer(cluster, content, spp=planned, on_phase=begin, **options)
         if print_kernel:
             click.echo(renderer.compiled.source)
             return
@@ -199,7 +205,6 @@ def _render(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, den
     """Renders to the goal, or until it is interrupted, and writes the results; of an interrupted frame none."""
     guides = renderer.session.guides() if denoiser else {}
     progress.phase("render", device=renderer.name, device_bytes=renderer.session.device_bytes)
-    results.prepare()
     for state in renderer.passes(spp=goal.spp, time=goal.seconds, error=goal.error, reference=expected):
         progress.workers(renderer.session.shares())
         progress.state(state, goal)
