@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from typing import Literal
 
 import numpy as np
@@ -11,6 +13,8 @@ from .model import FloatArray, IntArray
 from .transform import unit
 
 Normals = Literal["file", "smooth", "flat"]
+#: Faces that a thread works on at a time, from memory that is there: larger arrays come anew from the system.
+PART = 1 << 14
 
 
 def choose_normals(wanted: Normals, vertices: FloatArray, faces: IntArray, stored: FloatArray | None,
@@ -57,6 +61,13 @@ def smooth_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 def corner_normals(vertices: FloatArray, faces: IntArray) -> NDArray[np.float64]:
     """(3m, 3), by face and corner: the face's normal, as long as its angle there; 0 where the face has no area."""
+    parts = [slice(first, first + PART) for first in range(0, len(faces), PART)]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        weighted = list(pool.map(lambda part: _corner_normals(vertices, faces[part]), parts))
+    return np.concatenate([np.zeros((0, 3)), *weighted])
+
+
+def _corner_normals(vertices: FloatArray, faces: IntArray) -> NDArray[np.float64]:
     positions = [vertices[faces[:, corner]].astype(np.float64) for corner in range(3)]
     edges = [positions[(corner + 1) % 3] - positions[corner] for corner in range(3)]
     areas = np.cross(edges[0], edges[1])
