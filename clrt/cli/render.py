@@ -149,7 +149,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
 
         def begin(phase: str) -> None:
             progress.phase(phase)
-            if phase == "compile":
+            if phase == "compile" and not print_kernel:
                 results.prepare()
 
         renderer = make_renderer(cluster, content, spp=planned, on_phase=begin, **options)
