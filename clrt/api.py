@@ -33,7 +33,7 @@ def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | N
     subclasses."""
     denoiser = Denoiser() if denoise else None
     scene = scene if isinstance(scene, Scene) else load(scene)
-    renderer = Renderer(scene, spp=planned_spp(scene.render, spp, time, error), **options)
+    renderer = Renderer(scene, spp=planned_spp(scene.render, spp, time, error), first_hits=denoise, **options)
     return _rendered(renderer, denoiser, reference, spp=spp, time=time, error=error)
 
 
@@ -49,7 +49,7 @@ def animate(scene: Scene | str | Path, *, frames: Iterable[int] | None = None, s
     renderer = None
     for number, still in _frames(scene, frames):
         if renderer is None:
-            renderer = Renderer(still, spp=planned_spp(still.render, spp, time, error), **options)
+            renderer = Renderer(still, spp=planned_spp(still.render, spp, time, error), first_hits=denoise, **options)
         else:
             renderer.look(still.camera)
         yield number, _rendered(renderer, denoiser, None, spp=spp, time=time, error=error)

@@ -8,7 +8,7 @@ from typing import Any
 from ..errors import UsageError
 from .build import DEVICE_BUILDERS
 from .builders import BUILDERS
-from .layouts import PACK, Layout
+from .layouts import NO_RAYS, PACK, Layout
 
 #: Files of the tree layouts, and how many primitives of a leaf they test at a time.
 TREES = {"bvh8": ("traverse/bvh8.cl", 8), "bvh2": ("traverse/bvh2.cl", 1), "cwbvh": ("traverse/cwbvh.cl", 1),
@@ -57,23 +57,31 @@ def tree_defines(tree: Layout) -> dict[str, int]:
 
     And COUNT_VISITS, if there is a buffer to count in (kernels/traverse/visits.cl).
     """
+    if tree is NO_RAYS:
+        return {}
     defines = {"WIDTH": TREES[tree.name][1], "STACK_SIZE": max(32, -(-tree.stack // 32) * 32)}
     return defines | ({"COUNT_VISITS": 1} if "visits" in tree.buffers else {})
 
 
-def tree_features(triangles: bool, spheres: bool, lone: bool = False) -> dict[str, bool]:
-    """What the kernels of kernels/traverse ask of the scene; lone: its spheres are not in the tree."""
-    return {"TRIANGLES": triangles, "LEAF_SPHERES": spheres and not lone, "LONE_SPHERES": spheres and lone,
-            "IN_TREE": triangles or (spheres and not lone), "PRIMITIVES": triangles or spheres}
+def tree_features(triangles: bool, spheres: bool, lone: bool = False, rays: bool = True) -> dict[str, bool]:
+    """What the kernels of kernels/traverse ask of the scene; lone: its spheres are not in the tree; rays: whether any
+    is followed."""
+    return {"TRIANGLES": triangles, "LEAF_SPHERES": rays and spheres and not lone,
+            "LONE_SPHERES": rays and spheres and lone, "IN_TREE": rays and (triangles or (spheres and not lone)),
+            "PRIMITIVES": triangles or spheres}
 
 
 def tree_files(layout: str, tests: HitTests, triangles: bool, spheres: bool, lone: bool = False,
                instances: bool = False) -> dict[str, list[str]]:
-    """What the includes of kernels/traverse stand for, in a scene that has triangles or spheres or neither."""
+    """What the includes of kernels/traverse stand for, in a scene that has triangles or spheres or neither. layout: one
+    of TREES, or that of NO_RAYS."""
+    sphere_test = [SPHERE_TESTS[tests.sphere]] if spheres else []
+    if layout == NO_RAYS.name:
+        return {"TREE": [], "LONE_SPHERES_FILE": [], "SPHERE_TEST": sphere_test}
     triangle_test = PACKS_TEST if layout == "packs" else TRIANGLE_TESTS[tests.triangle]
     return {"TREE": [TREES[layout][0]] if triangles or (spheres and not lone) else [],
             "LONE_SPHERES_FILE": ["traverse/lone_spheres.cl"] if lone else [],
             "BOX_TEST": [BOX_TESTS[tests.box]],
             "TRIANGLE_TEST": [triangle_test] if triangles else [],
             "UPPER_LEVEL": [UPPER_LEVELS[layout]] if instances else [],
-            "SPHERE_TEST": [SPHERE_TESTS[tests.sphere]] if spheres else []}
+            "SPHERE_TEST": sphere_test}

@@ -94,6 +94,10 @@ class Layout:
         return sum(records.nbytes for records in self.buffers.values())
 
 
+#: What is packed where no ray is followed.
+NO_RAYS = Layout("none", {}, stack=0, nodes=0, depth=0, work=0.0)
+
+
 def pack(layout: str, builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
     """Build a tree and pack it.
 

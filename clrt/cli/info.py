@@ -45,7 +45,7 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
     names = chosen_aovs(",".join(aovs)) if aovs else ()
     content = load(scene)
     choices = Choices(lanes or WAVE_LANES, layout, builder, HitTests(triangle, box, sphere), offset,
-                      needs_direct_light(names), paths, tree)
+                      needs_direct_light(names), paths, tree, bool(seen_first(names)))
     device = _device(selector)
     compiled = compile_scene(content, choices_on(device, choices, lanes) if device else choices, device=device)
     built = compiled.tree

@@ -121,7 +121,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         "size": size, "max_depth": depth, "seed": seed, "device": devices or None,
         "integrator": integrator, "shadows": shadows, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
         "checkpoint": None if print_kernel else checkpoint, "resume": resume and not (print_kernel or sequence),
-        "checkpoint_seconds": checkpoint_every, "error_percentile": error_percentile, "aovs": beside, **tracing}
+        "checkpoint_seconds": checkpoint_every, "error_percentile": error_percentile, "aovs": beside,
+        "first_hits": denoise, **tracing}
     if print_kernel:
         scheduler = local_cluster = None
     with (make_progress(progress_kind, quiet) as progress,

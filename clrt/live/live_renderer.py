@@ -70,7 +70,8 @@ class LiveRenderer:
         self._open(asked.settings.device)
         last, self._guided = self.renderer, None
         self.renderer = renderer = Renderer(asked.scene, device=self._devices, size=size, spp=spp,
-                                            on_phase=self._on_phase, before=last, **asked.settings.tracing)
+                                            on_phase=self._on_phase, before=last, first_hits=True,
+                                            **asked.settings.tracing)
         self.programs += not (last and last.session.scene.program is renderer.session.scene.program)
         begun = time.perf_counter()
         self._on_phase("render")

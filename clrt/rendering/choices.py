@@ -28,6 +28,8 @@ class Choices:
     (kernels/wave.cl); None for waves where there are 8 lanes, as they need.
     layout: a name in TREES, or None for the one that fits the device and the scene. tree: False where every ray is to
     meet all that there is one by one, True for a tree even where there is little; None for what is faster.
+    first_hits: whether beside the picture what rays meet first is asked for, as AOVs, by a denoiser or by a user: then
+    rays are followed whatever the integrator does.
     Raises UsageError for what is unknown, or can't be chosen together.
     """
 
@@ -39,6 +41,7 @@ class Choices:
     direct_light: bool = False
     paths: str | None = None
     tree: bool | None = None
+    first_hits: bool = False
 
     def __post_init__(self) -> None:
         known: dict[str, tuple[object, ...]] = {"layout": (None, *TREES), "builder": (None, *BUILDER_NAMES),

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Iterable
 
 from ..accel.kernels import tree_defines, tree_features, tree_files
+from ..accel.layouts import NO_RAYS
 from ..device.preamble import defines, scene_struct, type_list, typedefs
 from ..scene.materials import MATERIALS, Material
 from ..scene.model import Scene
@@ -42,7 +43,7 @@ def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
     features = {f"MATERIAL_{kind.kernel.upper()}" for kind in materials.used}
     features |= {f"LIGHT_{kind.upper()}" for kind in emitters.types}
     features |= set().union(*(material.features() for material in packed.shapes.users))
-    has = {**tree_features(bool(scene.meshes), bool(scene.spheres), packed.shapes.lone),
+    has = {**tree_features(bool(scene.meshes), bool(scene.spheres), packed.shapes.lone, packed.tree is not NO_RAYS),
            "SPHERES": bool(scene.spheres), "INSTANCES": bool(scene.instances),
            "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes),
            "VERTEX_COLORS": any(mesh.colors is not None for mesh in scene.meshes),

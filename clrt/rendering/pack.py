@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..accel.build import FEW_SPHERES, fitting_layout
 from ..accel.kernels import tree_buffers
-from ..accel.layouts import Layout, leaf_spheres
+from ..accel.layouts import NO_RAYS, Layout, leaf_spheres
 from ..device.open import Device
 from ..device.preamble import Buffers
 from ..scene.instancing import arranged
@@ -56,20 +56,29 @@ class Shapes:
         return [*(mesh.material for mesh in self.scene.meshes), *(sphere.material for sphere in self.scene.spheres),
                 *self.placements.materials]
 
+    def _follows_rays(self, choices: Choices) -> bool:
+        """Whether rays are: the integrator `raster` has no others than those of shadows, mirrors, glass and holes."""
+        render = self.scene.render
+        return (render.integrator != "raster" or render.shadows or choices.first_hits
+                or any(user.is_specular or "TRANSMISSION" in user.features() or "opacity" in user.surface_parameters()
+                       for user in self.users))
+
     def tree(self, choices: Choices, device: Device | None, carried: Carried) -> Layout:
-        """The tree over all but lone spheres."""
+        """The tree over all but lone spheres; NO_RAYS where none is needed."""
+        if not self._follows_rays(choices):
+            return NO_RAYS
         in_tree, test = self.spheres[:0] if self.lone else self.spheres, choices.tests.triangle
         layout = choices.layout or fitting_layout(device, len(self.triangles), len(in_tree), test,
                                                   bool(self.scene.instances), choices.tree)
         return carried.tree(device, layout, choices.builder, self.scene.meshes, self.triangles, in_tree, test,
                             self.placements)
 
-    def buffers(self, codes: NDArray[np.int32], emitters: Emitters) -> dict[str, tuple[str, Any]]:
-        """What surfaces are made of; codes: of the users' materials."""
+    def buffers(self, codes: NDArray[np.int32], emitters: Emitters, rays: bool) -> dict[str, tuple[str, Any]]:
+        """What surfaces are made of; codes: of the users' materials; rays: whether any is followed."""
         meshes, spheres = self.scene.meshes, self.spheres
         of_meshes, of_spheres, of_instances = np.split(codes, np.cumsum([len(meshes), len(spheres)]))
         buffers: dict[str, tuple[str, Any]] = {}
-        if self.lone:
+        if self.lone and rays:
             every = np.arange(len(spheres), dtype=np.int32)
             first = len(self.triangles) - self.placements.before
             buffers["leaf_spheres"] = ("LeafSphere", leaf_spheres(spheres, every, first))
@@ -120,7 +129,7 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: C
     textures = Textures()
     emitters = pack_emitters(shapes.scene, shapes.triangles, sky, textures)
     materials = pack_materials(shapes.users, textures)
-    buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters)
+    buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, tree is not NO_RAYS)
     buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, bool(materials.mapped("normal_map")))
     buffers |= materials.buffers | textures.buffers() | emitters.buffers | sky.buffers
     if scene.render.filter != "box":

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..accel.layouts import NO_RAYS
 from ..device.arrays import DeviceArray, empty_array, resident
 from ..device.launch import Launches
 from ..device.program import build, make_kernel
+from ..errors import UsageError
 from .accumulation import Accumulation
 from .loop_limit import check_pixels, mark_pixels
 from .on_device import WINDOW, WINDOWS
@@ -21,8 +23,11 @@ def render_pixels(session: Accumulation, source: str, name: str, record: np.dtyp
     """(height, width) records of the session's picture that kernel `name` of a program writes, in bounded launches.
 
     The kernel takes the scene, the records of a launch, the tiles and the launch, as `path` does. samples: what the
-    launch says. KernelError and DeviceError where the device fails.
+    launch says. KernelError and DeviceError where the device fails. UsageError where the renderer was not told.
     """
+    if session.compiled.tree is NO_RAYS:
+        raise UsageError("nothing of this picture takes rays, so nothing is there for them: what they meet first must be "
+                         "asked for when the renderer is made (first_hits=True)")
     device = session.device
     kernel = make_kernel(device, build(device, WINDOWS + source), name)
     order = scattered(session.tile_samples.size).astype(np.uint32)

@@ -55,7 +55,8 @@ class Renderer:
     error_percentile: a wanted error is reached where so many per cent of the tiles of 8 x 8 pixels have it.
     before: one that is of no use any more; what it has on the devices is taken over as far as its scene is the same:
     parts of a scene that are the same objects must not have been changed in place.
-    aovs: pictures that are made beside, by their names (docs/aovs.md); those of a state: see `aovs`.
+    aovs: pictures that are made beside, by their names (docs/aovs.md); those of a state: see `aovs`. first_hits:
+    whether its session will be asked for a denoiser's guides, or for what is seen first.
     Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
 
@@ -72,7 +73,7 @@ class Renderer:
                  on_phase: Callable[[str], None] = lambda phase: None, checkpoint: str | Path | None = None,
                  resume: bool = False, checkpoint_seconds: float = 30.0,
                  error_percentile: float | None = None, aovs: str | Iterable[str] = (), before: Renderer | None = None,
-                 ) -> None:
+                 first_hits: bool = False) -> None:
         self._aovs = chosen_aovs(aovs)
         self._percentile = checked_percentile(error_percentile)
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
@@ -81,7 +82,7 @@ class Renderer:
         self.scene = replace(scene, render=settings)
         check_light(self._aovs, settings.integrator)
         self.choices = Choices(lanes or WAVE_LANES, layout, builder, HitTests(triangle, box, sphere), offset,
-                               needs_direct_light(self._aovs), paths, tree)
+                               needs_direct_light(self._aovs), paths, tree, first_hits or bool(seen_first(self._aovs)))
         self._open(device, lanes, on_phase, before)
         self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene, self.choices,
                                                    self.name)

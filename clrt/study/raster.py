@@ -28,7 +28,7 @@ SEEN = record(x="f4", y="f4", t="f4", u="f4", v="f4", primitive="i4", instance="
 def seen_both_ways(device: Device, scene: Scene, sample: int = 0, **chosen: Any) -> tuple[NDArray[Any], NDArray[Any]]:
     """(height, width) SEEN records, rasterised and traced, of a sample of each pixel; chosen: see `probe.choices`."""
     scene = replace(scene, render=replace(scene.render, integrator="raster"))
-    compiled = compile_scene(scene, choices(device, **chosen), device=device)
+    compiled = compile_scene(scene, choices(device, first_hits=True, **chosen), device=device)
     width, height = size = scene.render.size
     launch = first_launch(compiled, size, 1, scene.render.seed, scene.render.spp)
     tiles = np.arange(np.prod(tiles_of(size)), dtype=np.uint32)

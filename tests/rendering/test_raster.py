@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from clrt.device.memory import VARIABLE
 from clrt.device.open import Device
-from clrt.errors import DeviceError, SceneError
+from clrt.errors import DeviceError, SceneError, UsageError
 from clrt.rendering.choices import Choices
 from clrt.rendering.compile import compile_scene
 from clrt.rendering.crew import Crew
 from clrt.rendering.renderer import Renderer
 from clrt.scene.file import load
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.materials import Diffuse, Mirror
+from clrt.scene.materials import Dielectric, Diffuse, Mirror
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 from clrt.study.raster import seen_both_ways
 
@@ -258,6 +258,28 @@ def test_what_does_not_fit_is_refused_with_the_size(device: Device, monkeypatch:
     scene = Scene(meshes=[ball(4, (0.0, 0.0, -3.0))], camera=AHEAD)
     with pytest.raises(DeviceError, match="what the camera sees takes a buffer of .* to rasterise"):
         Renderer(scene, device=device.info.index, integrator="raster", size=SIZE)
+
+
+def test_where_no_ray_is_followed_there_is_no_tree(device: Device) -> None:
+    """The picture is the same bit for bit as with one; what rays meet first can be asked for all the same."""
+    balls = [Sphere(center=(-1.5, 0.0, -4.0), radius=0.7), Sphere(center=(1.5, 0.0, -4.0), radius=0.7)]
+    sun = DirectionalLight(direction=(-1, -1, 0), irradiance=(1.0, 1.0, 1.0))
+    scene = Scene(meshes=[ball(3, (0.0, 0.0, -3.0)), plain(9.0, 1.0)], spheres=balls, lights=[sun], camera=AHEAD,
+                  environment=Environment(color=(0.1, 0.2, 0.3)), render=replace(SETTINGS, shadows=False, size=(64, 48)))
+    asked = Renderer(scene, device=device.info.index, aovs="object")
+    renderer = Renderer(scene, device=device.info.index)
+    with_tree, without = (list(each.passes(spp=4))[-1] for each in (asked, renderer))
+    assert with_tree.film.pixels.tobytes() == without.film.pixels.tobytes() and without.pixels.std() > 0.1
+    assert not {"nodes", "packs", "leaf_triangles", "leaf_spheres"} & set(renderer.compiled.buffers)
+    assert renderer.session.device_bytes < asked.session.device_bytes
+    assert set(np.unique(asked.aovs(with_tree)["object"])) == {-1, 0, 1, 2, 3}
+    with pytest.raises(UsageError, match="first_hits=True"):
+        renderer.session.guides()
+    for needed in ({"shadows": True}, {"integrator": "local"}, {"first_hits": True}):
+        assert "IN_TREE" in Renderer(scene, device=device.info.index, **needed).compiled.features  # type: ignore
+    for material in (Mirror(), Dielectric(), Diffuse(opacity=0.5)):
+        other = replace(scene, spheres=[replace(balls[0], material=material)])
+        assert compile_scene(other, Choices()).tree.nodes > 0
 
 
 def test_other_scenes_pay_nothing_and_other_cameras_are_refused() -> None:
