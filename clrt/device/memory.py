@@ -65,6 +65,16 @@ def part_count(array: Any, part_bytes: int | None) -> int:
 def check_memory(info: DeviceInfo, needs: Mapping[str, int], parameter_bytes: int, most_parameter_bytes: int) -> None:
     """NoRoomError with the numbers where buffers of so many bytes do not fit, or a kernel cannot take as many as there
     are parts: its parameters would fill `parameter_bytes`."""
+    check_room(info, needs)
+    if parameter_bytes > most_parameter_bytes:
+        raise NoRoomError(f"{info.name}: its buffers are {size(info.max_alloc_bytes)} at most, and the scene of "
+                          f"{size(sum(needs.values()))} would be in more of them than the {most_parameter_bytes // 8} "
+                          "or so that a kernel takes; take another --device, or a smaller scene (or set "
+                          f"{VARIABLE} to more)")
+
+
+def check_room(info: DeviceInfo, needs: Mapping[str, int]) -> None:
+    """NoRoomError with the numbers where buffers of so many bytes, by what is in them, do not fit."""
     total = sum(needs.values())
     if total > info.global_bytes:
         largest = sorted(needs, key=lambda name: -needs[name])[:4]
@@ -72,10 +82,6 @@ def check_memory(info: DeviceInfo, needs: Mapping[str, int], parameter_bytes: in
         raise NoRoomError(f"{info.name}: this render needs {size(total)} ({told}), and the device has "
                           f"{size(info.global_bytes)}; take another --device, smaller pictures and models, or fewer "
                           "of them")
-    if parameter_bytes > most_parameter_bytes:
-        raise NoRoomError(f"{info.name}: its buffers are {size(info.max_alloc_bytes)} at most, and the scene of "
-                          f"{size(total)} would be in more of them than the {most_parameter_bytes // 8} or so that a "
-                          f"kernel takes; take another --device, or a smaller scene (or set {VARIABLE} to more)")
 
 
 def check_host(film_bytes: int, width: int, height: int) -> None:

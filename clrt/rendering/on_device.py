@@ -89,11 +89,17 @@ class SceneOnDevice:
         """Memory of all buffers on the device."""
         return self.compiled.bytes + self.film_bytes + (self._bins.bytes if self._bins else 0)
 
+    @property
+    def _needs(self) -> dict[str, int]:
+        """Bytes there, by what takes them, but for a camera's bins."""
+        arrays = self.compiled.buffers.items()
+        return {**{name: array_bytes(array, self.compiled.part_bytes) for name, (_, array) in arrays},
+                "film": self.film_bytes}
+
     def _check_memory(self) -> None:
         compiled, part_bytes = self.compiled, self.compiled.part_bytes
-        needs = {name: array_bytes(array, part_bytes) for name, (_, array) in compiled.buffers.items()}
         pointers = sum(part_count(array, part_bytes) for _, array in compiled.buffers.values())
-        check_memory(self.device.info, {**needs, "film": self.film_bytes},
+        check_memory(self.device.info, self._needs,
                      8 * pointers + compiled.counts.itemsize + self.launch.itemsize + OTHER_PARAMETERS,
                      self.device.cl.max_parameter_size)
 
@@ -125,7 +131,7 @@ class SceneOnDevice:
 
     def enqueue_pixels(self, film: cl.Buffer, tiles: cl.Buffer) -> cl.Event:
         """Enqueues the integrator for the range in the launch record, of the picture's tiles in `tiles`."""
-        bins = self._bins.of(self.launch) if self._bins else []
+        bins = self._bins.of(self.launch, self._needs) if self._bins else []
         self._kernel.set_args(*self.scene_arguments, film, tiles, self.launch[0], *bins)
         return self.enqueue(self._kernel, int(self.launch["pixel_count"][0]), self.compiled.pixels)
 

@@ -26,8 +26,8 @@ def render_pixels(session: Accumulation, source: str, name: str, record: np.dtyp
     launch says. KernelError and DeviceError where the device fails. UsageError where the renderer was not told.
     """
     if session.compiled.tree is NO_RAYS:
-        raise UsageError("nothing of this picture takes rays, so nothing is there for them: what they meet first must be "
-                         "asked for when the renderer is made (first_hits=True)")
+        raise UsageError("nothing of this picture takes rays, so there is no tree for them: what they meet first must "
+                         "be asked for when the renderer is made (first_hits=True)")
     device = session.device
     kernel = make_kernel(device, build(device, WINDOWS + source), name)
     order = scattered(session.tile_samples.size).astype(np.uint32)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..device.blocks import Blocks
 from ..device.launch import calling
-from ..device.memory import size
+from ..device.memory import check_room, size
 from ..device.open import Device
 from ..errors import NoRoomError
 from .compile import CompiledScene
@@ -69,17 +70,20 @@ class Bins:
         """Memory of the bins and of what is in them."""
         return sum(buffer.size for buffer in self._held)
 
-    def of(self, launch: NDArray[Any]) -> list[cl.Buffer]:
-        """What the raster kernel takes last, for the camera of a LAUNCH record; NoRoomError where it sees too much."""
+    def of(self, launch: NDArray[Any], needs: Mapping[str, int]) -> list[cl.Buffer]:
+        """What the raster kernel takes last, for the camera of a LAUNCH record; NoRoomError where it sees too much.
+
+        needs: bytes of what else is on the device, by name.
+        """
         view = b"".join(launch[name].tobytes() for name in VIEW)
         if view != self._view:
             self._view = b""
             with calling():
-                self._sort(launch[0])
+                self._sort(launch[0], needs)
             self._view = view
         return self._held
 
-    def _sort(self, launch: np.void) -> None:
+    def _sort(self, launch: np.void, needs: Mapping[str, int]) -> None:
         blocks, bins = self._blocks, bin_count((int(launch["width"]), int(launch["height"])))
         blocks.free(*self._held)
         self._held = []
@@ -87,7 +91,7 @@ class Bins:
         self._run(launch, 0, numbers, counts, nothing, nothing)
         starts = np.append(0, np.cumsum(blocks.download(counts, np.uint32, bins), dtype=np.int64))
         seen = int(blocks.download(numbers, np.uint32, 1)[0])
-        self._check(4 * int(starts[-1]), seen * OUTLINE.itemsize)
+        self._check(needs, starts.astype(np.uint32).nbytes, 4 * int(starts[-1]), seen * OUTLINE.itemsize)
         self._held = [blocks.upload(starts.astype(np.uint32)), blocks.empty(np.uint32, int(starts[-1])),
                       blocks.empty(OUTLINE, seen)]
         places = blocks.upload(starts[:-1].astype(np.uint32))
@@ -104,8 +108,9 @@ class Bins:
         if spheres:
             self._blocks.run("sort_spheres", spheres, *arguments)
 
-    def _check(self, *sizes: int) -> None:
+    def _check(self, needs: Mapping[str, int], *sizes: int) -> None:
         info = self._device.info
+        check_room(info, {**needs, **dict(zip(("bin_starts", "bin_entries", "outlines"), sizes))})
         if max(sizes) > info.max_alloc_bytes:
             raise NoRoomError(f"{info.name}: what the camera sees takes a buffer of {size(max(sizes))} to rasterise, "
                               f"and there they have {size(info.max_alloc_bytes)} at most; take the integrator local, a "

@@ -39,7 +39,7 @@ def seen_both_ways(device: Device, scene: Scene, sample: int = 0, **chosen: Any)
     seen = [empty_array(device, SEEN, width * height) for _ in range(2)]
     given = [*(each.buffer for each in seen), on_device(device, tiles), launch[0]]   # kernels keep no arguments alive
     bins = Bins(device, compiled, arguments)
-    kernel.set_args(*arguments, *given, *bins.of(launch))
+    kernel.set_args(*arguments, *given, *bins.of(launch, {}))
     run_kernel(device, kernel, -(-len(tiles) * TILE_PIXELS // (compiled.choices.lanes * device.local_size)))
     rasterised, traced = (each.read(device).reshape(height, width) for each in seen)
     return rasterised, traced

@@ -11,13 +11,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.device.arrays import on_device
 from clrt.device.memory import VARIABLE
 from clrt.device.open import Device
-from clrt.errors import DeviceError, SceneError, UsageError
+from clrt.errors import DeviceError, NoRoomError, SceneError, UsageError
 from clrt.rendering.choices import Choices
 from clrt.rendering.compile import compile_scene
 from clrt.rendering.crew import Crew
+from clrt.rendering.raster import Bins
 from clrt.rendering.renderer import Renderer
+from clrt.rendering.session import first_launch
 from clrt.scene.file import load
 from clrt.scene.lights import DirectionalLight
 from clrt.scene.materials import Dielectric, Diffuse, Mirror
@@ -258,6 +261,18 @@ def test_what_does_not_fit_is_refused_with_the_size(device: Device, monkeypatch:
     scene = Scene(meshes=[ball(4, (0.0, 0.0, -3.0))], camera=AHEAD)
     with pytest.raises(DeviceError, match="what the camera sees takes a buffer of .* to rasterise"):
         Renderer(scene, device=device.info.index, integrator="raster", size=SIZE)
+
+
+def test_bins_are_in_the_memory_plan(device: Device) -> None:
+    """What is sorted is compared with the room beside the scene before it takes any."""
+    scene = Scene(meshes=[ball(4, (0.0, 0.0, -3.0))], camera=AHEAD, render=SETTINGS)
+    compiled = compile_scene(scene, Choices(), device=device)
+    arguments = [*(on_device(device, array) for _, array in compiled.buffers.values()), compiled.counts[0]]
+    bins, launch = Bins(device, compiled, arguments), first_launch(compiled, SIZE, 2, 0, None)
+    full = {"film": device.info.global_bytes - 64 * 5120 // 4}
+    with pytest.raises(NoRoomError, match="outlines .* KiB"):
+        bins.of(launch, full)
+    assert bins.bytes == 0 and bins.of(launch, {}) and 64 * 5120 // 4 < bins.bytes < 64 * 5120 * 1.5
 
 
 def test_where_no_ray_is_followed_there_is_no_tree(device: Device) -> None:
