@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 #: Those of contestants.py, there after "clrt, ".
 NAMES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "lanes 8", "lanes 16", "paths in lanes",
          "unplanned"]
-INTEGRATORS = ["path", "direct", "local"]
+INTEGRATORS = ["path", "direct", "local", "raster"]
 
 
 @click.command("converge")

@@ -12,11 +12,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import fmean, median
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 from ..rendering.renderer import Renderer
 from ..scene.materials import Material
-from ..scene.model import Integrator, Scene
+from ..scene.model import Scene
 from .theses_scenes import GLASS, STONE, dragon_scene, hall, tree_scene
 
 MACHINES = {"N": "Radeon RX 9070 XT", "S": "GeForce RTX 2060 mobile, ray tracing in hardware"}
@@ -123,21 +123,19 @@ def _with_and_without(name: str, title: str, scene: Scene, effort: Effort, their
 
 def _shadows(effort: Effort, models: Models) -> Experiment:
     scene = _smaller(hall(effort.detail, models.statue), effort)
-    variants = [Variant("hard shadows, traced", scene, {"max_depth": 2}, 1 / 537)]
-    if "raster" in get_args(Integrator):
-        variants.append(Variant("rasterised, no shadows", scene, RASTER, 1 / 540))
+    variants = [Variant("hard shadows, traced", scene, {"max_depth": 2}, 1 / 537),
+                Variant("rasterised, no shadows", scene, RASTER, 1 / 540)]
     return Experiment("shadows", "S 7.5: a hall of 700 thousand triangles and a point light, 1280x720", "S", variants,
-                      [("hard shadows, traced", "rasterised, no shadows")] if len(variants) > 1 else [])
+                      [("hard shadows, traced", "rasterised, no shadows")])
 
 
 def _mirrors(name: str, title: str, scene: Scene, effort: Effort, traced: Mapping[int, float]) -> Experiment:
     scene = _smaller(scene, effort)
     variants = [Variant(f"depth {depth}", scene, {"max_depth": depth + 1},
                         1 / traced[depth] if depth in traced else None, depth=depth) for depth in effort.depths]
-    if "raster" in get_args(Integrator):
-        dull = replace(scene, meshes=[replace(mesh, material=STONE) if mesh.material == GLASS else mesh
-                                      for mesh in scene.meshes])
-        variants.append(Variant("rasterised, no reflections", dull, RASTER, 1 / 530 if name == "mirrors" else None))
+    dull = replace(scene, meshes=[replace(mesh, material=STONE) if mesh.material == GLASS else mesh
+                                  for mesh in scene.meshes])
+    variants.append(Variant("rasterised, no reflections", dull, RASTER, 1 / 530 if name == "mirrors" else None))
     return Experiment(name, title, "S", variants, [("depth 25", "depth 4")])
 
 
