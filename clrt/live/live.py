@@ -7,6 +7,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 from types import TracebackType
 from typing import Any
@@ -22,9 +23,10 @@ from ..rendering.renderer import Renderer, State
 from ..rendering.report import render_report
 from ..scene.model import Scene
 from .history import History
+from .live_renderer import Asked, LiveRenderer, Superseded
+from .picks import Picks, Thing
 from .settings import Selector, Settings
 from .snapshot import Snapshot
-from .live_renderer import Asked, LiveRenderer, Superseded
 
 #: A movement without anything new for so many seconds has ended.
 SETTLED = 0.2
@@ -48,7 +50,7 @@ class Live:
         self._snapshot = Snapshot(scene=scene, settings=settings, pixels=black, size=size)
         self._still: tuple[Renderer, State] | None = None
         self._times: deque[float] = deque(maxlen=64)
-        self._history = History()
+        self._history, self._picks = History(), Picks()
         self._changed = threading.Condition(threading.RLock())
         self._closed = False
         self._unseen = True     # no picture of what is being rendered was published
@@ -119,6 +121,14 @@ class Live:
             self._changed.wait_for(lambda: self._closed or until(self._snapshot), seconds)
             return self._snapshot
 
+    def pick(self, x: float, y: float) -> Future[Thing | None]:
+        """What is seen first at a place of the picture, or None for the sky; (0, 0) is its upper left corner, (1, 1)
+        the lower right. It is an object of the scene that was shown when that was found out. Raises what renders do."""
+        with self._changed:
+            found = self._picks.ask(x, y)
+            self._changed.notify_all()
+        return found
+
     def image(self) -> Image:
         """The newest picture, to be saved; with its report if it is a whole one."""
         with self._changed:
@@ -133,6 +143,7 @@ class Live:
             self._renderer.abandon()
             self._changed.notify_all()
         self._thread.join()
+        self._picks.cancel()
 
     def __enter__(self) -> Live:
         return self
@@ -150,10 +161,14 @@ class Live:
 
     def _work(self) -> None:
         """The thread: shows what was asked for last, until that is closed."""
-        asked: Asked | None = None
-        while (asked := self._next(asked)) is not None:
+        last: Asked | None = None
+        while (asked := self._next(last)) is not None:
             try:
-                self._show(asked)
+                if asked is last:
+                    self._picks.answer(self._renderer.seen_at)
+                else:
+                    last = asked
+                    self._show(asked)
             except Superseded:
                 pass
             except ClrtError as error:
@@ -163,9 +178,9 @@ class Live:
                 self._publish(asked=asked.number, error=f"{type(error).__name__}: {error}", phase="rest")
 
     def _next(self, last: Asked | None) -> Asked | None:
-        """What to show, once it is not the last; None in the end."""
+        """What to show, once it is not the last, or the last where something is asked of it; None in the end."""
         with self._changed:
-            self._changed.wait_for(lambda: self._closed or self._asked is not last)
+            self._changed.wait_for(lambda: self._closed or self._picks or self._asked is not last)
             return None if self._closed else self._asked
 
     def _show(self, asked: Asked) -> None:
@@ -190,6 +205,7 @@ class Live:
                 self._publish_picture(asked, state)
                 if self._is_superseded(asked):
                     raise Superseded
+                self._picks.answer(self._renderer.seen_at)
                 if self._is_denoised(asked, size) and (pixels := self._renderer.denoised(state)) is not None:
                     self._publish(denoised=pixels)
         if self._is_superseded(asked):

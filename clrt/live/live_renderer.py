@@ -15,6 +15,7 @@ from ..rendering.guides import render_guides
 from ..rendering.renderer import Renderer, State
 from ..scene.model import Scene
 from .pace import Pace
+from .picks import Thing
 from .settings import Selector, Settings
 
 
@@ -58,6 +59,8 @@ class LiveRenderer:
         self._guides: dict[str, NDArray[np.float32]] = {}
         self._guided: Renderer | None = None    # whose guides these are
         self._denoise_from = 0.0
+        self._met: NDArray[np.generic] = np.zeros((0, 0), np.int32)    # objects' numbers, pixel by pixel
+        self._met_by: Renderer | None = None    # where these are seen
 
     def quick_size(self, asked: Asked) -> tuple[int, int]:
         """Of a picture that comes in time while things move; the whole one's where that does."""
@@ -98,6 +101,19 @@ class LiveRenderer:
         done = time.perf_counter()
         self._denoise_from = done + (done - now) / DENOISING
         return pixels
+
+    def seen_at(self, x: float, y: float) -> Thing | None:
+        """What is seen first there (see `Picks`), in the middle of a pixel."""
+        renderer = self.renderer
+        if renderer is None:
+            return None
+        if self._met_by is not renderer:
+            self._met = renderer.session.first_hits(renderer.scene, ["object"])["object"]
+            self._met_by = renderer
+        row, column = (min(max(int(at * size), 0), size - 1) for at, size in zip((y, x), self._met.shape))
+        number, scene = int(self._met[row, column]), renderer.scene
+        things: list[Thing] = [*scene.meshes, *scene.instances, *scene.spheres]
+        return None if number < 0 else things[number]
 
     def abandon(self) -> None:
         """Has `states` end soon; for any thread."""

@@ -10,15 +10,13 @@ from ..device.discover import find_devices
 from ..live.live import Live
 from ..live.settings import Settings
 from ..scene.model import Scene
-from .editor import Editor
+from .editor import MATERIALS, SPHERES, Editor
 from .tone_mapping import Look as Look
 from .needs import no_display
-from .panels import render, statistics
+from .panels import materials, render, spheres, statistics
 from .panels.camera import CameraPanel
 from .panels.files import Files
 from .panels.lights import Lights
-from .panels.materials import Materials
-from .panels.spheres import Spheres
 from .viewport import Viewport
 
 SIZE = (1280, 800)
@@ -75,8 +73,8 @@ class App:
     def _panels(self) -> list[hello_imgui.DockableWindow]:
         places: dict[str, dict[str, Callable[[Editor], None]]] = {
             "MainDockSpace": {"Picture": self.viewport.show},
-            "Panels": {"Spheres": Spheres().show, "Materials": Materials().show, "Lights": Lights().show,
-                       "Camera": CameraPanel().show, "Render": render.show, "File": Files(self.editor.scene.name).show},
+            "Panels": {SPHERES: spheres.show, MATERIALS: materials.show, "Lights": Lights().show,
+                       "Camera": CameraPanel().show, "Render": render.show, "File": Files().show},
             "Figures": {"Statistics": statistics.show}}
         return [self._panel(place, name, show) for place, panels in places.items() for name, show in panels.items()]
 

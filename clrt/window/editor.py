@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from math import tau
 from pathlib import Path
@@ -15,20 +15,24 @@ from imgui_bundle import imgui
 from ..device.describe import DeviceInfo
 from ..errors import ClrtError
 from ..live.live import Live
+from ..live.picks import Thing
 from ..live.settings import Settings
 from ..live.snapshot import Snapshot
 from ..output.images import write_image
 from ..output.scenes import save_scene
 from ..scene.editing import materials_of, with_material
+from ..scene.file import load
 from ..scene.lights import DirectionalLight
 from ..scene.material import Material
-from ..scene.model import Camera, Scene
+from ..scene.model import Camera, Instance, Scene, Sphere
 from .camera_controls import CameraControls
 from .navigation import around, distance
 from .screenshot import screenshot
 from .tone_mapping import Look, ToneMapper
 
 _log = logging.getLogger(__name__)
+#: Panels, by their titles.
+SPHERES, MATERIALS = "Spheres", "Materials"
 #: What a pixel of dragging a coordinate moves, over the camera's distance.
 STEP = 1 / 500
 #: Seconds that a moving light takes for its circle.
@@ -37,16 +41,19 @@ ROUND = 8.0
 
 class Editor:
     """The scene and the settings are the session's own. message: what could not be done last, or was done; frames: how
-    many were drawn; moving_light: the number of the one that circles round what the camera looks at."""
+    many were drawn; moving_light: the number of the one that circles round what the camera looks at; sphere, material:
+    the number and the name of those that the panels edit."""
 
     def __init__(self, live: Live, look: Look, devices: Sequence[DeviceInfo]) -> None:
         self.live, self.look, self.devices = live, look, devices
         self.tone_mapper, self.controls = ToneMapper(), CameraControls()
         self.message, self.frames = "", 0
         self.moving_light: int | None = None
+        self.sphere, self.material = 0, ""
+        self._picked: Future[Thing | None] | None = None
         self._dragging = False
         self._screenshot: Path | None = None
-        self._writer = ThreadPoolExecutor(1, "clrt writes")
+        self._files = ThreadPoolExecutor(1, "clrt files")
         self._materials: tuple[Scene, dict[str, Material]] | None = None
 
     @property
@@ -92,15 +99,39 @@ class Editor:
         """Replaces the settings."""
         self.attempt(lambda: self.live.choose(settings))
 
+    def pick(self, x: float, y: float) -> None:
+        """Has the panels edit what is seen at a place of the picture (see `Live.pick`), once that is known."""
+        self._picked = self.live.pick(x, y)
+
+    def _choose_picked(self) -> None:
+        if self._picked is None or not self._picked.done():
+            return
+        picked, self._picked = self._picked, None
+        self.attempt(lambda: self._choose(picked.result()))
+
+    def _choose(self, thing: Thing | None) -> None:
+        if thing is None:
+            return
+        if isinstance(thing, Sphere):
+            self.sphere = next((i for i, each in enumerate(self.scene.spheres) if each is thing), self.sphere)
+        material = thing.material or thing.mesh.material if isinstance(thing, Instance) else thing.material
+        self.material = next((name for name, each in self.materials.items() if each is material), self.material)
+        if imgui.internal.find_window_by_name(MATERIALS).hidden:
+            _bring_forward(SPHERES if isinstance(thing, Sphere) else MATERIALS)
+
     def save_picture(self, path: Path) -> None:
         """Writes the newest whole picture as it is shown (.png), or its light (.exr, .hdr)."""
         look = self.look
-        self._save(path, lambda: self.live.image().save(path, view=look.view, exposure=look.exposure))
+        self._beside(path, "is written", lambda: self.live.image().save(path, view=look.view, exposure=look.exposure))
 
     def save_scene(self, path: Path) -> None:
         """Writes the scene as a scene file, with what belongs beside it."""
         scene = self.scene
-        self._save(path, lambda: save_scene(scene, path))
+        self._beside(path, "is written", lambda: save_scene(scene, path))
+
+    def open(self, path: Path) -> None:
+        """Shows the scene in a file instead, which is a step of undoing."""
+        self._beside(path, "is shown", lambda: self.live.edit(load(path)))
 
     def save_screenshot(self, path: Path) -> None:
         """Writes the window as it looks, once this frame is drawn."""
@@ -111,23 +142,23 @@ class Editor:
         if self._screenshot is not None:
             path, pixels = self._screenshot, screenshot()
             self._screenshot = None
-            self._save(path, lambda: write_image(path, pixels, view="raw"))
+            self._beside(path, "is written", lambda: write_image(path, pixels, view="raw"))
 
-    def _save(self, path: Path, write: Callable[[], object]) -> None:
-        """Has a file written without waiting for it."""
+    def _beside(self, path: Path, done: str, do: Callable[[], object]) -> None:
+        """Does something with a file without waiting for it. done: what is said of the file then."""
         def work() -> None:
             try:
-                self.attempt(write)
-                self.message = self.message or f"{path} is written"
-            except Exception as error:  # a mistake of ours must not pass for a file
-                _log.exception("%s was not written", path)
+                self.attempt(do)
+                self.message = self.message or f"{path} {done}"
+            except Exception as error:  # a mistake of ours must not pass for success
+                _log.exception("%s failed", path)
                 self.message = f"{path}: {type(error).__name__}: {error}"
 
-        self._writer.submit(work)
+        self._files.submit(work)
 
     def close(self) -> None:
         """Ends its threads, once files are written."""
-        self._writer.shutdown()
+        self._files.shutdown()
         self.tone_mapper.close()
 
     def attempt(self, do: Callable[[], object]) -> None:
@@ -144,6 +175,7 @@ class Editor:
         self.tone_mapper.ask(self.snapshot, self.look)
         if self._dragging and not imgui.is_any_item_active():
             self._show(self.scene)
+        self._choose_picked()
         self._move_light()
         if not imgui.get_io().want_text_input:
             self._shortcuts()
@@ -167,3 +199,10 @@ class Editor:
             turn = tau * imgui.get_io().delta_time / ROUND
             lights[self.moving_light] = replace(light, position=around(light.position, self.scene.camera, turn))
             self.attempt(lambda: self.live.edit(replace(self.scene, lights=lights), moving=True, step=False))
+
+
+def _bring_forward(panel: str) -> None:
+    """Selects a panel's tab. The keyboard stays with the picture, which giving the panel the focus would not allow."""
+    window = imgui.internal.find_window_by_name(panel)
+    if window.dock_node is not None and window.dock_node.tab_bar is not None:
+        window.dock_node.tab_bar.next_selected_tab_id = window.tab_id

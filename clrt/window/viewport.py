@@ -9,6 +9,7 @@ from imgui_bundle import ImVec2, hello_imgui, imgui
 from .editor import Editor
 from .tone_mapping import ToneMapped
 
+LEFT = imgui.MouseButton_.left.value
 ANY_BUTTON = (imgui.ButtonFlags_.mouse_button_left.value | imgui.ButtonFlags_.mouse_button_middle.value
               | imgui.ButtonFlags_.mouse_button_right.value)
 
@@ -27,13 +28,20 @@ class Viewport:
         if newest is not None and newest is not self.shown:
             self.shown, self._texture = newest, hello_imgui.create_texture_gpu_from_rgba_data(newest.rgba)
         self._place(editor.scene.render.size)
-        imgui.invisible_button("picture", self.size, ANY_BUTTON)
+        if imgui.invisible_button("picture", self.size, ANY_BUTTON):
+            self._clicked(editor)
         if self._texture is not None:
             end = self.corner[0] + self.size[0], self.corner[1] + self.size[1]
             imgui.get_window_draw_list().add_image(imgui.ImTextureRef(self._texture.texture_id()), self.corner, end)
         camera = editor.controls.move(editor.scene.camera, self.size[1])
         if camera is not editor.scene.camera:
             editor.walk(camera)
+
+    def _clicked(self, editor: Editor) -> None:
+        """A click chooses what is there; the end of dragging does not."""
+        if imgui.is_mouse_released(LEFT) and not any(imgui.get_mouse_drag_delta(LEFT)):
+            at = imgui.get_mouse_pos()
+            editor.pick((at.x - self.corner[0]) / self.size[0], (at.y - self.corner[1]) / self.size[1])
 
     def release(self) -> None:
         """Gives back what lies on the display's device, which must be done while the window is there."""

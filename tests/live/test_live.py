@@ -104,6 +104,21 @@ def test_edits_of_values_build_nothing_and_show_what_a_render_shows(live: Live, 
     assert check_as_rendered(live, device).tree["nodes"] == 0
 
 
+def test_what_is_seen_at_a_place(live: Live) -> None:
+    """While it is rendered, and at rest; what was removed is seen no more, and a picture that went wrong stays."""
+    ball, mesh = live.scene.spheres[0], live.scene.meshes[1]
+    places = {(0.5, 0.5): mesh, (0.74, 0.5): ball, (0.5, 0.97): live.scene.meshes[0], (0.02, 0.02): None}
+    for _ in range(2):
+        for place, thing in places.items():
+            assert live.pick(*place).result(SECONDS) is thing, place
+        whole(live)
+    live.edit(replace(live.scene, spheres=live.scene.spheres[1:]))
+    whole(live)
+    assert live.pick(0.74, 0.5).result(SECONDS) is not ball
+    live.edit(replace(live.scene, camera=replace(live.scene.camera, fov_degrees=200)))
+    assert whole(live).error is not None and live.pick(0.5, 0.5).result(SECONDS) is mesh
+
+
 def test_moved_instances_keep_the_trees_of_their_meshes(device: Device) -> None:
     """The upper level alone is made anew; the picture is that of a fresh render."""
     vertices, faces = icosphere(6)

@@ -280,7 +280,8 @@ def test_where_no_ray_is_followed_there_is_no_tree(device: Device) -> None:
     balls = [Sphere(center=(-1.5, 0.0, -4.0), radius=0.7), Sphere(center=(1.5, 0.0, -4.0), radius=0.7)]
     sun = DirectionalLight(direction=(-1, -1, 0), irradiance=(1.0, 1.0, 1.0))
     scene = Scene(meshes=[ball(3, (0.0, 0.0, -3.0)), plain(9.0, 1.0)], spheres=balls, lights=[sun], camera=AHEAD,
-                  environment=Environment(color=(0.1, 0.2, 0.3)), render=replace(SETTINGS, shadows=False, size=(64, 48)))
+                  environment=Environment(color=(0.1, 0.2, 0.3)),
+                  render=replace(SETTINGS, shadows=False, size=(64, 48)))
     asked = Renderer(scene, device=device.info.index, aovs="object")
     renderer = Renderer(scene, device=device.info.index)
     with_tree, without = (list(each.passes(spp=4))[-1] for each in (asked, renderer))
@@ -291,7 +292,7 @@ def test_where_no_ray_is_followed_there_is_no_tree(device: Device) -> None:
     with pytest.raises(UsageError, match="first_hits=True"):
         renderer.session.guides()
     for needed in ({"shadows": True}, {"integrator": "local"}, {"first_hits": True}):
-        assert "IN_TREE" in Renderer(scene, device=device.info.index, **needed).compiled.features  # type: ignore
+        assert "IN_TREE" in Renderer(scene, device=device.info.index, **needed).compiled.features
     for material in (Mirror(), Dielectric(), Diffuse(opacity=0.5)):
         other = replace(scene, spheres=[replace(balls[0], material=material)])
         assert compile_scene(other, Choices()).tree.nodes > 0

@@ -80,6 +80,23 @@ class Driver:
         return self.window()[y:y + height, x:x + width]
 
 
+def changed(before: Levels, after: Levels) -> NDArray[np.bool_]:
+    """(height, width): where two pictures differ by more than the rounding of a level."""
+    return np.asarray(np.abs(before - after).max(axis=2) > 1)
+
+
+def halves(mask: NDArray[np.bool_]) -> tuple[float, float]:
+    """The part of the left half that is set, and that of the right half."""
+    middle = mask.shape[1] // 2
+    return float(mask[:, :middle].mean()), float(mask[:, middle:].mean())
+
+
+def at(picture: Levels, x: float, y: float) -> list[int]:
+    """The colour at a point of the 160 x 120 pixels that were rendered."""
+    height, width = picture.shape[:2]
+    return [int(level) for level in picture[int(y / 120 * height), int(x / 160 * width)]]
+
+
 def drive(scene: Scene, test: Callable[[Driver], None], folder: Path, settings: Settings = Settings()) -> None:
     """Opens a window on the scene, runs the test in it, and closes it. Pictures of the window go to the folder."""
     app = App(scene, settings)

@@ -1,4 +1,4 @@
-"""What is written: the picture, the scene, the window itself."""
+"""What is read, another scene, and written: the picture, the scene, the window itself."""
 
 from __future__ import annotations
 
@@ -11,13 +11,21 @@ from ..editor import Editor
 
 
 class Files:
-    """The panel; `names` are the files that it writes, by what it writes to them."""
+    """The panel; `names` are the files that it writes, by what it writes to them, `other` the one to open."""
 
-    def __init__(self, stem: str) -> None:
-        self.names = {"picture": f"{stem}.png", "scene": f"{stem}.edited.toml", "screenshot": f"{stem}.window.png"}
+    def __init__(self) -> None:
+        self.names: dict[str, str] = {}
+        self.other, self._stem = "", ""
 
     def show(self, editor: Editor) -> None:
         """Draws it."""
+        if (stem := editor.scene.name) != self._stem:
+            self._stem = stem
+            self.names = {"picture": f"{stem}.png", "scene": f"{stem}.edited.toml", "screenshot": f"{stem}.window.png"}
+        _, self.other = imgui.input_text_with_hint("##other", "a scene or model", self.other)
+        imgui.same_line()
+        if imgui.button("open") and self.other:
+            editor.open(Path(self.other))
         actions: dict[str, Callable[[Path], None]] = {"picture": editor.save_picture, "scene": editor.save_scene,
                                                       "screenshot": editor.save_screenshot}
         for what, write in actions.items():

@@ -17,29 +17,22 @@ from ..fields import choose, edit_fields
 TYPES = {kind.kernel: kind for kind in MATERIALS}
 
 
-class Materials:
-    """The panel; `chosen` is the name of the material that it edits."""
-
-    def __init__(self) -> None:
-        self.chosen = ""
-
-    def show(self, editor: Editor) -> None:
-        """Draws it."""
-        materials = editor.materials
-        names = list(materials)
-        self.chosen = choose("##material", names, self.chosen if self.chosen in names else names[0]) if names else ""
-        imgui.same_line()
-        if imgui.button("add"):
-            self.chosen = free_name("material", names)
-            editor.edit(materials={**editor.scene.materials, self.chosen: Diffuse()})
-        if self.chosen not in editor.materials:
-            return
-        old = editor.materials[self.chosen]
-        imgui.push_id("material")
-        new = _edited(old, editor.step)
-        imgui.pop_id()
-        if new is not old:
-            editor.repaint(old, new)
+def show(editor: Editor) -> None:
+    """Draws the panel."""
+    names, chosen = list(editor.materials), editor.material
+    editor.material = choose("##material", names, chosen if chosen in names else names[0]) if names else ""
+    imgui.same_line()
+    if imgui.button("add"):
+        editor.material = free_name("material", names)
+        editor.edit(materials={**editor.scene.materials, editor.material: Diffuse()})
+    if editor.material not in editor.materials:
+        return
+    old = editor.materials[editor.material]
+    imgui.push_id("material")
+    new = _edited(old, editor.step)
+    imgui.pop_id()
+    if new is not old:
+        editor.repaint(old, new)
 
 
 def _edited(material: Material, step: float) -> Material:

@@ -18,28 +18,22 @@ from ..navigation import distance
 NEW = 0.1
 
 
-class Spheres:
-    """The panel; `chosen` is the sphere that it edits."""
-
-    def __init__(self) -> None:
-        self.chosen = 0
-
-    def show(self, editor: Editor) -> None:
-        """Draws it."""
-        scene = editor.scene
-        self.chosen = pick("##spheres", [sphere.name for sphere in scene.spheres], self.chosen)
-        material = scene.spheres[self.chosen].material if scene.spheres else Diffuse()
-        new = Sphere(center=scene.camera.look_at, radius=NEW * distance(scene.camera), material=material)
-        spheres, self.chosen = change(scene.spheres, self.chosen, {"sphere": new})
-        if spheres != scene.spheres:
-            editor.edit(spheres=spheres)
-        elif spheres:
-            imgui.push_id("sphere")
-            new, named = _edited(editor, spheres[self.chosen])
-            imgui.pop_id()
-            if new is not spheres[self.chosen]:
-                spheres[self.chosen] = new
-                editor.edit(spheres=spheres, materials=named)
+def show(editor: Editor) -> None:
+    """Draws the panel."""
+    scene = editor.scene
+    editor.sphere = pick("##spheres", [sphere.name for sphere in scene.spheres], editor.sphere)
+    material = scene.spheres[editor.sphere].material if scene.spheres else Diffuse()
+    new = Sphere(center=scene.camera.look_at, radius=NEW * distance(scene.camera), material=material)
+    spheres, editor.sphere = change(scene.spheres, editor.sphere, {"sphere": new})
+    if spheres != scene.spheres:
+        editor.edit(spheres=spheres)
+    elif spheres:
+        imgui.push_id("sphere")
+        new, named = _edited(editor, spheres[editor.sphere])
+        imgui.pop_id()
+        if new is not spheres[editor.sphere]:
+            spheres[editor.sphere] = new
+            editor.edit(spheres=spheres, materials=named)
 
 
 def _edited(editor: Editor, sphere: Sphere) -> tuple[Sphere, dict[str, Material]]:

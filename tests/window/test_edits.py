@@ -1,0 +1,72 @@
+"""Spheres and lights, edited as a user would: what changes in the picture, and what does not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from imgui_bundle import imgui
+
+from clrt.output.view import to_display
+
+from .driver import Driver, at, changed, drive, halves
+from .scenes import SKY, two_balls
+
+
+def test_a_sphere_is_edited(tmp_path: Path) -> None:
+    def test(window: Driver) -> None:
+        window.rest()
+        before = window.picture()
+        window.panel("Spheres")
+        window.context.item_input_value("sphere/radius", 0.5)
+        window.rest()
+        smaller = window.picture()
+        left, right = halves(changed(before, smaller))
+        assert left > 0.1 and right == 0
+        assert at(before, 44, 40) != at(smaller, 44, 40) == at(before, 80, 40), "where it was is sky now"
+        assert window.live.scene.spheres[0].radius == 0.5
+
+        window.context.item_click("//**/1: right")
+        window.context.item_click("remove")
+        window.rest()
+        left, right = halves(changed(smaller, window.picture()))
+        assert left == 0 and right > 0.1
+
+        window.context.key_press(imgui.Key.mod_ctrl | imgui.Key.z)
+        window.rest()
+        assert not changed(smaller, window.picture()).any(), "it is back"
+        window.context.key_press(imgui.Key.mod_ctrl | imgui.Key.z)
+        window.rest()
+        assert not changed(before, window.picture()).any() and not window.live.can_undo
+
+    drive(two_balls(), test, tmp_path)
+
+
+def test_the_light_moves(tmp_path: Path) -> None:
+    def test(window: Driver) -> None:
+        window.rest()
+        before = window.picture()
+        window.panel("Lights")
+        window.context.item_input_value("light/position/$$0", 3.0)
+        window.rest()
+        after = window.picture()
+        assert window.live.scene.lights[0].position == (3, 5, 3)  # type: ignore[union-attr]
+        assert min(halves(changed(before, after))) > 0.1, "light and shadows of all"
+        assert not changed(before, after)[:20].any(), "the sky is no surface"
+        assert min(at(before, 24, 107)) > max(at(after, 24, 107)) - 40
+
+        window.context.item_check("light/moves")
+        window.until(lambda: window.live.scene.lights[0].position[2] < 2, "a part of a circle")  # type: ignore
+        window.context.item_uncheck("light/moves")
+        x, y, z = window.live.scene.lights[0].position  # type: ignore[union-attr]
+        assert y == pytest.approx(5) and np.hypot(x, z) == pytest.approx(np.hypot(3, 3), rel=1e-4)
+        window.rest()
+
+        window.context.item_input_value("environment/strength", 0.5)
+        window.rest()
+        half = 0.5 * np.array(SKY)
+        expected = to_display(half.astype(np.float32)[None, None])[0, 0]
+        assert at(window.picture(), 80, 5) == pytest.approx(expected.tolist(), abs=1)
+
+    drive(two_balls(), test, tmp_path)
