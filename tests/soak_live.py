@@ -4,13 +4,15 @@ What they need is a few dozen programs: PoCL's compiler keeps about a megabyte o
 
     python tests/soak_live.py SCENE --minutes 30
 
-Prints a line from time to time, and at the end what became of memory; exits with 1 where it grew by more than 5 %,
-where an edit that should work failed, or one that should not work did.
+Prints a line from time to time, and at the end what became of memory: of the process, of that what is in use (by
+glibc's own count, which tells a leak from what compilers leave in pieces), and of the device. Exits with 1 where any
+grew by more than 5 %, where an edit that should work failed, or one that should not work did.
 """
 
 from __future__ import annotations
 
 import argparse
+import ctypes
 import random
 import shutil
 import subprocess
@@ -56,7 +58,7 @@ def main() -> int:
           f"median {np.median(soak.latencies):.3f}, 99 % {np.percentile(soak.latencies, 99):.3f}")
     # Caches fill in the first third; what grows after it is a leak.
     settled, last = (np.median(np.array(part), axis=0) for part in np.array_split(memory, 3)[1:])
-    for name, before, after in zip(("process", "device"), settled, last):
+    for name, before, after in zip(("process", "process in use", "device"), settled, last):
         print(f"memory of the {name} in the second third {before / 2**20:.1f} MiB, in the last {after / 2**20:.1f} MiB")
     for problem in soak.problems:
         print(problem)
@@ -76,8 +78,8 @@ class Soak:
             self.walk, self.material, self.preset, self.move_sphere, self.add_sphere, self.remove_sphere,
             self.light, self.sky, self.integrator, self.settings, self.undo, self.redo, self.mistake]
 
-    def run(self, seconds: float) -> list[tuple[int, int]]:
-        """Edits for so long; memory of the process and on the device, second by second."""
+    def run(self, seconds: float) -> list[tuple[int, int, int]]:
+        """Edits for so long; memory of the process, what of it is in use, and on the device, second by second."""
         end, memory, told = time.monotonic() + seconds, [], 0.0
         while time.monotonic() < end:
             edit = self.random.choice(self._edits)
@@ -94,7 +96,7 @@ class Soak:
                     self.problems.append(f"{edit.__name__}: {seen.error}")
                 self.latencies.append(time.perf_counter() - start)
                 time.sleep(wait)
-            memory.append((process_memory(), device_memory()))
+            memory.append((process_memory(), memory_in_use(), device_memory()))
             if time.monotonic() > told + 30:
                 told, seen = time.monotonic(), self.live.snapshot()
                 print(f"{end - told:6.0f} s to go, {self.edits} edits, {memory[-1][0] / 2**20:.1f} MiB, "
@@ -158,7 +160,7 @@ class Soak:
 
     def integrator(self) -> None:
         """Another one, or depth."""
-        names: list[Integrator] = ["path", "path", "direct", "local"]
+        names: list[Integrator] = ["path", "path", "direct", "local", "raster"]
         name = self.random.choice(names)
         render = replace(self.live.scene.render, integrator=name, max_depth=self.random.randint(1, 12))
         self._edit(replace(self.live.scene, render=render))
@@ -201,6 +203,21 @@ class Soak:
 def process_memory() -> int:
     """Bytes that this process has in memory."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+
+
+class Mallinfo(ctypes.Structure):
+    """struct mallinfo2, mallinfo(3)."""
+
+    _fields_ = [(name, ctypes.c_size_t) for name in ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks",
+                                                     "fsmblks", "uordblks", "fordblks", "keepcost")]
+
+
+def memory_in_use() -> int:
+    """Bytes that were allocated and not freed since."""
+    libc = ctypes.CDLL("libc.so.6")
+    libc.mallinfo2.restype = Mallinfo
+    told = libc.mallinfo2()
+    return int(told.uordblks + told.hblkhd)
 
 
 def device_memory() -> int:

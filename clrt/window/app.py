@@ -34,7 +34,7 @@ class App:
         self.live = Live(scene, settings=settings)
         self.editor, self.viewport = Editor(self.live, look, devices), Viewport()
         self.params = hello_imgui.RunnerParams()
-        self.params.app_window_params.window_title = f"{scene.name} - clrt"
+        self.params.app_window_params.window_title = "clrt"
         self.params.app_window_params.window_geometry.size = SIZE
         self.params.renderer_backend_options.open_gl_options.anti_aliasing_samples = 0
         self.params.fps_idling.fps_max, self.params.fps_idling.fps_idle = FASTEST, IDLE
@@ -87,7 +87,8 @@ class App:
         snapshot = self.editor.snapshot
         shown = self.viewport.shown
         trouble = self.editor.message or snapshot.error or (shown and shown.error)
-        imgui.text(trouble or f"{snapshot.spp} samples a pixel, {snapshot.phase}, {snapshot.device}")
+        progress = f"{snapshot.spp} samples a pixel, {snapshot.phase}, {snapshot.device}"
+        imgui.text(trouble or f"{snapshot.scene.name}: {progress}")
 
 
 def _splits() -> list[hello_imgui.DockingSplit]:

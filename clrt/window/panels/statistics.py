@@ -64,13 +64,14 @@ def _noise(snapshot: Snapshot) -> None:
     """The estimated error over time, both logarithmic."""
     points = np.array([(entry["seconds"], entry["noise"]) for entry in snapshot.history
                        if entry["noise"] and entry["seconds"] > 0], np.float64).reshape(-1, 2)
+    spans = len(points) > 1     # one point leaves the axes without a length
     if implot.begin_plot("##noise", (-1, LINES * imgui.get_text_line_height_with_spacing()),
                          implot.Flags_.no_legend.value | implot.Flags_.no_mouse_text.value):
         fit = implot.AxisFlags_.auto_fit.value
         implot.setup_axes("seconds", "noise", fit, fit)
-        for axis in (implot.ImAxis_.x1.value, implot.ImAxis_.y1.value) if len(points) else ():
+        for axis in (implot.ImAxis_.x1.value, implot.ImAxis_.y1.value) if spans else ():
             implot.setup_axis_scale(axis, implot.Scale_.log10.value)
             implot.setup_axis_ticks(axis, TICKS, [f"{tick:g}" for tick in TICKS])
-        if len(points):
+        if spans:
             implot.plot_line("noise", np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1]))
         implot.end_plot()
