@@ -1,6 +1,6 @@
 """Random edits of a live session for some minutes: no error, and memory that does not grow.
 
-What they need is a few dozen programs: PoCL's compiler keeps about a megabyte of each that it compiles.
+What they need is a few dozen programs: PoCL's compiler keeps some two megabytes of each that it compiles.
 
     python tests/soak_live.py SCENE --minutes 30
 

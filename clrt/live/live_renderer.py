@@ -71,7 +71,7 @@ class LiveRenderer:
         """The picture at more and more samples, up to `spp`."""
         start = time.perf_counter()
         self._open(asked.settings.device)
-        last, self._guided = self.renderer, None
+        last, self._guided, self._met_by = self.renderer, None, None
         self.renderer = renderer = Renderer(asked.scene, device=self._devices, size=size, spp=spp,
                                             on_phase=self._on_phase, before=last, first_hits=True,
                                             **asked.settings.tracing)
