@@ -48,27 +48,34 @@ class Dispatch:
         self.sent = 0
 
     def run(self) -> Iterator[None]:
-        """Until the source has nothing left; yields at least every TICK."""
-        while self.tasks or self._source.left():
+        """Until the source has nothing left, and then workers have at hand what follows; yields at least every TICK."""
+        self._hand_out()
+        while self._source.left():
             if not self.cluster.alive:
                 yield from self._find_scheduler()
             self._look()
-            self._hand_out()
             for key, result in self.cluster.hear(TICK):
                 self._hear(key, result)
+            self._hand_out()
             yield
 
-    def drain(self, seconds: float) -> list[Task]:
-        """Waits for what is in flight, for so long at most; the tasks that were not done by then, which it forgets."""
+    def drain(self, tasks: list[Task], seconds: float) -> list[Task]:
+        """Waits for these, for so long at most; those that were not done by then, which it forgets."""
         end = time.perf_counter() + seconds
-        while any(task.runs for task in self.tasks) and self.cluster.alive and time.perf_counter() < end:
+        while any(task.runs for task in tasks) and self.cluster.alive and time.perf_counter() < end:
             for key, result in self.cluster.hear(TICK):
                 self._hear(key, result)
-        forgotten, self.tasks = self.tasks, []
-        self._again.clear()
-        for task in forgotten:
+        late = [task for task in tasks if task in self.tasks]
+        self.forget(late)
+        return late
+
+    def forget(self, tasks: list[Task]) -> None:
+        """Their results count for nothing."""
+        for task in tasks:
             task.runs.clear()
-        return forgotten
+            self.tasks.remove(task)
+            if task in self._again:
+                self._again.remove(task)
 
     def wait_for(self, count: int = 1) -> list[Member]:
         """The workers that are ready, once there are so many."""
@@ -147,13 +154,13 @@ class Dispatch:
     def _hand_out(self) -> None:
         """Gives each worker what it should have at hand, in turns; and then those without any what is overdue."""
         ready = self.ready()
-        for load in range(self._source.ahead(len(ready))):
-            for member in ready:
-                if member.load == load and (task := self._again.popleft() if self._again
-                                            else self._source.next(member)):
-                    if task not in self.tasks:
-                        self.tasks.append(task)
-                    self._begin(task, member)
+        for member in (each for load in range(self._source.ahead(len(ready))) for each in ready if each.load == load):
+            task = self._again.popleft() if self._again else self._source.next(member)
+            if task is None:
+                break
+            if task not in self.tasks:
+                self.tasks.append(task)
+            self._begin(task, member)
         idle = [member for member in ready if not member.load]
         for member, run in zip(idle, self._overdue() if idle else []):
             _log.info("%s is slow; %s does again what it is at", run.member.name, member.name)

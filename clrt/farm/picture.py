@@ -3,7 +3,8 @@
 A task is some tiles, their pixels as they are, and which samples to add: what a device of a crew gets
 (rendering/team.py), only larger. A tile is in one task at a time, and the pixels that come back replace the film's. So
 each pixel's samples are added one after another in their own order: nothing depends on who did what, or when, the sums
-are those of one machine to the last bit, and what is rendered twice counts once.
+are those of one machine to the last bit, and what is rendered twice counts once. Tiles that have all samples of a pass
+get those of the next while the others catch up (ahead.py).
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from ..rendering.session import FEWEST_TILES
 from ..rendering.tiles import TILE_PIXELS, row_by_row, tile_by_tile
 from ..rendering.work import Work
 from ..scene.model import Scene
+from .ahead import Ahead
 from .cluster import Cluster
 from .dispatch import Dispatch
 from .members import BadResult, Member, Task
@@ -36,15 +38,16 @@ from .remote import draw, identity, prepare, render_share
 
 #: Seconds that a task should take, of few workers; of many as much more as keeps the client and the scheduler at so
 #: many tasks a second.
-TASK_SECONDS, TASKS_A_SECOND = 1.0, 64
+TASK_SECONDS, TASKS_A_SECOND = 1.0, 32
 #: Samples of the first task of a worker whose speed is not known.
 FIRST_SAMPLES = 1 << 17
 #: The smallest task is such a part of a full one. Tiles of one at most: what is sent with a task should be below 10 MB.
 SMALLEST, MOST_TILES = 4, 2048
-#: Tasks that a worker has at hand; and of a pass, for each.
-AHEAD, PASS_TASKS = 2, 36
-#: A pass takes so many times as long as workers wait between two, while the client estimates the picture's error.
-GAP_COST = 100
+#: Tasks that a worker has at hand, and more, up to so many, where the client is away for longer; and of a pass, for
+#: each.
+AHEAD, MOST_AHEAD, PASS_TASKS = 2, 8, 36
+#: A pass takes so many times as long as the client is away between two, to estimate the picture's error.
+GAP_COST = 10
 #: How long the end of a render waits for what is in flight, in times of a task.
 DRAIN = 2.5
 #: A worker that drops a larger part of its samples is not believed.
@@ -59,7 +62,7 @@ class FarmPicture(Accumulation):
         super().__init__(order.scene.render.size)
         tiles = self.work.samples.size
         check_host(tiles * TILE_PIXELS * pixel.itemsize, *self.size)
-        self._film = np.zeros((tiles, TILE_PIXELS), pixel)
+        self._ahead = Ahead(np.zeros((tiles, TILE_PIXELS), pixel))
         self._inside = _inside(self.size)
         self._parcel = pack(order)
         self._proofs, self._drops = Proofs(), False
@@ -105,39 +108,40 @@ class FarmPicture(Accumulation):
         self._proofs.compare(member)
 
     def left(self) -> bool:
-        """Whether there is work in hand."""
-        return bool(self.work.parts)
+        """Whether anything of the pass is in hand or in flight."""
+        return self._busy
 
     def ahead(self, members: int) -> int:
-        """One that it is at, and the next."""
-        return AHEAD
+        """One that it is at, the next, and as many as keep it busy while the client is away."""
+        return min(MOST_AHEAD, AHEAD + round(self._gap / self._task_seconds))
 
     def next(self, member: Member) -> Task | None:
         """As much as fills its time, and less near the end, so that all end together."""
-        rates = [each.rate for each in self.dispatch.ready() if each.rate]
-        rate = member.rate or (sum(rates) / len(rates) if rates else 0.0)
-        size = rate * self._task_seconds or FIRST_SAMPLES
-        fair = self.work.left * TILE_PIXELS / max(1, len(self.dispatch.ready())) / 2
-        most = min(size, max(fair, size / SMALLEST)) / TILE_PIXELS
-        busy = [task.what[0] for task in self.dispatch.tasks]
-        part = self.work.cut(int(most), FEWEST_TILES, MOST_TILES, None, busy)
-        if part is None:
+        rates = [each.rate for each in self.dispatch.members.values() if each.ready]
+        known = [rate for rate in rates if rate]
+        size = (member.rate or sum(known) / max(1, len(known))) * self._task_seconds or FIRST_SAMPLES
+        left = self.work.left + (self._ahead.work.left if self._ahead.work else 0)
+        fair = left * TILE_PIXELS / max(1, len(rates)) / 2
+        found = self._ahead.cut(self.work, int(min(size, max(fair, size / SMALLEST)) / TILE_PIXELS), FEWEST_TILES,
+                                MOST_TILES, [task.what[1] for task in self.dispatch.tasks])
+        if found is None:
             return None
-        tiles = self.work.tiles[part.first:part.end]
-        pixels = self._film[tiles] if part.samples else None
+        work, part = found
+        tiles = work.tiles[part.first:part.end]
+        pixels = self._ahead.film[tiles] if part.samples else None
         self.moved_bytes += tiles.nbytes + (0 if pixels is None else pixels.nbytes)
         name = f"a task of {len(tiles)} tiles, samples {part.samples} to {part.samples + part.more}"
-        return Task((part, tiles), name,
+        return Task((work, part, tiles), name,
                     len(tiles) * TILE_PIXELS * part.more, render_share,
                     lambda: (self._parcel.key, tiles, part.samples, part.more, pixels))
 
     def accept(self, task: Task, result: NDArray[Any], member: Member) -> None:
         """Takes the pixels into the film, if they can be right."""
-        part, tiles = task.what
-        dropped = check_pixels(result, self._film[tiles], self._inside[tiles], part.more)
+        work, part, tiles = task.what
+        dropped = check_pixels(result, self._ahead.film[tiles], self._inside[tiles], part.more)
         if dropped > MOST_DROPPED * task.work and not self._drops:
             self._doubt(task, result, member)
-        self._film[tiles] = result
+        self._ahead.take(work, tiles, result)
         self.moved_bytes += result.nbytes
 
     def _doubt(self, task: Task, result: NDArray[Any], member: Member) -> None:
@@ -148,6 +152,25 @@ class FarmPicture(Accumulation):
             raise BadResult("it returned NaN or infinity for most samples")
         self._drops, other.refused = True, ""
 
+    def advance(self, room: Callable[[int], int]) -> Iterator[None]:
+        """See `Accumulation.advance`; the pass may have begun, and the next one may begin before it ends."""
+        done = self.samples_done
+        if not self._busy:
+            if self._ahead.work and self._ahead.samples <= room(done):
+                self.work = self._ahead.begin()
+            else:
+                self.work.add_to_all(max(1, min(room(done), self.pass_limit())))
+                self._begin_work()
+        then = int(self.work.then.flat[0])
+        if self._ahead.work is None and room(then):
+            self._ahead.plan(self.work, min(room(then), self.pass_limit()))
+        yield from self._work()
+
+    def _begin_work(self) -> None:
+        """What was begun ahead is not what follows."""
+        self.dispatch.forget([task for task in self.dispatch.tasks if task not in self._at_pass])
+        self._ahead.forget()
+
     def _work(self) -> Iterator[None]:
         if self._ended:
             self._gap = perf_counter() - self._ended
@@ -156,43 +179,48 @@ class FarmPicture(Accumulation):
         self._ended = perf_counter()
 
     @property
+    def _at_pass(self) -> list[Task]:
+        """The tasks that are of the pass in work."""
+        return [task for task in self.dispatch.tasks if task.what[0] is self.work]
+
+    @property
     def _busy(self) -> bool:
-        return bool(self.work.parts or self.dispatch.tasks)
+        return bool(self.work.parts or self._at_pass)
 
     @property
     def _task_seconds(self) -> float:
         return TASK_SECONDS * max(1.0, len(self.dispatch.members) / TASKS_A_SECOND)
 
     def _clear(self) -> None:
-        self._film.fill(0)
+        self._ahead.film.fill(0)
 
     def wait(self) -> None:
-        """Waits for what is in flight, but not for slow workers: what they are at is in hand again."""
-        for task in self.dispatch.drain(DRAIN * self._task_seconds):
-            self.work.give_back(task.what[0])
+        """Waits for what is in flight of the pass, but not for slow workers: what they are at is in hand again."""
+        for task in self.dispatch.drain(self._at_pass, DRAIN * self._task_seconds):
+            self.work.give_back(task.what[1])
         self.work.settle()
 
     def work_left(self) -> Work:
-        """The work with what is in flight in hand."""
+        """The work of the pass with what is in flight in hand."""
         kept = Work(self.work.samples)
         kept.then, kept.tiles, kept.parts = self.work.then, self.work.tiles, self.work.parts.copy()
-        for task in self.dispatch.tasks:
-            kept.give_back(task.what[0])
+        for task in self._at_pass:
+            kept.give_back(task.what[1])
         return kept
 
     def pass_limit(self) -> int:
-        """As many samples a pixel as keep all busy for some tasks, and for much longer than they wait for the next."""
+        """As many samples a pixel as keep all busy for some tasks, and for much longer than the client is away."""
         rates = sum(each.rate for each in self.dispatch.ready())
         seconds = max(PASS_TASKS * self._task_seconds, GAP_COST * self._gap)
         return max(1, int(rates * seconds / (self.size[0] * self.size[1])))
 
     def film(self) -> Film:
-        """The film so far, without what is in flight."""
-        return Film(row_by_row(self._film, self.size))
+        """The film so far, without what is in flight, or of what follows the pass."""
+        return Film(row_by_row(self._ahead.shown(), self.size))
 
     def restore(self, film: Film, work: Work) -> None:
         """Goes on from a film of this size and the work that it was rendered by."""
-        self.work, self._film = work, tile_by_tile(film.pixels)
+        self.work, self._ahead = work, Ahead(tile_by_tile(film.pixels))
 
     def shares(self) -> list[dict[str, Any]]:
         """What each worker did, and how fast it is."""

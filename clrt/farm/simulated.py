@@ -57,8 +57,11 @@ class Simulation:
 
 
 async def _run(address: str, count: int) -> None:
+    import dask
     from distributed import Worker
 
+    # Each looks at its own stack a hundred times a second, and at its machine twice: too much for many in one process.
+    dask.config.set({"distributed.worker.profile.enabled": False, "distributed.admin.system-monitor.interval": "60s"})
     workers = [Worker(address, nthreads=1, memory_limit=0, host="127.0.0.1", dashboard=False) for _ in range(count)]
     await asyncio.gather(*workers)
     await asyncio.gather(*(worker.finished() for worker in workers))

@@ -50,8 +50,8 @@ class WholePictures:
         """Whoever passed the introduction may work."""
 
     def left(self) -> bool:
-        """Whether there are names left."""
-        return bool(self._names)
+        """Whether there are names left, or in work."""
+        return bool(self._names or self.dispatch.tasks)
 
     def ahead(self, members: int) -> int:
         """One, and the next where there are plenty."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,11 @@ class Accumulation(ABC):
             self.work.add_to_all(samples)
             self._begin_work()
         yield from self._work()
+
+    def advance(self, room: Callable[[int], int]) -> Iterator[None]:
+        """Adds a pass: as many samples to every pixel as there is `room` for after those done, `pass_limit` at most;
+        otherwise like `render`. Of more samples than are done room tells what may follow; 0 where nothing does."""
+        yield from self.render(max(1, min(room(self.samples_done), self.pass_limit())))
 
     def double(self, tiles: NDArray[np.intp]) -> Iterator[None]:
         """Doubles the samples of these tiles, by their number in `tile_samples`; otherwise like `render`."""

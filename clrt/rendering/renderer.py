@@ -266,8 +266,11 @@ class Renderer:
         yield from self.session.double(tiles)
 
     def _even_pass(self, spp: int | None, error: float | None) -> Iterator[None]:
-        done = self.session.samples_done
-        return self.session.render(max(1, min(pass_end(done, spp, error) - done, self.session.pass_limit())))
+        def room(done: int) -> int:
+            ends = spp is not None and done >= spp or self.settings.adaptive and done >= FLOOR_SPP
+            return 0 if ends else pass_end(done, spp, error) - done
+
+        return self.session.advance(room)
 
     def _film(self) -> Film:
         """The film with all that was launched, and the time until then."""

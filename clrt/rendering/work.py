@@ -64,21 +64,42 @@ class Work:
         `most_tiles` and `most_samples` a pixel at most, and of none that are among the `busy`. None where there is
         nothing left for now.
 
-        What few tiles of many samples leave comes next.
+        What few tiles of many samples leave comes last, so that all tiles come along together.
         """
-        place = next((i for i, part in enumerate(self.parts) if not any(map(part.meets, busy))), None)
-        if place is None:
+        found = self._first_free(busy)
+        if found is None:
             return None
+        place, first, free_end = found
         part = self.parts[place]
         more = min(part.more, most_samples or part.more)
-        end = min(part.end, part.first + min(max(least_tiles, most // more), most_tiles or part.end))
-        share = Part(part.first, end, part.samples, min(more, max(1, most // (end - part.first))))
+        end = min(free_end, first + min(max(least_tiles, most // more), most_tiles or part.end))
+        share = Part(first, end, part.samples, min(more, max(1, most // (end - first))))
         del self.parts[place]
         if end < part.end:
             self.parts.insert(place, part._replace(first=end))
+        if part.first < first:
+            self.parts.insert(place, part._replace(end=first))
         if share.more < part.more:
-            self.parts.insert(place, Part(part.first, end, part.samples + share.more, part.more - share.more))
+            self._put_last(Part(first, end, part.samples + share.more, part.more - share.more))
         return share
+
+    def _put_last(self, rest: Part) -> None:
+        """Behind all in hand but what the same tiles get after it, which is there where a share was given back."""
+        place = next((i for i, part in enumerate(self.parts) if part.meets(rest)), len(self.parts))
+        self.parts.insert(place, rest)
+
+    def _first_free(self, busy: Sequence[Part]) -> tuple[int, int, int] | None:
+        """The place in hand of a part, and the first stretch of its tiles, none of which is busy or comes before."""
+        taken = np.zeros(len(self.tiles) + 1, bool)
+        taken[-1] = True
+        for part in busy:
+            taken[part.first:part.end] = True
+        for place, part in enumerate(self.parts):
+            first = part.first + int(taken[part.first:part.end].argmin())
+            if not taken[first]:
+                return place, first, min(part.end, first + int(taken[first:].argmax()))
+            taken[part.first:part.end] = True
+        return None
 
     def give_back(self, share: Part) -> None:
         """Takes a share in hand again, which was not rendered."""

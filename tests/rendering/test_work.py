@@ -43,12 +43,12 @@ def test_samples_come_once_and_in_their_order(seed: int) -> None:
     (100, 1, Part(0, 10, 3, 8)), (16, 1, Part(0, 2, 3, 8)), (4, 1, Part(0, 1, 3, 4)), (4, 4, Part(0, 4, 3, 1)),
     (0, 5, Part(0, 5, 3, 1)), (40, 10, Part(0, 10, 3, 4))])
 def test_a_share_is_no_larger_than_asked(most: int, least: int, expected: Part) -> None:
-    """Of tiles times samples, down to a sample of the fewest tiles; what few tiles leave comes before other tiles."""
+    """Of tiles times samples, down to a sample of the fewest tiles; what few tiles leave comes after other tiles."""
     work = Work(np.full((2, 5), 3))
     work.add_to_all(8)
     assert work.cut(most, least) == expected and work.left == 80 - (expected.end - expected.first) * expected.more
     if expected.more < 8:
-        assert work.parts[0] == Part(0, expected.end, 3 + expected.more, 8 - expected.more)
+        assert work.parts[-1] == Part(0, expected.end, 3 + expected.more, 8 - expected.more)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 64, 100, 1023, 4096])
