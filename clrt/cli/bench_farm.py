@@ -23,10 +23,12 @@ SCENES = Path(__file__).parents[2] / "scenes"
               help="Of overhead: workers that only sleep; their client's memory is told.")
 @click.option("--seconds", default=300.0, show_default=True, help="Of overhead: what the work itself takes.")
 @click.option("--size", type=Size(), default="16384x16384", show_default=True, help="Of huge: the picture.")
+@click.option("--out", type=click.Path(path_type=Path), default="huge.exr", show_default=True, metavar="FILE",
+              help="Of huge: where the picture is written.")
 @click.option("--quick", is_flag=True, help="Small pictures, and less of everything.")
 @click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
 def farm_command(trials: tuple[str, ...], scenes: tuple[Path, ...], spp: int | None, every: float, workers: int,
-                 seconds: float, size: tuple[int, int], quick: bool, json_file: Path | None) -> None:
+                 seconds: float, size: tuple[int, int], out: Path, quick: bool, json_file: Path | None) -> None:
     """Trials of a farm on this machine: is its picture that of one process to the last bit, also where workers are
     killed; how far are 64 workers from 64 times one; and what memory does a client take for a picture of 16k x 16k."""
     from ..farm import trials as trial
@@ -53,7 +55,7 @@ def farm_command(trials: tuple[str, ...], scenes: tuple[Path, ...], spp: int | N
             case "overhead":
                 told(trial.overhead(pictures[0], 8 if quick else workers, 10 if quick else seconds))
             case _:
-                told(trial.huge(pictures[0], (2048, 4608) if quick else size, spp or 1, 2))
+                told(trial.huge(pictures[0], (2048, 4608) if quick else size, spp or 1, 2, out))
     if json_file is not None:
         write_report(json_file, {"trials": rows})
         click.echo(str(json_file))

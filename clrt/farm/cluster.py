@@ -49,7 +49,8 @@ class Cluster:
         self._heard: SimpleQueue[tuple[str, Result | None]] = SimpleQueue()
         self._sent: dict[str, Future[Any]] = {}
         self._waiting: deque[str] = deque()
-        self._coming = 0
+        self._coming: set[str] = set()
+        self._there: dict[str, str] = {}
 
     def _connect(self) -> Client:
         from distributed import Client
@@ -80,9 +81,17 @@ class Cluster:
         return True
 
     def workers(self) -> dict[str, str]:
-        """The names of those that are there, by address."""
-        found = self._client.scheduler_info(n_workers=-1)["workers"]
-        return {address: str(about.get("name", address)) for address, about in found.items()}
+        """The names of those that are there, by address; as it was known last where there is no answer.
+
+        The scheduler is asked itself: `Client.scheduler_info` may be overwritten by one without workers, which the
+        client fetches every two seconds.
+        """
+        client = self._client
+        with suppress(OSError):
+            assert client.scheduler is not None
+            found = client.sync(client.scheduler.identity, n_workers=-1, callback_timeout=ANSWER)["workers"]
+            self._there = {address: str(about.get("name", address)) for address, about in found.items()}
+        return self._there
 
     def put(self, arrays: dict[str, NDArray[Any]]) -> list[Future[Any]]:
         """Arrays that workers will take, each sent once: a task whose result they are, which Dask hands from worker
@@ -108,6 +117,11 @@ class Cluster:
     def forget(self, key: str) -> None:
         """What was sent under the key is not waited for any more."""
         self._sent.pop(key, None)
+        self._coming.discard(key)
+
+    def is_late(self, key: str) -> None:
+        """Others do what was sent under the key: if it is on its way, it keeps nothing else from coming."""
+        self._coming.discard(key)
 
     def hear(self, seconds: float) -> list[tuple[str, Result]]:
         """Keys and results of what ended since; waits for the first of them. There are never more than MOST_RESULTS
@@ -117,7 +131,7 @@ class Cluster:
             self._take_in(*self._heard.get(timeout=seconds), ended)
             while True:
                 self._take_in(*self._heard.get_nowait(), ended)
-        while self._waiting and self._coming < MOST_RESULTS:
+        while self._waiting and len(self._coming) < MOST_RESULTS:
             self._fetch(self._waiting.popleft())
         return ended
 
@@ -126,7 +140,6 @@ class Cluster:
         if result is None:
             self._waiting.append(key)
             return
-        self._coming -= 1
         self.forget(key)
         ended.append((key, result))
 
@@ -135,8 +148,8 @@ class Cluster:
             return
         client, heard = self._client, self._heard
         loop: AbstractEventLoop = getattr(client.loop, "asyncio_loop")
-        self._coming += 1
-        coming = run_coroutine_threadsafe(client.gather(future, asynchronous=True), loop)
+        self._coming.add(key)
+        coming = run_coroutine_threadsafe(_fetched(client, future), loop)
         coming.add_done_callback(lambda result: heard.put((key, result)))
 
     def call(self, worker: str, key: str, function: Callable[..., Any], *arguments: Any) -> Any:
@@ -170,6 +183,18 @@ class Cluster:
 
     def __exit__(self, *error: object) -> None:
         self.close()
+
+
+async def _fetched(client: Client, future: Future[Any]) -> Any:
+    """The result of what is done, by itself: `Client.gather` joins requests, and then one worker that hangs keeps the
+    results of all others back."""
+    if future.status != "finished":
+        return await client.gather(future, asynchronous=True)    # raises what is wrong
+    assert client.scheduler is not None    # as long as it is connected
+    found = await client.scheduler.gather(keys=[future.key])
+    if found["status"] != "OK":
+        raise ConnectionError("its worker has not got it any more")
+    return found["data"][future.key]
 
 
 def _give_memory_back() -> None:

@@ -53,9 +53,7 @@ class Dispatch:
         while self._source.left():
             if not self.cluster.alive:
                 yield from self._find_scheduler()
-            self._look()
-            for key, result in self.cluster.hear(TICK):
-                self._hear(key, result)
+            self.meet()
             self._hand_out()
             yield
 
@@ -85,9 +83,13 @@ class Dispatch:
             if not self.cluster.alive:
                 for _ in self._find_scheduler():
                     pass
-            self._look()
-            for key, result in self.cluster.hear(TICK):
-                self._hear(key, result)
+            self.meet()
+
+    def meet(self) -> None:
+        """Meets those that are new, and hears what there is to be heard."""
+        self._look()
+        for key, result in self.cluster.hear(TICK):
+            self._hear(key, result)
 
     def everyone(self) -> list[Member]:
         """Its workers, also those that are gone."""
@@ -164,6 +166,7 @@ class Dispatch:
         idle = [member for member in ready if not member.load]
         for member, run in zip(idle, self._overdue() if idle else []):
             _log.info("%s is slow; %s does again what it is at", run.member.name, member.name)
+            self.cluster.is_late(run.key)
             self._begin(run.task, member)
 
     def _overdue(self) -> list[Run]:
@@ -183,7 +186,7 @@ class Dispatch:
         self.sent += 1
         member.load += 1
         member.work += task.work
-        run = Run(task, member, time.perf_counter(), member.work)
+        run = Run(key, task, member, time.perf_counter(), member.work)
         task.runs.append(run)
         self._runs[key] = run
 

@@ -64,8 +64,9 @@ class Task:
 
 @dataclass(eq=False)
 class Run:
-    """A task on a worker. ahead: the work that it then had at hand, this one included."""
+    """A task on a worker. key: that it was sent under; ahead: the work that it then had at hand, this one included."""
 
+    key: str
     task: Task
     member: Member
     began: float

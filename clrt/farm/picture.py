@@ -122,8 +122,9 @@ class FarmPicture(Accumulation):
         size = (member.rate or sum(known) / max(1, len(known))) * self._task_seconds or FIRST_SAMPLES
         left = self.work.left + (self._ahead.work.left if self._ahead.work else 0)
         fair = left * TILE_PIXELS / max(1, len(rates)) / 2
-        found = self._ahead.cut(self.work, int(min(size, max(fair, size / SMALLEST)) / TILE_PIXELS), FEWEST_TILES,
-                                MOST_TILES, [task.what[1] for task in self.dispatch.tasks])
+        most = evenly(int(min(size, max(fair, size / SMALLEST)) / TILE_PIXELS), self.work)
+        found = self._ahead.cut(self.work, most, FEWEST_TILES, MOST_TILES,
+                                [task.what[1] for task in self.dispatch.tasks])
         if found is None:
             return None
         work, part = found
@@ -249,6 +250,12 @@ def _inside(size: tuple[int, int]) -> NDArray[np.bool_]:
     """(tiles, TILE_PIXELS): which of the tiles' pixels are in the picture."""
     width, height = size
     return np.asarray(tile_by_tile(np.ones((height, width), bool)))
+
+
+def evenly(most: int, work: Work) -> int:
+    """About as many samples of a tile's pixels, so that tasks of the fewest tiles leave no small rest of a pass."""
+    each, samples = max(1, most // FEWEST_TILES), int((work.then - work.samples).max())
+    return most if samples <= each else FEWEST_TILES * -(-samples // round(samples / each))
 
 
 def check_pixels(found: NDArray[Any], before: NDArray[Any], inside: NDArray[np.bool_], more: int) -> int:

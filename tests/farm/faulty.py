@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 from typing import Any
 
+from clrt.errors import DeviceError
 from clrt.farm import remote
+from clrt.rendering.worker import Share, Worker
 
 if not hasattr(remote, "right"):    # Dask loads this more than once
-    setattr(remote, "right", (remote.identity, remote.render_share))
-_identity, _share = getattr(remote, "right")
+    setattr(remote, "right", (remote.identity, remote.render_share, Worker.ended))
+_identity, _share, _ended = getattr(remote, "right")
+_first: list[Worker] = []
 
 
 def another_version() -> dict[str, str]:
@@ -31,6 +34,15 @@ def share_that_crashes(*arguments: Any) -> Any:
     return _share(*arguments)
 
 
+def ended_of_a_lost_device(self: Worker) -> Share | None:
+    """The process's first device is gone once it has rendered something for the picture."""
+    _first[:] = _first or [self]
+    if self is _first[0] and self.samples > 4096:
+        raise DeviceError("the device is lost")
+    share: Share | None = _ended(self)
+    return share
+
+
 match os.environ.get("CLRT_TEST_FAULT"):
     case "version":
         setattr(remote, "identity", another_version)
@@ -38,3 +50,5 @@ match os.environ.get("CLRT_TEST_FAULT"):
         setattr(remote, "render_share", share_of_nans)
     case "crash":
         setattr(remote, "render_share", share_that_crashes)
+    case "lost":
+        setattr(Worker, "ended", ended_of_a_lost_device)

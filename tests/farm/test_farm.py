@@ -16,6 +16,9 @@ import numpy as np
 import pytest
 
 import clrt
+from clrt.device.open import Device
+from clrt.device.sources import kernel_digest
+from clrt.device.verdicts import Verdict, keep_verdict
 from clrt.errors import DeviceError
 from clrt.farm import dispatch
 from clrt.farm.bands import Banded
@@ -64,7 +67,7 @@ def alone(scene: Scene, **options: Any) -> Renderer:
 
 def together(cluster: Cluster, scene: Scene, count: int = 4, **options: Any) -> FarmRenderer:
     """Once so many workers are ready."""
-    made = FarmRenderer(scene, cluster, device=0, **{"size": SIZE, "seed": 1, "spp": 24, **options})
+    made = FarmRenderer(scene, cluster, **{"device": 0, "size": SIZE, "seed": 1, "spp": 24, **options})
     made.session.dispatch.wait_for(count)
     return made
 
@@ -159,6 +162,37 @@ def test_those_that_lie_are_left_out(processes: Processes, cluster: Cluster, sma
     assert "it returned pixels that are no finite numbers" in caplog.text
 
 
+@pytest.mark.parametrize("devices", [1, 2])
+def test_a_device_that_is_lost(processes: Processes, cluster: Cluster, small_tasks: None, devices: int,
+                               caplog: pytest.LogCaptureFixture) -> None:
+    """Its worker goes on with the other that it has, or is left out."""
+    processes.add_workers(1, FAULTS, CLRT_TEST_FAULT="lost")
+    expected, found = alone(room()), together(cluster, room(), 5, device=[0] * devices)
+    run(expected, spp=40)
+    run(found, spp=40)
+    processes.kill(processes.workers[-1])
+    assert same(expected, found)
+    assert sum(share["lost"] for share in found.session.shares()) == (devices == 1)
+    assert ("is left out: the device is lost" in caplog.text) == (devices == 1)
+
+
+def test_a_device_that_failed_its_check(processes: Processes, cluster: Cluster, device: Device, tmp_path: Path,
+                                        monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    """A worker without any other is left out."""
+    with monkeypatch.context() as there:
+        there.setenv("CLRT_CACHE_DIR", str(tmp_path))
+        assert keep_verdict(device.info, Verdict(False, ["it adds wrong"], "2026-01-01T00:00:00", 1.0, kernel_digest()))
+    processes.add_workers(1, CLRT_CACHE_DIR=str(tmp_path))
+    expected, found = alone(room()), together(cluster, room(), device=None)
+    run(expected, spp=8)
+    found.session.dispatch.wait_for(4)
+    while "is left out" not in caplog.text:
+        found.session.dispatch.meet()
+    run(found, spp=8)
+    processes.kill(processes.workers[-1])
+    assert same(expected, found) and "is left out: no usable device passed its check" in caplog.text
+
+
 def test_frames(cluster: Cluster) -> None:
     """24 of them, each by one worker, are those of one process, and all four took part."""
     def frame(name: str) -> PictureOrder:
@@ -201,11 +235,28 @@ def test_bands(cluster: Cluster, tmp_path: Path) -> None:
     assert again.summary()["noise"] == pytest.approx(expected.report["noise"], rel=0.1)
 
 
+def test_a_scheduler_that_comes_back(processes: Processes, cluster: Cluster, small_tasks: None,
+                                     caplog: pytest.LogCaptureFixture) -> None:
+    """In the middle of a pass, with other workers: the render goes on with what it has."""
+    def event() -> None:
+        processes.kill(processes.scheduler)
+        for worker in list(processes.workers):
+            processes.kill(worker)
+        processes.scheduler = processes.start_scheduler()
+        processes.add_workers(2)
+
+    expected, found = alone(room()), together(cluster, room())
+    run(expected, spp=128)
+    at_pass(found, 6, event, spp=128)
+    assert same(expected, found) and "answers again" in caplog.text
+    assert sum(share["samples"] > 0 for share in found.session.shares() if share["lost"] is False) >= 1
+
+
 def test_a_scheduler_that_is_killed(processes: Processes, cluster: Cluster, small_tasks: None, tmp_path: Path,
                                     monkeypatch: pytest.MonkeyPatch) -> None:
     """The render ends with what it has in its checkpoint, which one machine goes on with."""
     monkeypatch.setattr(dispatch, "GONE", 1.0)
-    found = together(cluster, room(), checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e6)
+    found = together(cluster, room(), 2, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e6)
     with pytest.raises(DeviceError, match="has not answered for 1 s"):
         at_pass(found, 6, lambda: processes.kill(processes.scheduler), spp=128)
     expected, resumed = alone(room()), alone(room(), checkpoint=tmp_path / "a.ck", resume=True)
