@@ -9,7 +9,7 @@ import click
 
 from .options import Size
 
-TRIALS = ("equality", "kills", "overhead", "huge")
+TRIALS = ("equality", "animation", "kills", "overhead", "huge")
 SCENES = Path(__file__).parents[2] / "scenes"
 
 
@@ -34,9 +34,13 @@ def farm_command(trials: tuple[str, ...], scenes: tuple[Path, ...], spp: int | N
     from ..farm import trials as trial
     from ..output.report import write_report
     from ..scene.file import load
+    from ..scene.model import Scene
 
     paths = scenes or tuple(SCENES / f"{name}.toml" for name in ("cornell", "glass", "materials"))
-    pictures = [trial.sized(load(path), (128, 128) if quick else (512, 512)) for path in paths]
+
+    def picture(number: int) -> Scene:
+        return trial.sized(load(paths[number]), (128, 128) if quick else (512, 512))
+
     rows: list[dict[str, Any]] = []
 
     def told(row: dict[str, Any]) -> None:
@@ -47,15 +51,19 @@ def farm_command(trials: tuple[str, ...], scenes: tuple[Path, ...], spp: int | N
     for name in trials or TRIALS:
         match name:
             case "equality":
+                pictures = [picture(number) for number in range(len(paths))]
                 for row in trial.equality(pictures, spp or (16 if quick else 64)):
                     told(row)
+            case "animation":
+                for row in trial.animation(trial.sized(picture(0), (96, 64)), 24, spp or 16):
+                    told(row)
             case "kills":
-                for row in trial.kills(pictures[0], spp or (256 if quick else 1024), every):
+                for row in trial.kills(picture(0), spp or (256 if quick else 1024), every):
                     told(row)
             case "overhead":
-                told(trial.overhead(pictures[0], 8 if quick else workers, 10 if quick else seconds))
+                told(trial.overhead(picture(0), 8 if quick else workers, 10 if quick else seconds))
             case _:
-                told(trial.huge(pictures[0], (2048, 4608) if quick else size, spp or 1, 2, out))
+                told(trial.huge(picture(0), (2048, 4608) if quick else size, spp or 1, 2, out))
     if json_file is not None:
         write_report(json_file, {"trials": rows})
         click.echo(str(json_file))

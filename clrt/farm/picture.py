@@ -42,7 +42,7 @@ TASK_SECONDS, TASKS_A_SECOND = 1.0, 32
 #: Samples of the first task of a worker whose speed is not known.
 FIRST_SAMPLES = 1 << 17
 #: The smallest task is such a part of a full one. Tiles of one at most: what is sent with a task should be below 10 MB.
-SMALLEST, MOST_TILES = 4, 2048
+SMALLEST, MOST_TILES = 8, 2048
 #: Tasks that a worker has at hand, and more, up to so many, where the client is away for longer; and of a pass, for
 #: each.
 AHEAD, MOST_AHEAD, PASS_TASKS = 2, 8, 36

@@ -60,6 +60,12 @@ class Processes:
                                 start_new_session=True)
 
     def __enter__(self) -> Processes:
+        """Once the scheduler listens, which takes long on a busy machine."""
+        host, _, port = self.address.rpartition("/")[2].partition(":")
+        while self.scheduler.poll() is None:
+            with suppress(OSError), socket.create_connection((host, int(port)), 1):
+                break
+            time.sleep(0.05)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,

@@ -7,6 +7,7 @@ import resource
 import sys
 import tempfile
 import time
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -14,13 +15,17 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
+import numpy as np
+
 from ..rendering.renderer import Renderer, State
+from ..scene.animation import frames, turntable
 from ..scene.model import RenderSettings, Scene
 from .bands import Banded
 from .cluster import connect, local_cluster
 from .orders import PictureOrder
 from .processes import Processes
 from .renderer import FarmRenderer
+from .whole_pictures import WholePictures
 
 #: Samples a second of a worker that only sleeps: what two cores make of the Cornell box.
 SPEED = 4e6
@@ -55,6 +60,25 @@ def equality(scenes: list[Scene], spp: int) -> Iterator[Row]:
                        "bytes_a_sample": together.session.moved_bytes / found.film.samples}
 
 
+def animation(scene: Scene, count: int, spp: int) -> Iterator[Row]:
+    """Frames of a turntable by one process, two of --local-cluster, and four of a scheduler: are they the same?"""
+    shots = {f"frame {number}": PictureOrder(shot, spp=spp) for number, shot in frames(turntable(scene, count))}
+    renderer = Renderer(scene, spp=spp)
+    alone = {}
+    for name, order in shots.items():
+        renderer.look(order.scene.camera)
+        alone[name] = _run(renderer, spp).pixels
+    with local_cluster(2) as two, farm(4) as processes, connect(processes.address) as four:
+        for named, cluster, workers in (("--local-cluster 2", two, 2), ("4 processes", four, 4)):
+            pictures = WholePictures(cluster, list(shots), lambda name: shots[name])
+            pictures.dispatch.wait_for(workers)
+            start = time.perf_counter()
+            found = dict(filter(None, pictures.results()))
+            yield {"trial": "animation", "scene": scene.name, "workers": named, "frames": len(found), "spp": spp,
+                   "equal": all(np.array_equal(alone[name], found[name]["pixels"]) for name in shots),
+                   "seconds": time.perf_counter() - start}
+
+
 def kills(scene: Scene, spp: int, every: float) -> Iterator[Row]:
     """Four workers, one of which is killed every so many seconds and replaced, and the same in peace."""
     alone = _run(Renderer(scene, spp=spp), spp)
@@ -83,20 +107,24 @@ def kills(scene: Scene, spp: int, every: float) -> Iterator[Row]:
 
 
 def overhead(scene: Scene, workers: int, seconds: float) -> Row:
-    """Workers that only sleep, at a fixed speed: how far they are from so many times one, what is moved, and what the
-    client needs for it."""
+    """Workers that only sleep, at a fixed speed: how far they are from so many times one, what is moved, and what
+    client and scheduler need for it."""
+    import psutil    # comes with Dask
+
     width, height = scene.render.size
     spp = int(workers * SPEED * seconds / (width * height))
     with farm(simulated=workers) as processes, connect(processes.address) as cluster:
         together = FarmRenderer(scene, cluster, spp=spp, simulated=SPEED)
         together.session.dispatch.wait_for(workers)
-        start = time.process_time()
+        start, scheduler = time.process_time(), psutil.Process(processes.scheduler.pid)
+        before = sum(scheduler.cpu_times()[:2])
         film = _run(together, spp).film
         return {"trial": "overhead", "workers": workers, "spp": spp, "seconds": together.seconds,
                 "efficiency": film.samples / (workers * SPEED * together.seconds),
                 "bytes_a_sample": together.session.moved_bytes / film.samples,
                 "tasks": together.session.dispatch.sent,
-                "client_seconds": time.process_time() - start, "client_bytes": peak_bytes()}
+                "client_seconds": time.process_time() - start,
+                "scheduler_seconds": sum(scheduler.cpu_times()[:2]) - before, "client_bytes": peak_bytes()}
 
 
 def huge(scene: Scene, size: tuple[int, int], spp: int, workers: int, path: Path) -> Row:
@@ -132,5 +160,4 @@ def same_film(one: State, other: State) -> bool:
 
 
 def _run(renderer: Renderer, spp: int) -> State:
-    *_, last = renderer.passes(spp=spp)
-    return last
+    return deque(renderer.passes(spp=spp), maxlen=1).pop()    # one state in memory, not all
