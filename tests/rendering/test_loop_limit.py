@@ -89,7 +89,7 @@ def test_work_is_shortened_in_order() -> None:
     while work.parts:
         done.append(work.cut(100, 2, most_tiles=2, most_samples=3))
     work.settle()
-    assert done == [Part(0, 2, 0, 3), Part(0, 2, 3, 3), Part(0, 2, 6, 1), Part(2, 3, 0, 3), Part(2, 3, 3, 3),
+    assert done == [Part(0, 2, 0, 3), Part(2, 3, 0, 3), Part(0, 2, 3, 3), Part(2, 3, 3, 3), Part(0, 2, 6, 1),
                     Part(2, 3, 6, 1)]
     assert work.samples.tolist() == [[7, 7, 7]]
 
