@@ -18,7 +18,7 @@ static inline uint mask_bits16(int16 mask) {
 }
 #endif
 
-static inline int first_bit(uint bits) { return 31 - (int)clz(bits & -bits); }
+static inline int first_bit(uint bits) { return (int)popcount(~bits & (bits - 1)); }
 
 // Writes the lanes whose bits are set to target[0], [1] …; up to target[7] anything may be overwritten.
 #if defined(__AVX512VL__) && !PORTABLE_MASK
@@ -69,7 +69,7 @@ static inline int least_lane(float8 numbers, int8 mask) {
 
 // Brings the cache lines of `bytes` from `address` on near; where that cannot be said, nothing.
 #if defined(__SSE2__) && !PORTABLE_MASK
-#define PREFETCH(address, bytes) for (int line = 0; line < (bytes); line += 64) \
+#define PREFETCH(address, bytes) _Pragma("unroll") for (int line = 0; line < (bytes); line += 64) \
     __builtin_prefetch((global const char *)(address) + line);
 #else
 #define PREFETCH(address, bytes)

@@ -98,6 +98,7 @@ typedef struct { WideHit hit; wide_mask open; wide inverse_det; } ShearedHit;
 static inline wide wide_far(wide x, wide y) { return WIDE_ABS(x) > WIDE_ABS(y) ? WIDE_ABS(x) : WIDE_ABS(y); }
 
 // Corners with permuted components, one triangle in each lane against one ray, or one for all lanes against a ray in each.
+__attribute__((always_inline))
 static inline ShearedHit intersect_sheared(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray,
                                            wide t_max) {
     const Sheared a = shear(p0, ray), b = shear(p1, ray), c = shear(p2, ray);
@@ -134,9 +135,10 @@ static inline ShearedHit intersect_sheared(const wide p0[3], const wide p1[3], c
     return result;
 }
 
-// The hits, with t in twice as many digits where it was left open.
-static inline WideHit settle(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray, wide t_max,
-                             ShearedHit sheared) {
+// The hits, with t in twice as many digits where it is left open. Seldom called, so it and what calls it begin anew: to
+// hand over what is known, all tests would have to put it into memory.
+static inline WideHit settle(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray, wide t_max) {
+    ShearedHit sheared = intersect_sheared(p0, p1, p2, ray, t_max);
     WideHit result = sheared.hit;
     wide t = -ray->sz * sheared.inverse_det * volume(p0, p1, p2, ray);
     result.t = sheared.open ? t : result.t;
@@ -148,15 +150,20 @@ static inline WideHit settle(const wide p0[3], const wide p1[3], const wide p2[3
 #define PACK_CORNERS wide p0[3] = PACK_CORNER(p0), p1[3] = PACK_CORNER(p1), p2[3] = PACK_CORNER(p2); \
     ShearedRay sheared_ray = {ray->sx, ray->sy, ray->sz, ray->ox, ray->oy, ray->oz};
 
-// Seldom called, so it loads the corners again: to hand them over, all tests would have to put them into memory.
 __attribute__((noinline)) static WideHit settle_triangles(const TriangleRay *ray, global const Triangles *leaf,
-                                                          float t_max, ShearedHit sheared) {
+                                                          float t_max) {
     PACK_CORNERS
-    return settle(p0, p1, p2, &sheared_ray, t_max, sheared);
+    return settle(p0, p1, p2, &sheared_ray, t_max);
 }
 
 static inline WideHit intersect_triangles(const TriangleRay *ray, global const Triangles *leaf, float t_max) {
     PACK_CORNERS
     ShearedHit sheared = intersect_sheared(p0, p1, p2, &sheared_ray, t_max);
-    return WIDE_ANY(sheared.open) ? settle_triangles(ray, leaf, t_max, sheared) : sheared.hit;
+    WideHit found = sheared.hit;
+    if (WIDE_ANY(sheared.open)) {
+        WideHit settled = settle_triangles(ray, leaf, t_max);
+        found.t = settled.t;
+        found.hit = settled.hit;
+    }
+    return found;
 }

@@ -56,10 +56,10 @@ static inline ireal enter_child(const Packet *packet, global const float *bounds
 #define CORNER(p) {pack->p[packet->axis[0]][i], pack->p[packet->axis[1]][i], pack->p[packet->axis[2]][i]}
 #define CORNERS wide p0[3] = CORNER(p0), p1[3] = CORNER(p1), p2[3] = CORNER(p2);
 
-__attribute__((noinline)) static WideHit settle_rays(const Packet *packet, global const Triangles *pack, int i, real t_max,
-                                                     ShearedHit found) {
+__attribute__((noinline)) static WideHit settle_rays(const Packet *packet, global const Triangles *pack, int i,
+                                                     real t_max) {
     CORNERS
-    return settle(p0, p1, p2, &packet->triangles, t_max, found);
+    return settle(p0, p1, p2, &packet->triangles, t_max);
 }
 
 static inline void hit_pack(const Packet *packet, global const Triangles *pack, Hits *hits) {
@@ -67,7 +67,11 @@ static inline void hit_pack(const Packet *packet, global const Triangles *pack, 
         CORNERS
         ShearedHit sheared = intersect_sheared(p0, p1, p2, &packet->triangles, hits->t);
         WideHit found = sheared.hit;
-        if (ANY(sheared.open)) found = settle_rays(packet, pack, i, hits->t, sheared);
+        if (ANY(sheared.open)) {
+            WideHit settled = settle_rays(packet, pack, i, hits->t);
+            found.t = settled.t;
+            found.hit = settled.hit;
+        }
         if (!ANY(found.hit)) continue;
         ireal primitive = pack->primitive[i];
         ireal closer = found.hit & packet->active
