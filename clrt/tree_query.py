@@ -36,9 +36,7 @@ FIRST, FEWEST = 1 << 15, 1 << 12
 #: Ways through the layout bvh8: ray by ray, eight coherent ones together (kernels/traverse/packet.cl), many in turns.
 TRAVERSALS = ("single", "packet", "pool")
 #: Rays that a work-item has in its pool (kernels/traverse/pool.cl), and how many it answers in all.
-POOL, SHARE = 16, 512
-#: Bytes; what a ray needs next is fetched by so many at a time.
-CACHE_LINE = 64
+POOL, SHARE = 32, 512
 #: Rays are coherent if the mean cosine between one and the next is above this: a camera's are, reflected ones are not.
 COHERENT, PAIRS = 0.9, 1024
 QUERIES = ("closest_hit", "any_hit", "next_hit")
@@ -208,12 +206,10 @@ class TreeQuery:
         instances = self._hit is INSTANCE_HIT
         has = tree_features(triangles, spheres) | {"INSTANCES": instances, "NEXT_HIT": name == "next_hit",
                                                    "LOOP_LIMIT": loop_turns(self.device) is not None}
-        fetched = max((array.dtype.itemsize for array in self.tree.buffers.values()), default=0)
         values = {"LANES": self.device.lanes, **tree_defines(self.tree)}
         values |= {feature: 1 for feature, present in has.items() if present}
         values |= {"packet": {"PACKET_RAYS": 1, "EMPTY": EMPTY}, "single": {},
-                   "pool": {"POOL": POOL, "SHARE": SHARE, "STOP_AT_FIRST": int(name == "any_hit"),
-                            "FETCH_LINES": -(-fetched // CACHE_LINE)}}[traversal]
+                   "pool": {"POOL": POOL, "SHARE": SHARE, "STOP_AT_FIRST": int(name == "any_hit")}}[traversal]
         preamble = "\n".join([defines(values), f"#define QUERY_NAME query_{name}",
                               typedefs({"Counts": COUNTS, "RayHit": self._hit}), scene_struct(tree_buffers(self.tree))])
         files = tree_files(self.tree.name, self._tests, triangles, spheres, instances=instances)

@@ -45,16 +45,16 @@ __attribute__((always_inline)) static inline bool depart(Departures *d, QUERY_RA
     return false;
 }
 
-// The places of the flights that are at nodes and of those that are at leaves.
-typedef struct { int at_nodes[POOL + 1], at_leaves[POOL + 1], nodes, leaves; } Round;
+// The flights that are at nodes and those that are at leaves; what stands behind the last one of a list does not count.
+typedef struct { Flight *at_nodes[POOL + 1], *at_leaves[POOL + 1]; } Round;
 
-static inline void list_flight(Round *round, int place, int reference) {
-    bool leaf = reference < 0;
-    round->at_nodes[round->nodes] = place;
-    round->at_leaves[round->leaves] = place;
-    round->nodes += !leaf;
-    round->leaves += leaf;
-}
+// Puts a flight on both lists, of which one grows.
+#define LIST(f) { \
+        int leaf = f->reference < 0; \
+        then->at_nodes[inner] = then->at_leaves[leaves] = f; \
+        inner += 1 - leaf; \
+        leaves += leaf; \
+    }
 
 // Where a flight goes on: what it needs there is fetched. One that is done is answered, and the next ray departs.
 #define GO_ON(to) { \
@@ -64,7 +64,7 @@ static inline void list_flight(Round *round, int place, int reference) {
             if (!depart(&departures, origins, directions, t_max, unit, end, answers, f)) continue; \
         } \
         fetch(&scene, f->reference); \
-        list_flight(then, place, f->reference); \
+        LIST(f) \
     }
 
 __attribute__((vec_type_hint(real)))
@@ -72,29 +72,28 @@ kernel void QUERY_NAME(SCENE_PARAMETERS, QUERY_RAYS, global Answer *answers, flo
     Scene scene = SCENE_ARGUMENTS;
     Flight flights[POOL];
     Round rounds[2], *now = rounds, *then = rounds + 1;
+    int inner = 0, leaves = 0;   // how many flights are on the lists of `then`
     Departures departures;
     departures.next = (uint)get_global_id(0) * SHARE;
     departures.lane = LANES;
     uint end = departures.next + SHARE < count ? departures.next + SHARE : count;
-    then->nodes = then->leaves = 0;
     for (int place = 0; place < POOL; ++place) {
         Flight *f = flights + place;
         if (!depart(&departures, origins, directions, t_max, unit, end, answers, f)) break;
-        list_flight(then, place, 0);
+        LIST(f)
     }
-    while (then->nodes + then->leaves > 0) {
+    while (inner + leaves > 0) {
         Round *done = now;
         now = then;
         then = done;
-        then->nodes = then->leaves = 0;
-        for (int i = 0; i < now->nodes; ++i) {
-            int place = now->at_nodes[i];
-            Flight *f = flights + place;
+        int inner_now = inner, leaves_now = leaves;
+        inner = leaves = 0;
+        for (int i = 0; i < inner_now; ++i) {
+            Flight *f = now->at_nodes[i];
             GO_ON(visit_node(&scene, f, STOP_AT_FIRST))
         }
-        for (int i = 0; i < now->leaves; ++i) {
-            int place = now->at_leaves[i];
-            Flight *f = flights + place;
+        for (int i = 0; i < leaves_now; ++i) {
+            Flight *f = now->at_leaves[i];
             GO_ON(visit_leaf(&scene, f, STOP_AT_FIRST))
         }
     }

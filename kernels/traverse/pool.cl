@@ -20,14 +20,17 @@ static inline FlightRay flight_ray(const FlightRays *rays, const Ray *ray, int l
 }
 
 static inline void fetch(const Scene *scene, int reference) {
-    global const void *node = RECORD(scene->nodes, reference);
+    global const void *record = RECORD(scene->nodes, reference);
+    uint last_line = sizeof(Node) - 64;
 #if TRIANGLES
-    node = reference < 0 ? (global const void *)RECORD(scene->packs, ~reference >> 4) : node;
+    record = reference < 0 ? (global const void *)RECORD(scene->packs, ~reference >> 4) : record;
+    last_line = reference < 0 ? sizeof(Triangles) - 64 : last_line;   // a pack is one line longer
 #endif
 #if LEAF_SPHERES
-    node = reference < 0 && (~reference & 8) ? (global const void *)RECORD(scene->leaf_spheres, ~reference >> 4) : node;
+    record = reference < 0 && (~reference & 8) ? (global const void *)RECORD(scene->leaf_spheres, ~reference >> 4) : record;
 #endif
-    PREFETCH(node, FETCH_LINES * 64)
+    PREFETCH(record, sizeof(Node))
+    PREFETCH((global const char *)record + last_line, 64)
 }
 
 typedef struct {
