@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import concurrent.futures
-import ctypes
 import logging
 import os
 import warnings
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from ..device.heap import keep_less
 from ..errors import DeviceError, UsageError
 from .remote import as_it_is
 
@@ -38,7 +38,7 @@ class Cluster:
     """A connection to a scheduler. Functions are sent to workers by address; how they ended is heard by `hear`."""
 
     def __init__(self, address: str, local: LocalCluster | None = None) -> None:
-        _give_memory_back()
+        keep_less()
         self.address, self._local = address, local
         self._held: dict[str, Future[Any]] = {}
         self._begin()
@@ -195,15 +195,6 @@ async def _fetched(client: Client, future: Future[Any]) -> Any:
     if found["status"] != "OK":
         raise ConnectionError("its worker has not got it any more")
     return found["data"][future.key]
-
-
-def _give_memory_back() -> None:
-    """Has the C library give large arrays back to the system once they are freed: it would keep ever more of them for
-    each of the threads that fetch results (glibc's mallopt, M_MMAP_THRESHOLD and M_ARENA_MAX; others have no such
-    function)."""
-    with suppress(OSError, AttributeError, TypeError):
-        ctypes.CDLL(None).mallopt(-3, 1 << 16)
-        ctypes.CDLL(None).mallopt(-8, 2)
 
 
 def connect(address: str) -> Cluster:

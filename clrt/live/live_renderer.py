@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..device.heap import give_back
 from ..device.open import Device, open_devices
 from ..output.denoise import Denoiser
 from ..rendering.guides import render_guides
@@ -75,13 +76,16 @@ class LiveRenderer:
         self.renderer = renderer = Renderer(asked.scene, device=self._devices, size=size, spp=spp,
                                             on_phase=self._on_phase, before=last, first_hits=True,
                                             **asked.settings.tracing)
-        self.programs += not (last and last.session.scene.program is renderer.session.scene.program)
+        changed = not (last and last.session.scene.program is renderer.session.scene.program)
+        self.programs += changed
         begun = time.perf_counter()
         self._on_phase("render")
         for first, state in enumerate(renderer.passes(spp=spp)):
             if first == 0:
                 preparation = begun - start - renderer.session.build_seconds
                 self._pace.note(size, state.spp, preparation, time.perf_counter() - begun)
+                if changed:     # drivers compile at the first launch, some of them
+                    give_back()
             yield state
 
     def _open(self, selector: Selector) -> None:
