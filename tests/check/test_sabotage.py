@@ -22,7 +22,7 @@ SABOTAGES = {
     "one bit too many": ("integers", r"\bpopcount\(", "1 + popcount("),
     "conversion that truncates": ("integers", r"PASTE\(convert_float, LANES\)",
                                   "PASTE(PASTE(convert_float, LANES), _rtz)"),
-    "the lane before": ("masks", r"31 - \(int\)clz", "30 - (int)clz"),
+    "the lane before": ("masks", r"popcount\(~bits & \(bits - 1\)\)", "popcount(~bits & (bits - 1)) - 1"),
     "an atomic that is none": ("memory", r"\batomic_max\(", "SET(", "#define SET(place, value) (*(place) = (value))"),
     "another hash": ("random numbers", r"1664525u", "1664527u"),
     "sums without their errors": ("sums", r"real s = \*sum \+ x;[^}]*", "*sum += x;"),
