@@ -2,6 +2,7 @@
 // with one material compiles to that material alone.
 #include "bsdf/interface.cl"
 #include MATERIAL_FILES
+#include NORMAL_MAPS_FILE
 
 // What the lanes hit: each lane's material is of one type, and only that member means something for it.
 typedef struct {
@@ -19,32 +20,6 @@ static inline void bsdf_at(const Scene *scene, const Surface *surface, Bsdf *bsd
     }
     MATERIAL_TYPES(READ)
 }
-
-#if NORMAL_MAPS
-// Bends the shading normal as the material's normal map says: (x, y) from 0 to 1 stand for −1 to 1, x along the tangent, y
-// along the bitangent. Before the normals are turned to a side.
-static inline void bend_normal(const Scene *scene, Surface *surface) {
-    ireal texture = (ireal)(-1);
-    real strength = ONE;
-#define NORMAL_MAP(name, number) { \
-        ireal is_type = (surface->material & 15) == number; \
-        ireal index = is_type ? surface->material >> 4 : (ireal)(0); \
-        texture = is_type ? GATHER(ireal, scene->name, index, .normal_map_texture) : texture; \
-        strength = is_type ? GATHER(real, scene->name, index, .normal_map) : strength; \
-    }
-    NORMAL_MAPPED_TYPES(NORMAL_MAP)
-    ireal mapped = (texture >= 0) & (surface->handedness != 0.0f);
-    if (!ANY(mapped)) return;
-    Footprint found = footprint(scene, mapped ? texture : (ireal)(0), &surface->at);
-    real x = (2.0f * filtered(&found, (ureal)(0)) - 1.0f) * strength, y = (2.0f * filtered(&found, (ureal)(8)) - 1.0f) * strength;
-    real z = 2.0f * filtered(&found, (ureal)(16)) - 1.0f;
-    real3 n = surface->ns, t = normalize3(sub(surface->tangent, scale(n, dot3(surface->tangent, n))));
-    real3 b = scale(cross3(n, t), surface->handedness);
-    real3 bent = mad3(t, x, mad3(b, y, scale(n, z)));
-    real norm2 = dot3(bent, bent);
-    surface->ns = choose(mapped & (norm2 > 0.0f), scale(bent, rsqrt(norm2)), surface->ns);
-}
-#endif
 
 static inline real3 bsdf_eval(const Bsdf *bsdf, real3 wo, real3 wi) {
     real3 value = splat(ZERO);

@@ -92,7 +92,7 @@ typedef struct {
 // 2. Light by shadow rays: which lanes send one.
 static inline ireal aim_at_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
                                  ireal active, Sampler *sampler, ShadowRay *ray) {
-    LightSample light = light_sample(scene, surface->p, choosing_normal(&shading->bsdf, surface->ns), sampler);
+    LightSample light = light_sample(scene, surface->p, choosing_normal(&shading->bsdf, shading->frame.n), sampler);
     real3 wi = to_local(shading->frame, light.wi);
     ireal reachable = same_side(wi.z, dot3(light.wi, surface->ng));
     real3 contribution = mul(bsdf_eval(&shading->bsdf, shading->wo, wi), light.radiance);
@@ -130,7 +130,7 @@ static inline ireal go_on(Path *path, const Surface *surface, const Shading *sha
     BsdfSample sample = bsdf_sample(&shading->bsdf, shading->wo, u, choice.x);
     path->wi = to_world(shading->frame, sample.wi);
     path->p = surface->p;
-    path->n = choosing_normal(&shading->bsdf, surface->ns);
+    path->n = choosing_normal(&shading->bsdf, shading->frame.n);
     path->pdf = sample.pdf;
     path->specular = sample.specular;
     active = active & (sample.pdf > 0.0f) & is_positive3(sample.weight)

@@ -1,6 +1,12 @@
 // What the material of a surface is where a ray met it, in the frame of its shading normal. World frame but for wo.
 #include "bsdf.cl"
 
+#if COAT_NORMALS
+#define FRAME_NORMAL(surface) frame_normal(surface)
+#else
+#define FRAME_NORMAL(surface) (surface)->ns
+#endif
+
 #if PRIMITIVES
 typedef struct {
     Frame frame;
@@ -16,7 +22,7 @@ static inline Shading shading_at(const Scene *scene, real3 direction, Surface *s
     bend_normal(scene, surface);
 #endif
     turn_towards(surface, towards);
-    shading.frame = frame_around(surface->ns);
+    shading.frame = frame_around(FRAME_NORMAL(surface));
     shading.wo = to_local(shading.frame, towards);
     bsdf_at(scene, surface, &shading.bsdf);
     return shading;

@@ -23,6 +23,9 @@ typedef struct {
     real3 tangent;        // not of unit length
     real handedness;      // of the bitangent; 0 where there are no tangents
 #endif
+#if COAT_NORMALS
+    real3 unbent, coat_normal;   // shading normals as no map bends them, and as a coat's own does (normal_maps.cl)
+#endif
 } Surface;
 
 #include PLACEMENT_FILE
@@ -173,15 +176,27 @@ static inline Surface surface_at(const Scene *scene, real3 origin, real3 directi
 #elif SPHERES
     sphere_surface(scene, origin, direction, hits, primitive, &surface);
 #endif
+#if COAT_NORMALS
+    surface.unbent = surface.coat_normal = surface.ns;
+#endif
     return surface;
 }
 
-// Turns both normals to the side of the unit vector `towards`; a shading normal that faces away from it is replaced.
+// A shading normal on the side of the geometric one, which replaces it if it faces away from `towards`.
+static inline real3 turned(real3 n, const Surface *surface, real3 towards) {
+    real3 aligned = choose(dot3(n, surface->ng) < 0.0f, negate(n), n);
+    return choose(dot3(aligned, towards) > 0.0f, aligned, surface->ng);
+}
+
+// Turns all normals to the side of the unit vector `towards`; a shading normal that faces away from it is replaced.
 static inline void turn_towards(Surface *surface, real3 towards) {
     surface->front = !(dot3(surface->ng, towards) < 0.0f);
     surface->ng = choose(surface->front, surface->ng, negate(surface->ng));
-    surface->ns = choose(dot3(surface->ns, surface->ng) < 0.0f, negate(surface->ns), surface->ns);
-    surface->ns = choose(dot3(surface->ns, towards) > 0.0f, surface->ns, surface->ng);
+    surface->ns = turned(surface->ns, surface, towards);
+#if COAT_NORMALS
+    surface->unbent = turned(surface->unbent, surface, towards);
+    surface->coat_normal = turned(surface->coat_normal, surface, towards);
+#endif
 }
 
 #include OFFSET

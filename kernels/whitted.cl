@@ -50,7 +50,7 @@ static inline real3 shade(const Scene *scene, const Surface *surface, const Shad
     real3 L = splat(ZERO);
 #if SKY
     real pdf;
-    real3 around = to_world(shading->frame, sample_cosine(next_2d(sampler)));
+    real3 around = to_world(frame_around(surface->ns), sample_cosine(next_2d(sampler)));
     L = mul(bsdf_albedo(&shading->bsdf), sky_radiance(scene, choose(active, around, vector(ZERO, ONE, ZERO)), &pdf));
 #endif
 #if LIGHTS

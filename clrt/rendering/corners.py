@@ -30,8 +30,8 @@ def pack_corners(meshes: Sequence[Mesh], uv_sets: int, normal_maps: bool) -> dic
                 _put(texcoords[own, i], "uv", uv[mesh.faces])
         if mesh.colors is not None:
             colors[own, :, :mesh.colors.shape[1]] = mesh.colors[mesh.faces]
-        if mesh.material.normal_map is not None and normal_maps:
-            tangent, sign = corner_tangents(mesh, mesh.material.normal_map.uv_set)
+        if mesh.material.bent_by is not None and normal_maps:
+            tangent, sign = corner_tangents(mesh, mesh.material.bent_by.uv_set)
             _put(tangents[own], "t", tangent)
             tangents["sign"][own] = sign
         first += len(mesh.faces)

@@ -43,6 +43,11 @@ class Materials:
         """The types in use that read the parameter from a texture."""
         return [kind for kind in self.used if self.reads.get(f"{kind.kernel}_{parameter}")]
 
+    @property
+    def normal_maps(self) -> bool:
+        """Whether there are any, on surfaces or on their coats."""
+        return bool(self.mapped("normal_map") or self.mapped("clearcoat_normal_map"))
+
 
 def pack_materials(users: Iterable[Material], textures: Textures) -> Materials:
     """The materials of these users, equal ones packed once, with their textures added to `textures`."""

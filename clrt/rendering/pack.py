@@ -130,7 +130,7 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: C
     emitters = pack_emitters(shapes.scene, shapes.triangles, sky, textures)
     materials = pack_materials(shapes.users, textures)
     buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, tree is not NO_RAYS)
-    buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, bool(materials.mapped("normal_map")))
+    buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, materials.normal_maps)
     buffers |= materials.buffers | textures.buffers() | emitters.buffers | sky.buffers
     if scene.render.filter != "box":
         buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))

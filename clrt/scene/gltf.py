@@ -187,7 +187,6 @@ def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
         "skins": any(node.skin is not None for node in document.nodes),
         "morph targets": any(primitive.targets for primitive in primitives),
         "points and lines": any(primitive.mode < TRIANGLES for primitive in primitives),
-        "normal maps of coats": any(look.KHR_materials_clearcoat.clearcoatNormalTexture for look in looks),
         "textures of sheen's roughness": any(look.KHR_materials_sheen.sheenRoughnessTexture for look in looks),
     }
     names = [name for name, present in left_out.items() if present]

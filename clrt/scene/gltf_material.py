@@ -55,9 +55,7 @@ class Materials:
         glass = _glass(source.extensions, made)
         if glass is not None:
             return glass
-        bend = self._texture(source.normalTexture, primitive, user)
-        if bend is not None and source.normalTexture is not None:
-            made = replace(made, normal_map=replace(bend, factor=max(source.normalTexture.scale, 0.0)))
+        made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
         if source.alphaMode == "OPAQUE":
             return made
         opacity = _numbered(_unit(pbr.baseColorFactor[3]), base, "alpha")
@@ -80,11 +78,17 @@ class Materials:
             "ior": float(np.clip(extensions.KHR_materials_ior.ior or MOST_IOR, 1, MOST_IOR)),
             "clearcoat": number(coat.clearcoatFactor, coat.clearcoatTexture, "red"),
             "clearcoat_roughness": number(coat.clearcoatRoughnessFactor, coat.clearcoatRoughnessTexture, "green"),
+            "clearcoat_normal_map": self._bend(coat.clearcoatNormalTexture if coat.clearcoatFactor > 0 else None,
+                                               primitive, user),
             "sheen_color": color(_cut(sheen.sheenColorFactor), sheen.sheenColorTexture),
             "sheen_roughness": _unit(sheen.sheenRoughnessFactor),
             "specular": number(specular.specularFactor, specular.specularTexture, "alpha"),
             "specular_color": color(_positive(specular.specularColorFactor), specular.specularColorTexture),
             "transmission": number(transmission.transmissionFactor, transmission.transmissionTexture, "red")}
+
+    def _bend(self, info: looks.NormalTextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:
+        texture = self._texture(info, primitive, user)
+        return None if texture is None or info is None else replace(texture, factor=max(info.scale, 0.0))
 
     def _emission(self, source: looks.Material, primitive: gltf.Primitive,
                   user: str) -> tuple[float, float, float] | Texture:

@@ -88,7 +88,7 @@ def prototypes(instances: list[Instance]) -> tuple[list[Mesh], NDArray[np.int32]
 
 def _stored(instance: Instance) -> Stored:
     """What instances must share to be stored once: the mesh, and tangents for a normal map."""
-    bumps = _material(instance).normal_map
+    bumps = _material(instance).bent_by
     return id(instance.mesh), None if bumps is None else bumps.uv_set
 
 

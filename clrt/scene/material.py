@@ -79,9 +79,15 @@ class Material:
     def without_textures(self: Self) -> Self:
         """Itself with the factors of its textures alone."""
         colors = {field.name for field in fields(self) if isinstance(field.default, tuple)}
+        maps = {field.name for field in fields(self) if field.default is None}
         plain: dict[str, Any] = {name: as_color(value.factor) if name in colors else value.factor
                                  for name, value in vars(self).items() if isinstance(value, Texture)}
-        return replace(self, **plain | {"normal_map": None})
+        return replace(self, **plain | dict.fromkeys(maps & plain.keys()))
+
+    @property
+    def bent_by(self) -> Texture | None:
+        """The normal map whose coordinates its tangents follow, if it has one."""
+        return self.normal_map
 
     def textures(self) -> list[Texture]:
         """All that it reads."""

@@ -35,8 +35,9 @@ class MetallicRoughness(Material):
     (scene.microfacets): white metal then reflects all light, and coloured metal grows deeper in color.
 
     The rest are glTF's extensions by their names. `ior`, `specular` and `specular_color`: F0 of what is no metal,
-    ((ior − 1)/(ior + 1))²·specular·specular_color, and F at grazing angles, `specular`. `clearcoat`: a clear film.
-    `sheen_color`: fibres. `transmission`: the part of what is no metal that is a sheet which light passes.
+    ((ior − 1)/(ior + 1))²·specular·specular_color, and F at grazing angles, `specular`. `clearcoat`: a clear film,
+    bent by `clearcoat_normal_map` alone. `sheen_color`: fibres. `transmission`: the part of what is no metal that is a
+    sheet which light passes.
     """
 
     kernel: ClassVar[str] = "metallic_roughness"
@@ -52,6 +53,7 @@ class MetallicRoughness(Material):
     specular_color: Radiance | Texture = (1.0, 1.0, 1.0)
     clearcoat: Unit | Texture = 0.0
     clearcoat_roughness: Unit | Texture = 0.0
+    clearcoat_normal_map: Texture | None = None
     sheen_color: Albedo | Texture = (0.0, 0.0, 0.0)
     sheen_roughness: Unit = 0.0
     transmission: Unit | Texture = 0.0
@@ -78,10 +80,15 @@ class MetallicRoughness(Material):
             values |= {"specular": self.specular, "specular_color": self.specular_color}
         if "CLEARCOAT" in has:
             values |= {"clearcoat": self.clearcoat, "clearcoat_roughness": self.clearcoat_roughness}
+            values |= {} if self.clearcoat_normal_map is None else {"clearcoat_normal_map": self.clearcoat_normal_map}
         if "SHEEN" in has:
             values |= {"sheen_color": self.sheen_color, "sheen_power": power(self.sheen_roughness),
                        "sheen_albedo": fitted_albedo(self.sheen_roughness)}
         return values | ({"transmission": self.transmission} if "THROUGH" in has else {})
+
+    @property
+    def bent_by(self) -> Texture | None:
+        return self.normal_map or (self.clearcoat_normal_map if self.clearcoat != 0 else None)
 
     def conflicts(self) -> list[str]:
         painted = any(isinstance(value, Texture) for value in (self.color, self.metallic, self.roughness))
@@ -105,6 +112,7 @@ class MetallicRoughness(Material):
         layers = {"CLEARCOAT": self.clearcoat != 0, "SHEEN": self.sheen_color != (0, 0, 0),
                   "THROUGH": self.transmission != 0}
         has = {f"SMITH_{self.smith.upper()}": True, "MULTIPLE_SCATTERING": self.multiple_scattering, **layers,
+               "COAT_NORMALS": layers["CLEARCOAT"] and self.bent_by is not None,
                "LAYERS": any(layers.values()), "SPECULAR": self.specular != 1 or self.specular_color != (1, 1, 1),
                "TRANSMISSION": layers["THROUGH"], "TRANSMISSION_LOBES": layers["THROUGH"]}
         return frozenset(name for name, present in has.items() if present)

@@ -4,9 +4,24 @@
 //   THROUGH    the part `transmission` of the body is a thin sheet, which passes light on through microfacets, not bent:
 //              color·(1 − F(wo·h))·G·D/(4·cos wo·cos wi), wi mirrored to wo's side
 //
+// COAT_NORMALS: wo and wi are in the frame of the unbent normal. The coat, and what lies below it, each reflect in a frame around
+// a normal of their own: nothing to below its horizon, nor to below that of the unbent one.
+//
 // What a coat reflects by F(cos) it takes from what lies below twice, at wo and at wi, and fibres leave 1 − max(sheen_color)·E
 // of the larger E of both: so all is reciprocal and no light is made. glTF takes a coat's share at wo alone. E, the fibres'
 // albedo by V, exceeds 1 at grazing angles where they are smooth; there their f is divided by it at each angle.
+#if COAT_NORMALS
+#define IN_BASE(m, w) to_local((m)->base_frame, w)
+#define IN_COAT(m, w) to_local((m)->coat_frame, w)
+#define OF_COAT(m, w) to_world((m)->coat_frame, w)
+#define IF_ABOVE(wo, wi, value) (((wo).z > 0.0f) & ((wi).z > 0.0f) ? (value) : ZERO)
+#else
+#define IN_BASE(m, w) (w)
+#define IN_COAT(m, w) (w)
+#define OF_COAT(m, w) (w)
+#define IF_ABOVE(wo, wi, value) (value)
+#endif
+
 #if CLEARCOAT
 static inline real coat_fresnel(const struct metallic_roughness *m, real cos_theta) {
     real c = 1.0f - minimum(absolute(cos_theta), ONE), c2 = c * c;
@@ -25,7 +40,7 @@ static inline real3 sheen_value(const struct metallic_roughness *m, real3 wo, re
     real z = normalize3(add(wo, wi)).z, n = m->sheen_power;
     real d = (2.0f + n) * (0.5f / PI) * exp(0.5f * n * log(maximum(1.0f - z * z, (real)(1e-30f))));
     real bounds = maximum(sheen_albedo(m, wo.z), ONE) * maximum(sheen_albedo(m, wi.z), ONE);
-    return scale(m->sheen, d * wi.z / (4.0f * (wo.z + wi.z - wo.z * wi.z) * bounds));
+    return scale(m->sheen, IF_ABOVE(wo, wi, d * wi.z / (4.0f * (wo.z + wi.z - wo.z * wi.z) * bounds)));
 }
 #endif
 
@@ -56,19 +71,19 @@ static inline real reflected_density(real3 wo, real3 wi, real alpha, real *hidde
 // The probabilities of the lobes: about their shares of the light that leaves.
 typedef struct { real coat, sheen, through, base; } LayerShares;
 
-static inline LayerShares layer_shares(const struct metallic_roughness *m, real3 wo) {
+static inline LayerShares layer_shares(const struct metallic_roughness *m, real3 base_o, real3 coat_o) {
     LayerShares share = {ZERO, ZERO, ZERO, ONE};
     real left = ONE;
 #if CLEARCOAT
-    share.coat = coat_fresnel(m, wo.z);
+    share.coat = coat_fresnel(m, coat_o.z);
     left -= share.coat;
 #endif
 #if SHEEN
-    real albedo = minimum(sheen_albedo(m, wo.z), ONE);
+    real albedo = minimum(sheen_albedo(m, base_o.z), ONE);
     share.sheen = left * luminance(m->sheen) * albedo;
     left *= 1.0f - largest(m->sheen) * albedo;
 #endif
-    real3 f = base_fresnel(m, wo.z);
+    real3 f = base_fresnel(m, base_o.z);
     share.base = left * (luminance(f) + luminance(mul(sub(splat(ONE), f), m->albedo)));
 #if THROUGH
     share.through = left * luminance(mul(sub(splat(ONE), f), m->through));
@@ -81,40 +96,43 @@ static inline LayerShares layer_shares(const struct metallic_roughness *m, real3
 }
 
 static inline real3 metallic_roughness_eval(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    real3 value = scale(base_eval(m, wo, wi), under_sheen(m, wo, wi));
+    real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), coat_o = IN_COAT(m, wo), coat_i = IN_COAT(m, wi);
+    real3 value = scale(base_eval(m, base_o, base_i), under_sheen(m, base_o, base_i));
 #if SHEEN
-    value = add(value, sheen_value(m, wo, wi));
+    value = add(value, sheen_value(m, base_o, base_i));
 #endif
-    value = scale(value, under_coat(m, wo, wi));
+    value = scale(value, under_coat(m, coat_o, coat_i));
 #if CLEARCOAT
     real hidden;
-    real coat = reflected_density(wo, wi, m->coat_alpha, &hidden) * hidden;
-    value = add(value, splat(coat_fresnel(m, 0.5f * length3(add(wo, wi))) * coat));
+    real coat = reflected_density(coat_o, coat_i, m->coat_alpha, &hidden) * hidden;
+    value = add(value, splat(IF_ABOVE(coat_o, coat_i, coat_fresnel(m, 0.5f * length3(add(wo, wi))) * coat)));
 #endif
     value = choose((wo.z > 0.0f) & (wi.z > 0.0f), value, splat(ZERO));
 #if THROUGH
-    real3 mirrored = vector(wi.x, wi.y, -wi.z);
+    real3 mirrored = vector(base_i.x, base_i.y, -base_i.z);
     real seen;
-    real density = reflected_density(wo, mirrored, m->alpha, &seen) * seen;
-    real3 on = mul(sub(splat(ONE), base_fresnel(m, 0.5f * length3(add(wo, mirrored)))), m->through);
-    on = scale(on, density * under_coat(m, wo, wi) * under_sheen(m, wo, wi));
+    real density = reflected_density(base_o, mirrored, m->alpha, &seen) * seen;
+    real3 on = mul(sub(splat(ONE), base_fresnel(m, 0.5f * length3(add(base_o, mirrored)))), m->through);
+    on = scale(on, IF_ABOVE(base_o, mirrored, density * under_coat(m, coat_o, coat_i) * under_sheen(m, base_o, base_i)));
     value = choose((wo.z > 0.0f) & (wi.z < 0.0f), on, value);
 #endif
     return value;
 }
 
 static inline real metallic_roughness_pdf(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    LayerShares share = layer_shares(m, wo);
-    real hidden, pdf = share.base * base_pdf(m, wo, wi);
+    real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), coat_o = IN_COAT(m, wo), coat_i = IN_COAT(m, wi);
+    LayerShares share = layer_shares(m, base_o, coat_o);
+    real hidden, pdf = share.base * base_pdf(m, base_o, base_i);
 #if CLEARCOAT
-    pdf += share.coat * reflected_density(wo, wi, m->coat_alpha, &hidden);
+    pdf += IF_ABOVE(coat_o, coat_i, share.coat * reflected_density(coat_o, coat_i, m->coat_alpha, &hidden));
 #endif
 #if SHEEN
-    pdf += share.sheen * (0.5f / PI);
+    pdf += IF_ABOVE(base_o, base_i, share.sheen * (0.5f / PI));
 #endif
     pdf = ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
 #if THROUGH
-    real on = share.through * reflected_density(wo, vector(wi.x, wi.y, -wi.z), m->alpha, &hidden);
+    real3 mirrored = vector(base_i.x, base_i.y, -base_i.z);
+    real on = IF_ABOVE(base_o, mirrored, share.through * reflected_density(base_o, mirrored, m->alpha, &hidden));
     pdf = ((wo.z > 0.0f) & (wi.z < 0.0f)) ? on : pdf;
 #endif
     return pdf;
@@ -137,14 +155,15 @@ static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m
 }
 
 static inline BsdfSample metallic_roughness_sample(const struct metallic_roughness *m, real3 wo, real2 u, real lobe) {
-    LayerShares share = layer_shares(m, wo);
+    real3 base_o = IN_BASE(m, wo), coat_o = IN_COAT(m, wo);
+    LayerShares share = layer_shares(m, base_o, coat_o);
     real below = 1.0f - share.base;
     ireal is_base = lobe >= below;
-    BsdfSample sample = base_sample(m, wo, u, is_base ? minimum((lobe - below) / share.base, BELOW_ONE) : ZERO);
+    BsdfSample sample = base_sample(m, base_o, u, is_base ? minimum((lobe - below) / share.base, BELOW_ONE) : ZERO);
     ireal through = NO_LANES;
 #if THROUGH
-    real3 h = sample_visible_normal(wo, m->alpha, u);
-    real3 mirrored = sub(scale(h, 2.0f * dot3(wo, h)), wo);
+    real3 h = sample_visible_normal(base_o, m->alpha, u);
+    real3 mirrored = sub(scale(h, 2.0f * dot3(base_o, h)), base_o);
     through = !is_base & (lobe >= below - share.through);
     sample.wi = choose(through, vector(mirrored.x, mirrored.y, -mirrored.z), sample.wi);
 #endif
@@ -153,12 +172,22 @@ static inline BsdfSample metallic_roughness_sample(const struct metallic_roughne
     sincos_turns(u.y, &sine, &cosine);
     sample.wi = choose(lobe < share.coat + share.sheen, vector(r * cosine, r * sine, u.x), sample.wi);
 #endif
+#if COAT_NORMALS
+    ireal own_side = through ? sample.wi.z < 0.0f : sample.wi.z > 0.0f;
+    sample.wi = to_world(m->base_frame, sample.wi);
+#endif
 #if CLEARCOAT
-    real3 film = sample_visible_normal(wo, m->coat_alpha, u);
-    sample.wi = choose(lobe < share.coat, sub(scale(film, 2.0f * dot3(wo, film)), wo), sample.wi);
+    real3 film = sample_visible_normal(coat_o, m->coat_alpha, u);
+    real3 reflected = sub(scale(film, 2.0f * dot3(coat_o, film)), coat_o);
+    sample.wi = choose(lobe < share.coat, OF_COAT(m, reflected), sample.wi);
 #endif
     real pdf = metallic_roughness_pdf(m, wo, sample.wi);
     sample.pdf = (through ? sample.wi.z < 0.0f : sample.wi.z > 0.0f) ? pdf : ZERO;
+#if COAT_NORMALS
+    // What a lobe sends below its own horizon has failed, though another lobe may send something there.
+    own_side = lobe < share.coat ? reflected.z > 0.0f : own_side;
+    sample.pdf = own_side ? sample.pdf : ZERO;
+#endif
     real inverse = sample.pdf > 0.0f ? 1.0f / sample.pdf : ZERO;
     sample.weight = scale(metallic_roughness_eval(m, wo, sample.wi), inverse);
     return sample;

@@ -41,6 +41,9 @@ struct metallic_roughness {
 #if CLEARCOAT
     real coat, coat_alpha;
 #endif
+#if COAT_NORMALS
+    Frame base_frame, coat_frame;   // in that of the unbent normal
+#endif
 #if SHEEN
     real3 sheen;
     real sheen_power, sheen_albedo[SHEEN_COEFFICIENTS];
@@ -74,6 +77,11 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
 #if CLEARCOAT
     m.coat = PARAMETER(metallic_roughness, clearcoat);
     m.coat_alpha = maximum(square(PARAMETER(metallic_roughness, clearcoat_roughness)), (real)(ALPHA_MIN));
+#endif
+#if COAT_NORMALS
+    Frame frame = frame_around(surface->unbent);
+    m.base_frame = frame_around(to_local(frame, surface->ns));
+    m.coat_frame = frame_around(to_local(frame, surface->coat_normal));
 #endif
 #if SHEEN
     m.sheen = PARAMETER3(metallic_roughness, sheen_color);

@@ -74,11 +74,18 @@ kernel void probe_accumulate(SCENE_PARAMETERS, uint n, global const float *in, g
     put(out, n, 13, TO_REAL(a.dropped));
 }
 
-// A material, by its code, somewhere on a surface.
+// A material, by its code, somewhere on a surface; where its picture begins, if normal maps bend it under a coat.
 static Bsdf material_at(const Scene *scene, real code, ireal front) {
     Surface surface;
     surface.material = TO_INT(code);
     surface.front = front;
+#if COAT_NORMALS
+    for (int i = 0; i < UV_SETS; ++i) surface.at.set[i] = (real2){ZERO, ZERO};
+    surface.unbent = surface.ns = vector(ZERO, ZERO, ONE);
+    surface.tangent = vector(ONE, ZERO, ZERO);
+    surface.handedness = ONE;
+    bend_normal(scene, &surface);
+#endif
     Bsdf bsdf;
     bsdf_at(scene, &surface, &bsdf);
     return bsdf;

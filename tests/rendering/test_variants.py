@@ -60,7 +60,8 @@ def painted(scene: Scene) -> Scene:
     there = Texture(picture=Picture(texels[1:4]), uv_set=1, wrap=("mirror", "clamp"))
     floor, lamp, ball = scene.meshes
     gold = MetallicRoughness(color=there, metallic=here, roughness=replace(here, channel="green", filter="nearest"),
-                             normal_map=here, opacity=replace(here, channel="alpha"))
+                             normal_map=here, opacity=replace(here, channel="alpha"), clearcoat=there,
+                             clearcoat_roughness=0.3, clearcoat_normal_map=there)
     flat = floor.vertices[:, [0, 2]]
     meshes = [replace(floor, material=Diffuse(color=here, alpha_cutoff=0.3, opacity=there), uv=flat,
                       uv1=flat[:, ::-1].copy(), colors=np.linspace(0, 1, 16, dtype=np.float32).reshape(4, 4)),

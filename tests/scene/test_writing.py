@@ -17,7 +17,7 @@ from clrt.scene.animation import Animation, Keyframe
 from clrt.scene.editing import materials_of, with_material
 from clrt.scene.file import load
 from clrt.scene.lights import PointLight
-from clrt.scene.materials import Dielectric, Diffuse, Mirror
+from clrt.scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Instance, Mesh, Scene, Sphere
 from clrt.scene.textures import Picture, Texture
 from clrt.scene.writing import scene_files, started
@@ -171,9 +171,11 @@ def test_what_no_scene_file_can_say_is_written_beside_it(tmp_path: Path) -> None
                 tangents=np.column_stack([directions[[1, 2, 0]], np.ones(3, np.float32)]),
                 uv=rng.random((3, 2), np.float32), uv1=rng.random((3, 2), np.float32),
                 colors=rng.random((3, 4), np.float32))
+    coated = MetallicRoughness(clearcoat=0.5, clearcoat_normal_map=Texture(picture=picture, factor=0.25))
     hidden = Mesh(rng.random((3, 3), np.float32), faces, Mirror(), name="all of it")
     places = [rng.random((3, 4)) for _ in range(2)]
-    scene = Scene(meshes=[mesh], instances=[Instance(hidden, place, name=f"{i}") for i, place in enumerate(places)],
+    scene = Scene(meshes=[mesh], spheres=[Sphere(material=coated)],
+                  instances=[Instance(hidden, place, name=f"{i}") for i, place in enumerate(places)],
                   environment=Environment(image=rng.random((4, 8, 3), np.float32)))
     written = again(scene, tmp_path / "scene.toml")
     check_same(scene, written)

@@ -59,7 +59,7 @@ def test_every_parameter_can_be_edited(tmp_path: Path) -> None:
                 shared = "emission, normal map, opacity/" if field.name in SHARED else ""
                 widgets = (field.name, f"##{field.name} given", f"{field.name}/##X", f"{field.name}/$$0")
                 found = any(window.context.item_exists(f"material/{shared}{widget}") for widget in widgets)
-                assert found or field.name == "normal_map", f"{kind.kernel}.{field.name}"
+                assert found or field.name.endswith("normal_map"), f"{kind.kernel}.{field.name}"
 
     drive(two_balls(), test, tmp_path)
 

@@ -1,0 +1,62 @@
+// Normal maps: they bend the shading normal, as glTF has it. (x, y) from 0 to 1 stand for −1 to 1, x along the tangent, y along
+// the bitangent. Before the normals are turned to a side.
+//
+// COAT_NORMALS: a coat lies on the unbent surface, or as a map of its own bends it. Types with such coats are evaluated in the
+// frame of the unbent normal, where those of coat and base are two directions (bsdf/layers.cl).
+
+// Of each lane's material the texture of a map, −1 for none, and how far it bends.
+typedef struct { ireal texture; real strength; } NormalMap;
+
+#define READ_MAP(map, name, number) { \
+        ireal is_type = (surface->material & 15) == number; \
+        ireal index = is_type ? surface->material >> 4 : (ireal)(0); \
+        found.texture = is_type ? GATHER(ireal, scene->name, index, .map##_texture) : found.texture; \
+        found.strength = is_type ? GATHER(real, scene->name, index, .map) : found.strength; \
+    }
+
+static inline NormalMap normal_map(const Scene *scene, const Surface *surface) {
+    NormalMap found = {(ireal)(-1), ONE};
+#define NORMAL_MAP(name, number) READ_MAP(normal_map, name, number)
+    NORMAL_MAPPED_TYPES(NORMAL_MAP)
+    return found;
+}
+
+#if COAT_NORMALS
+static inline NormalMap coat_normal_map(const Scene *scene, const Surface *surface) {
+    NormalMap found = {(ireal)(-1), ONE};
+#define COAT_NORMAL_MAP(name, number) READ_MAP(clearcoat_normal_map, name, number)
+    COAT_MAPPED_TYPES(COAT_NORMAL_MAP)
+    return found;
+}
+#endif
+
+static inline real3 bent(const Scene *scene, const Surface *surface, NormalMap map) {
+    ireal mapped = (map.texture >= 0) & (surface->handedness != 0.0f);
+    if (!ANY(mapped)) return surface->ns;
+    Footprint found = footprint(scene, mapped ? map.texture : (ireal)(0), &surface->at);
+    real x = (2.0f * filtered(&found, (ureal)(0)) - 1.0f) * map.strength;
+    real y = (2.0f * filtered(&found, (ureal)(8)) - 1.0f) * map.strength;
+    real z = 2.0f * filtered(&found, (ureal)(16)) - 1.0f;
+    real3 n = surface->ns, t = normalize3(sub(surface->tangent, scale(n, dot3(surface->tangent, n))));
+    real3 b = scale(cross3(n, t), surface->handedness);
+    real3 turned = mad3(t, x, mad3(b, y, scale(n, z)));
+    real norm2 = dot3(turned, turned);
+    return choose(mapped & (norm2 > 0.0f), scale(turned, rsqrt(norm2)), n);
+}
+
+static inline void bend_normal(const Scene *scene, Surface *surface) {
+#if COAT_NORMALS
+    surface->coat_normal = bent(scene, surface, coat_normal_map(scene, surface));
+#endif
+    surface->ns = bent(scene, surface, normal_map(scene, surface));
+}
+
+#if COAT_NORMALS
+// The normal of the frame in which a material is evaluated.
+static inline real3 frame_normal(const Surface *surface) {
+    real3 n = surface->ns;
+#define UNBENT(name, number) n = choose((surface->material & 15) == number, surface->unbent, n);
+    COATED_TYPES(UNBENT)
+    return n;
+}
+#endif
