@@ -15,11 +15,22 @@ PIXELS = 1 << 15
 T = TypeVar("T")
 
 
-def in_bands(size: tuple[int, ...], work: Callable[[slice], T]) -> list[T]:
+class Unwanted(Exception):
+    """Nobody waits any more for what was being made of a picture."""
+
+
+def in_bands(size: tuple[int, ...], work: Callable[[slice], T], unwanted: Callable[[], bool] = lambda: False,
+             ) -> list[T]:
     """What `work` returns for the rows of each band of a picture, (height, width, …), from the top down; several run at
-    a time. No tile is in two bands."""
+    a time. No tile is in two bands. Unwanted as soon as it is."""
     height, width = size[:2]
     step = max(1, PIXELS // (width * TILE)) * TILE
     bands = [slice(first, min(first + step, height)) for first in range(0, height, step)]
+
+    def wanted(rows: slice) -> T:
+        if unwanted():
+            raise Unwanted
+        return work(rows)
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(work, bands))
+        return list(pool.map(wanted, bands))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -15,10 +16,11 @@ RELATIVE_FLOOR = 0.01
 
 
 class Film:
-    """A copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT."""
+    """A copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT; unwanted: asked
+    while its error is estimated, which ends with `Unwanted` where that is so."""
 
-    def __init__(self, pixels: NDArray[Any]) -> None:
-        self.pixels = pixels
+    def __init__(self, pixels: NDArray[Any], unwanted: Callable[[], bool] = lambda: False) -> None:
+        self.pixels, self.unwanted = pixels, unwanted
 
     @cached_property
     def mean(self) -> NDArray[np.float64]:
@@ -95,7 +97,7 @@ class Film:
             relative[rows] = np.sqrt(squared)
             return float(np.sum(variance / squared))
 
-        return relative, sum(in_bands(self.mean.shape, judge))
+        return relative, sum(in_bands(self.mean.shape, judge, self.unwanted))
 
     @property
     def samples(self) -> int:

@@ -58,7 +58,7 @@ class NoiseEstimate:
         if level.max() >= 0:    # the first sample is no change
             relative = film.relative_to
             change = np.concatenate(in_bands(
-                mean.shape, lambda rows: tile_sums(((mean[rows] - before[rows]) / relative[rows]) ** 2)))
+                mean.shape, lambda rows: tile_sums(((mean[rows] - before[rows]) / relative[rows]) ** 2), film.unwanted))
         self._changes += [np.full(due.shape, np.nan) for _ in range(max(level) + 1 - len(self._changes))]
         for k in sorted({*level.tolist()} - {-1}):
             at_k = due & (self._level == k)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,7 @@ from ..scene.validate import validate
 from .accumulation import Accumulation
 from .adaptive import FLOOR_SPP, tiles_to_double
 from .aovs import check_light, chosen_aovs, film_aovs, needs_direct_light, seen_first
+from .bands import Unwanted
 from .camera import camera_file
 from .checkpoint import open_checkpoints
 from .choices import WAVE_LANES, Choices, choices_on
@@ -91,7 +94,7 @@ class Renderer:
         self._planned_spp = kept.planned_spp if kept else planned
         self.session: Accumulation = self._make_picture(before.session.scenes if before else ())
         self._begin()
-        self._clock, self._interrupted, self._abandoned = 0.0, False, False
+        self._clock, self._interrupted, self._abandoned = 0.0, False, Event()
         if kept:
             self._convergence.restore(kept)
             self.session.restore(kept.film, kept.work)
@@ -182,7 +185,7 @@ class Renderer:
         next_state = 0.0
         while self.stop_reason is None:
             self._run_pass(spp, time, error)
-            if self._abandoned:
+            if self._abandoned.is_set():
                 return
             now, done = clock.perf_counter(), self.session.samples_done
             if self.stop_reason is None and spp is not None and done >= spp:
@@ -193,16 +196,18 @@ class Renderer:
             if self.stop_reason is None and not due:
                 continue
             film = self._film()
-            in_haste = self._in_haste
-            if in_haste:
+            state = self._unless_interrupted(film, reference)
+            if self._abandoned.is_set():
+                return
+            self._heed_interrupt()
+            if state is None:
                 self._keep(film, last=True)
-            state = self._convergence.record(film, self.session, self.seconds, reference, in_haste)
-            if self.stop_reason is None and looks and low_enough(state.stops_by, error):
-                self.stop_reason = "error"
-            self._heed_interrupt()    # while it made this state
-            next_state = now + max(STATE_SECONDS, STATE_COST * (clock.perf_counter() - now))
-            if not in_haste:
+                state = self._convergence.record(film, self.session, self.seconds, reference, in_haste=True)
+            else:
+                if self.stop_reason is None and looks and low_enough(state.stops_by, error):
+                    self.stop_reason = "error"
                 self._keep(film, last=self.stop_reason is not None)
+            next_state = now + max(STATE_SECONDS, STATE_COST * (clock.perf_counter() - now))
             yield state
 
     def interrupt(self) -> None:
@@ -211,7 +216,7 @@ class Renderer:
 
     def abandon(self) -> None:
         """Has `passes` end after the launch that is being made, with nothing: nobody wants the picture any more."""
-        self._abandoned = True
+        self._abandoned.set()
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
@@ -236,7 +241,7 @@ class Renderer:
         """One pass; sets the stop reason where `time` is over or it is interrupted, maybe inside the pass."""
         for _ in self._adaptive_pass(spp) if self._adapts else self._even_pass(spp, error):
             self.seconds = clock.perf_counter() - self._clock
-            if self._abandoned:
+            if self._abandoned.is_set():
                 return
             self._heed_interrupt()
             if self._in_haste:
@@ -276,7 +281,17 @@ class Renderer:
         """The film with all that was launched, and the time until then."""
         self.session.wait()
         self.seconds = clock.perf_counter() - self._clock
-        return self.session.film()
+        film = self.session.film()
+        film.unwanted = lambda: self._abandoned.is_set() or self._interrupted and self.stop_reason is None
+        return film
+
+    def _unless_interrupted(self, film: Film, reference: NDArray[np.float32] | None) -> State | None:
+        """The state, if there is time to make it."""
+        if self._in_haste:
+            return None
+        with suppress(Unwanted):
+            return self._convergence.record(film, self.session, self.seconds, reference)
+        return None
 
     def _heed_interrupt(self) -> None:
         if self.stop_reason is None and self._interrupted:
