@@ -78,7 +78,12 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
         return os.WEXITSTATUS(status)
     name = signal.Signals(os.WTERMSIG(status)).name
     if os.WTERMSIG(status) in CRASHES:
-        _say(f"the render crashed ({name}), most likely in the device's driver: see `clrt devices --check`", advice)
+        from ..device.pocl_cache import kept_programs, remove_damaged
+
+        damaged = remove_damaged()
+        cause = (f"since PoCL keeps programs in {kept_programs()}, of which {damaged} were damaged: they are removed, "
+                 "so run it again" if damaged else "most likely in the device's driver: see `clrt devices --check`")
+        _say(f"the render crashed ({name}), {cause}", advice)
         return DEVICE
     _say(f"the render was ended from outside ({name}); by SIGKILL systems end what uses too much memory", advice)
     return 128 + os.WTERMSIG(status)

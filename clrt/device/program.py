@@ -23,6 +23,7 @@ from ..errors import KernelError
 from .background import in_background
 from .cache import keep_log, read_binary, write_binary
 from .open import Device
+from .pocl_cache import remove_damaged
 from .sources import kernel_folder
 
 log = logging.getLogger(__name__)
@@ -94,6 +95,8 @@ def build(device: Device, source: str) -> BuiltProgram:
         binary = read_binary(key)
         cached = binary is not None
         program = (_from_binary(device, binary) if binary else None) or _compile(device, source)
+        if not program.get_info(cl.program_info.NUM_KERNELS) and remove_damaged():
+            program = _compile(device, source)
         if not cached:
             keeps_its_own = device.info.platform == "Portable Computing Language"
             write_binary(key, b"" if keeps_its_own else _binary(program))

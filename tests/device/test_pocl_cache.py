@@ -1,0 +1,53 @@
+"""What PoCL keeps, damaged: as by a disk that was full, or power that failed."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clrt.device.pocl_cache import remove_damaged
+from clrt.output.images import read_image
+
+from .test_shared_cache import RENDER, SCENE, surroundings
+
+GARBAGE = bytes(range(256)) * 4
+
+
+@pytest.mark.parametrize("name, size", [("program.bc", 0), ("program.bc", 1000), ("*.so", 0), ("*.so", 1000)])
+def test_a_damaged_program_is_compiled_again(tmp_path: Path, name: str, size: int) -> None:
+    """Some are noticed at once; on others PoCL aborts, which is told with what was done about it, and is the last time.
+    """
+    (tmp_path / "scene.toml").write_text(SCENE)
+    places = surroundings(HOME=str(tmp_path), CLRT_CACHE_DIR=str(tmp_path / "cache"),
+                          POCL_CACHE_DIR=str(tmp_path / "kept"))
+
+    def rendered(picture: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([*RENDER, picture], cwd=tmp_path, env=places, capture_output=True, text=True, timeout=200)
+
+    assert rendered("whole.exr").returncode == 0
+    files = list((tmp_path / "kept").rglob(name))
+    if not files:
+        pytest.skip("the device is not PoCL's")
+    for file in files:
+        file.write_bytes(GARBAGE[:size])
+    first = rendered("first.exr")
+    assert first.returncode == 0 or (first.returncode == 4 and f"of which {len(files)} were damaged: they are removed, "
+                                     "so run it again" in first.stderr), first.stderr
+    assert rendered("second.exr").returncode == 0
+    assert np.array_equal(read_image(tmp_path / "second.exr"), read_image(tmp_path / "whole.exr"))
+
+
+def test_whole_programs_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of files without a home, and of a folder that is not there, nothing is removed."""
+    monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path / "absent"))
+    assert remove_damaged() == 0
+    program = tmp_path / "AB" / "CDE"
+    program.mkdir(parents=True)
+    (program / "program.bc").write_bytes(b"BC\xc0\xde" + GARBAGE)
+    monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path))
+    assert remove_damaged() == 0 and program.is_dir()
+    (program / "program.bc").write_bytes(b"BC")
+    assert remove_damaged() == 1 and not program.exists()
