@@ -18,6 +18,8 @@ from .tiles import tile_pixels, tile_sums
 FLOOR_SPP = 16
 #: By what part of all samples so far a round adds to them.
 GROWTH = 0.5
+#: By how much some tiles' samples may exceed what is planned before they begin anew.
+MOST_TIMES_PLANNED = 4
 
 
 def tiles_to_double(film: Film, tile_samples: NDArray[np.int64], errors: NDArray[np.float64],

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .accumulation import Accumulation
+from .adaptive import tiles_to_double
 from .film import Film
 from .kept import Kept
 from .noise import NoiseEstimate
@@ -47,6 +48,10 @@ class Convergence:
         if not in_haste:
             self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
         return state
+
+    def tiles_to_double(self, tile_samples: NDArray[np.int64], spp: int | None) -> NDArray[np.intp]:
+        """See `adaptive.tiles_to_double`; of the newest state."""
+        return tiles_to_double(self.last.film, tile_samples, self.noise.tile_errors(tile_samples), spp)
 
     def catch_up(self, picture: Accumulation, seconds: float) -> None:
         """Records what a picture has that was last seen in haste, unless it is in the middle of a pass."""

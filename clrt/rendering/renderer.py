@@ -19,7 +19,7 @@ from ..errors import UsageError
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validate import validate
 from .accumulation import Accumulation
-from .adaptive import FLOOR_SPP, tiles_to_double
+from .adaptive import FLOOR_SPP, MOST_TIMES_PLANNED
 from .aovs import check_light, chosen_aovs, film_aovs, needs_direct_light, seen_first
 from .bands import Unwanted
 from .camera import camera_file
@@ -40,8 +40,6 @@ from .stops import check_step, check_stops, checked_percentile, low_enough, pass
 #: Between two states at least this long passes, and this many times what making a state costs.
 STATE_SECONDS = 0.5
 STATE_COST = 20
-#: Where sampling is adaptive, by how much some tiles' samples may exceed what is planned before they begin anew.
-MOST_TIMES_PLANNED = 4
 
 
 class Renderer:
@@ -77,8 +75,7 @@ class Renderer:
                  resume: bool = False, checkpoint_seconds: float = 30.0,
                  error_percentile: float | None = None, aovs: str | Iterable[str] = (), before: Renderer | None = None,
                  first_hits: bool = False) -> None:
-        self._aovs = chosen_aovs(aovs)
-        self._percentile = checked_percentile(error_percentile)
+        self._aovs, self._percentile = chosen_aovs(aovs), checked_percentile(error_percentile)
         given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
                                  "shadows": shadows, "sampler": sampler, "filter": filter, "adaptive": adaptive}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
@@ -112,9 +109,8 @@ class Renderer:
         warn_of_darkness(self.scene, self.compiled.features)
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
-        settings = self.settings
-        return make_picture(self.devices, self._compiled, settings.size, depth_of(settings), settings.seed,
-                            self._planned_spp, before)
+        return make_picture(self.devices, self._compiled, self.settings.size, depth_of(self.settings),
+                            self.settings.seed, self._planned_spp, before)
 
     @property
     def name(self) -> str:
@@ -195,8 +191,10 @@ class Renderer:
             due = now >= next_state or done & (done - 1) == 0 or looks or self._adapts
             if self.stop_reason is None and not due:
                 continue
-            film = self._film()
-            state = self._unless_interrupted(film, reference)
+            film, state = self._film(), None
+            if not self._in_haste:
+                with suppress(Unwanted):
+                    state = self._convergence.record(film, self.session, self.seconds, reference)
             if self._abandoned.is_set():
                 return
             self._heed_interrupt()
@@ -263,9 +261,7 @@ class Renderer:
 
     def _adaptive_pass(self, spp: int | None) -> Iterator[None]:
         """Doubles the samples of those tiles where that takes most error away; ends the render at `spp`."""
-        tile_samples = self.session.tile_samples
-        tiles = tiles_to_double(self._convergence.last.film, tile_samples,
-                                self._convergence.noise.tile_errors(tile_samples), spp)
+        tiles = self._convergence.tiles_to_double(self.session.tile_samples, spp)
         if len(tiles) == 0:
             self.stop_reason = "spp"
         yield from self.session.double(tiles)
@@ -284,14 +280,6 @@ class Renderer:
         film = self.session.film()
         film.unwanted = lambda: self._abandoned.is_set() or self._interrupted and self.stop_reason is None
         return film
-
-    def _unless_interrupted(self, film: Film, reference: NDArray[np.float32] | None) -> State | None:
-        """The state, if there is time to make it."""
-        if self._in_haste:
-            return None
-        with suppress(Unwanted):
-            return self._convergence.record(film, self.session, self.seconds, reference)
-        return None
 
     def _heed_interrupt(self) -> None:
         if self.stop_reason is None and self._interrupted:
