@@ -15,15 +15,21 @@ MEMORY = "/dev/shm"
 
 
 def provide_cache_folders() -> None:
-    """Points XDG_CACHE_HOME and POCL_CACHE_DIR to a temporary folder unless the user's cache folder can be written."""
+    """Points XDG_CACHE_HOME and POCL_CACHE_DIR to a temporary folder where what they name cannot be written."""
     temporary = _temporary()
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    if not _writable(home):
-        folder = os.path.join(temporary, f"clrt-cache-{os.getuid() if hasattr(os, 'getuid') else 0}")
-        if not _writable(folder):
-            folder = tempfile.mkdtemp(prefix="clrt-cache-")
+    programs = os.environ.get("POCL_CACHE_DIR")
+    home_is_closed = not _writable(home)
+    programs_are_closed = not _writable(programs) if programs else home_is_closed
+    if not (home_is_closed or programs_are_closed):
+        return
+    folder = os.path.join(temporary, f"clrt-cache-{os.getuid() if hasattr(os, 'getuid') else 0}")
+    if not _writable(folder):
+        folder = tempfile.mkdtemp(prefix="clrt-cache-")
+    if home_is_closed:
         os.environ["XDG_CACHE_HOME"] = folder
-        os.environ.setdefault("POCL_CACHE_DIR", os.path.join(folder, "pocl"))
+    if programs_are_closed:
+        os.environ["POCL_CACHE_DIR"] = os.path.join(folder, "pocl")
 
 
 def _writable(folder: str) -> bool:

@@ -46,14 +46,16 @@ def test_eight_processes_start_on_a_cold_cache(tmp_path: Path) -> None:
     assert not list((tmp_path / "cache").glob("unfinished-*"))
 
 
-@pytest.mark.parametrize("home", ["a read-only home", "no home", "a home that cannot be told"])
+@pytest.mark.parametrize("home", ["a read-only home", "no home", "a home that cannot be told",
+                                  "a cache of PoCL's that is read-only"])
 def test_whatever_the_home_is(tmp_path: Path, home: str) -> None:
     """The picture is written, and nothing into a folder named ~."""
     (tmp_path / "scene.toml").write_text(SCENE)
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o555)
     places = {"a read-only home": {"HOME": str(closed), "CLRT_CACHE_DIR": str(closed / "clrt")},
-              "no home": {}, "a home that cannot be told": {"HOME": "~"}}[home]
+              "no home": {}, "a home that cannot be told": {"HOME": "~"},
+              "a cache of PoCL's that is read-only": {"HOME": str(tmp_path), "POCL_CACHE_DIR": str(closed)}}[home]
     result = subprocess.run([*RENDER, "picture.png"], cwd=tmp_path, env=surroundings(TMPDIR=str(tmp_path), **places),
                             capture_output=True, text=True, timeout=100, preexec_fn=no_rights)
     assert (result.returncode, result.stdout) == (0, "picture.png\n"), result.stderr
