@@ -1,7 +1,7 @@
 """One device of one thread, then two of one thread each: same picture, and how much faster; one killed on the way.
 
-POCL_MAX_PTHREAD_COUNT=1 makes one thread each of PoCL's devices, and a device may be named twice. Means nothing but on
-a machine with two idle cores.
+POCL_MAX_PTHREAD_COUNT=1 makes one thread of a PoCL, however many devices it has: there must be two, pip's and the
+system's. Means nothing but on a machine with two idle cores.
 """
 
 from __future__ import annotations
@@ -22,10 +22,20 @@ from .renders import CORNELL, GALLERY, finish, start
 
 TURNS, FAILURES = 5, 20
 SCENES = [scene for scene in GALLERY if scene.stem in ("cornell", "glass", "spheres", "spot")]
-RENDERS = {"one": ("--device", "0"), "two": ("--device", "0", "--device", "0")}
+POCL = "Portable Computing Language"
+#: The options of "one" and "two", once it is known which devices there are.
+RENDERS: dict[str, tuple[str, ...]] = {}
 
 
 def trial() -> Iterator[str]:
+    import clrt
+
+    found = [device for device in clrt.devices() if device["usable"] and device["platform"] == POCL]
+    if len(found) < 2:
+        yield "there is one PoCL: OCL_ICD_VENDORS names a folder without the system's, or none is installed"
+        return
+    RENDERS.update(one=("--device", found[0]["id"]),
+                   two=("--device", found[0]["id"], "--device", found[1]["id"]))
     os.environ["POCL_MAX_PTHREAD_COUNT"] = "1"
     yield f"{'scene':12}{'one':>9}{'two':>9}  times as fast"
     for scene in SCENES:
