@@ -14,7 +14,7 @@
 #define IN_BASE(m, w) to_local((m)->base_frame, w)
 #define IN_COAT(m, w) to_local((m)->coat_frame, w)
 #define OF_COAT(m, w) to_world((m)->coat_frame, w)
-#define IF_ABOVE(wo, wi, value) (((wo).z > 0.0f) & ((wi).z > 0.0f) ? (value) : ZERO)
+#define IF_ABOVE(wo, wi, value) ((((wo).z > 0.0f) & ((wi).z > 0.0f)) ? (value) : ZERO)
 #else
 #define IN_BASE(m, w) (w)
 #define IN_COAT(m, w) (w)
