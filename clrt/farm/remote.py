@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..device.open import Device
-    from .share_renderer import ShareRenderer
     from .orders import Order
+    from .share_renderer import ShareRenderer
     from .simulated import Simulation
 
 P = ParamSpec("P")

@@ -11,12 +11,12 @@ from ..live.live import Live
 from ..live.settings import Settings
 from ..scene.model import Scene
 from .editor import MATERIALS, SPHERES, Editor
-from .tone_mapping import Look as Look
 from .needs import no_display
 from .panels import materials, render, spheres, statistics
 from .panels.camera import CameraPanel
 from .panels.files import Files
 from .panels.lights import Lights
+from .tone_mapping import Look as Look
 from .viewport import Viewport
 
 SIZE = (1280, 800)

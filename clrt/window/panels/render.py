@@ -12,8 +12,8 @@ from ...accel.kernels import BUILDER_NAMES, TREES, TRIANGLE_TESTS
 from ...live.settings import Settings
 from ...output.view import VIEWS
 from ..editor import Editor
-from ..tone_mapping import Look
 from ..fields import choose, edit, edit_fields
+from ..tone_mapping import Look
 
 #: The settings that are one of these, by name; None is the one that suits device and scene.
 CHOICES: dict[str, list[Any]] = {"tree": [None, True, False], "builder": [None, *BUILDER_NAMES],
