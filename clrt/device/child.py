@@ -11,11 +11,14 @@ from pathlib import Path
 from typing import IO
 
 
-def start_child(module: str, argument: str, output: IO[bytes] | int, errors: IO[bytes]) -> subprocess.Popen[str]:
-    """`python -m module argument`, which finds the same modules as this process wherever it is started."""
+def start_child(module: str, argument: str, output: IO[bytes] | int, errors: IO[bytes],
+                **variables: str) -> subprocess.Popen[str]:
+    """`python -m module argument`, which finds the same modules as this process wherever it is started; `variables`
+    are added to its environment."""
     path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
+    environment = {**os.environ, "PYTHONPATH": path, **variables}
     return subprocess.Popen([sys.executable, "-P", "-m", module, argument], stdin=subprocess.DEVNULL, stdout=output,
-                            stderr=errors, text=True, encoding="utf-8", env={**os.environ, "PYTHONPATH": path})
+                            stderr=errors, text=True, encoding="utf-8", env=environment)
 
 
 def end_child(child: subprocess.Popen[str]) -> None:

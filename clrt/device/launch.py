@@ -7,6 +7,8 @@ flight, and their events are polled. One that has not ended after `patience` has
 
 from __future__ import annotations
 
+import atexit
+import threading
 import time
 from collections import deque
 from collections.abc import Iterator
@@ -29,6 +31,10 @@ LEAST_TELLING = 0.25
 IN_FLIGHT = 2
 #: Waiting counts at most so much between two looks: a process that was stopped (Ctrl-Z) has not waited.
 LONGEST_LOOK = 0.1
+#: Seconds after which a launch is no short one.
+SOON = 2e-4
+#: Of drivers, that are still to come.
+_callbacks: set[threading.Event] = set()
 
 
 class LaunchSize:
@@ -156,12 +162,36 @@ class Wait:
 def wait_for(event: cl.Event) -> None:
     """Returns when the event is complete, letting signals through; DeviceError where it failed or hangs.
 
-    Asking for an event's status starts nothing: a driver may hold commands back until their queue is flushed.
+    Asking for an event's status starts nothing: a driver may hold commands back until their queue is flushed. On a CPU
+    each look takes time from the launch itself: after the first ones it is the driver that tells.
     """
     check_process()
     with calling():
         event.command_queue.flush()
-    start, pause, wait = time.perf_counter(), 1e-5, Wait()
+    start, wait = time.perf_counter(), Wait()
     while not wait.is_over(event):
-        time.sleep(pause)
-        pause = max(1e-5, min(2e-3, (time.perf_counter() - start) / 50))
+        if time.perf_counter() - start > SOON:
+            return _wait_long(event, wait)
+        time.sleep(1e-5)
+
+
+def _wait_long(event: cl.Event, wait: Wait) -> None:
+    ended, pause = threading.Event(), SOON
+    _callbacks.add(ended)
+
+    def called(_: int) -> None:
+        ended.set()
+        _callbacks.discard(ended)
+
+    with calling():
+        event.set_callback(cl.command_execution_status.COMPLETE, called)
+    while not wait.is_over(event):
+        ended.wait(pause)
+        pause = min(2 * pause, LONGEST_LOOK)
+
+
+@atexit.register
+def _let_callbacks_end() -> None:
+    """One that came while Python ends would abort the process."""
+    for ended in list(_callbacks):
+        ended.wait(1.0)

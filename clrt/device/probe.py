@@ -27,8 +27,13 @@ PATIENCE, IDLE = 10.0, 2.0
 
 def probe(libraries: Sequence[str], limit: float = LIMIT) -> list[str]:
     """What is wrong with each driver, empty where nothing is; they are asked all at once."""
+    with tempfile.TemporaryDirectory(prefix="clrt-probes-") as folder:  # for what those that crash leave behind
+        return _probe(libraries, limit, folder)
+
+
+def _probe(libraries: Sequence[str], limit: float, folder: str) -> list[str]:
     logs = [(tempfile.TemporaryFile(), tempfile.TemporaryFile()) for _ in libraries]
-    children = [start_child(__name__, library, *log) for library, log in zip(libraries, logs)]
+    children = [start_child(__name__, library, *log, TMPDIR=folder) for library, log in zip(libraries, logs)]
     try:
         _wait(children, limit)
         return [_fault(child, *log, limit) for child, log in zip(children, logs)]

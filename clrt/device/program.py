@@ -109,6 +109,13 @@ def build(device: Device, source: str) -> BuiltProgram:
     return BuiltProgram(program, seconds, cached)
 
 
+def forget(devices: Sequence[Device]) -> None:
+    """Lets go of the programs that are kept for these devices, so that their contexts end with their last user."""
+    ended = tuple(f"-{device.context.int_ptr}" for device in devices)
+    for key in [key for key in _built if key.endswith(ended)]:
+        _built.pop(key, None)
+
+
 def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
     """The kernel `name` of a program; KernelError where the driver fails only now."""
     try:

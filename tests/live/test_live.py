@@ -7,10 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pyopencl as cl
 import pytest
 
 import clrt
 from clrt.device.open import Device
+from clrt.live import live_renderer
 from clrt.live.history import History
 from clrt.live.live import Live
 from clrt.live.pace import DIVISORS, Pace
@@ -158,6 +160,19 @@ def test_mistakes_are_told_and_the_last_picture_stays(live: Live, device: Device
     live.undo()
     assert live.can_redo and not live.can_undo
     check_as_rendered(live, device)
+
+
+def test_after_many_programs_the_device_is_opened_anew(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And nothing keeps what belongs to it before: a compiler's memory is freed with its context."""
+    with Live(room(), device=device.info.index) as live:
+        whole(live)
+        before, = live._renderer._devices
+        monkeypatch.setattr(live_renderer, "MOST_COMPILED", 0)
+        live.edit(moved(live.scene))
+        check_as_rendered(live, device)
+        after, = live._renderer._devices
+        assert after.context != before.context
+        assert before.context.get_info(cl.context_info.REFERENCE_COUNT) == 1 + 1    # its queue's
 
 
 def test_the_newest_edit_wins(live: Live, device: Device) -> None:
