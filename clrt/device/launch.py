@@ -187,6 +187,7 @@ def _wait_long(event: cl.Event, wait: Wait) -> None:
         event.set_callback(cl.command_execution_status.COMPLETE, called)
     while not wait.is_over(event):
         ended.wait(pause)
+        ended.clear()
         pause = min(2 * pause, LONGEST_LOOK)
 
 

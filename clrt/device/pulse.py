@@ -18,9 +18,12 @@ from ..errors import UsageError
 #: changes it, and 0 turns it off.
 HANG_SECONDS, VARIABLE = 60.0, "CLRT_HANG_SECONDS"
 
-#: Calls begun and ended; what is going on that may take any time. A fork shares it.
-_counts = memoryview(mmap.mmap(-1, 24)).cast("q")
-CALLS, UNWATCHED, HUNG = 0, 1, 2
+#: Many drivers compile at the first launch, which may take so many times as long.
+WARM_UP = 10
+
+#: Calls begun and ended; simulators in use; whether any hung; warm-ups. A fork shares it.
+_counts = memoryview(mmap.mmap(-1, 32)).cast("q")
+CALLS, UNWATCHED, HUNG, WARMING = 0, 1, 2, 3
 
 
 def patience() -> float:
@@ -29,13 +32,14 @@ def patience() -> float:
         seconds = float(os.environ.get(VARIABLE) or HANG_SECONDS)
     except ValueError:
         raise UsageError(f"{VARIABLE} is {os.environ[VARIABLE]!r}; it must be a number of seconds, or 0") from None
-    return seconds if seconds > 0 and not _counts[UNWATCHED] else float("inf")
+    watched = seconds > 0 and not _counts[UNWATCHED]
+    return seconds * (WARM_UP if _counts[WARMING] else 1) if watched else float("inf")
 
 
 def call_in_progress() -> int:
     """A number that is the same as long as the same call goes on; 0 where there is none, or none that is watched."""
     calls = _counts[CALLS]
-    return calls if calls % 2 and not _counts[UNWATCHED] else 0
+    return calls if calls % 2 and not (_counts[UNWATCHED] or _counts[WARMING]) else 0
 
 
 @contextmanager
@@ -65,10 +69,10 @@ def take_any_time() -> None:
 
 
 @contextmanager
-def taking_any_time() -> Iterator[None]:
-    """Around what may take long: many drivers compile at the first launch."""
-    _counts[UNWATCHED] += 1
+def warming_up() -> Iterator[None]:
+    """Around the first launch of a program. Its calls are not watched: see background.py."""
+    _counts[WARMING] += 1
     try:
         yield
     finally:
-        _counts[UNWATCHED] -= 1
+        _counts[WARMING] -= 1

@@ -17,7 +17,7 @@ from ..device.launch import calling, wait_for
 from ..device.memory import array_bytes, check_memory, part_count, part_records, parts, size
 from ..device.open import Device
 from ..device.program import BuiltProgram, build, make_kernel
-from ..device.pulse import taking_any_time
+from ..device.pulse import warming_up
 from ..errors import NoRoomError
 from ..scene.model import Camera
 from .camera import CAMERA_FIELDS, launch_record
@@ -125,7 +125,7 @@ class SceneOnDevice:
             return
         start = time.perf_counter()
         self.launch["pixel_count"] = 0
-        with taking_any_time():
+        with warming_up():
             wait_for(in_background(self.device.info.name, lambda: self.enqueue_pixels(film, tiles)))
         self.build_seconds += time.perf_counter() - start
 

@@ -67,6 +67,13 @@ def test_of_two_devices_one_ends_it_alone(folder: Path, whole: Path, faulty: Pat
     assert_same(folder, whole)
 
 
+def test_of_two_devices_one_never_does_anything(folder: Path, whole: Path, faulty: Path) -> None:
+    """Drivers may compile at the first launch, so that is waited for ten times as long, but not for ever."""
+    result = render(folder, *TWO, **fault(faulty, "endless", 1, after=0) | {"CLRT_HANG_SECONDS": "0.3"})
+    assert result.returncode == 0 and "has not ended a launch in 3 s" in result.stderr, result.stderr
+    assert_same(folder, whole)
+
+
 @pytest.mark.parametrize(("kind", "words", "devices"), [
     ("lost", "the device failed", ONE), ("endless", "has not ended a launch in 1 s", ONE),
     ("hangs", "has not returned from a call in 1 s", ONE), ("hangs", "has not returned from a call in 1 s", TWO),

@@ -16,6 +16,8 @@ from .renders import GALLERY
 
 #: Samples a pixel and seconds, whatever comes first.
 SPP, SECONDS = 32, 20.0
+#: The kernels that make pictures.
+INTEGRATORS = ("wave", "integrate", "raster")
 #: Seconds that no launch on a CPU should take longer.
 LIMIT = 0.2
 
@@ -62,9 +64,8 @@ def measured(scene: str, device: str) -> dict[str, Any]:
     cl.enqueue_nd_range_kernel = noted
     report = clrt.render(clrt.load(scene), device=device, spp=SPP, time=SECONDS).report
     took = [(name, run_seconds(event)) for name, event in launched]
-    mine = sorted(seconds for name, seconds in took if name in ("path", "wave", "whitted", "picture"))
-    other = max(((seconds, name) for name, seconds in took if name not in ("path", "wave", "whitted", "picture")),
-                default=(0.0, ""))
+    mine = sorted(seconds for name, seconds in took if name in INTEGRATORS)
+    other = max(((seconds, name) for name, seconds in took if name not in INTEGRATORS), default=(0.0, ""))
     return {"launches": len(mine), "median": mine[len(mine) // 2], "other": other[0], "name": other[1],
             "longest": max(mine[-1], report["kernel"]["longest_launch_seconds"])}
 
