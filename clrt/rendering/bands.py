@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import TypeVar
 
 from .tiles import TILE
@@ -22,7 +23,7 @@ class Unwanted(Exception):
 def in_bands(size: tuple[int, ...], work: Callable[[slice], T], unwanted: Callable[[], bool] = lambda: False,
              ) -> list[T]:
     """What `work` returns for the rows of each band of a picture, (height, width, …), from the top down; several run at
-    a time. No tile is in two bands. Unwanted as soon as it is."""
+    a time. No tile is in two bands. Unwanted as soon as it is. `work` must not call this itself."""
     height, width = size[:2]
     step = max(1, PIXELS // (width * TILE)) * TILE
     bands = [slice(first, min(first + step, height)) for first in range(0, height, step)]
@@ -32,5 +33,10 @@ def in_bands(size: tuple[int, ...], work: Callable[[slice], T], unwanted: Callab
             raise Unwanted
         return work(rows)
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(wanted, bands))
+    return list(_pool(os.getpid()).map(wanted, bands))
+
+
+@cache
+def _pool(process: int) -> ThreadPoolExecutor:
+    """Of this process: a fork has none of the threads."""
+    return ThreadPoolExecutor(os.cpu_count(), "bands")

@@ -15,6 +15,29 @@ from .bands import in_bands
 RELATIVE_FLOOR = 0.01
 
 
+def _in_planes(values: NDArray[Any]) -> NDArray[Any]:
+    """(3, height, width) as (height, width, 3), colour by colour in memory still: numpy's loops are then as long as a
+    row, not three values."""
+    return np.moveaxis(values, 0, -1)
+
+
+def _sums(pixels: NDArray[Any], name: str) -> NDArray[np.float64]:
+    total = np.moveaxis(pixels[name], -1, 0).astype(np.float64, order="C")
+    total += np.moveaxis(pixels[f"{name}_error"], -1, 0)
+    return _in_planes(total)
+
+
+def _with_both_sides(values: NDArray[np.float64], before: NDArray[np.float64], after: NDArray[np.float64],
+                     ) -> NDArray[np.float64]:
+    """Each of the values with those next to it along the first axis, outside of which are `before` and `after`."""
+    sums = values.copy(order="K")
+    sums[1:] += values[:-1]
+    sums[0] += before
+    sums[:-1] += values[1:]
+    sums[-1] += after
+    return sums
+
+
 class Film:
     """A copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT; unwanted: asked
     while its error is estimated, which ends with `Unwanted` where that is so."""
@@ -33,12 +56,11 @@ class Film:
         return self._mean_of("direct")
 
     def _mean_of(self, name: str) -> NDArray[np.float64]:
-        mean = np.empty((*self.pixels.shape, 3))
+        mean = _in_planes(np.empty((3, *self.pixels.shape)))
 
         def fill(rows: slice) -> None:
             pixels = self.pixels[rows]
-            total = pixels[name].astype(np.float64) + pixels[f"{name}_error"]
-            mean[rows] = total / np.maximum(pixels["count"], 1)[..., None]
+            mean[rows] = _sums(pixels, name) / np.maximum(pixels["count"], 1)[..., None]
 
         in_bands(mean.shape, fill)
         return mean
@@ -53,7 +75,7 @@ class Film:
         pixels, most = self.pixels[rows], self.mean[rows] ** 2
         count = pixels["count"].astype(np.float64)[..., None]
         with np.errstate(divide="ignore", invalid="ignore"):
-            squares = (pixels["square"].astype(np.float64) + pixels["square_error"]) / count
+            squares = _sums(pixels, "square") / count
             summed = squares >= (1 - 1e-6) * most    # false for NaN, too
             variance = np.where(summed, np.maximum(squares - most, 0) / (count - 1), most)
         return np.where(count < 2, np.nan, variance)
@@ -82,14 +104,14 @@ class Film:
     @cached_property
     def _judged(self) -> tuple[NDArray[np.float32], float]:
         """`relative_to`, and the sum of the variances over that: the same is needed for both."""
-        relative = np.empty(self.mean.shape, np.float32)
+        mean, last = self.mean, len(self.mean) - 1
+        relative = np.empty_like(mean, np.float32)
 
         def judge(rows: slice) -> float:
-            own, variance = self.mean[rows], self._variance(rows)
-            first, edges = max(rows.start - 1, 0), (int(rows.start == 0), int(rows.stop == len(self.mean)))
-            padded = np.pad(self.mean[first:rows.stop + 1], (edges, (1, 1), (0, 0)), mode="edge")
-            sums = padded[:-2] + padded[1:-1] + padded[2:]
-            around = (sums[:, :-2] + sums[:, 1:-1] + sums[:, 2:] - own) / 8
+            own, variance = mean[rows], self._variance(rows)
+            sums = _with_both_sides(own, mean[max(rows.start - 1, 0)], mean[min(rows.stop, last)])
+            columns = sums.swapaxes(0, 1)
+            around = (_with_both_sides(columns, columns[0], columns[-1]).swapaxes(0, 1) - own) / 8
             difference = own - around
             with np.errstate(divide="ignore", invalid="ignore"):
                 towards_own = np.fmax(1 - variance / difference**2, 0)   # 0 for NaN, too

@@ -50,7 +50,7 @@ class NoiseEstimate:
         """The film, with samples (rows, columns) of each tile; counts only where those are the next power of two."""
         mean = film.mean
         if self._mean is None:
-            self._mean, self._level = np.zeros(mean.shape, np.float32), np.full(tile_samples.shape, -1)
+            self._mean, self._level = np.zeros_like(mean, np.float32), np.full(tile_samples.shape, -1)
         due = tile_samples == 2 ** (self._level + 1)
         if not due.any():
             return

@@ -38,7 +38,7 @@ class State:
     @cached_property
     def pixels(self) -> NDArray[np.float32]:
         """(height, width, 3) float32, linear Rec. 709."""
-        return self.film.mean.astype(np.float32)
+        return self.film.mean.astype(np.float32, order="C")
 
 
 def relmse(film: Film, reference: NDArray[np.float32] | None) -> float | None:

@@ -30,10 +30,9 @@ def tile_pixels(size: tuple[int, int]) -> NDArray[np.int64]:
 
 def tile_sums(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     """(rows, columns) sums over the tiles of values (height, width) or (height, width, k)."""
-    height, width = values.shape[:2]
-    rows = np.add.reduceat(values, np.arange(0, height, TILE), axis=0, dtype=np.float64)
-    sums = np.add.reduceat(rows, np.arange(0, width, TILE), axis=1)
-    return np.asarray(sums if values.ndim == 2 else sums.sum(axis=2))
+    (height, width), pixels = values.shape[:2], values if values.ndim == 2 else values.sum(axis=2, dtype=np.float64)
+    rows = np.add.reduceat(pixels, np.arange(0, height, TILE), axis=0, dtype=np.float64)
+    return np.asarray(np.add.reduceat(rows, np.arange(0, width, TILE), axis=1))
 
 
 def scattered(count: int) -> NDArray[np.intp]:
