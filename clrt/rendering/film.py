@@ -39,11 +39,13 @@ def _with_both_sides(values: NDArray[np.float64], before: NDArray[np.float64], a
 
 
 class Film:
-    """A copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT; unwanted: asked
+    """A copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT; `unwanted` is asked
     while its error is estimated, which ends with `Unwanted` where that is so."""
 
-    def __init__(self, pixels: NDArray[Any], unwanted: Callable[[], bool] = lambda: False) -> None:
-        self.pixels, self.unwanted = pixels, unwanted
+    unwanted: Callable[[], bool] = staticmethod(lambda: False)
+
+    def __init__(self, pixels: NDArray[Any]) -> None:
+        self.pixels = pixels
 
     @cached_property
     def mean(self) -> NDArray[np.float64]:

@@ -193,8 +193,10 @@ class Renderer:
                 continue
             film, state = self._film(), None
             if not self._in_haste:
+                film.unwanted = lambda: self._abandoned.is_set() or self._interrupted and self.stop_reason is None
                 with suppress(Unwanted):
                     state = self._convergence.record(film, self.session, self.seconds, reference)
+                del film.unwanted   # each would keep the other
             if self._abandoned.is_set():
                 return
             self._heed_interrupt()
@@ -277,9 +279,7 @@ class Renderer:
         """The film with all that was launched, and the time until then."""
         self.session.wait()
         self.seconds = clock.perf_counter() - self._clock
-        film = self.session.film()
-        film.unwanted = lambda: self._abandoned.is_set() or self._interrupted and self.stop_reason is None
-        return film
+        return self.session.film()
 
     def _heed_interrupt(self) -> None:
         if self.stop_reason is None and self._interrupted:
