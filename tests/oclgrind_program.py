@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
-from clrt.device import blocks, program
+from clrt.device import blocks, contexts, program
 from clrt.device.open import Device, open_device
 from clrt.rendering import on_device
 from clrt.scene import instancing
@@ -64,7 +64,8 @@ def at_once(where: str, work: Callable[[], Any]) -> Any:
 
 def compiled_files() -> list[str]:
     """The kernel files of all programs that this process has built."""
-    return sorted({file for built in program._built.values() for file in program.files_of(built.source)})
+    return sorted({file for shared in contexts._shared.values() for built in shared.programs.values()
+                   for file in program.files_of(built.source)})
 
 
 def main(form: str, path: str) -> None:

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 import pyopencl as cl
 
 from ..errors import DeviceError, HungError, NoRoomError
+from .contexts import share_no_more
 from .fork import check_process
 from .open import Device
 from .pulse import VARIABLE, counted_call, note_hang, patience
@@ -135,6 +136,7 @@ def calling() -> Iterator[None]:
     except cl.MemoryError as error:
         raise NoRoomError(f"the device has not enough memory: {error}") from error
     except cl.Error as error:
+        share_no_more()
         raise DeviceError(f"the device failed: {error}") from error
 
 
@@ -149,11 +151,13 @@ class Wait:
         with calling():
             status = event.command_execution_status
         if status < 0:
+            share_no_more()
             raise DeviceError(f"the device stopped a launch with error {status}")
         now = time.perf_counter()
         self._seconds, self._looked = self._seconds + min(now - self._looked, LONGEST_LOOK), now
         if status != cl.command_execution_status.COMPLETE and self._seconds > patience():
             note_hang()
+            share_no_more()
             raise HungError(f"the device has not ended a launch in {patience():g} s: its driver hangs, or it is lost; "
                             f"if launches may take that long there, set {VARIABLE} to more")
         return bool(status == cl.command_execution_status.COMPLETE)

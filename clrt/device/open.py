@@ -11,6 +11,7 @@ from pyopencl import CommandQueue, Context
 
 from ..errors import DeviceError
 from . import pocl
+from .contexts import Shared, shared_by
 from .describe import DeviceInfo
 from .discover import choose
 from .pulse import take_any_time
@@ -25,8 +26,13 @@ class Device:
 
     info: DeviceInfo
     cl: cl.Device
-    context: Context
+    shared: Shared
     queue: CommandQueue
+
+    @property
+    def context(self) -> Context:
+        """Of its buffers and programs."""
+        return self.shared.context
 
     @property
     def vectors(self) -> bool:
@@ -83,7 +89,7 @@ def open_device(selector: str | int | None = None) -> Device:
     if info.type == "simulator":
         take_any_time()
     try:
-        context = Context([device])
-        return Device(info, device, context, CommandQueue(context, properties=TIMED))
+        shared = shared_by(device)
+        return Device(info, device, shared, CommandQueue(shared.context, properties=TIMED))
     except cl.Error as error:
         raise DeviceError(f"{info.name} ({info.platform}) cannot be opened: {error}") from error

@@ -31,9 +31,8 @@ OPTIONS = ["-cl-std=CL1.2"]
 #: Oclgrind's LLVM lacks an intrinsic that its clang writes where it optimises, or inlines what says that it must be.
 SIMULATOR_OPTIONS = ["-cl-opt-disable", "-Dalways_inline="]
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|(\w+))\s*$')
-#: Programs that are kept in memory, those used last: each takes some megabytes.
+#: Programs that are kept in memory of a context, those used last: each takes some megabytes.
 MOST_KEPT = 32
-_built: dict[str, cl.Program] = {}
 
 
 @dataclass(frozen=True)
@@ -88,8 +87,8 @@ def build(device: Device, source: str) -> BuiltProgram:
         source = compose("", "fma.cl", {}) + source
     identity = "\n".join([source, *OPTIONS, device.info.id, device.info.platform_version, device.info.driver])
     key = hashlib.sha256(identity.encode()).hexdigest()
-    context_key = f"{key}-{device.context.int_ptr}"
-    program = _built.pop(context_key, None)
+    programs = device.shared.programs
+    program = programs.pop(key, None)
     cached = program is not None
     if program is None:
         binary = read_binary(key)
@@ -100,20 +99,14 @@ def build(device: Device, source: str) -> BuiltProgram:
         if not cached:
             keeps_its_own = device.info.platform == "Portable Computing Language"
             write_binary(key, b"" if keeps_its_own else _binary(program))
-    _built[context_key] = program
-    for old in list(_built)[:-MOST_KEPT]:
-        _built.pop(old, None)
+        device.shared.compiled += not cached
+    programs[key] = program
+    for old in list(programs)[:-MOST_KEPT]:
+        programs.pop(old, None)
     seconds = time.perf_counter() - start
     log.info("program of %d files %s in %.2f s", len(files_of(source)), "found" if cached else "built", seconds)
     log.debug("its files: %s", " ".join(files_of(source)))
     return BuiltProgram(program, seconds, cached)
-
-
-def forget(devices: Sequence[Device]) -> None:
-    """Lets go of the programs that are kept for these devices, so that their contexts end with their last user."""
-    ended = tuple(f"-{device.context.int_ptr}" for device in devices)
-    for key in [key for key in _built if key.endswith(ended)]:
-        _built.pop(key, None)
 
 
 def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..device.heap import give_back
 from ..device.open import Device, open_devices
-from ..device.program import forget
 from ..output.denoise import Denoiser
 from ..rendering.guides import render_guides
 from ..rendering.renderer import Renderer, State
@@ -23,9 +22,6 @@ from .settings import Selector, Settings
 
 #: The part of the time that denoising may take before all samples are there.
 DENOISING = 0.25
-#: Programs that are compiled before the devices are opened anew: of each its compiler keeps something until its context
-#: ends (PoCL 3 a quarter of a megabyte).
-MOST_COMPILED = 40
 
 
 class Asked(NamedTuple):
@@ -56,7 +52,6 @@ class LiveRenderer:
         self._on_phase = on_phase
         self._devices: list[Device] = []
         self._selector: object = self     # nobody's
-        self._compiled = 0                # programs, since they were opened
         self._pace = Pace()
         self.renderer: Renderer | None = None
         #: How often another one was needed than before.
@@ -90,14 +85,12 @@ class LiveRenderer:
                 preparation = begun - start - renderer.session.build_seconds
                 self._pace.note(size, state.spp, preparation, time.perf_counter() - begun)
                 if changed:     # drivers compile at the first launch, some of them
-                    self._compiled += not renderer.session.cached
                     give_back()
             yield state
 
     def _open(self, selector: Selector) -> None:
-        if selector != self._selector or self._compiled >= MOST_COMPILED:
-            self._selector, self.renderer, self._compiled = self, None, 0
-            forget(self._devices)
+        if selector != self._selector or any(device.shared.worn for device in self._devices):
+            self._selector, self.renderer = self, None
             self._devices, self._selector = open_devices(selector), selector
 
     def denoised(self, state: State) -> NDArray[np.float32] | None:

@@ -18,7 +18,7 @@ from clrt.accel import refit
 from clrt.accel.device_builder import SHAPES, program_source
 from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS, HitTests
 from clrt.check import probe
-from clrt.device import cache, program
+from clrt.device import cache
 from clrt.device.loops import turns_source
 from clrt.device.open import Device
 from clrt.device.program import build, compose, files_of
@@ -160,7 +160,7 @@ def test_a_program_is_built_whatever_the_cache_holds(device: Device, state: str,
     stored = list(folder.glob("*.bin"))
     assert len(stored) == 1
     content = stored[0].read_bytes()
-    monkeypatch.setattr(program, "_built", {})
+    device.shared.programs.clear()
     if state == "absent":
         cache.clear()
     elif state == "corrupt":

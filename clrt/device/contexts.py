@@ -1,0 +1,55 @@
+"""One context a device, shared by all that is opened on it, and the programs that were built in it.
+
+Each takes time and memory (with PoCL a compiler of a hundred megabytes), and compilers keep something of every program
+(PoCL 3 a quarter of a megabyte) until it ends. So it is used again, but not once it compiled MOST_COMPILED programs, or
+anything has failed: a device that was lost needs another.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+from dataclasses import dataclass, field
+
+import pyopencl as cl
+from pyopencl import Context
+
+MOST_COMPILED = 40
+
+
+@dataclass(eq=False)
+class Shared:
+    """A context; programs: those of it that were used last, by their key; compiled: how many programs were, in it."""
+
+    context: Context
+    programs: dict[str, cl.Program] = field(default_factory=dict)
+    compiled: int = 0
+
+    @property
+    def worn(self) -> bool:
+        """Whether its device should be opened anew."""
+        return self.compiled >= MOST_COMPILED
+
+
+#: By device, those that are opened again.
+_shared: dict[int, Shared] = {}
+
+
+def shared_by(device: cl.Device) -> Shared:
+    """The context to open it with."""
+    shared = _shared.get(device.int_ptr)
+    if shared is None or shared.worn:
+        shared = _shared[device.int_ptr] = Shared(Context([device]))
+    return shared
+
+
+def share_no_more() -> None:
+    """Something failed: what is opened from now on has contexts of its own."""
+    _shared.clear()
+
+
+@atexit.register
+def _end_with_the_process() -> None:
+    """PoCL 3 aborts where a context ends in which a program was damaged, and then all work is done."""
+    for shared in _shared.values():
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(shared))
