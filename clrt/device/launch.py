@@ -34,8 +34,9 @@ IN_FLIGHT = 2
 LONGEST_LOOK = 0.1
 #: Seconds after which a launch is no short one.
 SOON = 2e-4
-#: Of drivers, that are still to come.
+#: Of drivers, that are still to come; and whether no more should.
 _callbacks: set[threading.Event] = set()
+_python_ends = threading.Event()
 
 
 class LaunchSize:
@@ -181,14 +182,17 @@ def wait_for(event: cl.Event) -> None:
 
 def _wait_long(event: cl.Event, wait: Wait) -> None:
     ended, pause = threading.Event(), SOON
-    _callbacks.add(ended)
 
     def called(_: int) -> None:
         ended.set()
         _callbacks.discard(ended)
 
-    with calling():
-        event.set_callback(cl.command_execution_status.COMPLETE, called)
+    _callbacks.add(ended)
+    if _python_ends.is_set():
+        _callbacks.clear()
+    else:
+        with calling():
+            event.set_callback(cl.command_execution_status.COMPLETE, called)
     while not wait.is_over(event):
         ended.wait(pause)
         ended.clear()
@@ -197,6 +201,8 @@ def _wait_long(event: cl.Event, wait: Wait) -> None:
 
 @atexit.register
 def _let_callbacks_end() -> None:
-    """One that came while Python ends would abort the process."""
-    for ended in list(_callbacks):
-        ended.wait(1.0)
+    """One that came while Python ends would abort the process; threads that still wait then do without."""
+    _python_ends.set()
+    start = time.perf_counter()
+    while _callbacks and time.perf_counter() < start + 1:
+        time.sleep(1e-3)
