@@ -29,6 +29,8 @@ def preferred_device() -> Preference | None:
     try:
         content = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError, RuntimeError):
+        if os.environ.get("CLRT_CONFIG"):
+            raise UsageError(f"{path}: CLRT_CONFIG names it, and there is no such file; create or unset it") from None
         return None
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror}); make it readable, or move it away") from error

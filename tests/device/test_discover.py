@@ -22,14 +22,15 @@ MACHINE = [("NVIDIA H200", "gpu"), ("NVIDIA H200", "gpu"), ("Radeon RX 9070", "g
 
 
 @pytest.fixture
-def machine(monkeypatch: pytest.MonkeyPatch) -> list[DeviceInfo]:
+def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[DeviceInfo]:
     """A machine with five devices: two alike, and the third cannot be used. Only the list is made up."""
+    (tmp_path / "nothing.toml").touch()
     own = find_devices()[0]
     infos = [replace(own[0], index=i, id=f"{i}a{i}b", name=name, type=kind, chosen=i == 0, usable=i != 2,
                      why="its driver has no compiler" if i == 2 else "fine") for i, (name, kind) in enumerate(MACHINE)]
     monkeypatch.setattr(discover, "find_devices", lambda: [(info, own[1]) for info in infos])
     monkeypatch.delenv("CLRT_DEVICE", raising=False)
-    monkeypatch.setenv("CLRT_CONFIG", "/nowhere/config.toml")
+    monkeypatch.setenv("CLRT_CONFIG", str(tmp_path / "nothing.toml"))
     return infos
 
 
@@ -62,8 +63,12 @@ def test_environment_variable(machine: list[DeviceInfo], monkeypatch: pytest.Mon
 def test_configuration_file(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Its device stands in where neither the variable nor a selector is given; without one the best is used."""
     file = tmp_path / "config.toml"
-    monkeypatch.setenv("CLRT_CONFIG", str(file))
+    monkeypatch.setenv("CLRT_CONFIG", "")
+    monkeypatch.setattr("platformdirs.user_config_dir", lambda name: str(tmp_path))
     assert choose()[0] is machine[0], "there need be none"
+    monkeypatch.setenv("CLRT_CONFIG", str(file))
+    with pytest.raises(UsageError, match="config.toml: CLRT_CONFIG names it"):
+        choose()
     for content, chosen in (('device = "epyc"', 3), ("device = 0", 0), ('device = "cpu"', 3), ('device = ""', 0),
                             ("# nothing", 0)):
         file.write_text(content)
