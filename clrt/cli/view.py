@@ -39,13 +39,13 @@ def command(scene: Path, camera: str | None, devices: tuple[str, ...], view: str
     check_window()
     from ..device.discover import select
     from ..live.settings import Settings
-    from ..output.view import view_called
+    from ..output.view import check_view
     from ..scene.fields import field_problems
     from ..scene.file import load
     from ..scene.model import RenderSettings
     from ..window.app import App, Look
 
-    view_called(view)
+    check_view(view, exposure)
     for selector in devices or (None,):
         select(selector)
     chosen = {name: value for name, value in given.items() if value is not None}

@@ -15,7 +15,7 @@ from ..errors import OutputError
 from ..scene.pictures import read_picture
 from .files import check_target, replacing
 from .layers import Pictures, drawn, files_beside, layered
-from .view import to_display, view_called
+from .view import check_view, to_display
 
 FloatArray = NDArray[np.float32]
 
@@ -57,10 +57,11 @@ def write_image(path: Path, pixels: FloatArray, *, metadata: Mapping[str, str] |
 
     `exposure` (stops) and `view` apply to .png alone. An .exr keeps every bit; an .hdr is rounded to RGBE, with
     NaN and negative values as 0. `metadata` is kept in .exr and .png; names with a colon, such as "clrt:spp", meet
-    none of the formats' own. Raises OutputError, and UsageError for an unknown view.
+    none of the formats' own. Raises OutputError, and UsageError for an unknown view or an exposure that is
+    not finite.
     """
     check_writable(path)
-    view_called(view)
+    check_view(view, exposure)
     about, aovs = metadata or {}, aovs or {}
     match path.suffix.lower():
         case ".png":

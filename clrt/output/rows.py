@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..errors import OutputError
 from .files import replacing
 from .images import check_writable, rgbe_rounded
-from .view import to_display, view_called
+from .view import check_view, to_display
 
 #: Rows of a block of an .exr that is packed as a whole: every piece but the last must have a multiple of it.
 BLOCK_ROWS = 16
@@ -27,7 +27,7 @@ def write_rows(path: Path, size: tuple[int, int], pieces: Iterable[NDArray[np.fl
     import OpenImageIO as oiio
 
     check_writable(path)
-    view_called(view)
+    check_view(view, exposure)
     kind, (width, height) = path.suffix.lower(), size
     spec = oiio.ImageSpec(width, height, 3, "uint8" if kind == ".png" else "float")
     for name, value in {**(metadata or {}), **ATTRIBUTES.get(kind, {})}.items():

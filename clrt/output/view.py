@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from difflib import get_close_matches
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,6 +105,13 @@ def view_called(name: str) -> View:
         return ocio_view("", view)
     meant = "".join(f"; did you mean {match}?" for match in get_close_matches(name, [*VIEWS, "aces"], 1))
     raise UsageError(f"no view transform {name!r}; there are {', '.join(VIEWS)}, aces and ocio:VIEW{meant}")
+
+
+def check_view(name: str, exposure: float) -> None:
+    """Raise UsageError unless there is a view of this name, and the exposure is a finite number of stops."""
+    view_called(name)
+    if not isfinite(exposure):
+        raise UsageError(f"exposure is {exposure}; it must be a finite number of stops, such as -1.5")
 
 
 def to_display(pixels: FloatArray, view: str = "srgb", exposure: float = 0.0) -> NDArray[np.uint8]:

@@ -170,9 +170,12 @@ def test_checking_leaves_nothing_behind(tmp_path: Path) -> None:
     assert os.listdir(tmp_path) == ["old.png"] and (tmp_path / "old.png").read_text() == "old"
 
 
-def test_unknown_view_writes_nothing(tmp_path: Path) -> None:
+def test_unknown_views_and_exposures_write_nothing(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no view transform"):
         write_image(tmp_path / "a.png", noise(), view="film")
+    for exposure in (math.nan, math.inf, -math.inf):
+        with pytest.raises(UsageError, match="exposure is .*; it must be a finite number"):
+            write_image(tmp_path / "a.png", noise(), exposure=exposure)
     assert not os.listdir(tmp_path)
 
 
