@@ -12,7 +12,8 @@ from typing import NoReturn
 
 import click
 
-from ..errors import ClrtError, DeviceError, KernelError
+from ..errors import ClrtError, DeviceError, KernelError, OutputError
+from .streams import open_missing, patient_stdout, stdout_problem
 
 STARTED = time.perf_counter()
 #: What commands find as their context's object where they have the process to themselves.
@@ -47,27 +48,38 @@ def main(arguments: list[str] | None = None) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Python looks for garbage after every 700 new objects, a tenth of the time until all modules are there.
     gc.set_threshold(OBJECTS)
+    open_missing()
+    stdout = patient_stdout()
+    code = _run(arguments)
+    if problem := stdout_problem(stdout):
+        print(f"error: {problem}", file=sys.stderr)
+        code = code or OutputError.exit_code
+    _leave(code)
+
+
+def _run(arguments: list[str] | None) -> str | int | None:
+    """Runs a command and tells what goes wrong; the exit code."""
     try:
         commands.main(arguments, prog_name="clrt", standalone_mode=False, obj=PROGRAM)
     except click.exceptions.Exit as stop:
-        _leave(stop.exit_code)
+        return stop.exit_code
     except click.ClickException as error:
         error.show()
-        sys.exit(2)
+        return 2
     except ClrtError as error:
         if isinstance(error, DeviceError | KernelError):
             _keep(str(error))
         print("\n".join(f"error: {line}" for line in getattr(error, "problems", [str(error)])), file=sys.stderr)
-        _leave(error.exit_code)
+        return error.exit_code
     except (KeyboardInterrupt, click.Abort):
         print("interrupted", file=sys.stderr)
-        _leave(130)
+        return 130
     except SystemExit as stop:
-        _leave(stop.code)
+        return stop.code
     except Exception:
         _keep(traceback.format_exc())
         raise
-    _leave(0)
+    return 0
 
 
 def _keep(error: str) -> None:

@@ -1,0 +1,63 @@
+"""Standard streams that are closed or full: files are written all the same."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from clrt.output.images import read_image
+
+from .test_commands import SCENE
+
+RENDER = "render ball.toml -q -o a.png -o a.exr --report r.json"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "ball.toml").write_text(SCENE)
+    return tmp_path
+
+
+def shell(arguments: str, redirection: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Runs it with a redirection; of a pipe it is the first part that gives the code."""
+    line = f"{sys.executable} -m clrt {arguments} {redirection}"
+    return subprocess.run(["bash", "-o", "pipefail", "-c", line], cwd=folder, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize(("redirection", "code", "told"), [
+    ("> /dev/full", 6, "error: standard output cannot be written (No space left on device)"), ("| true", 0, ""),
+    (">&-", 0, ""), ("2>&-", 0, ""), (">&- 2>&-", 0, "")])
+def test_all_files_are_written(folder: Path, redirection: str, code: int, told: str) -> None:
+    result = shell(RENDER, redirection, folder)
+    assert result.returncode == code and result.stderr.startswith(told), result.stderr
+    assert len(result.stderr.splitlines()) == bool(told)
+    for name in ("a.png", "a.exr"):
+        assert read_image(folder / name).shape == (16, 24, 3)
+    assert (folder / "r.json").read_text().startswith("{")
+
+
+def test_progress_into_a_closed_stream(folder: Path) -> None:
+    for options in ("", "--progress bar", "--progress json -v"):
+        assert shell(f"render ball.toml -o a.png {options}", "2>&-", folder).stdout == "a.png\n"
+
+
+@pytest.mark.parametrize("arguments", ["info ball.toml", "devices --json", "cache", "doctor", "compare a.exr a.exr",
+                                       "render ball.toml -q --print-kernel", "--help"])
+def test_results_that_cannot_be_printed(folder: Path, arguments: str) -> None:
+    """One line and 6 where there is no room; nothing where whoever reads has seen enough."""
+    if "a.exr" in arguments:
+        shell(RENDER, "", folder)
+    full = shell(arguments, "> /dev/full", folder)
+    assert full.returncode == 6 and full.stderr.splitlines()[-1].startswith("error: standard output cannot be written")
+    closed = shell(arguments, "| true", folder)
+    assert closed.returncode == 0 and "rror" not in closed.stderr and "Traceback" not in full.stderr
+
+
+def test_an_interrupt_before_it_has_begun(folder: Path) -> None:
+    """It comes while modules are loaded, of which one raises it itself."""
+    (folder / "click.py").write_text("raise KeyboardInterrupt")
+    result = shell("cache", "", folder)
+    assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
