@@ -75,7 +75,7 @@ class Sequence:
             check_video(video, size or scene.render.size, self._fps)
         if self.videos and self.outputs.pictures[-1].parent == spool(self.videos[0]):
             spool(self.videos[0]).mkdir(exist_ok=True)
-        self._of(0).check(None, None)
+        self._of(0).check()
         return replace(scene, camera=next(iter(self._stills.values())), animation=None)
 
     def _of(self, number: int) -> Outputs:

@@ -22,10 +22,11 @@ if TYPE_CHECKING:
 
 @dataclass
 class Outputs:
-    """pictures: of the end result, with its aovs; denoise: whether the raw ones are kept beside them; view, exposure:
-    of .png pictures; header: what is written there beside the report. One that cannot be written keeps none of the
-    others from being written."""
+    """inputs: the scene, and the reference if any; pictures: of the end result, with its aovs; denoise: whether
+    the raw ones are kept beside them; view, exposure: of .png pictures; header: what is written there beside the
+    report. One that cannot be written keeps none of the others from being written."""
 
+    inputs: tuple[Path, ...]
     pictures: tuple[Path, ...]
     aovs: tuple[str, ...]
     denoise: bool
@@ -50,31 +51,36 @@ class Outputs:
 
         return tuple(path for picture in self.pictures for path in files_beside(picture, self.aovs).values())
 
-    def check(self, reference: Path | None, checkpoint: Path | None) -> None:
+    def check(self, checkpoint: Path | None = None) -> None:
         """Finds out before the render whether its results can be written, and over none of its inputs."""
         from ..output.files import check_target
         from ..output.images import check_writable
         from ..output.plots import check_plot
-        from ..output.view import view_called
+        from ..output.view import check_view
 
-        view_called(self.view)
+        check_view(self.view, self.exposure)
         if self.aovs and all(picture.suffix.lower() == ".hdr" for picture in self.pictures):
             raise UsageError("an .hdr holds the picture alone; for --aov name an .exr or .png, too, with -o")
+        self._check_distinct(checkpoint)
         for picture in [*self.pictures, *self.raws, *self.beside]:
             check_writable(picture)
-            for others, what in ((self.raws, "the raw picture is kept"), (self.beside, "an AOV is written")):
-                if picture in others and picture in self.pictures:
-                    raise UsageError(f"{picture}: is where {what}; name another picture with -o")
-            if reference is not None and picture.resolve() == reference.resolve():
-                raise UsageError(f"{picture}: is the reference, and would be overwritten; name another picture with -o")
         for other in (self.report, checkpoint):
             if other is not None:
                 check_target(other)
         if self.plot is not None:
             check_plot(self.plot)
-        results = [*self.pictures, *self.raws, *self.beside, self.report, self.plot, reference]
-        if checkpoint is not None and checkpoint.resolve() in [path.resolve() for path in results if path]:
-            raise UsageError(f"{checkpoint}: is named for something else, too; name another --checkpoint")
+
+    def _check_distinct(self, checkpoint: Path | None) -> None:
+        named = {"the scene": self.inputs[:1], "the reference": self.inputs[1:], "a picture (-o)": self.pictures,
+                 "where the raw picture is kept": self.raws, "where an AOV is written": self.beside,
+                 "the --report": (self.report,), "the --plot": (self.plot,),
+                 "the --checkpoint": (checkpoint,), "the checkpoint before": (checkpoint and Path(f"{checkpoint}~"),)}
+        taken: dict[Path, str] = {}
+        for what, paths in named.items():
+            for path in filter(None, paths):
+                if before := taken.get(path.resolve()):
+                    raise UsageError(f"{path}: is {before} and {what}, one of which would be lost; name another file")
+                taken[path.resolve()] = what
 
     def prepare(self) -> None:
         """Loads what writes pictures while a compiler is at work, so that nothing waits for it in the end."""

@@ -101,7 +101,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
 
     atexit.register(gc.freeze)  # else Python, as it ends, searches all modules' objects for garbage, in 0.05 s
     beside = _chosen_aovs(aovs) if aovs else ()
-    results = Outputs(outputs or (Path(f"{scene.stem}.png"),), beside, denoise, view, exposure, report, plot)
+    inputs = (scene,) if reference is None else (scene, reference)
+    results = Outputs(inputs, outputs or (Path(f"{scene.stem}.png"),), beside, denoise, view, exposure, report, plot)
     sequence = make_sequence(results, frames, resume, {"checkpoint": checkpoint, "reference": reference, "plot": plot}
                              ) if frames or turntable else None
     if sequence is None:
@@ -109,7 +110,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             raise UsageError("--fps is how fast frames follow each other; ask for some with --frames or --turntable")
         if resume and checkpoint is None:
             raise UsageError("--resume goes on from a checkpoint; name its file with --checkpoint")
-        results.check(reference, checkpoint)
+        results.check(checkpoint)
     check_stops(spp, seconds, error)
     if error_percentile is not None and error is None:
         raise UsageError("--error-percentile says of how much of the picture --error is asked; name that, too")

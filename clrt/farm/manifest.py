@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import CheckpointError, OutputError
+from ..rendering.checkpoint_file import check_replaceable
 from ..rendering.identity import differences
 
 VERSION = "clrt manifest 1"
@@ -19,11 +20,14 @@ VERSION = "clrt manifest 1"
 
 class Manifest:
     """The pictures that are done, by name, with what is to be known of each. facts: of the render, see
-    `identity.facts_of`. CheckpointError where the file is of another one, OutputError where it cannot be written."""
+    `identity.facts_of`. CheckpointError where the file is of another one, or something else; OutputError where it
+    cannot be written."""
 
     def __init__(self, path: Path, facts: dict[str, str], resume: bool) -> None:
         self.path = path
         self.done: dict[str, dict[str, Any]] = {}
+        if not resume:
+            check_replaceable(path, b'{"manifest": "clrt ')
         whole = self._read(facts) if resume and path.exists() else 0
         try:
             self._file = open(path, "r+b" if whole else "wb")

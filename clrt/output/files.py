@@ -16,6 +16,7 @@ def check_target(path: Path) -> None:
     """Raise OutputError unless a file can be written at `path`; for use before the work that fills it."""
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; name a file in it")
+    _check_kind(path)
     if not path.parent.is_dir():
         raise OutputError(f"{path}: the folder {path.parent} does not exist; create it first")
     try:
@@ -25,17 +26,23 @@ def check_target(path: Path) -> None:
                           "change its permissions or choose another folder") from error
 
 
+def _check_kind(path: Path) -> None:
+    if path.exists() and not path.is_file():
+        raise OutputError(f"{path}: is a device, a pipe or a socket, which is not replaced; name a regular file")
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Lend a path beside `path`, with its extension, to write to; then move that file onto `path` in one step.
 
     If the block fails, `path` is as it was and nothing is left beside it; an OSError comes out as OutputError.
-    A link stays a link: the file it points to is replaced.
+    A link stays a link: the file it points to is replaced. What is no regular file never is: OutputError.
     """
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".clrt-{secrets.token_hex(8)}{path.suffix.lower()}")
     try:
         yield temporary
+        _check_kind(target)
         os.replace(temporary, target)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); "

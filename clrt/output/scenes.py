@@ -27,6 +27,8 @@ def save_scene(scene: Scene, path: str | Path) -> list[Path]:
         raise OutputError(f"{path}: the name of a file of the scene is no text, so no scene file can name it; rename it"
                           ) from None
     written = [path.with_name(name) for name in (*files.models, *files.texels, *files.pixels)]
+    for other in written:
+        check_target(other)
     for name, content in files.models.items():
         _write(path.with_name(name), content)
     for name, texels in files.texels.items():

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..errors import CheckpointError, OutputError, UsageError
 from ..scene.model import Scene
-from .checkpoint_file import older, read_checkpoint, write_checkpoint
+from .checkpoint_file import FAMILY, check_replaceable, older, read_checkpoint, write_checkpoint
 from .choices import Choices
 from .identity import differences, facts_of
 from .kept import KINDS, NO_SENSE, Kept, from_arrays, to_arrays
@@ -27,8 +27,8 @@ class Checkpoints:
     """
 
     def __init__(self, path: Path, facts: dict[str, str], device: str, seconds: float) -> None:
-        if path.is_dir() or not path.parent.is_dir():
-            raise OutputError(f"{path}: is no place for a checkpoint; name a file in a folder that exists")
+        if not path.parent.is_dir() or path.exists() and not path.is_file():
+            raise OutputError(f"{path}: is no place for a checkpoint; name a regular file in a folder that exists")
         if not seconds >= 0:
             raise UsageError(f"checkpoint_seconds is {seconds}; it must be 0 or more")
         self.path, self._facts, self._device, self._every = path, facts, device, seconds
@@ -37,7 +37,8 @@ class Checkpoints:
         self._writer: threading.Thread | None = None
 
     def warn_of_another(self) -> None:
-        """Warns where there is one already, which this render will replace."""
+        """Warns where there is one already, which this render will replace. CheckpointError where it is none."""
+        check_replaceable(self.path, FAMILY)
         if self.path.exists():
             _log.warning("%s: this checkpoint will be replaced; --resume goes on from it", self.path)
 

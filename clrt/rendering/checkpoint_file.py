@@ -24,7 +24,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-MAGIC = b"clrt checkpoint 2\n"
+from ..errors import CheckpointError
+
+#: How those of any version begin.
+FAMILY = b"clrt checkpoint "
+MAGIC = FAMILY + b"2\n"
 #: Bytes, more than any header has.
 LONGEST_HEADER = 1 << 16
 
@@ -34,6 +38,20 @@ Arrays = dict[str, NDArray[Any]]
 def older(path: Path) -> Path:
     """Where the generation before the one at `path` is."""
     return Path(f"{path}~")
+
+
+def check_replaceable(path: Path, beginning: bytes) -> None:
+    """Raise CheckpointError where a file at `path` does not begin so, as far as it goes: it is something else."""
+    try:
+        with open(path, "rb") as file:
+            found = file.read(len(beginning))
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise CheckpointError(f"{path}: cannot be read ({error.strerror}); name another file") from error
+    if not beginning.startswith(found):
+        raise CheckpointError(f"{path}: is there and is no checkpoint, so it is not replaced; name another file, or "
+                              "remove it first")
 
 
 def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, keep_older: bool = True) -> None:

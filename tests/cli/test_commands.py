@@ -153,6 +153,7 @@ file = "nowhere.ply"
     (("render", "ball.toml", "--device", "nonesuch"), 4, ["nonesuch"]),
     (("render", "ball.toml", "--size", "0x4"), 2, ["0x4"]),
     (("render", "ball.toml", "--view", "srbg"), 2, ["srbg"]),
+    (("render", "ball.toml", "--exposure", "nan"), 2, ["exposure is nan", "finite"]),
     (("render", "ball.toml", "--spp", "0"), 2, ["--spp"]),
     (("render", "ball.toml", "--time", "-1"), 2, ["time", "-1"]),
     (("render", "ball.toml", "-o", "r.exr", "--reference", "r.exr"), 2, ["r.exr", "reference"]),

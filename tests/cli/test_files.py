@@ -1,0 +1,93 @@
+"""What the command line never writes over: devices, pipes, its inputs, its other outputs, and others' files."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+import pytest
+
+from clrt.errors import CheckpointError, OutputError
+from clrt.farm.manifest import Manifest
+from clrt.output.files import replacing
+from clrt.output.scenes import save_scene
+from clrt.scene.file import load
+
+from .test_checkpoints import SCENE
+from .test_commands import clrt
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "ball.toml").write_text(SCENE)
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    return tmp_path
+
+
+@pytest.mark.parametrize("arguments", [
+    ("render", "ball.toml", "-o", "pipe.png"), ("render", "ball.toml", "--report", "pipe.json"),
+    ("render", "ball.toml", "--plot", "pipe.png"), ("render", "ball.toml", "--checkpoint", "pipe.ck"),
+    ("convert", "a.obj", "pipe.toml", "--force"), ("doctor", "-o", "pipe.txt")], ids=" ".join)
+def test_pipes_are_no_targets(folder: Path, arguments: tuple[str, ...]) -> None:
+    pipe = folder / next(argument for argument in arguments if argument.startswith("pipe"))
+    os.mkfifo(pipe)
+    before = sorted(folder.iterdir())
+    result = clrt(*arguments, cwd=folder)
+    assert (result.returncode, result.stdout, result.stderr.count(f"{pipe.name}: is a device, a pipe")) == (6, "", 1)
+    assert stat.S_ISFIFO(os.lstat(pipe).st_mode) and sorted(folder.iterdir()) == before
+
+
+def test_devices_are_no_targets(folder: Path) -> None:
+    try:
+        os.mknod(folder / "null", stat.S_IFCHR | 0o666, os.makedev(1, 3))
+    except OSError:
+        pytest.skip("this user cannot make devices")
+    result = clrt("render", "ball.toml", "--report", "null", cwd=folder)
+    assert result.returncode == 6 and stat.S_ISCHR(os.lstat(folder / "null").st_mode)
+
+
+def test_nothing_replaces_a_pipe_that_comes_later(folder: Path) -> None:
+    """Through a link, too; a scene is not begun where one of its files would be a pipe."""
+    os.mkfifo(folder / "pipe")
+    (folder / "link").symlink_to(folder / "pipe")
+    for path in (folder / "pipe", folder / "link"):
+        with pytest.raises(OutputError, match="is a device, a pipe"), replacing(path) as temporary:
+            temporary.touch()
+    with pytest.raises(OutputError, match="is a device, a pipe"):
+        os.mkfifo(folder / "b.toml")
+        save_scene(load(folder / "ball.toml"), folder / "b.toml")
+    assert stat.S_ISFIFO(os.lstat(folder / "pipe").st_mode) and (folder / "link").is_symlink()
+
+
+@pytest.mark.parametrize("options", [
+    ("--report", "ball.toml"), ("--checkpoint", "ball.toml"), ("--checkpoint", "ball"), ("--report", "./ball.toml"),
+    ("--report", "w.exr"), ("--plot", "w.exr"), ("-o", "w.exr"), ("--report", "w.json", "--plot", "w.json"),
+    ("--reference", "r.exr", "--report", "r.exr"), ("--reference", "r.exr", "--plot", "r.exr"),
+    ("--turntable", "2", "--report", "w_####.exr")], ids=" ".join)
+def test_no_file_is_named_twice(folder: Path, options: tuple[str, ...]) -> None:
+    (folder / "r.exr").write_text("a reference")
+    (folder / "ball").write_text("somebody's file")
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    result = clrt("render", "ball.toml", "-o", "w.exr", *options, cwd=folder)
+    code = 3 if "ball" in options else 2
+    assert result.returncode == code and result.stdout == "" and "Traceback" not in result.stderr, result.stderr
+    assert f"{Path(options[-1])}: is".replace("####", "0000") in result.stderr, result.stderr
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_checkpoints_of_any_version_are_replaced(folder: Path) -> None:
+    """Also damaged ones, as far as they can be known."""
+    for content in (b"clrt checkpoint 1\nold", b"clrt check", b""):
+        (folder / "a.ck").write_bytes(content)
+        result = clrt("render", "ball.toml", "--spp", "1", "--checkpoint", "a.ck", cwd=folder)
+        assert result.returncode == 0 and "will be replaced" in result.stderr, result.stderr
+
+
+def test_lists_of_bands_replace_their_own_kind_alone(tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("somebody's file")
+    with pytest.raises(CheckpointError, match="mine: is there and is no checkpoint"):
+        Manifest(tmp_path / "mine", {}, resume=False)
+    assert (tmp_path / "mine").read_text() == "somebody's file"
+    for _ in range(2):
+        Manifest(tmp_path / "a.bands", {}, resume=False).close()
