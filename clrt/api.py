@@ -23,7 +23,7 @@ from .scene.model import Scene
 def load(path: str | Path, camera: str | None = None) -> Scene:
     """The scene in a .toml file or a bare model (.glb .gltf .obj .ply .stl .off), seen by a camera of the model file
     if one is named; SceneError lists all its mistakes."""
-    return _load(Path(path), camera)
+    return _load(path, camera)
 
 
 def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | None = None, error: float | None = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from os import PathLike
 from pathlib import Path
 
 from ..errors import SceneError
@@ -21,6 +22,8 @@ def load(path: str | Path, camera: str | None = None) -> Scene:
     A glTF model's own first camera and lights are used if it has any. camera: the name of one in a model file instead.
     Raises one SceneError with all mistakes in the file, each as "FILE: object: value is wrong; remedy".
     """
+    if not isinstance(path, (str, PathLike)):
+        raise SceneError(f"{path!r} is no path of a scene; name a file, such as \"scene.toml\"")
     path = Path(path)
     if not path.is_file():
         raise SceneError(f"{path}: {'is a folder, not a scene' if path.is_dir() else 'no such scene file'}")

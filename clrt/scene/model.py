@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 from numpy.typing import NDArray
 
+from ..errors import ClrtError
 from .animation import Animation
 from .lights import Light
 from .material import tuples_for_lists
 from .materials import Diffuse, Material
+from .numbers import real_array, whole_array
 from .textures import NonNegative
 
 if TYPE_CHECKING:
@@ -57,7 +59,8 @@ class Camera:
 class Mesh:
     """Triangles of one material.
 
-    vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front; normals: (n, 3) float32,
+    vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front; both become that from lists
+    and arrays of other numbers. normals: (n, 3) float32,
     interpolated over each face, or None for flat shading. uv, uv1: (n, 2) float32, the two sets of texture coordinates
     (scene.textures). colors: (n, 3) or (n, 4) float32, linear, which multiply the material's color. tangents: (n, 4)
     float32, for normal maps, w the sign of the bitangent as in glTF; computed where they are missing.
@@ -76,12 +79,14 @@ class Mesh:
     material_name: str = ""
 
     def __post_init__(self) -> None:
-        """Lists become arrays; what is wrong with an array is for `validate` to say."""
-        written: dict[str, Any] = {"vertices": self.vertices, "faces": self.faces}
-        for (name, value), dtype in zip(written.items(), (np.float32, np.int32)):
-            if isinstance(value, list):
-                with suppress(ValueError, TypeError, OverflowError):
-                    setattr(self, name, np.array(value, dtype))
+        """Lists and arrays of other numbers become float32 and int32 where these hold them; what is wrong with an array
+        is for `validate` to say."""
+        with suppress(ClrtError), np.errstate(over="ignore"):
+            self.vertices = real_array("vertices", self.vertices).astype(np.float32, copy=False)
+        with suppress(ClrtError):
+            faces = whole_array("faces", self.faces)
+            narrow = faces.astype(np.int32, copy=False)
+            self.faces = narrow if np.array_equal(faces, narrow) else faces
 
 
 @dataclass(eq=False)

@@ -33,6 +33,8 @@ def validate(scene: Scene) -> None:
 
 def scene_problems(scene: Scene) -> list[str]:
     """One sentence a problem, empty if the scene can be rendered."""
+    if problems := _list_problems(scene):
+        return problems
     problems = _camera_problems(scene.camera)
     if scene.animation is not None:
         problems += _object_problems(scene.animation, Animation, "animation") or (
@@ -57,6 +59,13 @@ def scene_problems(scene: Scene) -> list[str]:
     return problems
 
 
+def _list_problems(scene: Scene) -> list[str]:
+    """Parts of the scene that there may be many of, and are no list."""
+    parts = {name: getattr(scene, name) for name in ("meshes", "instances", "spheres", "lights")}
+    return [f"{name}: {show(part)} is no list; write {name}=[...]" for name, part in parts.items()
+            if not isinstance(part, (list, tuple))]
+
+
 def mesh_problems(mesh: object, where: str) -> list[str]:
     """What is wrong with a mesh's arrays.
 
@@ -74,7 +83,8 @@ def mesh_problems(mesh: object, where: str) -> list[str]:
     problems = [problem for name, array, dtype, rows, columns in arrays
                 if (problem := _array_problem(array, dtype, rows, columns, f"{where}: {name}"))]
     if problems:
-        return problems
+        wide = isinstance(mesh.faces, np.ndarray) and mesh.faces.dtype in (np.int64, np.uint64, np.uint32)
+        return wide and index_problems(mesh.faces, n, where) or problems
     if len(mesh.faces) == 0:
         problems.append(f"{where}: has no triangles; add some or leave the mesh out")
     problems += index_problems(mesh.faces, n, where)

@@ -169,3 +169,8 @@ def test_endless_mistakes_are_counted(folder: Path) -> None:
     rows = ", ".join(['["a", 0, 0]'] * 500)
     lines = problems(folder, f"[[mesh]]\nvertices = [{rows}]\nfaces = [[0, 1, 2]]")
     assert lines[-1] == f"mesh[0]: {500 - len(lines) + 1} more mistakes like these" and len(lines) < 20
+
+
+def test_what_is_no_path_is_refused() -> None:
+    with pytest.raises(SceneError, match="3 is no path"):
+        load(3)  # type: ignore[arg-type]

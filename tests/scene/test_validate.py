@@ -70,11 +70,14 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "index below": (set_array("faces", (7, 0), -1), "faces[7] uses vertex -1, but valid are 0 to 41"),
     "normal": (set_array("normals", 3, 0), "normals[3] = [0.0, 0.0, 0.0] points nowhere"),
     "normals": (set_mesh(normals=np.ones((4, 3), np.float32)), "normals has shape (4, 3); it must be (42, 3)"),
-    "faces dtype": (set_mesh(faces=np.zeros((1, 3), np.int64)), "faces has dtype int64; convert it"),
-    "vertices dtype": (set_mesh(vertices=np.ones((42, 3))), "vertices has dtype float64"),
+    "faces dtype": (set_mesh(faces=np.zeros((1, 3))), "faces has dtype float64; convert it"),
+    "faces beyond int32": (set_mesh(faces=np.array([[0, 1, 2**32]])), "faces[0] uses vertex 4294967296, but"),
+    "vertices dtype": (set_mesh(vertices=np.ones((42, 3), complex)), "vertices has dtype complex128"),
+    "vertices beyond float32": (set_mesh(vertices=np.full((42, 3), 1e39)), "vertices[0] = [inf, inf, inf] is not"),
     "vertices shape": (set_mesh(vertices=np.ones((9, 2), np.float32), normals=None), "shape (9, 2); it must be"),
     "vertices list": (set_mesh(vertices=[[0, 0, 0], [1]], normals=None), "vertices is a list; write a numpy array"),
     "no faces": (set_mesh(faces=np.zeros((0, 3), np.int32)), 'mesh[0] "ball": has no triangles'),
+    "no list": (set_scene(spheres=Sphere()), "is no list; write spheres=[...]"),
     "no mesh": (set_scene(meshes=["ball"]), 'mesh[0]: "ball" is no Mesh'),
     "material": (set_mesh(material=Diffuse(color=(0, 1.5, 0))), "mesh[0].material.color[1]: 1.5 is above 1"),
     "no material": (set_mesh(material="gold"), 'mesh[0].material: "gold" is no Material'),
@@ -154,3 +157,13 @@ def test_a_shared_material_is_named_once() -> None:
     with pytest.raises(SceneError) as caught:
         validate(Scene(spheres=[Sphere(material=material), Sphere(material=material)]))
     assert caught.value.problems == ["sphere[0].material.color[0]: 2.0 is above 1; write at most 1"]
+
+
+@pytest.mark.parametrize("dtype", [np.int64, np.uint8, np.uint32])
+def test_meshes_of_numpy_s_own_dtypes(dtype: type) -> None:
+    """float64 and any integers become float32 and int32, which are taken as they are."""
+    mesh = Mesh(np.eye(3), np.array([[0, 1, 2]], dtype))  # type: ignore[arg-type]
+    validate(Scene(meshes=[mesh]))
+    assert mesh.vertices.dtype == np.float32 and mesh.faces.dtype == np.int32 and mesh.faces.tolist() == [[0, 1, 2]]
+    again = Mesh(mesh.vertices, mesh.faces)
+    assert again.vertices is mesh.vertices and again.faces is mesh.faces
