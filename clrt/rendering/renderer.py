@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import sys
 import time as clock
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..accel.kernels import HitTests
 from ..device.open import Device, name_of, open_devices
-from ..errors import UsageError
+from ..errors import DeviceError, UsageError
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validate import validate
 from .accumulation import Accumulation
@@ -34,12 +36,13 @@ from .film import Film
 from .kept import Kept
 from .on_device import SceneOnDevice
 from .session import depth_of
-from .state import State as State
+from .state import State as State, check_reference
 from .stops import check_step, check_stops, checked_percentile, low_enough, pass_end, planned_spp
 
 #: Between two states at least this long passes, and this many times what making a state costs.
 STATE_SECONDS = 0.5
 STATE_COST = 20
+_log = logging.getLogger(__name__)
 
 
 class Renderer:
@@ -48,8 +51,8 @@ class Renderer:
     device: see `clrt devices`, or one that is open; several render one picture together. size: (width, height);
     triangle, box, sphere: see `HitTests`; offset, builder, layout, tree, lanes, paths: see `choices.Choices`. spp: how
     many samples a pixel are planned, if that is known: the sampler then makes neighbouring pixels' errors differ for
-    that many, and later ones begin anew (kernels/sampler). adaptive: whether tiles get samples by their error, from the
-    pictures so far.
+    that many, and later ones begin anew (kernels/sampler); `passes` ends there unless told otherwise. adaptive: whether
+    tiles get samples by their error, from the pictures so far.
     on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
     checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the end; resume:
     go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
@@ -75,9 +78,10 @@ class Renderer:
                  resume: bool = False, checkpoint_seconds: float = 30.0,
                  error_percentile: float | None = None, aovs: str | Iterable[str] = (), before: Renderer | None = None,
                  first_hits: bool = False) -> None:
+        check_stops(spp)
         self._aovs, self._percentile = chosen_aovs(aovs), checked_percentile(error_percentile)
-        given: dict[str, Any] = {"size": size, "max_depth": max_depth, "seed": seed, "integrator": integrator,
-                                 "shadows": shadows, "sampler": sampler, "filter": filter, "adaptive": adaptive}
+        given: dict[str, Any] = {"size": size, "spp": spp, "max_depth": max_depth, "seed": seed, "filter": filter,
+                                 "integrator": integrator, "shadows": shadows, "sampler": sampler, "adaptive": adaptive}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
         check_light(self._aovs, settings.integrator)
@@ -101,6 +105,8 @@ class Renderer:
     def _open(self, device: str | int | Device | Sequence[str | int | Device] | None, lanes: int | None,
               on_phase: Callable[[str], None], before: Renderer | None) -> None:
         """Opens the devices, and compiles the scene for them; without `lanes` with as many as suit each."""
+        if isinstance(device, Sequence) and not device:
+            raise UsageError(f"device is {device!r}; name at least one, or leave it out for the best")
         self.device, *_ = self.devices = open_devices(device)
         on_phase("build")
         self._compiler: Compiler = Compiler.after(before._compiler if before else None, self.devices)
@@ -162,11 +168,15 @@ class Renderer:
         """Renders, yielding a State at powers of two of the samples, from time to time between them, and at the end.
 
         It ends at `spp` samples a pixel, after `time` seconds or at a noise of `error` (√relMSE), whatever comes
-        first; without any of them at the scene's `spp`. Call it again to go on. reference: (height, width, 3).
+        first; without any of them at the renderer's `spp`, or else the scene's. Call it again to go on. Where it is
+        left before its end (`break`, Ctrl-C) a checkpoint is written, too. reference: (height, width, 3).
         """
-        check_stops(spp, time, error)
+        check_reference(reference, self.session.size)
         try:
             yield from self._passes(planned_spp(self.settings, spp, time, error), time, error, reference)
+        except (GeneratorExit, KeyboardInterrupt):
+            self._keep_unfinished()
+            raise
         finally:
             if self._checkpoints is not None:
                 self._checkpoints.wait()
@@ -208,7 +218,10 @@ class Renderer:
                     self.stop_reason = "error"
                 self._keep(film, last=self.stop_reason is not None)
             next_state = now + max(STATE_SECONDS, STATE_COST * (clock.perf_counter() - now))
+            stop = self.stop_reason
             yield state
+            if (self.stop_reason, self.session.samples_done) != (stop, state.spp):    # another call went on meanwhile
+                self.stop_reason = self._reached(spp, time, error)
 
     def interrupt(self) -> None:
         """Has `passes` end after the launches in flight, with a state and a checkpoint; for signal handlers, too."""
@@ -297,3 +310,14 @@ class Renderer:
             write = self._checkpoints.begin if last else self._checkpoints.write
             write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(),
                        self.session.work_left(), self._convergence.noise))
+
+    def _keep_unfinished(self) -> None:
+        """Writes a checkpoint where `passes` is left before its end, unless nobody wants it or the device fails now."""
+        if self._checkpoints is None or self._abandoned.is_set() or sys.is_finalizing():    # threads have ended then
+            return
+        with suppress(DeviceError):
+            film = self.session.film()
+            if film.samples == self.session.work_left().rendered(self.session.size):
+                self._keep(film, last=True)
+            else:    # Ctrl-C came between taking work out of hand and launching it
+                _log.warning("interrupted as a launch was being made: the checkpoint from before stays")

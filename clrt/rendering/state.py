@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import sqrt
+from os import PathLike
+from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ..errors import UsageError
+from ..scene.numbers import real_array
 from .film import RELATIVE_FLOOR, Film
 
 
@@ -39,6 +43,18 @@ class State:
     def pixels(self) -> NDArray[np.float32]:
         """(height, width, 3) float32, linear Rec. 709."""
         return self.film.mean.astype(np.float32, order="C")
+
+
+def check_reference(reference: object, size: tuple[int, int]) -> None:
+    """UsageError unless it is None, or what a picture of (width, height) can be compared with."""
+    if reference is None:
+        return
+    if isinstance(reference, (str, PathLike)):
+        raise UsageError(f"reference is the path {str(reference)!r}; read it with clrt.output.images.read_image")
+    shape = real_array("reference", cast(ArrayLike, reference)).shape
+    if not isinstance(reference, np.ndarray) or shape != (*size[::-1], 3):
+        raise UsageError(f"reference is a {type(reference).__name__} of shape {shape}; give a numpy array of the "
+                         f"picture's, {(*size[::-1], 3)}")
 
 
 def relmse(film: Film, reference: NDArray[np.float32] | None) -> float | None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from numbers import Integral, Real
+from typing import Any
+
 from ..errors import UsageError
 from ..scene.model import RenderSettings
 
@@ -10,14 +13,21 @@ CHECKS = 8
 
 
 def planned_spp(settings: RenderSettings, spp: int | None, time: float | None, error: float | None) -> int | None:
-    """How many samples a pixel `passes` takes with these stop conditions; None where only time or error ends it."""
+    """How many samples a pixel `passes` takes with these stop conditions; None where only time or error ends it.
+    UsageError as of `check_stops`."""
+    check_stops(spp, time, error)
     return settings.spp if spp is None and time is None and error is None else spp
 
 
-def check_stops(spp: int | None, time: float | None, error: float | None) -> None:
-    """UsageError unless each stop condition that is given is above 0 and finite."""
-    for name, value in [("spp", spp), ("time", time), ("error", error)]:
-        if value is not None and not 0 < value < float("inf"):
+def check_stops(spp: int | None, time: float | None = None, error: float | None = None) -> None:
+    """UsageError unless each stop condition that is given is a number above 0 and finite, spp a whole one."""
+    given: list[tuple[str, Any, Any]] = [("spp", spp, Integral), ("time", time, Real), ("error", error, Real)]
+    for name, value, kind in given:
+        if value is None:
+            continue
+        if not isinstance(value, kind) or isinstance(value, bool):
+            raise UsageError(f"{name} is {value!r}; give a {'whole ' if kind is Integral else ''}number above 0")
+        if not 0 < value < float("inf"):
             raise UsageError(f"{name} is {value}; it must be above 0")
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .tiles import scattered
+from .tiles import scattered, tile_pixels
 
 
 class Part(NamedTuple):
@@ -109,6 +109,13 @@ class Work:
         """Once all that was cut is rendered: where nothing is left in hand, all tiles have their samples."""
         if not self.parts:
             self.samples = self.then
+
+    def rendered(self, size: tuple[int, int]) -> int:
+        """Samples that all pixels of a picture of (width, height) have by now."""
+        now = self.then.copy()
+        for part in self.parts:
+            now.ravel()[self.tiles[part.first:part.end]] -= part.more
+        return int(np.sum(now * tile_pixels(size)))
 
     @property
     def left(self) -> int:

@@ -134,3 +134,70 @@ def test_it_costs_little(device: Device, tmp_path: Path, monkeypatch: pytest.Mon
     assert not checkpoints.due
     now[0] += 1.5
     assert checkpoints.due
+
+
+@pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
+def test_left_by_break(device: Device, tmp_path: Path, adaptive: bool) -> None:
+    left = renderer(device, adaptive=adaptive, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e9)
+    for state in left.passes(spp=24):
+        if state.spp >= 4:
+            break
+    goes_on_to_the_same(device, tmp_path / "a.ck", adaptive)
+
+
+@pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
+@pytest.mark.parametrize("launches", [3, 17, 40])
+def test_left_by_a_keyboard_interrupt(device: Device, tmp_path: Path, small_launches: None, adaptive: bool,
+                                      launches: int) -> None:
+    """Raised as a launch is waited for, also in the middle of a pass."""
+    left = renderer(device, adaptive=adaptive, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e9)
+    raise_after(left, launches)
+    with pytest.raises(KeyboardInterrupt):
+        run(left, spp=24)
+    goes_on_to_the_same(device, tmp_path / "a.ck", adaptive)
+
+
+def raise_after(running: Renderer, launches: int) -> None:
+    """KeyboardInterrupt once so many launches were made."""
+    launch, left = running.session._launches.add, [launches]  # type: ignore[attr-defined]
+
+    def interrupted(*arguments: Any) -> None:
+        launch(*arguments)
+        left[0] -= 1
+        if left[0] == 0:
+            raise KeyboardInterrupt
+
+    setattr(running.session._launches, "add", interrupted)  # type: ignore[attr-defined]
+
+
+def goes_on_to_the_same(device: Device, path: Path, adaptive: bool) -> None:
+    at_once = renderer(device, adaptive=adaptive)
+    running = renderer(device, adaptive=adaptive, checkpoint=path, resume=True)
+    assert 0 < running.session.film().samples < 24 * running.session.film().pixels.size
+    run(at_once, spp=24)
+    run(running, spp=24)
+    assert same(at_once, running)
+
+
+def test_work_that_was_cut_and_not_launched_is_not_kept(device: Device, tmp_path: Path, small_launches: None,
+                                                        caplog: pytest.LogCaptureFixture) -> None:
+    """Its samples would be missing for ever."""
+    left = renderer(device, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e9)
+    cut = left.session.work.cut
+
+    def interrupted(*arguments: Any, **limits: Any) -> Any:
+        cut(*arguments, **limits)
+        raise KeyboardInterrupt
+
+    setattr(left.session.work, "cut", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run(left, spp=24)
+    assert not (tmp_path / "a.ck").exists() and "the checkpoint from before stays" in caplog.text
+
+
+def test_an_abandoned_picture_is_not_kept(device: Device, tmp_path: Path) -> None:
+    left = renderer(device, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e9)
+    for _ in left.passes(spp=24):
+        left.abandon()
+        break
+    assert not (tmp_path / "a.ck").exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -80,18 +81,48 @@ def test_the_first_condition_met_ends_it(renderer: Renderer, stops: dict[str, fl
     assert renderer.stop_reason == reason
 
 
-@pytest.mark.parametrize("stops", [{"spp": 0}, {"time": -1.0}, {"error": float("nan")}, {"time": float("inf")}],
+@pytest.mark.parametrize("stops", [{"spp": 0}, {"time": -1.0}, {"error": float("nan")}, {"time": float("inf")},
+                                   {"spp": "4"}, {"spp": 1.5}, {"spp": True}, {"time": "1"}, {"error": [0.1]}],
                          ids=str)
-def test_impossible_conditions_are_refused(renderer: Renderer, stops: dict[str, float]) -> None:
+def test_impossible_conditions_are_refused(renderer: Renderer, stops: dict[str, Any]) -> None:
     with pytest.raises(UsageError, match=next(iter(stops))):
-        next(renderer.passes(**stops))  # type: ignore[arg-type]
+        next(renderer.passes(**stops))
 
 
-@pytest.mark.parametrize("chosen", [{"layout": "octree"}, {"lanes": 3}, {"triangle": "square"}, {"builder": "hope"}],
+@pytest.mark.parametrize("reference, said", [
+    (np.zeros((4, 4, 3)), "of shape \\(4, 4, 3\\); give a numpy array of the picture's, \\(30, 40, 3\\)"),
+    ("full.exr", "read it with clrt.output.images.read_image"), (np.full((30, 40, 3), "1"), "give real numbers")])
+def test_what_is_no_reference_is_refused(renderer: Renderer, reference: Any, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        next(renderer.passes(spp=1, reference=reference))
+
+
+def test_what_was_planned_is_where_it_ends(renderer: Renderer, device: Device) -> None:
+    planned = Renderer(renderer.scene, device=device.info.index, spp=np.int64(6))  # type: ignore[arg-type]
+    assert list(planned.passes())[-1].spp == 6
+
+
+@pytest.mark.parametrize("other, rest", [(2, [4, 8, 12]), (8, [12]), (40, [])])
+def test_two_that_take_turns(renderer: Renderer, other: int, rest: list[int]) -> None:
+    """Each goes on from what is there to its own end."""
+    first = renderer.passes(spp=12)
+    while next(first).spp < 2:
+        pass
+    list(renderer.passes(spp=other))
+    assert [state.spp for state in first if state.spp & (state.spp - 1) == 0 or state.spp == 12] == rest
+
+
+@pytest.mark.parametrize("chosen", [{"layout": "octree"}, {"lanes": 3}, {"triangle": "square"}, {"builder": "hope"},
+                                    {"spp": "4"}, {"spp": 1.5}],
                          ids=str)
 def test_unknown_choices_are_refused(device: Device, chosen: dict[str, object]) -> None:
     with pytest.raises(UsageError, match=next(iter(chosen))):
         Renderer(Scene(), device=device.info.index, **chosen)  # type: ignore[arg-type]
+
+
+def test_no_device_at_all_is_refused() -> None:
+    with pytest.raises(UsageError, match="name at least one"):
+        Renderer(Scene(), device=[])
 
 
 def test_relmse_against_a_reference(renderer: Renderer) -> None:
