@@ -21,8 +21,8 @@ LOWEST, HIGHEST = np.log(1e-7), np.log(1e4)
 #: Gauss–Legendre points inside a cell at which a density is summed, in log r and in azimuth.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
 #: As many for densities with edges inside, where all is reflected or a microfacet is no more seen.
-MANY = np.polynomial.legendre.leggauss(12)
-TURNS, TURN_WEIGHTS = np.polynomial.legendre.leggauss(16)
+MANY = np.polynomial.legendre.leggauss(24)
+TURNS, TURN_WEIGHTS = np.polynomial.legendre.leggauss(32)
 
 
 def count(wo: Doubles, wi: Doubles) -> NDArray[np.int64]:
