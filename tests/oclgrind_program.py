@@ -72,7 +72,7 @@ def main(form: str, path: str) -> None:
     """Works with the device as with a `form` of DEVICES; writes the answers to `path`, an .npz file."""
     workarounds = {"Buffer": KeptBuffer, "enqueue_copy": copy_whole}
     instancing.FEW_TRIANGLES = 0   # instances of small meshes, too
-    program.MOST_KEPT = sys.maxsize    # see compiled_files
+    contexts.MOST_COMPILED = program.MOST_KEPT = sys.maxsize    # see compiled_files
     alone = {"in_background": at_once}
     for owner, values in ((Device, DEVICES[form]), (blocks, SHARES), (cl, workarounds), (program, alone),
                           (on_device, alone)):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import pyopencl as cl
 from pyopencl import CommandQueue, Context
 
-from ..errors import DeviceError
+from ..errors import DeviceError, UsageError
 from . import pocl
 from .contexts import Shared, shared_by
 from .describe import DeviceInfo
@@ -70,10 +70,12 @@ class Device:
 def open_devices(selectors: str | int | Device | Sequence[str | int | Device] | None) -> list[Device]:
     """Opens the devices that are named (see `choose`), at least one; DeviceError where that fails.
 
-    Those that are open already are taken as they are.
+    Those that are open already are taken as they are. UsageError where there are no names.
     """
+    if isinstance(selectors, Sequence) and not selectors:
+        raise UsageError(f"device is {selectors!r}; name at least one, or leave it out for the best")
     several = list(selectors) if isinstance(selectors, Sequence) and not isinstance(selectors, str) else [selectors]
-    return [each if isinstance(each, Device) else open_device(each) for each in several or [None]]
+    return [each if isinstance(each, Device) else open_device(each) for each in several]
 
 
 def name_of(devices: Sequence[Device]) -> str:

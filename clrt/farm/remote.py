@@ -133,7 +133,7 @@ def opened(selectors: tuple[str | int, ...]) -> list[Device]:
     """The devices of this worker that are meant, opened once."""
     from ..device.open import open_devices
 
-    return open_devices(selectors)
+    return open_devices(selectors or None)
 
 
 def about(devices: list[Device]) -> dict[str, Any]:

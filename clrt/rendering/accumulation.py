@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any
@@ -17,6 +18,8 @@ from .film import Film
 from .on_device import SceneOnDevice
 from .tiles import tile_pixels, tiles_of
 from .work import Work
+
+_log = logging.getLogger(__name__)
 
 
 class Accumulation(ABC):
@@ -101,6 +104,14 @@ class Accumulation(ABC):
     @abstractmethod
     def film(self) -> Film:
         """The film so far; waits for the launches in flight."""
+
+    def whole_film(self) -> Film | None:
+        """The film; None where it has not what the work says, as Ctrl-C came between the two."""
+        film = self.film()
+        if film.samples == self.work_left().rendered(self.size):
+            return film
+        _log.warning("interrupted as a launch was being made: the checkpoint from before stays")
+        return None
 
     @abstractmethod
     def restore(self, film: Film, work: Work) -> None:

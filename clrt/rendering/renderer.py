@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 import sys
 import time as clock
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -37,12 +37,10 @@ from .kept import Kept
 from .on_device import SceneOnDevice
 from .session import depth_of
 from .state import State as State, check_reference
-from .stops import check_step, check_stops, checked_percentile, low_enough, pass_end, planned_spp
+from .stops import check_step, check_stops, checked_percentile, low_enough, pass_room, planned_spp
 
 #: Between two states at least this long passes, and this many times what making a state costs.
-STATE_SECONDS = 0.5
-STATE_COST = 20
-_log = logging.getLogger(__name__)
+STATE_SECONDS, STATE_COST = 0.5, 20
 
 
 class Renderer:
@@ -50,17 +48,16 @@ class Renderer:
 
     device: see `clrt devices`, or one that is open; several render one picture together. size: (width, height);
     triangle, box, sphere: see `HitTests`; offset, builder, layout, tree, lanes, paths: see `choices.Choices`. spp: how
-    many samples a pixel are planned, if that is known: the sampler then makes neighbouring pixels' errors differ for
-    that many, and later ones begin anew (kernels/sampler); `passes` ends there unless told otherwise. adaptive: whether
-    tiles get samples by their error, from the pictures so far.
-    on_phase hears "build" (packing, tree) and "compile" (program, upload) as they begin.
-    checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the end; resume:
-    go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
-    error_percentile: a wanted error is reached where so many per cent of the tiles of 8 x 8 pixels have it.
-    before: one that is of no use any more; what it has on the devices is taken over as far as its scene is the same:
-    parts of a scene that are the same objects must not have been changed in place.
-    aovs: pictures that are made beside, by their names (docs/aovs.md); those of a state: see `aovs`. first_hits:
-    whether its session will be asked for a denoiser's guides, or for what is seen first.
+    many samples a pixel are planned: the sampler then makes neighbouring pixels' errors differ for that many, and later
+    ones begin anew (kernels/sampler); `passes` ends there unless told otherwise. adaptive: whether tiles get samples by
+    their error, from the pictures so far. on_phase hears "build" (packing, tree) and "compile" (program, upload) as
+    they begin. checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the
+    end; resume: go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
+    error_percentile: a wanted error is reached where so many per cent of the tiles of 8 x 8 pixels have it. before: one
+    that is of no use any more; what it has on the devices is taken over as far as its scene is the same: parts of a
+    scene that are the same objects must not have been changed in place. aovs: names of pictures made beside
+    (docs/aovs.md), see `aovs`. first_hits: whether its session will be asked for a denoiser's guides, or for what is
+    seen first.
     Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
 
@@ -73,11 +70,10 @@ class Renderer:
                  sampler: str | None = None, filter: str | None = None, adaptive: bool | None = None,
                  triangle: str = "watertight", box: str = "robust", sphere: str = "robust", offset: str = "bound",
                  builder: str | None = None, layout: str | None = None, lanes: int | None = None,
-                 paths: str | None = None, tree: bool | None = None,
-                 on_phase: Callable[[str], None] = lambda phase: None, checkpoint: str | Path | None = None,
-                 resume: bool = False, checkpoint_seconds: float = 30.0,
-                 error_percentile: float | None = None, aovs: str | Iterable[str] = (), before: Renderer | None = None,
-                 first_hits: bool = False) -> None:
+                 paths: str | None = None, tree: bool | None = None, error_percentile: float | None = None,
+                 on_phase: Callable[[str], None] = lambda phase: None, aovs: str | Iterable[str] = (),
+                 checkpoint: str | Path | None = None, resume: bool = False, checkpoint_seconds: float = 30.0,
+                 before: Renderer | None = None, first_hits: bool = False) -> None:
         check_stops(spp)
         self._aovs, self._percentile = chosen_aovs(aovs), checked_percentile(error_percentile)
         given: dict[str, Any] = {"size": size, "spp": spp, "max_depth": max_depth, "seed": seed, "filter": filter,
@@ -105,8 +101,6 @@ class Renderer:
     def _open(self, device: str | int | Device | Sequence[str | int | Device] | None, lanes: int | None,
               on_phase: Callable[[str], None], before: Renderer | None) -> None:
         """Opens the devices, and compiles the scene for them; without `lanes` with as many as suit each."""
-        if isinstance(device, Sequence) and not device:
-            raise UsageError(f"device is {device!r}; name at least one, or leave it out for the best")
         self.device, *_ = self.devices = open_devices(device)
         on_phase("build")
         self._compiler: Compiler = Compiler.after(before._compiler if before else None, self.devices)
@@ -201,7 +195,9 @@ class Renderer:
             due = now >= next_state or done & (done - 1) == 0 or looks or self._adapts
             if self.stop_reason is None and not due:
                 continue
-            film, state = self._film(), None
+            self.session.wait()
+            self.seconds = clock.perf_counter() - self._clock
+            film, state = self.session.film(), None
             if not self._in_haste:
                 film.unwanted = lambda: self._abandoned.is_set() or self._interrupted and self.stop_reason is None
                 with suppress(Unwanted):
@@ -252,12 +248,11 @@ class Renderer:
 
     def _run_pass(self, spp: int | None, time: float | None, error: float | None) -> None:
         """One pass; sets the stop reason where `time` is over or it is interrupted, maybe inside the pass."""
-        for _ in self._adaptive_pass(spp) if self._adapts else self._even_pass(spp, error):
+        room = partial(pass_room, spp=spp, error=error, even_to=FLOOR_SPP if self.settings.adaptive else None)
+        for _ in self._adaptive_pass(spp) if self._adapts else self.session.advance(room):
             self.seconds = clock.perf_counter() - self._clock
-            if self._abandoned.is_set():
-                return
             self._heed_interrupt()
-            if self._in_haste:
+            if self._abandoned.is_set() or self._in_haste:
                 return
             if time is not None and self.seconds >= time and self.session.samples_done:
                 self.stop_reason = "time"
@@ -276,23 +271,9 @@ class Renderer:
 
     def _adaptive_pass(self, spp: int | None) -> Iterator[None]:
         """Doubles the samples of those tiles where that takes most error away; ends the render at `spp`."""
-        tiles = self._convergence.tiles_to_double(self.session.tile_samples, spp)
-        if len(tiles) == 0:
+        if not len(tiles := self._convergence.tiles_to_double(self.session.tile_samples, spp)):
             self.stop_reason = "spp"
         yield from self.session.double(tiles)
-
-    def _even_pass(self, spp: int | None, error: float | None) -> Iterator[None]:
-        def room(done: int) -> int:
-            ends = spp is not None and done >= spp or self.settings.adaptive and done >= FLOOR_SPP
-            return 0 if ends else pass_end(done, spp, error) - done
-
-        return self.session.advance(room)
-
-    def _film(self) -> Film:
-        """The film with all that was launched, and the time until then."""
-        self.session.wait()
-        self.seconds = clock.perf_counter() - self._clock
-        return self.session.film()
 
     def _heed_interrupt(self) -> None:
         if self.stop_reason is None and self._interrupted:
@@ -300,8 +281,7 @@ class Renderer:
 
     @property
     def _in_haste(self) -> bool:
-        """Whether it was interrupted: then checkpoint, estimate and history have nothing of the last pass, which takes
-        time, until it is gone on with."""
+        """Whether it was interrupted: estimate and history have nothing of the last pass until it is gone on with."""
         return self.stop_reason == "interrupted"
 
     def _keep(self, film: Film | None = None, last: bool = False) -> None:
@@ -316,8 +296,5 @@ class Renderer:
         if self._checkpoints is None or self._abandoned.is_set() or sys.is_finalizing():    # threads have ended then
             return
         with suppress(DeviceError):
-            film = self.session.film()
-            if film.samples == self.session.work_left().rendered(self.session.size):
+            if (film := self.session.whole_film()) is not None:
                 self._keep(film, last=True)
-            else:    # Ctrl-C came between taking work out of hand and launching it
-                _log.warning("interrupted as a launch was being made: the checkpoint from before stays")

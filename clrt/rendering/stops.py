@@ -51,6 +51,13 @@ def pass_end(done: int, spp: int | None, error: float | None) -> int:
     return min(end for end in (1 << done.bit_length(), spp, checked) if end is not None)
 
 
+def pass_room(done: int, spp: int | None, error: float | None, even_to: int | None) -> int:
+    """Samples that a pass after `done` may add to every pixel; none from `spp` on, and from `even_to` on, if it is
+    given, where tiles get theirs by their error."""
+    ends = spp is not None and done >= spp or even_to is not None and done >= even_to
+    return 0 if ends else pass_end(done, spp, error) - done
+
+
 def low_enough(noise: float | None, error: float | None) -> bool:
     """Whether the noise, if it is known, is at most the wanted error, if there is one."""
     return noise is not None and error is not None and noise <= error
