@@ -2,7 +2,8 @@
 
 Each takes time and memory (with PoCL a compiler of a hundred megabytes), and compilers keep something of every program
 (PoCL 3 a quarter of a megabyte) until it ends. So it is used again, but not once it compiled MOST_COMPILED programs, or
-anything has failed: a device that was lost needs another.
+anything has failed: a device that was lost needs another. All contexts of PoCL that there are at a time share one
+compiler (its pocl_llvm_utils.cc), so what a worn one has kept is freed only if it ends before the next begins.
 """
 
 from __future__ import annotations
@@ -37,10 +38,11 @@ _shared: dict[int, Shared] = {}
 
 def shared_by(device: cl.Device) -> Shared:
     """The context to open it with."""
-    shared = _shared.get(device.int_ptr)
-    if shared is None or shared.worn:
-        shared = _shared[device.int_ptr] = Shared(Context([device]))
-    return shared
+    if device.int_ptr in _shared and _shared[device.int_ptr].worn:
+        del _shared[device.int_ptr]
+    if device.int_ptr not in _shared:
+        _shared[device.int_ptr] = Shared(Context([device]))
+    return _shared[device.int_ptr]
 
 
 def share_no_more() -> None:

@@ -71,8 +71,9 @@ class LiveRenderer:
     def states(self, asked: Asked, size: tuple[int, int], spp: int) -> Iterator[State]:
         """The picture at more and more samples, up to `spp`."""
         start = time.perf_counter()
+        self._guided = self._met_by = None
         self._open(asked.settings.device)
-        last, self._guided, self._met_by = self.renderer, None, None
+        last = self.renderer
         self.renderer = renderer = Renderer(asked.scene, device=self._devices, size=size, spp=spp,
                                             on_phase=self._on_phase, before=last, first_hits=True,
                                             **asked.settings.tracing)
@@ -90,7 +91,7 @@ class LiveRenderer:
 
     def _open(self, selector: Selector) -> None:
         if selector != self._selector or any(device.shared.worn for device in self._devices):
-            self._selector, self.renderer = self, None
+            self._selector, self._devices, self.renderer = self, [], None
             self._devices, self._selector = open_devices(selector), selector
 
     def denoised(self, state: State) -> NDArray[np.float32] | None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pyopencl as cl
 import pytest
 
 import clrt
@@ -163,15 +164,22 @@ def test_mistakes_are_told_and_the_last_picture_stays(live: Live, device: Device
 
 
 def test_after_many_programs_the_device_is_opened_anew(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And nothing keeps what belongs to it before: a compiler's memory is freed with its context."""
+    """And not before all that belonged to it has ended: PoCL's compiler is one for all contexts that there are."""
     contexts.share_no_more()    # as the tests' own device is in use
     with Live(room(), device=device.info.index) as live:
         whole(live)
         before = weakref.ref(live._renderer._devices[0].shared)
+        ended = list[bool]()
+
+        def made(devices: list[cl.Device]) -> cl.Context:
+            ended.append(before() is None)
+            return cl.Context(devices)
+
         monkeypatch.setattr(contexts, "MOST_COMPILED", 0)
+        monkeypatch.setattr(contexts, "Context", made)
         live.edit(moved(live.scene))
         check_as_rendered(live, device)
-        assert before() is None
+        assert ended and all(ended)
 
 
 def test_the_newest_edit_wins(live: Live, device: Device) -> None:
