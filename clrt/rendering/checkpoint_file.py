@@ -28,7 +28,7 @@ from ..errors import CheckpointError
 
 #: How those of any version begin.
 FAMILY = b"clrt checkpoint "
-MAGIC = FAMILY + b"2\n"
+MAGIC = FAMILY + b"3\n"
 #: Bytes, more than any header has.
 LONGEST_HEADER = 1 << 16
 
@@ -111,7 +111,7 @@ def _header(line: bytes, kinds: Mapping[str, np.dtype[Any]]) -> tuple[dict[str, 
     try:
         read = json.loads(line)
         header, shapes = dict(read["header"]), dict(read["shapes"])
-        good = set(shapes) == set(kinds) and all(type(n) is int and 0 <= n < 1 << 40 and len(shape) < 4
+        good = set(shapes) == set(kinds) and all(type(n) is int and 0 <= n < 1 << 40 and len(shape) < 5
                                                  for shape in shapes.values() for n in shape)
     except (ValueError, TypeError, LookupError, RecursionError):
         good = False

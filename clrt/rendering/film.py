@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bands import in_bands
+from .expected import REACH, expected
+from .tiles import tile_sums
 
 #: Added to the squared reference in relMSE, so that black pixels do not divide by zero.
 RELATIVE_FLOOR = 0.01
@@ -27,15 +29,9 @@ def _sums(pixels: NDArray[Any], name: str) -> NDArray[np.float64]:
     return _in_planes(total)
 
 
-def _with_both_sides(values: NDArray[np.float64], before: NDArray[np.float64], after: NDArray[np.float64],
-                     ) -> NDArray[np.float64]:
-    """Each of the values with those next to it along the first axis, outside of which are `before` and `after`."""
-    sums = values.copy(order="K")
-    sums[1:] += values[:-1]
-    sums[0] += before
-    sums[:-1] += values[1:]
-    sums[-1] += after
-    return sums
+def _padded(values: NDArray[np.float64], rows: tuple[int, int]) -> NDArray[np.float64]:
+    """With REACH columns on both sides, and so many rows above and below, as those at the edge."""
+    return _in_planes(np.pad(np.moveaxis(values, -1, 0), [(0, 0), rows, (REACH, REACH)], "edge"))
 
 
 class Film:
@@ -84,12 +80,8 @@ class Film:
 
     @property
     def relative_to(self) -> NDArray[np.float32]:
-        """(height, width, 3): what errors are divided by in relMSE, √(expected² + 0.01), as far as it is known.
-
-        What is expected of a pixel is the mean of the eight around it, so that one bright by chance does not count
-        itself; and from there on towards its own as far as its variance cannot explain the difference (James and Stein
-        1961).
-        """
+        """(height, width, 3): what errors are divided by in relMSE, √(expected² + 0.01), as far as it is known
+        (rendering/expected.py)."""
         return self._judged[0]
 
     @cached_property
@@ -101,27 +93,28 @@ class Film:
         count = self.pixels["count"]
         if not count.size or count.min() < 2:
             return None
-        return float(np.sqrt(self._judged[1] / self.mean.size))
+        return float(np.sqrt(np.sum(self.tile_limits) / self.mean.size))
+
+    @property
+    def tile_limits(self) -> NDArray[np.float64]:
+        """(rows, columns): Var[mean] / (expected² + 0.01), summed over a tile's values: NaN below two samples."""
+        return self._judged[1]
 
     @cached_property
-    def _judged(self) -> tuple[NDArray[np.float32], float]:
-        """`relative_to`, and the sum of the variances over that: the same is needed for both."""
-        mean, last = self.mean, len(self.mean) - 1
+    def _judged(self) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        """`relative_to` and `tile_limits`: the same is needed for both."""
+        mean, height = self.mean, len(self.mean)
         relative = np.empty_like(mean, np.float32)
 
-        def judge(rows: slice) -> float:
-            own, variance = mean[rows], self._variance(rows)
-            sums = _with_both_sides(own, mean[max(rows.start - 1, 0)], mean[min(rows.stop, last)])
-            columns = sums.swapaxes(0, 1)
-            around = (_with_both_sides(columns, columns[0], columns[-1]).swapaxes(0, 1) - own) / 8
-            difference = own - around
-            with np.errstate(divide="ignore", invalid="ignore"):
-                towards_own = np.fmax(1 - variance / difference**2, 0)   # 0 for NaN, too
-            squared = (around + towards_own * difference) ** 2 + RELATIVE_FLOOR
+        def judge(rows: slice) -> NDArray[np.float64]:
+            there = slice(max(rows.start - REACH, 0), min(rows.stop + REACH, height))
+            beyond = (there.start - rows.start + REACH, rows.stop + REACH - there.stop)
+            variance = self._variance(there)
+            squared = expected(_padded(mean[there], beyond), _padded(variance, beyond)) ** 2 + RELATIVE_FLOOR
             relative[rows] = np.sqrt(squared)
-            return float(np.sum(variance / squared))
+            return tile_sums(variance[rows.start - there.start:][:rows.stop - rows.start] / squared)
 
-        return relative, sum(in_bands(self.mean.shape, judge, self.unwanted))
+        return relative, np.concatenate(in_bands(mean.shape, judge, self.unwanted))
 
     @property
     def samples(self) -> int:

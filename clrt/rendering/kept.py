@@ -100,6 +100,6 @@ def _noise_fits(arrays: Arrays, size: tuple[int, int]) -> bool:
     mean, changes, level = (arrays[name] for name in ("noise_mean", "noise_changes", "noise_level"))
     shapes = [(*size[::-1], 3), tiles_of(size)] if mean.size else [(0, 0, 3), (0, 0)]
     history = arrays["history"]
-    return bool([mean.shape, level.shape] == shapes and changes.shape[1:] == level.shape and len(changes) <= 64
+    return bool([mean.shape, level.shape] == shapes and changes.shape[1:] == (2, *level.shape) and len(changes) <= 64
                 and np.all((-1 <= level) & (level <= len(changes)))
                 and history.shape[1:] == (4,) and np.all(np.isfinite(history[:, :2])))

@@ -13,6 +13,7 @@ from .tiles import over_pixels, tile_pixels, tile_sums
 LEAST_FALL, MOST_FALL = 2.0, 8.0
 #: And while only two samples are known.
 FIRST_FALL = 2.4
+TINY = float(np.finfo(np.float64).tiny)
 
 
 class NoiseEstimate:
@@ -21,9 +22,11 @@ class NoiseEstimate:
     A pixel's samples are not independent, so their variance says too much. But the two halves of the first 2n samples
     are alike, which is enough: with E_n the mean of the first n and V(n) its squared error, Cov(E_n, E_2n) = V(2n),
     hence the mean square of E_n − E_2n is V(n) − V(2n). If V falls by r with each doubling that is (r − 1)·V(2n). The
-    last three such differences, over all tiles that have as many samples, tell how fast it fell, and as that always
-    slows down, towards 2 in the end, r is the geometric mean of both. Blocks of 2^k samples, taken for independent of
-    each other, give V between powers of two. It is never more than the samples' variance gives (Film.noise).
+    last three such differences, over all tiles that have as many samples, tell how fast it fell, beside the samples'
+    variance at these times, which falls by 2: what is expected of a pixel was not known alike then, and divides both.
+    As the fall always slows down, towards 2 in the end, r is the geometric mean of both. Blocks of 2^k samples, taken
+    for independent of each other, give V between powers of two. It is never more than the samples' variance gives
+    (Film.noise).
 
     planned_spp: where the sampler begins anew, r is 2 from there on.
     """
@@ -31,16 +34,17 @@ class NoiseEstimate:
     def __init__(self, planned_spp: int | None = None) -> None:
         self._planned = planned_spp or 1 << 32
         self._mean: NDArray[np.float32] | None = None
-        #: V(n/2) − V(n) at n = 2, 4, 8 …, sums over a tile's values (rows, columns), NaN where it has fewer samples.
+        #: V(n/2) − V(n) at n = 2, 4, 8 …, and what n independent samples would leave of variance: sums over a tile's
+        #: values (2, rows, columns), NaN where it has fewer samples.
         self._changes: list[NDArray[np.float64]] = []
         #: How many of these each tile has, −1 before its first sample.
         self._level: NDArray[np.int64] = np.zeros((0, 0), np.int64)
 
     def arrays(self) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.int64]]:
-        """All that it knows: the picture's mean (height, width, 3), the changes (k, rows, columns), and how many of
+        """All that it knows: the picture's mean (height, width, 3), the changes (k, 2, rows, columns), and how many of
         these each tile has; empty arrays before the first picture."""
         mean = np.zeros((0, 0, 3), np.float32) if self._mean is None else self._mean
-        return mean, np.array(self._changes).reshape(len(self._changes), *self._level.shape), self._level
+        return mean, np.array(self._changes).reshape(len(self._changes), 2, *self._level.shape), self._level
 
     def restore(self, mean: NDArray[np.float32], changes: NDArray[np.float64], level: NDArray[np.int64]) -> None:
         """Goes on from what `arrays` gave."""
@@ -59,10 +63,11 @@ class NoiseEstimate:
             relative = film.relative_to
             change = np.concatenate(in_bands(
                 mean.shape, lambda rows: tile_sums(((mean[rows] - before[rows]) / relative[rows]) ** 2), film.unwanted))
-        self._changes += [np.full(due.shape, np.nan) for _ in range(max(level) + 1 - len(self._changes))]
+            both = np.stack([change, film.tile_limits])
+        self._changes += [np.full((2, *due.shape), np.nan) for _ in range(max(level) + 1 - len(self._changes))]
         for k in sorted({*level.tolist()} - {-1}):
             at_k = due & (self._level == k)
-            self._changes[k][at_k] = change[at_k]
+            self._changes[k][:, at_k] = both[:, at_k]
         self._level[due] += 1
         np.copyto(self._mean, mean, where=over_pixels(due, mean.shape[1::-1])[..., None])
 
@@ -90,7 +95,7 @@ class NoiseEstimate:
         for spp, level in {*zip(tile_samples.ravel().tolist(), self._level.ravel().tolist())}:
             alike = (tile_samples == spp) & (self._level == level)
             fall = self._fall(level)
-            at_power = self._changes[level - 1][alike] / (fall - 1)
+            at_power = self._changes[level - 1][0, alike] / (fall - 1)
             blocks = [bit for bit in range(spp.bit_length()) if spp >> bit & 1]
             errors[alike] = at_power * sum(4.0**bit * fall ** (level - bit) for bit in blocks) / spp**2
         return errors
@@ -98,11 +103,12 @@ class NoiseEstimate:
     def _fall(self, level: int) -> float:
         """V(n/2)/V(n) at n = 2^level, over all tiles that came so far."""
         there = self._level >= level
-        changes = [float(np.sum(change[there])) for change in self._changes[:level]]
-        if changes[-1] <= 0 or 1 << level > self._planned:
+        steps = min(level - 1, 2)
+        change, variance = np.sum(self._changes[level - 1][:, there], axis=1)
+        if change <= 0 or 1 << level > self._planned:
             return LEAST_FALL
         if level < 2:
             return FIRST_FALL
-        steps = min(level - 1, 2)
-        measured = (changes[-1 - steps] / changes[-1]) ** (1 / steps)
+        earlier, its_variance = np.sum(self._changes[level - 1 - steps][:, there], axis=1)
+        measured = LEAST_FALL * (earlier * variance / (change * max(its_variance, TINY))) ** (1 / steps)
         return float(np.sqrt(LEAST_FALL * np.clip(measured, LEAST_FALL, MOST_FALL)))

@@ -109,7 +109,7 @@ def test_the_whole_generation_outlives_the_damaged_one(device: Device, kept: Pat
     {"then": np.full((6, 8), 1 << 62)}, {"tiles": np.array([48], np.uint32)}, {"tiles": np.zeros((1, 1), np.uint32)},
     {"parts": np.array([[0, 99, 24, 1]])}, {"parts": np.zeros((1, 4), np.int64)}, {"parts": np.zeros((3,), np.int64)},
     {"noise_level": np.full((6, 8), 60)}, {"noise_level": np.zeros((0, 0), np.int64)},
-    {"noise_mean": np.zeros((0, 0, 3), np.float32)}, {"noise_changes": np.zeros((5, 8, 6))},
+    {"noise_mean": np.zeros((0, 0, 3), np.float32)}, {"noise_changes": np.zeros((5, 2, 8, 6))},
     {"history": np.full((1, 4), np.nan)}, {"history": np.zeros((4,))}], ids=lambda changes: next(iter(changes)))
 def test_what_does_not_fit_is_damage(device: Device, kept: Path, changes: dict[str, Any]) -> None:
     """Whoever wrote it with a right checksum: no size or number is believed."""

@@ -28,7 +28,7 @@ Damage = Callable[[bytes, random.Random], bytes]
 DAMAGES: dict[str, Damage] = {
     "cut": lambda content, rng: content[:rng.randrange(len(content))],
     "a bit flipped": lambda content, rng: _flipped(content, rng.randrange(len(content)), 1 << rng.randrange(8)),
-    "old version": lambda content, rng: content.replace(MAGIC, MAGIC.replace(b"2", b"1"), 1)}
+    "old version": lambda content, rng: content.replace(MAGIC, MAGIC.replace(b"3", b"1"), 1)}
 
 
 def _flipped(content: bytes, place: int, bit: int) -> bytes:
