@@ -39,8 +39,9 @@ def one_by_one(mean: Doubles, variance: Doubles, y: int, x: int, c: int) -> floa
 def test_as_one_by_one(seed: int) -> None:
     mean, variance = picture(seed)
     found = expected(mean, variance)
-    each = [[[one_by_one(mean, variance, y, x, c) for c in range(3)] for x in range(REACH, 16)] for y in range(REACH, 20)]
-    np.testing.assert_allclose(found, each, rtol=1e-9, atol=1e-9)
+    for y, x, c in np.ndindex(found.shape):
+        each = one_by_one(mean, variance, y + REACH, x + REACH, c)
+        assert found[y, x, c] == pytest.approx(each, rel=1e-9, abs=1e-9)
 
 
 def test_what_is_known_is_expected() -> None:
