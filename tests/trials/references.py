@@ -19,12 +19,17 @@ SIDE = 256
 STEPS, STEP_SPP = 8, 256
 
 
+def small(path: Path, side: int = SIDE) -> clrt.Scene:
+    """The scene with so many pixels along the longer side."""
+    scene = clrt.load(path)
+    width, height = (round(extent * side / max(scene.render.size)) for extent in scene.render.size)
+    return replace(scene, render=replace(scene.render, size=(width, height)))
+
+
 def with_references() -> Iterator[tuple[Path, clrt.Scene, Reference]]:
     """Each scene; references of 2048 samples a pixel are kept in the cache."""
     for path in GALLERY:
-        scene = clrt.load(path)
-        width, height = (round(extent * SIDE / max(scene.render.size)) for extent in scene.render.size)
-        scene = replace(scene, render=replace(scene.render, size=(width, height)))
+        scene = small(path)
         print(f"    {path.stem}", file=sys.stderr, flush=True)
         yield path, scene, render_reference(scene, STEPS, step_spp=STEP_SPP)
 
