@@ -1,5 +1,5 @@
-// One ray against all triangles of a scene that has few, in packs, without a branch: what geometry/triangle_watertight.cl
-// says, for less where nothing is close.
+// One ray against all triangles of a scene that has few, in packs: what geometry/triangle_watertight.cl says, for less
+// where nothing is close. Packs that its line passes by cost no division; what it meets costs no branch.
 //
 // Left to the exact test is whatever may need it: a ray through an edge, and a t that may be no more than rounding. How
 // small a volume is no more than that is said once a ray, for corners as far away as any of the scene is.
@@ -27,6 +27,7 @@ static inline bool meet_packs(const TriangleRay *ray, global const Triangles *pa
         const Sheared a = shear(p0, &sheared_ray), b = shear(p1, &sheared_ray), c = shear(p2, &sheared_ray);
         const Edges edges = edges_of(&a, &b, &c);
         wide_mask inside = inside_edges(&edges);
+        if (!WIDE_ANY(inside)) continue;
         wide at_a = edges.u1 - edges.u2, at_b = edges.v1 - edges.v2, at_c = edges.w1 - edges.w2, det = at_a + at_b + at_c;
         wide inverse = 1.0f / det;
         wide volume = weighted(at_a, at_b, at_c, a.z * ray->sz, b.z * ray->sz, c.z * ray->sz);
