@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SceneError
-from .fields import field_problems
+from .fields import field_problems, show
 from .pictures import read_texels
 from .textures import Channel, NonNegative, Pair, Picture, Texture, Wrap
 
@@ -45,9 +45,11 @@ class TextureReader:
         if isinstance(scale := values.get("scale"), int | float):
             values["scale"] = (scale, scale)
         problems = field_problems(TextureTable, values, where)
+        name = values.pop("image", "")
+        if not isinstance(name, str):
+            problems.append(f"{where}.image: {show(name)} is not a text; write a file name in quotes")
         if problems:
             raise SceneError(problems)
-        name = values.pop("image")
         if name not in self.pictures:
             try:
                 self.pictures[name] = Picture(read_texels(self._folder / name), name)
