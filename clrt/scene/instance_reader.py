@@ -60,7 +60,7 @@ class InstanceReader:
 
     def materials(self, table: InstanceTable) -> list[Material | None]:
         """Those of what the table's mesh shows, without the table's own."""
-        return [each.material for each in self._shown.get(table.mesh, [[]])[0]]
+        return [each.material for each in self._shown.get(str(table.mesh), [[]])[0]]
 
     def read(self, table: InstanceTable, repeats: Sequence[Repeat], material: Material | None, where: str,
              ) -> list[Instance]:
@@ -74,7 +74,7 @@ class InstanceReader:
             if found.any():
                 copy = f", of copy {found.argmax()}," if found.size > 1 else ""
                 raise SceneError(f"{where}: its transform{copy} {fault}; write a scale without 0")
-        shown = self._shown.get(table.mesh, [[]])[0]
+        shown = self._shown.get(str(table.mesh), [[]])[0]
         return [replace(moved(each, matrix), material=material or each.material, name=table.name or each.name)
                 for matrix in matrices for each in shown]
 

@@ -126,6 +126,8 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
     ('camera = 3', "camera: 3 is not a table; write [camera]"),
     ('[mesh]\nfile = "a.ply"', "mesh: is not a list of tables; write [[mesh]] in double brackets"),
     ('instance = [3]', "instance[0]: 3 is not a table; write [[instance]]"),
+    ('[[instance]]\nmesh = { a = 1 }', "instance[0].mesh: { a = 1 } is unknown; none is defined"),
+    (f'{MESH}[[instance]]\nmesh = [{{}}]', "instance[0].mesh: [{  }] is unknown; write one of a"),
     ('[[instance]]\ntranslate = [1, 0, 0]', "instance[0]: mesh is missing; add it"),
     (f'{MESH}[[instance]]\nmesh = "a"\nmaterial = "b"', 'instance[0].material: "b" is unknown; none is defined'),
     (f'{MESH}[[instance]]\nmesh = "a"\nscale = 0', "instance[0]: its transform flattens the mesh; write a scale with"),
