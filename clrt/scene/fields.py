@@ -20,6 +20,7 @@ from .textures import Texture
 
 #: Fields whose values are no plain data; whoever holds them checks them.
 ELSEWHERE = frozenset({"image", "material", "materials", "mesh", "picture", "to_world"})
+INT64_END = 2**63
 FLOAT32_MAX = float(np.finfo(np.float32).max)
 #: More mistakes than this in one object are counted, not listed.
 MOST = 12
@@ -47,6 +48,13 @@ def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[st
             for name, value in plain.items() if _too_large(value)]
 
 
+def usable(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
+    """`values` without problems for the fields of `kind`, where numpy can use them all: whole numbers of more than 64
+    bits, for which it has no type, become floats where these will do."""
+    hints = _hints(kind)
+    return {name: _floats(hints[name], value) for name, value in values.items()}
+
+
 def unknown(name: object, known: Iterable[str]) -> str:
     """What to say after a name that is not among the `known` ones, with the nearest of them."""
     import difflib
@@ -69,7 +77,8 @@ def show(value: object) -> str:
     elif isinstance(value, dict):
         text = f"{{ {', '.join(f'{key} = {show(entry)}' for key, entry in value.items())} }}"
     else:
-        text = repr(value)
+        # Python writes no decimal numbers of more than 4300 digits.
+        text = hex(value) if isinstance(value, int) and value.bit_length() > 1024 else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -109,6 +118,21 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
             yield f"{path}: {show(value)} has {len(value)} entries; write {len(kinds)}"
     elif hint is not Any and (fault := _fault(origin or hint, value)):
         yield f"{path}: {show(value)} {fault}"
+
+
+def _floats(hint: Any, value: Any) -> Any:
+    """A value that is what the type asks for, with floats for long whole numbers where these will do."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if hint is float:
+        return value if abs(value) < INT64_END else float(value)
+    if origin is Annotated:
+        return _floats(parts[0], value)
+    if origin in (Union, UnionType) and value is not None:
+        return _floats(_meant(parts, value), value)
+    if origin is tuple:
+        kinds = (parts[0],) * len(value) if parts[-1] is ... else parts
+        return tuple(map(_floats, kinds, value))
+    return value
 
 
 def _meant(parts: tuple[Any, ...], value: Any) -> Any:

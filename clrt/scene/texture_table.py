@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SceneError
-from .fields import field_problems, show
+from .fields import field_problems, show, usable
 from .pictures import read_texels
 from .textures import Channel, NonNegative, Pair, Picture, Texture, Wrap
 
@@ -55,4 +55,4 @@ class TextureReader:
                 self.pictures[name] = Picture(read_texels(self._folder / name), name)
             except SceneError as error:
                 raise SceneError([f"{where}.image: {problem}" for problem in error.problems]) from None
-        return Texture(picture=self.pictures[name], **values)
+        return Texture(picture=self.pictures[name], **usable(TextureTable, values))

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from ..errors import SceneError
 from .animation import Animation, Keyframe
-from .fields import field_problems, show, unknown
+from .fields import field_problems, show, unknown, usable
 from .instance_reader import InstanceReader, InstanceTable, Repeat, placed
 from .instancing import meshes_by_id
 from .lights import LIGHTS, Light
@@ -78,7 +78,7 @@ class SceneReader:
             return Camera()
         camera = self._build(Camera, values, where)
         place = {key: values[key] for key in ("position", "look_at", "up") if key in values}
-        return camera or (Camera() if field_problems(Camera, place, where) else Camera(**place))
+        return camera or (Camera() if field_problems(Camera, place, where) else Camera(**usable(Camera, place)))
 
     def _named_camera(self, values: Table) -> Camera:
         """The one of `cameras` that the table names."""
@@ -125,7 +125,7 @@ class SceneReader:
         """kind(**values), or None if they are wrong."""
         problems = field_problems(kind, values, where)
         self.problems += problems
-        return None if problems else kind(**values)
+        return None if problems else kind(**usable(kind, values))
 
     def _typed(self, kinds: Sequence[type[Kind]], values: Any, where: str) -> Kind | None:
         """A material or light of the class whose `kernel` is the table's `type`."""

@@ -5,10 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import imageio.v3 as imageio
 import numpy as np
 import pytest
 
 from clrt.errors import SceneError
+from clrt.rendering.identity import scene_hash
 from clrt.scene.file import load
 from clrt.scene.lights import DirectionalLight, PointLight
 from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
@@ -201,6 +203,37 @@ def test_scenes_load_without_opencl(folder: Path) -> None:
 def test_materials_of_every_type_load(folder: Path) -> None:
     scene = load(write(folder, GOOD + '[[sphere]]\nmaterial = "glass"\n'))
     assert scene.spheres[1].material == Mirror()
+
+
+def test_whole_numbers_may_be_of_any_length(folder: Path) -> None:
+    """Wherever numbers need not be whole: as the same float."""
+    imageio.imwrite(folder / "a.png", np.zeros((2, 2, 3), np.uint8))
+    text = """
+instance = [{{ mesh = "a", scale = 1e-20, repeat = [{{ count = 2, scale = {0} }}] }}]
+[camera]
+position = [{0}, 0, {0}]
+focus_distance = {0}
+[materials.a]
+type = "diffuse"
+color = {{ image = "a.png", scale = {0}, rotation_degrees = {0} }}
+emission = [{0}, 1, 1]
+[[mesh]]
+name = "a"
+vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+faces = [[0, 1, 2]]
+uv = [[0, 0], [1, 0], [0, 1]]
+material = "a"
+scale = {0}
+translate = [{0}, 0, -{0}]
+rotate_degrees = [{0}, 0, 0]
+[[light]]
+type = "spot"
+position = [0, 0, 0]
+direction = [{0}, 0, 0]
+intensity = [{0}, 0, 0]
+"""
+    whole, decimal = (load(write(folder, text.format(number))) for number in (str(10**22), "1e22"))
+    assert scene_hash(whole) == scene_hash(decimal)
 
 
 def test_instances_repeat_by_steps_of_the_world(folder: Path) -> None:

@@ -160,6 +160,8 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
      "light[0].inner_degrees: 45 is not below outer_degrees, 45; write less"),
     ('[environment]\nimage = 3', "environment.image: 3 is not a text; write a file name in quotes"),
     ('[camera\nposition = 3', "is not valid TOML: "),
+    (f'[camera]\nposition = [1{"0" * 5000}, 0, 0]', "is not valid TOML: "),
+    (f'[camera]\nposition = [0x1{"0" * 5000}, 0, 0]', "camera.position: [0x10000"),
 ])
 def test_each_mistake(text: str, sentence: str, folder: Path) -> None:
     problem, = problems(folder, text)
