@@ -11,6 +11,7 @@ from annotated_types import Gt, Lt
 
 from ..errors import SceneError, UsageError
 from .curves import Doubles, smooth
+from .fields import field_problems
 from .material import tuples_for_lists
 from .textures import NonNegative
 
@@ -72,16 +73,22 @@ class Animation:
 
 
 def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
-    """The scene, its camera going once around in so many frames."""
+    """The scene, its camera going once around in so many frames. UsageError unless `fps` is above 0 and finite."""
+    if not 0 < fps < np.inf:
+        raise UsageError(f"fps is {fps}; it must be above 0 and finite")
     return replace(scene, animation=Animation(fps=fps, turntable_seconds=frames / fps))
 
 
 def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[int, Scene]]:
     """The numbers of all frames, or of those `chosen`, and for each the still scene that it shows, which differs from
-    the others by its camera alone. SceneError where there is no animation, UsageError for a frame that is none of it.
+    the others by its camera alone. SceneError where there is no animation, or a wrong one, UsageError for a frame that
+    is none of it.
     """
     if scene.animation is None:
         raise SceneError(f"{scene.name}: nothing moves; write [[keyframe]] tables, or have it turned (--turntable)")
+    if problems := (field_problems(Animation, vars(scene.animation), "animation")
+                    or animation_problems(scene.camera, scene.animation)):
+        raise SceneError(problems)
     count = scene.animation.frames
     numbers = range(count) if chosen is None else list(chosen)
     for number in numbers:
@@ -105,7 +112,7 @@ def animation_problems(camera: Camera, animation: Animation) -> list[str]:
     problems = [f"keyframe[{i + 1}].time: {times[i + 1]:g} is not after {times[i]:g}, that of the one before; write "
                 "them in order" for i in range(len(times) - 1) if times[i + 1] <= times[i]]
     if not problems and animation.seconds * animation.fps >= MOST_FRAMES:
-        problems = [f"animation: would have {animation.seconds * animation.fps:.0f} frames, more than {MOST_FRAMES}; "
+        problems = [f"animation: would have {animation.seconds * animation.fps:.9g} frames, more than {MOST_FRAMES}; "
                     "check the times, in seconds, and fps"]
     return problems or _view_problems(camera, animation)
 

@@ -142,6 +142,10 @@ def test_interrupted_frames_are_not_written_and_resume_ends_it(flight: Path) -> 
     (["--fps", "3"], 2, "--turntable"),
     (["--frames", "0", "-o", "a.mp4", "--size", "25x16"], 2, "26x16"), (["-o", "a.gif"], 6, ".gif"),
     (["--frames", "0", "-o", "a.gif", "--fps", "60"], 2, "60 frames a second"),
+    (["--turntable", "4", "-o", "a.gif", "--fps", "nan"], 2, "fps is nan; it must be above 0 and finite"),
+    (["--turntable", "4", "-o", "a.gif", "--fps", "inf"], 2, "fps is inf; it must be above 0 and finite"),
+    (["--frames", "all", "--fps", "nan"], 3, "animation.fps: nan is not a finite number"),
+    (["--frames", "all", "--fps", "1e12"], 3, "frames, more than 1000000; check the times"),
     (["--frames", "0", "-o", "no/a.png"], 6, "does not exist")])
 def test_mistakes_end_in_one_message(arguments: list[str], code: int, words: str, flight: Path) -> None:
     done = subprocess.run([sys.executable, "-m", "clrt", "render", "flight.toml", *arguments], capture_output=True,

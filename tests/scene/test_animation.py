@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -123,12 +124,15 @@ KEY = Keyframe(time=0, position=(0, 0, 5))
     (Animation(fps=4, keyframes=(KEY, Keyframe(time=2, position=(0, 0, -5)))), "in frame 4, 1 s after the first"),
     (Animation(keyframes=(KEY, Keyframe(time=2, position=(0, 5, 0)))), "frame 48, 2 s after the first, the camera sees "
      "nothing: it looks along its up"),
+    (Animation(fps=1e30, turntable_seconds=1e30), "would have 1e+60 frames, more than 1000000"),
     (Animation(fps=0), "animation.fps: 0 is not above 0"),
     (Animation(keyframes=(KEY, Keyframe(time=1, fov_degrees=200))), "animation.keyframes[1].fov_degrees: 200"),
     (Animation(keyframes=(KEY, 3)), "animation.keyframes[1]: 3 is no Keyframe")])  # type: ignore[arg-type]
 def test_what_cannot_be_shown_is_refused(animation: Animation, words: str) -> None:
     problems = scene_problems(Scene(animation=animation))
     assert len(problems) == 1 and words in problems[0]
+    with pytest.raises(SceneError, match=re.escape(words)):
+        frames(Scene(animation=animation))
 
 
 def test_mistakes_in_the_file_are_told_together(tmp_path: Path) -> None:
