@@ -22,6 +22,8 @@ COLORS = ["-vf", "scale=out_color_matrix=bt709:out_range=tv,"
 VIDEOS = (".gif", *CODECS)
 #: Frames a second: browsers show faster ones at 10.
 FASTEST_GIF = 50.0
+#: Seconds that a frame lasts: 16 bits, in hundredths.
+LONGEST_GIF = 655.35
 
 
 def is_video(path: Path) -> bool:
@@ -37,6 +39,9 @@ def check_video(path: Path, size: tuple[int, int], fps: float) -> None:
         if fps > FASTEST_GIF:
             raise UsageError(f"{path}: {fps:g} frames a second are more than the {FASTEST_GIF:g} that a .gif is shown "
                              "with; write an .mp4, or lower --fps")
+        if 1 / fps > LONGEST_GIF:
+            raise UsageError(f"{path}: {1 / fps:g} s are more than the {LONGEST_GIF:g} that a frame of a .gif can "
+                             "last; write an .mp4, or raise --fps")
         return
     if find_spec("imageio_ffmpeg") is None:
         raise UsageError(f"{path}: {path.suffix} videos need ffmpeg: install it with `pip install 'clrt[video]'`, or "
