@@ -97,9 +97,10 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         guarded(advice)
     from ..output.data import check_denoisable
     from ..rendering.stops import check_stops, planned_spp
-    from ..scene.file import load
+    from ..scene.file import check_scene, load
 
     atexit.register(gc.freeze)  # else Python, as it ends, searches all modules' objects for garbage, in 0.05 s
+    check_scene(scene)
     beside = _chosen_aovs(aovs) if aovs else ()
     inputs = (scene,) if reference is None else (scene, reference)
     results = Outputs(inputs, outputs or (Path(f"{scene.stem}.png"),), beside, denoise, view, exposure, report, plot)

@@ -10,6 +10,7 @@ from ..errors import SceneError
 from .framing import frame
 from .meshes import SUFFIXES, read_model
 from .model import Scene
+from .paths import check_file
 from .source import source_of_model
 from .sky import SUN, default_sky
 from .toml import SceneReader, camera_problems
@@ -25,12 +26,8 @@ def load(path: str | Path, camera: str | None = None) -> Scene:
     if not isinstance(path, (str, PathLike)):
         raise SceneError(f"{path!r} is no path of a scene; name a file, such as \"scene.toml\"")
     path = Path(path)
-    if not path.is_file():
-        raise SceneError(f"{path}: {'is a folder, not a scene' if path.is_dir() else 'no such scene file'}")
-    suffix = path.suffix.lower()
-    if suffix != ".toml" and suffix not in SUFFIXES:
-        raise SceneError(f"{path}: a scene must be one of .toml, {', '.join(SUFFIXES)}; convert it")
-    scene, problems = _load_toml(path) if suffix == ".toml" else (_load_model(path), [])
+    check_scene(path)
+    scene, problems = _load_toml(path) if path.suffix.lower() == ".toml" else (_load_model(path), [])
     if camera is not None:
         scene.camera = scene.cameras.get(camera, scene.camera)
         problems += camera_problems(camera, scene.cameras, "--camera")
@@ -38,6 +35,14 @@ def load(path: str | Path, camera: str | None = None) -> Scene:
     if problems:
         raise SceneError([f"{path}: {problem}" for problem in problems])
     return scene
+
+
+def check_scene(path: Path) -> None:
+    """Raise SceneError unless there is a file at `path`, with the name of a scene or a model."""
+    is_model = path.suffix.lower() in SUFFIXES
+    check_file(path, "model" if is_model else "scene")
+    if not is_model and path.suffix.lower() != ".toml":
+        raise SceneError(f"{path}: a scene must be one of .toml, {', '.join(SUFFIXES)}; convert it")
 
 
 def _load_model(path: Path) -> Scene:

@@ -19,6 +19,7 @@ from .instancing import baked
 from .model import Mesh, Model
 from .normals import Normals, choose_normals
 from .obj import parse_obj
+from .paths import check_file
 from .pictures import linear_from_srgb
 from .ply import plain_ply
 from .validate import index_problems, mesh_problems
@@ -43,8 +44,7 @@ def read_model(path: Path, normals: Normals = "file") -> Model:
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise SceneError(f"{path}: a model must be one of {', '.join(SUFFIXES)}; convert it")
-    if not path.is_file():
-        raise SceneError(f"{path}: {'is a folder, not a model' if path.is_dir() else 'no such model file'}")
+    check_file(path, "model")
     if suffix in (".glb", ".gltf"):
         from .gltf import read_gltf
         return read_gltf(path, normals)

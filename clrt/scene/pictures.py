@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .decoder import decode
+from .paths import check_file
 from .radiance import read_radiance
 
 #: How a glTF picture's bytes begin, and the ending of a file of that kind.
@@ -23,7 +24,7 @@ def read_picture(path: Path) -> NDArray[np.float32]:
     One channel is grey; alpha is left out. Raises SceneError naming the file if it is missing, empty, damaged, cropped
     (a data window that differs from the display window), or has no colour channels.
     """
-    _check_file(path)
+    _check_stored(path)
     if (radiance := read_radiance(path)) is not None:
         return radiance
     pixels, names = _stored(path, str(path))
@@ -40,7 +41,7 @@ def read_texels(source: Path | bytes, name: str = "") -> NDArray[np.uint8]:
     `read_picture`, and for pictures of floats, which would lose most of what they hold.
     """
     if isinstance(source, Path):
-        _check_file(source)
+        _check_stored(source)
     name = name or str(source)
     pixels, names = _stored(source, name)
     if pixels.dtype == np.float32:
@@ -55,9 +56,8 @@ def read_texels(source: Path | bytes, name: str = "") -> NDArray[np.uint8]:
     return texels
 
 
-def _check_file(path: Path) -> None:
-    if not path.is_file():
-        raise SceneError(f"{path}: {'is a folder, not a picture' if path.is_dir() else 'no such picture file'}")
+def _check_stored(path: Path) -> None:
+    check_file(path, "picture")
     if path.stat().st_size == 0:
         raise SceneError(f"{path}: the picture file is empty; write it again")
 

@@ -148,6 +148,10 @@ file = "nowhere.ply"
 
 @pytest.mark.parametrize(("arguments", "code", "words"), [
     (("render", "missing.toml"), 3, ["missing.toml"]),
+    (("render", "loop.toml"), 3, ["loop.toml: no such scene file"]),
+    (("render", "x.png"), 3, ["x.png: a scene must be one of .toml"]),
+    (("render", "."), 3, [".: is a folder, not a scene"]),
+    (("convert", "nope.obj", "z.toml"), 3, ["nope.obj: no such model file"]),
     (("render", "ball.toml", "-o", "no/such/folder/x.png"), 6, ["no/such/folder"]),
     (("render", "ball.toml", "-o", "x.pgn"), 6, [".pgn", "did you mean", ".png"]),
     (("render", "ball.toml", "--device", "nonesuch"), 4, ["nonesuch"]),
@@ -161,6 +165,8 @@ file = "nowhere.ply"
     (("compare", "ball.toml", "ball.toml"), 3, ["ball.toml"]),
 ])
 def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], code: int, words: list[str]) -> None:
+    scene.with_name("loop.toml").symlink_to("loop.toml")
+    scene.with_name("x.png").touch()
     result = clrt(*arguments, cwd=scene.parent)
     assert result.returncode == code and result.stdout == ""
     assert "Traceback" not in result.stderr and all(word in result.stderr for word in words), result.stderr

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -184,9 +185,13 @@ def test_a_model_shows_its_own_camera(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name, sentence", [("a.toml", "no such scene file"), (".", "is a folder, not a scene"),
+                                            ("a.obj", "no such model file"), ("loop.toml", "no such scene file"),
+                                            ("pipe.toml", "is a device, a pipe or a socket, not a scene"),
                                             ("a.blend", "a scene must be one of .toml, .glb")])
 def test_files_that_are_no_scene(name: str, sentence: str, tmp_path: Path) -> None:
     (tmp_path / "a.blend").touch()
+    (tmp_path / "loop.toml").symlink_to("loop.toml")
+    os.mkfifo(tmp_path / "pipe.toml")
     with pytest.raises(SceneError, match=sentence):
         load(tmp_path / name)
 
