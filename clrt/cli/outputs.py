@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections.abc import Callable
@@ -71,16 +72,16 @@ class Outputs:
             check_plot(self.plot)
 
     def _check_distinct(self, checkpoint: Path | None) -> None:
-        named = {"the scene": self.inputs[:1], "the reference": self.inputs[1:], "a picture (-o)": self.pictures,
+        named = {"a picture (-o)": self.pictures,
                  "where the raw picture is kept": self.raws, "where an AOV is written": self.beside,
                  "the --report": (self.report,), "the --plot": (self.plot,),
                  "the --checkpoint": (checkpoint,), "the checkpoint before": (checkpoint and Path(f"{checkpoint}~"),)}
-        taken: dict[Path, str] = {}
+        taken = {os.path.realpath(path): what for path, what in zip(self.inputs, ("the scene", "the reference"))}
         for what, paths in named.items():
             for path in filter(None, paths):
-                if before := taken.get(path.resolve()):
+                if before := taken.get(real := os.path.realpath(path)):
                     raise UsageError(f"{path}: is {before} and {what}, one of which would be lost; name another file")
-                taken[path.resolve()] = what
+                taken[real] = what
 
     def prepare(self) -> None:
         """Loads what writes pictures while a compiler is at work, so that nothing waits for it in the end."""

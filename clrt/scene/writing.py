@@ -74,7 +74,7 @@ class _Writer:
 
     def __init__(self, scene: Scene, path: Path) -> None:
         self._scene, self._source = scene, scene.source or Source()
-        self._folder, self._stem = path.resolve().parent, path.stem
+        self._folder, self._stem = Path(os.path.realpath(path)).parent, path.stem
         self.files = SceneFiles()
         self._names = {id(material): name for name, material in materials_of(scene).items()}
         self._materials = dict(scene.materials)

@@ -152,6 +152,7 @@ file = "nowhere.ply"
     (("render", "x.png"), 3, ["x.png: a scene must be one of .toml"]),
     (("render", "."), 3, [".: is a folder, not a scene"]),
     (("convert", "nope.obj", "z.toml"), 3, ["nope.obj: no such model file"]),
+    (("render", "ball.toml", "--reference", "ball.toml"), 3, ["ball.toml: cannot be decoded as a picture"]),
     (("render", "ball.toml", "-o", "no/such/folder/x.png"), 6, ["no/such/folder"]),
     (("render", "ball.toml", "-o", "x.pgn"), 6, [".pgn", "did you mean", ".png"]),
     (("render", "ball.toml", "--device", "nonesuch"), 4, ["nonesuch"]),

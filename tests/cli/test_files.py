@@ -60,6 +60,14 @@ def test_nothing_replaces_a_pipe_that_comes_later(folder: Path) -> None:
     assert stat.S_ISFIFO(os.lstat(folder / "pipe").st_mode) and (folder / "link").is_symlink()
 
 
+def test_links_to_themselves_are_replaced(folder: Path) -> None:
+    for arguments in (("render", "ball.toml", "--spp", "1", "-o", "loop.png"), ("convert", "a.obj", "loop.toml")):
+        (folder / arguments[-1]).symlink_to(arguments[-1])
+        result = clrt(*arguments, cwd=folder)
+        assert (result.returncode, result.stdout) == (0, f"{arguments[-1]}\n"), result.stderr
+        assert (folder / arguments[-1]).is_file()
+
+
 @pytest.mark.parametrize("options", [
     ("--report", "ball.toml"), ("--checkpoint", "ball.toml"), ("--checkpoint", "ball"), ("--report", "./ball.toml"),
     ("--report", "w.exr"), ("--plot", "w.exr"), ("-o", "w.exr"), ("--report", "w.json", "--plot", "w.json"),
