@@ -21,6 +21,7 @@ from .sky import SUN, default_sky
 from .source import Origin, Source, material_of, parts_of
 from .texture_table import TextureReader
 from .textures import WHITE, Texture
+from .toml_text import toml_key
 
 Kind = TypeVar("Kind")
 Table = Mapping[str, Any]
@@ -174,11 +175,12 @@ class SceneReader:
 
     def _material(self, values: Table, where: str) -> Material | None:
         """The material that the table names, or None if it names none."""
-        if "material" not in values:
-            return None
-        name = values["material"]
+        return self._named_material(values["material"], f"{where}.material") if "material" in values else None
+
+    def _named_material(self, name: Any, where: str) -> Material:
+        """The material of this name, or a grey one if there is none."""
         if str(name) not in self._materials:
-            self.problems.append(f"{where}.material: {show(name)} {unknown(name, self._materials)}")
+            self.problems.append(f"{where}: {show(name)} {unknown(name, self._materials)}")
         return self._materials.get(str(name), Diffuse())
 
     def _sphere(self, values: Any, where: str) -> Sphere | None:
@@ -226,8 +228,11 @@ class SceneReader:
             return {}
         if pairs and "material" in values:
             self.problems.append(f"{where}: has a material and materials; keep one of them")
-        self.problems += [f'{where}.materials: "{name}" {unknown(name, own)}' for name in pairs if name not in own]
-        return {name: self._material({"material": other}, f"{where}.materials") or Diffuse()
+        named = own - {""}
+        self.problems += [f'{where}.materials: "{name}" '
+                          + (unknown(name, named) if named else "is unknown, since the model names no materials; write "
+                             'material = "NAME"') for name in pairs if name not in own]
+        return {name: self._named_material(other, f"{where}.materials.{toml_key(name)}")
                 for name, other in pairs.items()}
 
     def _instance(self, values: Any, where: str) -> list[Instance]:

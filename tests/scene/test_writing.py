@@ -90,7 +90,7 @@ def test_some_of_a_file_s_materials_are_replaced(tmp_path: Path) -> None:
     assert caught.value.problems == [
         f"{scene}: mesh[0]: has a material and materials; keep one of them",
         f'{scene}: mesh[0].materials: "read" is unknown; did you mean "red"?',
-        f'{scene}: mesh[0].materials.material: "whit" is unknown; did you mean "white"?']
+        f'{scene}: mesh[0].materials.red: "whit" is unknown; did you mean "white"?']
     scene.write_text(head + "materials = 3\n[environment]\nsky = 1\ncolor = [1, 1, 1]\n")
     with pytest.raises(SceneError) as caught:
         load(scene)
