@@ -28,7 +28,8 @@ def check_stops(spp: int | None, time: float | None = None, error: float | None 
         if not isinstance(value, kind) or isinstance(value, bool):
             raise UsageError(f"{name} is {value!r}; give a {'whole ' if kind is Integral else ''}number above 0")
         if not 0 < value < float("inf"):
-            raise UsageError(f"{name} is {value}; it must be above 0")
+            finite = "" if kind is Integral else " and finite"
+            raise UsageError(f"{name} is {value}; it must be above 0{finite}")
 
 
 def checked_percentile(percentile: float | None) -> float | None:

@@ -152,7 +152,7 @@ def _outside(limits: Iterable[Any], value: float, path: str) -> Iterator[str]:
     for limit in limits:
         name, keeps, is_wrong, remedy = _LIMITS[type(limit)]
         if not keeps(value, bound := getattr(limit, name)):
-            yield f"{path}: {show(value)} {is_wrong} {bound:g}; {remedy} {bound:g}"
+            yield f"{path}: {show(value)} {is_wrong} {bound}; {remedy} {bound}"
 
 
 def _fault(kind: Any, value: Any) -> str:

@@ -161,6 +161,7 @@ file = "nowhere.ply"
     (("render", "ball.toml", "--exposure", "nan"), 2, ["exposure is nan", "finite"]),
     (("render", "ball.toml", "--spp", "0"), 2, ["--spp"]),
     (("render", "ball.toml", "--time", "-1"), 2, ["time", "-1"]),
+    (("render", "ball.toml", "--time", "inf"), 2, ["time is inf; it must be above 0 and finite"]),
     (("render", "ball.toml", "-o", "r.exr", "--reference", "r.exr"), 2, ["r.exr", "reference"]),
     (("render", "ball.toml", "--size", "60000x60000"), 4, ["60000x60000", "GiB", "--size"]),
     (("compare", "ball.toml", "ball.toml"), 3, ["ball.toml"]),

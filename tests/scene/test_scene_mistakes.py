@@ -136,6 +136,8 @@ def test_all_mistakes_come_at_once_and_no_others(folder: Path) -> None:
     (f'{MESH}[[instance]]\nmesh = "a"\nscale = 1e38', " takes the mesh beyond the range of float32"),
     (f'{MESH}[[instance]]\nmesh = "a"\nrepeat = 3', "instance[0].repeat: 3 is not a list of tables; write"),
     (f'{MESH}[[instance]]\nmesh = "a"\nrepeat = [{{ scale = 2 }}]', "instance[0].repeat[0]: count is missing; add it"),
+    (f'{MESH}[[instance]]\nmesh = "a"\nrepeat = [{{ count = 3000000 }}]',
+     "instance[0].repeat[0].count: 3000000 is above 2000000; write at most 2000000"),
     (f'{MESH}[[instance]]\nmesh = "a"\nrepeat = [{{ count = 2000 }}, {{ count = 2000 }}]',
      "instance[0].repeat: makes 4000000 copies; write counts of at most 2000000 in all"),
     (f'{MESH}[[instance]]\nmesh = "a"\nrepeat = [{{ count = 400, scale = 9 }}]',
