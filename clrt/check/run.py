@@ -16,10 +16,17 @@ from ..device.child import end_child, last_line, start_child, told_end
 from ..device.describe import DeviceInfo
 from ..device.sources import kernel_digest
 from ..device.verdicts import Verdict
+from ..errors import DeviceError
+
+#: Seconds that any device has enough of, as long as it answers: one that ran out of fewer has not failed.
+LIMIT = 300.0
 
 
 def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] = lambda part: None) -> Verdict:
-    """Checks the device for at most `limit` seconds; `on_part` hears the name of each part as it begins."""
+    """Checks the device for at most `limit` seconds; `on_part` hears the name of each part as it begins.
+
+    DeviceError where nothing was wrong until a limit below LIMIT was over.
+    """
     start, kernels = time.monotonic(), kernel_digest()
     part, failures, figures = "starting", list[str](), dict[str, float | str]()
     with tempfile.TemporaryFile() as errors:
@@ -35,6 +42,9 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
             if child.wait(max(0.0, start + limit - time.monotonic())):
                 failures.append(f"{part}: {told_end(child.returncode)}{last_line(errors)}")
         except (Empty, subprocess.TimeoutExpired):
+            if limit < LIMIT and not failures:
+                raise DeviceError(f"{info.name} cannot be checked: {part} did not finish in {limit:g} s; raise "
+                                  f"--limit ({LIMIT:g} is the default)") from None
             failures.append(f"{part}: it did not finish in {limit:g} s")
         finally:
             end_child(child)

@@ -11,6 +11,7 @@ import click
 
 from ..errors import DeviceError
 from .logs import verbose_option
+from .options import Finite
 
 if TYPE_CHECKING:
     from ..device.describe import DeviceInfo
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 @click.option("--check", is_flag=True, help="Check each against known answers, and keep what is found.")
 @click.option("--bench", is_flag=True, help="Measure how many rays a second each follows, and rank them by that.")
 @click.option("--device", "selectors", multiple=True, metavar="SEL", help="Only this one; may be repeated.")
-@click.option("--limit", type=click.FloatRange(1.0), default=300.0, show_default=True, metavar="SECONDS",
+@click.option("--limit", type=Finite(1.0), default=300.0, show_default=True, metavar="SECONDS",
               help="What a check or measurement of a device may take.")
 @verbose_option
 def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...], limit: float) -> None:
@@ -38,8 +39,9 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     before = [info for info, _ in find_devices(again=True)]
     wanted = [select(selector)[0].id for selector in selectors]
     tried = [info for info in before if (info.id in wanted if wanted else info.usable and info.type != "simulator")]
-    verdicts = {info.id: _checked(info, limit) for info in tried if check}
-    unmeasured = [problem for info in tried if bench and (problem := _measured(info, limit))]
+    verdicts: dict[str, Verdict] = {}
+    problems = [problem for info in tried if check and (problem := _checked(info, limit, verdicts))]
+    problems += [problem for info in tried if bench and (problem := _measured(info, limit))]
     found = [replace(info, check=verdicts.get(info.id, info.check)) for info, _ in find_devices()
              if not wanted or info.id in wanted]
     if as_json:
@@ -51,9 +53,9 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     if preference := preferred_device():
         click.echo(f"{preference.origin} names {preference.selector!r}: device {select()[0].index} is used where none "
                    "is named", err=True)
-    problems = unmeasured + [f"{info.name} failed the check: update the driver and run `clrt devices --check` again; "
-                             "until that passes, it is used only if it is named"
-                             for info in found if info.id in verdicts and info.failed]
+    problems += [f"{info.name} failed the check: update the driver and run `clrt devices --check` again; until that "
+                 "passes, it is used only if it is named"
+                 for info in found if info.id in verdicts and info.failed]
     if problems:
         raise DeviceError("; ".join(problems))
 
@@ -71,15 +73,20 @@ def _measured(info: DeviceInfo, limit: float) -> str:
     return "" if keep_speed(info, speed) else f"{info.name}: its speed cannot be kept"
 
 
-def _checked(info: DeviceInfo, limit: float) -> Verdict:
-    """Checks a device, telling what is going on, and keeps the verdict."""
+def _checked(info: DeviceInfo, limit: float, verdicts: dict[str, Verdict]) -> str:
+    """Checks a device, telling what is going on, and keeps the verdict, also among `verdicts`; returns why there is
+    none."""
     from ..check.run import check_device
     from ..device.verdicts import keep_verdict
 
-    verdict = check_device(info, limit, lambda part: click.echo(f"{info.name}: {part}", err=True))
+    try:
+        verdict = check_device(info, limit, lambda part: click.echo(f"{info.name}: {part}", err=True))
+    except DeviceError as error:
+        return str(error)
     if not keep_verdict(info, verdict):
         click.echo(f"{info.name}: what was found cannot be kept: the cache folder cannot be written", err=True)
-    return verdict
+    verdicts[info.id] = verdict
+    return ""
 
 
 def _lines(info: DeviceInfo) -> Iterator[str]:

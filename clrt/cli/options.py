@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from math import isfinite
 from typing import Any, TypeVar
 
 import click
@@ -21,6 +22,16 @@ class Size(click.ParamType[tuple[int, int]]):
         if not match or not all(1 <= int(n) <= 65536 for n in match.groups()):
             self.fail(f"{value!r} is no size; write WIDTHxHEIGHT with 1 to 65536 pixels, e.g. 640x480", param, context)
         return int(match[1]), int(match[2])
+
+
+class Finite(click.FloatRange):
+    """A range without NaN and infinity, which are within all of click's."""
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> float:
+        number: float = super().convert(value, param, context)
+        if not isfinite(number):
+            self.fail(f"{value!r} is no finite number; write one that is", param, context)
+        return number
 
 
 triangle_option = click.option(

@@ -30,6 +30,8 @@ def patience() -> float:
     """Seconds that a launch or a call may take; infinite where that is not watched."""
     try:
         seconds = float(os.environ.get(VARIABLE) or HANG_SECONDS)
+        if not 0 <= seconds < float("inf"):
+            raise ValueError
     except ValueError:
         raise UsageError(f"{VARIABLE} is {os.environ[VARIABLE]!r}; it must be a number of seconds, or 0") from None
     watched = seconds > 0 and not _counts[UNWATCHED]

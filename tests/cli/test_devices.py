@@ -12,10 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 import clrt
+from clrt.check.run import LIMIT, check_device
+from clrt.cli import devices
 from clrt.device.discover import find_devices
 from clrt.device.open import open_device
+from clrt.errors import DeviceError
 
 from ..check.sabotage import sabotaged
 
@@ -83,16 +87,42 @@ def test_a_device_that_computes_wrong(best: str, tmp_path: Path) -> None:
     assert listed(run(tmp_path, "devices", "--json"), best)["chosen"]
 
 
-@pytest.mark.parametrize(("statement", "limit", "words"), [
-    ("*(volatile global int *)8 = 1;", "300", "the driver crashed with signal 11"),
-    ("volatile int ended = 0; while (!ended);", "6", "it did not finish in 6 s"),
-], ids=["crash", "hang"])
-def test_a_driver_that_does_not_come_back(best: str, tmp_path: Path, statement: str, limit: str, words: str) -> None:
-    result = run(tmp_path, "devices", "--check", "--device", best, "--limit", limit, "--json",
-                 broken=(IN_FLOATS, rf"\g<0>\n    {statement}"))
+def test_a_driver_that_crashes(best: str, tmp_path: Path) -> None:
+    result = run(tmp_path, "devices", "--check", "--device", best, "--json",
+                 broken=(IN_FLOATS, r"\g<0>\n    *(volatile global int *)8 = 1;"))
     assert result.returncode == 4 and "Traceback" not in result.stderr
     failure, = listed(result, best)["check"]["failures"]
-    assert failure.startswith("arithmetic: ") and words in failure
+    assert failure.startswith("arithmetic: ") and "the driver crashed with signal 11" in failure
+
+
+def test_a_kernel_that_never_ends(best: str, tmp_path: Path) -> None:
+    """Within a limit below the default's that is no verdict: a busy machine may be as slow."""
+    broken = (IN_FLOATS, r"\g<0>\n    volatile int ended = 0; while (!ended);")
+    result = run(tmp_path, "devices", "--check", "--device", best, "--limit", "6", "--json", broken=broken)
+    assert result.returncode == 4 and "Traceback" not in result.stderr
+    assert "arithmetic did not finish in 6 s; raise --limit (300 is" in result.stderr
+    assert "check" not in listed(run(tmp_path, "devices", "--json", broken=broken), best)
+
+
+def test_a_check_that_runs_out_of_the_default_limit_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    info = open_device().info
+    with pytest.raises(DeviceError, match="starting did not finish in 0.01 s; raise --limit"):
+        check_device(info, 0.01)
+    monkeypatch.setattr("clrt.check.run.LIMIT", 0.01)
+    verdict = check_device(info, 0.01)
+    assert not verdict.passed and verdict.failures == ["starting: it did not finish in 0.01 s"]
+
+
+@pytest.mark.parametrize(("limit", "words"), [
+    ("nan", "'nan' is no finite number"), ("inf", "'inf' is no finite number"), ("0.5", "0.5 is not in the range")])
+def test_limits_that_are_none(limit: str, words: str) -> None:
+    refused = CliRunner().invoke(devices.command, ["--limit", limit])
+    assert refused.exit_code == 2 and words in refused.output and "--limit" in refused.output
+
+
+def test_the_limit_is_the_one_that_is_enough() -> None:
+    """It is written out so that --help loads nothing."""
+    assert {option.name: option.default for option in devices.command.params}["limit"] == LIMIT
 
 
 def test_a_device_that_is_not_there(tmp_path: Path) -> None:

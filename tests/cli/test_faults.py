@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from clrt.device.pulse import VARIABLE, patience
+from clrt.errors import UsageError
 from clrt.output.images import read_image
 
 from .test_checkpoints import SCENE, arrays, worker_of
@@ -113,3 +115,10 @@ def test_ended_from_outside(folder: Path) -> None:
 def is_running(process: int) -> bool:
     status = Path(f"/proc/{process}/stat")
     return status.exists() and status.read_text().rpartition(")")[2].split()[0] != "Z"
+
+
+@pytest.mark.parametrize("seconds", ["abc", "nan", "inf", "-1"])
+def test_a_patience_that_is_none(seconds: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, seconds)
+    with pytest.raises(UsageError, match=f"CLRT_HANG_SECONDS is '{seconds}'; it must be a number of seconds, or 0"):
+        patience()
