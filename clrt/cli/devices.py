@@ -36,13 +36,14 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     from ..device.discover import NOTHING, as_dict, find_devices, select
     from ..device.preference import preferred_device
 
+    preference = preferred_device()
     before = [info for info, _ in find_devices(again=True)]
     wanted = [select(selector)[0].id for selector in selectors]
     tried = [info for info in before if (info.id in wanted if wanted else info.usable and info.type != "simulator")]
     verdicts: dict[str, Verdict] = {}
     problems = [problem for info in tried if check and (problem := _checked(info, limit, verdicts))]
     problems += [problem for info in tried if bench and (problem := _measured(info, limit))]
-    found = [replace(info, check=verdicts.get(info.id, info.check)) for info, _ in find_devices()
+    found = [replace(info, check=verdicts.get(info.id, info.check)) for info, _ in find_devices(preference=preference)
              if not wanted or info.id in wanted]
     if as_json:
         click.echo(json.dumps([as_dict(info) for info in found], indent=1))
@@ -50,7 +51,7 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
         click.echo("\n".join(line for info in found for line in _lines(info)), nl=bool(found))
     if not found:
         click.echo(NOTHING, err=True)
-    if preference := preferred_device():
+    if preference:
         click.echo(f"{preference.origin} names {preference.selector!r}: device {select()[0].index} is used where none "
                    "is named", err=True)
     problems += [f"{info.name} failed the check: update the driver and run `clrt devices --check` again; until that "

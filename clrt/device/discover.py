@@ -18,7 +18,7 @@ from .describe import DeviceInfo, describe, describe_empty, describe_faulty, siz
 from .fork import check_process
 from .loader import devices_of
 from .platforms import load_platforms
-from .preference import preferred_device
+from .preference import Preference, preferred_device
 from .speeds import kept_speed
 from .verdicts import kept_verdict
 
@@ -28,9 +28,10 @@ ORDER = ("gpu", "accelerator", "cpu", "simulator", "none")
 Found = list[tuple[DeviceInfo, cl.Device | None]]
 
 
-def find_devices(again: bool = False) -> Found:
+def find_devices(again: bool = False, preference: Preference | None = None) -> Found:
     """Every device of every platform, best first, and what is there without one. `chosen` is the one that is used when
-    none is named: no simulator, unless there is nothing else, as they are a thousand times as slow.
+    none is named: of a preference its own, if it has one alone, else no simulator, unless there is nothing else, as
+    they are a thousand times as slow.
 
     again: drivers that were faulty are tried once more, unless this process has loaded its drivers.
     """
@@ -39,12 +40,17 @@ def find_devices(again: bool = False) -> Found:
     infos = [info for info, _ in found]
     usable = [info for info in infos if info.usable]
     chosen = next((info for info in _real(usable) or usable if not info.failed), None)
-    return [(replace(info, chosen=info is chosen, why=_why(info, infos, chosen)), device) for info, device in found]
+    if preference:
+        named = [info for info, _ in _matching(found, preference.selector)]
+        chosen = named[0] if len(named) == 1 and named[0].usable else None
+    origin = preference.origin if preference else ""
+    return [(replace(info, chosen=info is chosen, why=_why(info, infos, chosen, origin)), device)
+            for info, device in found]
 
 
 def devices() -> list[dict[str, Any]]:
-    """What `clrt devices --json` prints: a dict for each device, best first."""
-    return [as_dict(info) for info, _ in find_devices(again=True)]
+    """What `clrt devices --json` prints: a dict for each device, best first. UsageError as of `preferred_device`."""
+    return [as_dict(info) for info, _ in find_devices(again=True, preference=preferred_device())]
 
 
 def as_dict(info: DeviceInfo) -> dict[str, Any]:
@@ -74,9 +80,7 @@ def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
     if selector is None:
         selector, origin = preferred_device() or (None, "")
     asked = f"{selector!r}" + (f" ({origin})" if origin else "")
-    matches = [pair for pair in found if _matches(pair[0], selector)]
-    if str(selector).lower() in ("cpu", "gpu", "none"):
-        matches = sorted((pair for pair in matches if pair[0].usable), key=lambda pair: pair[0].failed)[:1]
+    matches = _matching(found, selector)
     listing = "\n".join(f"  {info.index}  {info.id}  {info.name} ({info.platform}){_trouble(info)}"
                         for info, _ in found)
     if not matches and selector is None and any(info.failed for info, _ in found):
@@ -119,8 +123,9 @@ def _by_speed(found: Found) -> Found:
     return [found[ranked.get(place, place)] for place in range(len(found))]
 
 
-def _why(info: DeviceInfo, infos: list[DeviceInfo], chosen: DeviceInfo | None) -> str:
-    """What is to be said of a device of `infos`: whether and why it was chosen, and what makes it odd."""
+def _why(info: DeviceInfo, infos: list[DeviceInfo], chosen: DeviceInfo | None, origin: str) -> str:
+    """What is to be said of a device of `infos`: whether and why it was chosen, and what makes it odd; origin: what
+    names the chosen one, if anything does."""
     if not info.usable:
         return info.why
     speed = f"{info.bench.mrays:.3g} Mrays/s" if info.bench else "not measured"
@@ -128,7 +133,7 @@ def _why(info: DeviceInfo, infos: list[DeviceInfo], chosen: DeviceInfo | None) -
     if info is chosen:
         rivals = sum(other.usable and not other.failed for other in _real(infos))
         rank = "only one" if rivals <= 1 else "fastest measured" if info.bench else f"largest {info.type}"
-        notes = [f"chosen as the {rank}, {speed}"]
+        notes = [f"chosen as {origin} names it, {speed}" if origin else f"chosen as the {rank}, {speed}"]
     twin = next((other for other in infos[:info.index] if other.usable and _same_hardware(info, other)), None)
     if twin:
         notes.append(f"the same hardware as {twin.index} through another platform")
@@ -164,6 +169,14 @@ def _failures(info: DeviceInfo) -> str:
     """What the first failure of its check was, and how many there were."""
     failures = info.check.failures if info.check else []
     return failures[0] + (f" (and {len(failures) - 1} more)" if len(failures) > 1 else "")
+
+
+def _matching(found: Found, selector: str | int | None) -> Found:
+    """What a selector may mean; of a kind of device the best that did not fail."""
+    matches = [pair for pair in found if _matches(pair[0], selector)]
+    if str(selector).lower() in ("cpu", "gpu", "none"):
+        matches = sorted((pair for pair in matches if pair[0].usable), key=lambda pair: pair[0].failed)[:1]
+    return matches
 
 
 def _matches(info: DeviceInfo, selector: str | int | None) -> bool:

@@ -111,6 +111,22 @@ def test_this_machines_devices() -> None:
     assert json.loads(json.dumps(listed)) == listed
 
 
+def test_the_one_that_is_preferred_is_chosen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Of three devices, all alike: by the variable, then by the file; and none where there is no such device."""
+    own = find_devices()[0][1]
+    monkeypatch.setattr(discover, "load_platforms", lambda again: ([None], {}))
+    monkeypatch.setattr(discover, "devices_of", lambda platform: 3 * [own])
+    monkeypatch.setenv("CLRT_CONFIG", str(tmp_path / "config.toml"))
+    (tmp_path / "config.toml").write_text("device = 2\n")
+    for variable, chosen, origin in [("1", 1, "CLRT_DEVICE"), ("", 2, "config.toml"), ("nonesuch", None, "")]:
+        monkeypatch.setenv("CLRT_DEVICE", variable)
+        listed = devices()
+        assert [row["index"] for row in listed if row["chosen"]] == ([] if chosen is None else [chosen])
+        assert [row["index"] for row in listed if "chosen as" in row["why"]] == ([] if chosen is None else [chosen])
+        assert chosen is None or f"{origin} names it" in listed[chosen]["why"]
+        assert chosen is None or choose()[0].index == chosen
+
+
 def test_open_device_by_index() -> None:
     opened = open_device(0)
     assert opened.info.chosen and opened.lanes in (1, 8) and opened.layout in ("bvh2", "bvh8")
