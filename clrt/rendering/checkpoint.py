@@ -95,6 +95,7 @@ class Checkpoints:
             self._warn(path, header, problems)
             return kept
         if problems:
+            check_replaceable(self.path, FAMILY)    # else to begin anew would be refused, too
             raise CheckpointError(f"{'; '.join(problems)}; there is nothing to go on from: leave out --resume to begin "
                                   "anew")
         _log.warning("%s: there is no checkpoint yet, so the render begins", self.path)

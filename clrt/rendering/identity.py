@@ -43,7 +43,11 @@ def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:
     """What differs between two renders' facts, each in a few words, settings with both values."""
     told = []
     for name, value in wanted.items():
-        if (other := found.get(name)) != value:
+        if (other := found.get(name)) == value:
+            continue
+        if name == "direct_light":
+            told.append(f"{'without' if value == 'True' else 'with'} --aov direct or indirect")
+        else:
             hidden = name in (*PARTS, "kernels")
             told.append(f"other {name}" if hidden else f"{name} {other} instead of {value}")
     return told

@@ -75,7 +75,8 @@ def _other_version(content: bytes, rng: np.random.Generator) -> bytes:
 
 @pytest.mark.parametrize("damage", [_flipped, _cut, _longer, _noise, _other_version])
 def test_damage_is_found(device: Device, kept: Path, caplog: pytest.LogCaptureFixture, damage: Any) -> None:
-    """200 times: the older generation is used and a warning says so; without one that is whole it is refused."""
+    """200 times: the older generation is used and a warning says so; without one that is whole it is refused, with
+    what to do."""
     rng, content = np.random.default_rng(4), kept.read_bytes()
     checkpoints = renderer(device, checkpoint=kept, resume=True)._checkpoints
     assert checkpoints is not None
@@ -88,7 +89,7 @@ def test_damage_is_found(device: Device, kept: Path, caplog: pytest.LogCaptureFi
     whole = older(kept).read_bytes()
     for _ in range(20):
         older(kept).write_bytes(damage(whole, rng))
-        with pytest.raises(CheckpointError, match="--resume"):
+        with pytest.raises(CheckpointError, match="leave out --resume|remove it first"):
             checkpoints.read(SIZE)
 
 
@@ -156,6 +157,24 @@ def test_other_settings_are_refused(device: Device, kept: Path, other: dict[str,
     with pytest.raises(CheckpointError) as refused:
         renderer(device, checkpoint=kept, resume=True, **other)
     assert named in str(refused.value) and str(kept) in str(refused.value) and "--resume" in str(refused.value)
+
+
+def test_a_film_with_or_without_direct_light_is_refused(device: Device, kept: Path, tmp_path: Path) -> None:
+    """In the words of the option that asks for it."""
+    with pytest.raises(CheckpointError, match=r"another render \(without --aov direct or indirect\)"):
+        renderer(device, checkpoint=kept, resume=True, aovs="indirect")
+    run(renderer(device, checkpoint=tmp_path / "b.ck", aovs="direct"), spp=1)
+    with pytest.raises(CheckpointError, match=r"another render \(with --aov direct or indirect\)"):
+        renderer(device, checkpoint=tmp_path / "b.ck", resume=True)
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_file_that_is_no_checkpoint_is_kept(device: Device, tmp_path: Path, resume: bool) -> None:
+    """To begin anew would be refused, so that is not what is advised."""
+    (tmp_path / "a.ck").write_text("a letter")
+    with pytest.raises(CheckpointError, match="is no checkpoint, so it is not replaced; name another file, or remove"):
+        renderer(device, checkpoint=tmp_path / "a.ck", resume=resume)
+    assert (tmp_path / "a.ck").read_text() == "a letter"
 
 
 def test_other_scenes_and_kernels_are_refused(device: Device, kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
