@@ -240,10 +240,15 @@ def _write(renderer: Renderer, state: State, results: Outputs, denoiser: Denoise
 
 def _read_reference(path: Path, size: tuple[int, int]) -> Any:
     from ..output.images import read_image
+    from ..rendering.state import check_reference
 
     pixels = read_image(path)
     height, width = pixels.shape[:2]
     if (width, height) != size:
         raise UsageError(f"{path}: the reference is {width}x{height}, the picture {size[0]}x{size[1]}; "
                          f"use --size {width}x{height}")
+    try:
+        check_reference(pixels, size)
+    except UsageError as error:
+        raise UsageError(f"{path}: the {error}") from error
     return pixels

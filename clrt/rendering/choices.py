@@ -45,7 +45,8 @@ class Choices:
 
     def __post_init__(self) -> None:
         known: dict[str, tuple[object, ...]] = {"layout": (None, *TREES), "builder": (None, *BUILDER_NAMES),
-                                                "lanes": LANES, "paths": (None, *PATHS), "offset": tuple(OFFSETS)}
+                                                "lanes": LANES, "paths": (None, *PATHS), "offset": tuple(OFFSETS),
+                                                "tree": (None, True, False)}
         for name, values in known.items():
             if (value := getattr(self, name)) not in values:
                 named = ", ".join(str(known_value) for known_value in values if known_value is not None)

@@ -19,7 +19,7 @@ from ..accel.kernels import HitTests
 from ..device.open import Device, name_of, open_devices
 from ..errors import DeviceError, UsageError
 from ..scene.model import Camera, RenderSettings, Scene
-from ..scene.validate import validate
+from ..scene.validate import check_is_scene, validate
 from .accumulation import Accumulation
 from .adaptive import FLOOR_SPP, MOST_TIMES_PLANNED
 from .aovs import check_light, chosen_aovs, film_aovs, needs_direct_light, seen_first
@@ -57,8 +57,7 @@ class Renderer:
     that is of no use any more; what it has on the devices is taken over as far as its scene is the same: parts of a
     scene that are the same objects must not have been changed in place. aovs: names of pictures made beside
     (docs/aovs.md), see `aovs`. first_hits: whether its session will be asked for a denoiser's guides, or for what is
-    seen first.
-    Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
+    seen first. Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
 
     stop_reason: str | None
@@ -74,6 +73,7 @@ class Renderer:
                  on_phase: Callable[[str], None] = lambda phase: None, aovs: str | Iterable[str] = (),
                  checkpoint: str | Path | None = None, resume: bool = False, checkpoint_seconds: float = 30.0,
                  before: Renderer | None = None, first_hits: bool = False) -> None:
+        check_is_scene(scene)
         check_stops(spp)
         self._aovs, self._percentile = chosen_aovs(aovs), checked_percentile(error_percentile)
         given: dict[str, Any] = {"size": size, "spp": spp, "max_depth": max_depth, "seed": seed, "filter": filter,

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from os import PathLike
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
+from ..errors import SceneError, UsageError
 from .animation import Animation, animation_problems
 from .fields import field_problems, show
 from .instance_problems import matrix_problems
@@ -18,6 +19,14 @@ from .model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettin
 
 #: What a mesh may have for each vertex, and of how many numbers.
 CORNERS = {"normals": (3,), "uv": (2,), "uv1": (2,), "colors": (3, 4), "tangents": (4,)}
+
+
+def check_is_scene(scene: object) -> None:
+    """UsageError unless it is one."""
+    if isinstance(scene, (str, PathLike)):
+        raise UsageError(f"scene is the path {str(scene)!r}; read it with clrt.load")
+    if not isinstance(scene, Scene):
+        raise UsageError(f"scene is a {type(scene).__name__}; give a clrt.Scene")
 
 
 def validate(scene: Scene) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -91,7 +92,8 @@ def test_impossible_conditions_are_refused(renderer: Renderer, stops: dict[str, 
 
 @pytest.mark.parametrize("reference, said", [
     (np.zeros((4, 4, 3)), "of shape \\(4, 4, 3\\); give a numpy array of the picture's, \\(30, 40, 3\\)"),
-    ("full.exr", "read it with clrt.output.images.read_image"), (np.full((30, 40, 3), "1"), "give real numbers")])
+    ("full.exr", "read it with clrt.output.images.read_image"), (np.full((30, 40, 3), "1"), "give real numbers"),
+    (np.where(np.arange(3600).reshape(30, 40, 3) < 5, [np.nan, np.inf, 1], 1), "2 pixels that are NaN or infinite")])
 def test_what_is_no_reference_is_refused(renderer: Renderer, reference: Any, said: str) -> None:
     with pytest.raises(UsageError, match=said):
         next(renderer.passes(spp=1, reference=reference))
@@ -113,11 +115,20 @@ def test_two_that_take_turns(renderer: Renderer, other: int, rest: list[int]) ->
 
 
 @pytest.mark.parametrize("chosen", [{"layout": "octree"}, {"lanes": 3}, {"triangle": "square"}, {"builder": "hope"},
-                                    {"spp": "4"}, {"spp": 1.5}],
+                                    {"spp": "4"}, {"spp": 1.5}, {"tree": "off"}],
                          ids=str)
 def test_unknown_choices_are_refused(device: Device, chosen: dict[str, object]) -> None:
     with pytest.raises(UsageError, match=next(iter(chosen))):
         Renderer(Scene(), device=device.info.index, **chosen)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("scene", "words"), [
+    ("scenes/cornell.toml", "scene is the path 'scenes/cornell.toml'; read it with clrt.load"),
+    (Path("a.glb"), "scene is the path 'a.glb'; read it with clrt.load"),
+    (Camera(), "scene is a Camera; give a clrt.Scene")], ids=str)
+def test_what_is_no_scene_is_refused(scene: Any, words: str) -> None:
+    with pytest.raises(UsageError, match=words):
+        Renderer(scene)
 
 
 def test_no_device_at_all_is_refused() -> None:

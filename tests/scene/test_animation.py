@@ -147,6 +147,12 @@ def test_mistakes_in_the_file_are_told_together(tmp_path: Path) -> None:
         'keyframe[1]: key "tim" is unknown; did you mean "time"?', "keyframe[2].look_at: [0, 1] has 2 entries; write 3"]
 
 
+@pytest.mark.parametrize("count", [0, -24])
+def test_a_turntable_without_frames(count: int) -> None:
+    with pytest.raises(UsageError, match=f"frames is {count}; a turntable has at least 1"):
+        turntable(Scene(), count)
+
+
 @pytest.mark.parametrize(("scene", "chosen", "kind", "words"), [
     (Scene(name="still"), None, SceneError, "still: nothing moves"),
     (turntable(Scene(), 8), [3, 8], UsageError, "scene has no frame 8; its frames are 0 to 7")])
