@@ -73,8 +73,8 @@ class Animation:
 
 
 def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
-    """The scene, its camera going once around in so many frames, at least one. UsageError for fewer, and unless `fps` is
-    above 0 and finite."""
+    """The scene, its camera going once around in so many frames, at least one. UsageError for fewer, and unless `fps`
+    is above 0 and finite."""
     if not frames >= 1:
         raise UsageError(f"frames is {frames}; a turntable has at least 1")
     if not 0 < fps < np.inf:

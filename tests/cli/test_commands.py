@@ -158,6 +158,7 @@ file = "nowhere.ply"
     (("render", "ball.toml", "--device", "nonesuch"), 4, ["nonesuch"]),
     (("render", "ball.toml", "--size", "0x4"), 2, ["0x4"]),
     (("render", "ball.toml", "--view", "srbg"), 2, ["srbg"]),
+    (("render", "ball.toml", "-q", "--view", "ocio:Nope"), 2, ["no view 'Nope'"]),
     (("render", "ball.toml", "--exposure", "nan"), 2, ["exposure is nan", "finite"]),
     (("render", "ball.toml", "--spp", "0"), 2, ["--spp"]),
     (("render", "ball.toml", "--time", "-1"), 2, ["time", "-1"]),
@@ -172,6 +173,7 @@ def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], co
     result = clrt(*arguments, cwd=scene.parent)
     assert result.returncode == code and result.stdout == ""
     assert "Traceback" not in result.stderr and all(word in result.stderr for word in words), result.stderr
+    assert "leaked" not in result.stderr    # what OpenImageIO tells at exit of its own that is still there
 
 
 def test_print_kernel_prints_what_the_scene_needs(scene: Path) -> None:
