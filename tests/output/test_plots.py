@@ -66,13 +66,14 @@ def test_nothing_to_draw_and_other_formats_are_fine(tmp_path: Path) -> None:
         check_plot(tmp_path / "a.txt")
 
 
-@pytest.mark.parametrize("command", [["render", "no_such_scene.toml"], ["bench", "converge", "no_such_scene.toml"]])
+@pytest.mark.parametrize("command", [["render", "a.toml"], ["bench", "converge", "a.toml"]])
 def test_missing_matplotlib_is_told_first(command: list[str], tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text("no scene")
     program = f"""
 import sys
 sys.modules["matplotlib"] = None
 from clrt.cli import main
-main({[*command, "--plot", "a.png"]!r})
+main({[*command, "--plot", "plot.png"]!r})
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 2 and "pip install 'clrt[plot]'" in done.stderr and "Traceback" not in done.stderr
