@@ -115,11 +115,13 @@ class Launches:
 
 
 def run_seconds(event: cl.Event) -> float:
-    """How long a launch that has ended ran, by the device's own clock; 0 where it does not tell."""
+    """How long a launch that has ended ran, by the device's own clock; 0 where it does not tell: for rusticl's all take
+    a nanosecond."""
     try:
-        return 1e-9 * max(0, event.profile.end - event.profile.start)
+        nanoseconds = event.profile.end - event.profile.start
     except cl.Error:
         return 0.0
+    return 1e-9 * nanoseconds if nanoseconds > 1 else 0.0
 
 
 def run_kernel(device: Device, kernel: cl.Kernel, groups: int) -> None:
