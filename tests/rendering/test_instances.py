@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.device.open import Device
-from clrt.rendering import placements
 from clrt.rendering.compile import compile_scene
 from clrt.rendering.first_hits import first_hits
 from clrt.rendering.guides import render_guides
@@ -20,9 +19,8 @@ from clrt.scene.lights import DirectionalLight
 from clrt.scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.textures import Picture, Texture
-from clrt.study.cases.instances import lit_plane, transforms_of_kinds
-from clrt.study.cases.subject import Subject
-from clrt.study.probe import Probe, choices
+from clrt.study.cases.instances import transforms_of_kinds
+from clrt.study.probe import choices
 from clrt.study.significance import mean_test
 
 from . import rays
@@ -238,31 +236,6 @@ def test_only_what_saves_memory_becomes_instances(device: Device, monkeypatch: p
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
     once = replace(few, instances=[*few.instances, Instance(ball(), few.instances[0].to_world)])
     assert compile_scene(once, choices(device)).instances == 12
-
-
-def test_planes_do_not_shadow_themselves(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor are they met by any of the rays that leave them, but were, if the bound of their points left out the rounding
-    of the way to the mesh's frame, and rays left from there."""
-    scene = replace(lit_plane(transforms_of_kinds()["turned"][0]), render=replace(SETTINGS, integrator="direct"))
-    assert Subject(device.info.index).picture(scene).all()
-    assert not np.any(met_again(Probe(device, scene), scene))
-    monkeypatch.setattr(placements, "ROUNDINGS", 0.0)
-    at_the_bound = {"LEAST * largest(absolute3(p))": "ZERO"}
-    assert np.any(met_again(Probe(device, scene, changes=at_the_bound), scene))
-
-
-def met_again(probe: Probe, scene: Scene) -> NDArray[np.bool_]:
-    """(n,), of rays that leave the first instance, a plane, on its camera's side: whether they meet anything."""
-    rng, count = np.random.default_rng(5), 1 << 17
-    corners, eye = by_hand(scene.instances[0]).vertices.astype(np.float64), np.array(scene.camera.position)
-    centre = corners.mean(axis=0)
-    axes = np.linalg.svd(corners - centre, full_matrices=False)[2]
-    normal = axes[2] * np.sign((eye - centre) @ axes[2])
-    points = centre + (rng.uniform(-0.2, 0.2, (count, 2)) * np.ptp((corners - centre) @ axes[:2].T, axis=0)) @ axes[:2]
-    leave = rng.normal(size=(count, 3))
-    leave += (np.abs(leave @ normal) - leave @ normal)[:, None] * normal
-    out = probe("leave", 14, np.broadcast_to(eye, points.shape), points - eye, leave)
-    return np.asarray((out[:, 0] >= 0) & np.isfinite(out[:, 13]))
 
 
 def test_checkpoints_tell_instances_apart() -> None:
