@@ -1,9 +1,10 @@
 """Lets PoCL 3.0, the one that pip installs, run on processors newer than its compiler.
 
-Its LLVM 14 knows no processor after AMD's Zen 4 and calls those "generic", a name that its own front end then
-refuses: every program fails with "unknown target CPU 'generic'". The name is a pointer in PoCL's device structure,
-beside the target triple; `name_processor` points it at the best processor that LLVM 14 knows and this machine can
-run. It touches nothing unless exactly one such pair is found.
+Its LLVM 14 knows no processor after AMD's Zen 3 rightly. Zen 4 it takes for Zen 3, which has no AVX-512, while PoCL
+links its library for AVX-512: LLVM then aborts at the first fma. Later ones it calls "generic", a name that its own
+front end refuses: every program fails with "unknown target CPU 'generic'". The name is a pointer in PoCL's device
+structure, beside the target triple; `name_processor` points it at the best processor that LLVM 14 knows and this
+machine can run. It touches nothing unless exactly one such pair is found.
 """
 
 from __future__ import annotations
@@ -39,16 +40,21 @@ def best_processor(flags: set[str]) -> str:
     return next((name for name, needs in PROCESSORS.items() if needs <= flags), "x86-64")
 
 
+def is_misnamed(name: str, flags: set[str]) -> bool:
+    """Whether LLVM 14 calls a processor with these instructions by a wrong name."""
+    return name == "generic" or (name == "znver3" and "avx512f" in flags)
+
+
 def name_processor(device: cl.Device) -> bool:
-    """Gives the PoCL device a processor name its compiler knows; True where the name was "generic" and is replaced."""
+    """Gives the PoCL device a processor name its compiler knows; True where the name was wrong and is replaced."""
     if "LLVM 14" not in device.platform.version or not Path("/proc/self/mem").exists():
-        return False
-    found = [offset for offset, text, neighbour in _strings(device.int_ptr)
-             if text == "generic" and neighbour.startswith("x86_64")]
-    if len(found) != 1:
         return False
     flags = next((set(line.split(":")[1].split()) for line in Path("/proc/cpuinfo").read_text().splitlines()
                   if line.startswith("flags")), set())
+    found = [offset for offset, text, neighbour in _strings(device.int_ptr)
+             if is_misnamed(text, flags) and neighbour.startswith("x86_64")]
+    if len(found) != 1:
+        return False
     _names.append(ctypes.create_string_buffer(best_processor(flags).encode()))
     ctypes.c_uint64.from_address(device.int_ptr + found[0]).value = ctypes.addressof(_names[-1])
     return True

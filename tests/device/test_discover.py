@@ -144,6 +144,14 @@ def test_best_processor(flags: set[str], name: str) -> None:
     assert pocl.best_processor(flags) == name
 
 
+@pytest.mark.parametrize(("name", "flags", "wrong"), [
+    ("generic", set(), True), ("znver3", SKYLAKE, True), ("znver3", SKYLAKE - {"avx512f"}, False),
+    ("icelake-server", SKYLAKE, False)])
+def test_names_of_processors_newer_than_the_compiler(name: str, flags: set[str], wrong: bool) -> None:
+    """Zen 4 by Zen 3's name, and all later ones; a Zen 3 keeps its own."""
+    assert pocl.is_misnamed(name, flags) == wrong
+
+
 def test_a_named_processor_stays(device: Device) -> None:
     """Once named, or known from the start, nothing is touched again."""
     assert not pocl.name_processor(device.cl)
