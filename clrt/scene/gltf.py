@@ -182,12 +182,10 @@ def _corners(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> ND
 def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
     """One warning that names what the picture will lack."""
     primitives = [primitive for mesh in document.meshes for primitive in mesh.primitives]
-    looks = [material.extensions for material in document.materials]
     left_out = {
         "skins": any(node.skin is not None for node in document.nodes),
         "morph targets": any(primitive.targets for primitive in primitives),
         "points and lines": any(primitive.mode < TRIANGLES for primitive in primitives),
-        "textures of sheen's roughness": any(look.KHR_materials_sheen.sheenRoughnessTexture for look in looks),
     }
     names = [name for name, present in left_out.items() if present]
     names += sorted(f"the extension {name}" for name in set(document.extensionsUsed) - gltf.EXTENSIONS)

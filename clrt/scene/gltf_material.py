@@ -81,7 +81,7 @@ class Materials:
             "clearcoat_normal_map": self._bend(coat.clearcoatNormalTexture if coat.clearcoatFactor > 0 else None,
                                                primitive, user),
             "sheen_color": color(_cut(sheen.sheenColorFactor), sheen.sheenColorTexture),
-            "sheen_roughness": _unit(sheen.sheenRoughnessFactor),
+            "sheen_roughness": number(sheen.sheenRoughnessFactor, sheen.sheenRoughnessTexture, "alpha"),
             "specular": number(specular.specularFactor, specular.specularTexture, "alpha"),
             "specular_color": color(_positive(specular.specularColorFactor), specular.specularColorTexture),
             "transmission": number(transmission.transmissionFactor, transmission.transmissionTexture, "red")}

@@ -11,7 +11,6 @@ from annotated_types import Ge, Le
 from .material import ALPHA_MIN, Albedo, Material, Parameter, Radiance, Unit
 from .microfacets import fitted_loss, multiple_scattering
 from .presets import F0_PRESETS, Preset
-from .sheen import fitted_albedo, power
 from .textures import Texture
 
 Smith = Literal["height_correlated", "separable", "schlick", "schlick_ibl"]
@@ -41,7 +40,7 @@ class MetallicRoughness(Material):
     """
 
     kernel: ClassVar[str] = "metallic_roughness"
-    parts: ClassVar[tuple[str, ...]] = ("LAYERS",)
+    parts: ClassVar[tuple[str, ...]] = ("LAYERS", "SHEEN")
     color: Albedo | Texture = (0.8, 0.8, 0.8)
     metallic: Unit | Texture = 0.0
     roughness: Unit | Texture = 0.5
@@ -55,7 +54,7 @@ class MetallicRoughness(Material):
     clearcoat_roughness: Unit | Texture = 0.0
     clearcoat_normal_map: Texture | None = None
     sheen_color: Albedo | Texture = (0.0, 0.0, 0.0)
-    sheen_roughness: Unit = 0.0
+    sheen_roughness: Unit | Texture = 0.0
     transmission: Unit | Texture = 0.0
 
     def parameters(self) -> dict[str, Parameter]:
@@ -82,8 +81,7 @@ class MetallicRoughness(Material):
             values |= {"clearcoat": self.clearcoat, "clearcoat_roughness": self.clearcoat_roughness}
             values |= {} if self.clearcoat_normal_map is None else {"clearcoat_normal_map": self.clearcoat_normal_map}
         if "SHEEN" in has:
-            values |= {"sheen_color": self.sheen_color, "sheen_power": power(self.sheen_roughness),
-                       "sheen_albedo": fitted_albedo(self.sheen_roughness)}
+            values |= {"sheen_color": self.sheen_color, "sheen_roughness": self.sheen_roughness}
         return values | ({"transmission": self.transmission} if "THROUGH" in has else {})
 
     @property

@@ -1,6 +1,6 @@
 // What may lie on a metallic_roughness surface, and what may pass through it, as glTF's extensions have them:
 //   CLEARCOAT  a clear film over all, F0 = 0.04: factor `clearcoat`, GGX of its own roughness
-//   SHEEN      fibres over the rest: sheen_color·D(h)·V (scene/sheen.py), with n = sheen_power
+//   SHEEN      fibres over the rest: sheen_color·D(h)·V (sheen.cl)
 //   THROUGH    the part `transmission` of the body is a thin sheet, which passes light on through microfacets, not bent:
 //              color·(1 − F(wo·h))·G·D/(4·cos wo·cos wi), wi mirrored to wo's side
 //
@@ -30,16 +30,9 @@ static inline real coat_fresnel(const struct metallic_roughness *m, real cos_the
 #endif
 
 #if SHEEN
-static inline real sheen_albedo(const struct metallic_roughness *m, real cos_theta) {
-    real x = 2.0f * sqrt(minimum(absolute(cos_theta), ONE)) - 1.0f, sum = ZERO;
-    for (int k = SHEEN_COEFFICIENTS - 1; k >= 0; --k) sum = sum * x + m->sheen_albedo[k];
-    return maximum(sum, ZERO);
-}
-
 static inline real3 sheen_value(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    real z = normalize3(add(wo, wi)).z, n = m->sheen_power;
-    real d = (2.0f + n) * (0.5f / PI) * exp(0.5f * n * log(maximum(1.0f - z * z, (real)(1e-30f))));
-    real bounds = maximum(sheen_albedo(m, wo.z), ONE) * maximum(sheen_albedo(m, wi.z), ONE);
+    real d = fibres_d(&m->fibres, normalize3(add(wo, wi)).z);
+    real bounds = maximum(fibres_albedo(&m->fibres, wo.z), ONE) * maximum(fibres_albedo(&m->fibres, wi.z), ONE);
     return scale(m->sheen, IF_ABOVE(wo, wi, d * wi.z / (4.0f * (wo.z + wi.z - wo.z * wi.z) * bounds)));
 }
 #endif
@@ -55,7 +48,7 @@ static inline real under_coat(const struct metallic_roughness *m, real3 wo, real
 
 static inline real under_sheen(const struct metallic_roughness *m, real3 wo, real3 wi) {
 #if SHEEN
-    return 1.0f - largest(m->sheen) * minimum(maximum(sheen_albedo(m, wo.z), sheen_albedo(m, wi.z)), ONE);
+    return 1.0f - largest(m->sheen) * minimum(maximum(fibres_albedo(&m->fibres, wo.z), fibres_albedo(&m->fibres, wi.z)), ONE);
 #else
     return ONE;
 #endif
@@ -79,7 +72,7 @@ static inline LayerShares layer_shares(const struct metallic_roughness *m, real3
     left -= share.coat;
 #endif
 #if SHEEN
-    real albedo = minimum(sheen_albedo(m, base_o.z), ONE);
+    real albedo = minimum(fibres_albedo(&m->fibres, base_o.z), ONE);
     share.sheen = left * luminance(m->sheen) * albedo;
     left *= 1.0f - largest(m->sheen) * albedo;
 #endif
@@ -145,7 +138,7 @@ static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m
 #endif
     albedo = scale(albedo, under_sheen(m, straight, straight));
 #if SHEEN
-    albedo = mad3(m->sheen, sheen_albedo(m, ONE), albedo);
+    albedo = mad3(m->sheen, fibres_albedo(&m->fibres, ONE), albedo);
 #endif
     albedo = scale(albedo, under_coat(m, straight, straight));
 #if CLEARCOAT

@@ -17,13 +17,13 @@
 // LAYERS: what lies on it and passes through it (layers.cl).
 #include "bsdf/ggx.cl"
 #include "bsdf/interface.cl"
+#include SHEEN_FILE
 
 #if LAYERS
 #define BASE(name) base_##name
 #else
 #define BASE(name) metallic_roughness_##name
 #endif
-#define SHEEN_COEFFICIENTS ((int)(sizeof(((MetallicRoughness *)0)->sheen_albedo) / sizeof(float)))
 #define LOSS_COEFFICIENTS ((int)(sizeof(((MetallicRoughness *)0)->loss) / sizeof(float)))
 
 struct metallic_roughness {
@@ -46,7 +46,7 @@ struct metallic_roughness {
 #endif
 #if SHEEN
     real3 sheen;
-    real sheen_power, sheen_albedo[SHEEN_COEFFICIENTS];
+    Fibres fibres;
 #endif
 #if THROUGH
     real3 through;
@@ -85,9 +85,7 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
 #endif
 #if SHEEN
     m.sheen = PARAMETER3(metallic_roughness, sheen_color);
-    m.sheen_power = PARAMETER(metallic_roughness, sheen_power);
-    for (int k = 0; k < SHEEN_COEFFICIENTS; ++k)
-        m.sheen_albedo[k] = GATHER(real, scene->metallic_roughness, index, .sheen_albedo[k]);
+    m.fibres = fibres_of(PARAMETER(metallic_roughness, sheen_roughness));
 #endif
 #if THROUGH
     real transmission = PARAMETER(metallic_roughness, transmission);

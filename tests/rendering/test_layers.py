@@ -8,13 +8,13 @@ import pytest
 from clrt.device.open import Device
 from clrt.rendering.choices import Choices
 from clrt.rendering.compile import compile_scene
-from clrt.scene import sheen
 from clrt.scene.materials import MetallicRoughness
 from clrt.scene.model import Scene, Sphere
 from clrt.study.bsdfs import bsdfs, uniform
 from clrt.study.probe import Doubles
 from clrt.study.scattering import FLIP, above
 
+from . import sheen
 from .ggx import masking
 
 COLOR = (0.8, 0.5, 0.2)
@@ -121,6 +121,6 @@ def test_who_has_no_layers_compiles_none(device: Device) -> None:
         return compile_scene(Scene(spheres=[ball]), Choices(device.lanes)).source
 
     plain = program()
-    assert "bsdf/layers.cl" not in plain and "clearcoat;" not in plain and "sheen_power;" not in plain
+    assert "bsdf/layers.cl" not in plain and "clearcoat;" not in plain and "bsdf/sheen.cl" not in plain
     assert "bsdf/layers.cl" in program(clearcoat=1.0) and "bsdf/layers.cl" not in program(specular=0.5, ior=2.0)
     assert MetallicRoughness(ior=2.0).features() == MetallicRoughness().features()

@@ -73,14 +73,17 @@ def test_layers_and_glass(tmp_path: Path) -> None:
         "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25,
                                     "clearcoatRoughnessTexture": texture,
                                     "clearcoatNormalTexture": {"index": 0, "scale": 0.75}},
-        "KHR_materials_sheen": {"sheenColorFactor": [0.1, 0.2, 0.3], "sheenRoughnessFactor": 0.4},
+        "KHR_materials_sheen": {"sheenColorFactor": [0.1, 0.2, 0.3], "sheenRoughnessFactor": 0.4,
+                                "sheenRoughnessTexture": texture},
         "KHR_materials_specular": {"specularTexture": texture, "specularColorFactor": [2, 1, 0.5]},
         "KHR_materials_ior": {"ior": 1.33}, "KHR_materials_transmission": {"transmissionFactor": 0.75}})
     coat, specular, bent = layered.clearcoat_roughness, layered.specular, layered.clearcoat_normal_map
     assert layered.normal_map is None and bent is not None and bent.factor == 0.75
     assert layered.without_textures().clearcoat_normal_map is None
     assert isinstance(coat, Texture) and (coat.factor, coat.channel) == (0.25, "green")
-    assert layered == replace(layered, sheen_color=(0.1, 0.2, 0.3), sheen_roughness=0.4)
+    wool = layered.sheen_roughness
+    assert isinstance(wool, Texture) and (wool.factor, wool.channel) == (0.4, "alpha")
+    assert layered == replace(layered, sheen_color=(0.1, 0.2, 0.3))
     assert isinstance(specular, Texture) and specular.channel == "alpha"
     assert layered == replace(layered, specular_color=(2, 1, 0.5), ior=1.33, transmission=0.75, clearcoat=0.5)
     gltf = ball()
@@ -92,13 +95,6 @@ def test_layers_and_glass(tmp_path: Path) -> None:
     gltf.document["meshes"][0]["primitives"][0]["material"] = 0
     assert read(gltf, tmp_path).meshes[0].material == Dielectric(
         color=(1, 0.5, 1), ior=1.4, roughness=0.5, attenuation_color=(0.5, 1, 1), attenuation_distance=2)
-
-
-def test_what_layers_lack_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    texture = {"index": 0}
-    textured((255, 255, 255), tmp_path, extensions={
-        "KHR_materials_sheen": {"sheenColorFactor": [1, 1, 1], "sheenRoughnessTexture": texture}})
-    assert "left out: textures of sheen's roughness" in caplog.text
 
 
 def test_missing_texture_is_grey_with_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
