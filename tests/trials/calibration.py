@@ -12,13 +12,13 @@ from clrt.study.calibration import RIGHT, calibration, noise_ratio
 from .references import true_relmse, with_references
 
 LEVELS = (2, 4, 8, 16, 32, 64, 128, 256)
-#: Below it, all that is known is one difference, of one sample and two.
-FEWEST = 4
+#: Pictures of fewer samples are left out of what is told last. Of two, all that is known is one difference.
+FEWEST = (4, 8)
 SEEDS = 3
 
 
 def trial() -> Iterator[str]:
-    every: list[float] = []
+    every: dict[int, list[float]] = {spp: [] for spp in LEVELS}
     yield f"{'scene':18}" + "".join(f"{spp:>7}" for spp in LEVELS) + f"  samples a pixel; medians of {SEEDS} seeds"
     for path, scene, reference in with_references():
         medians = []
@@ -30,8 +30,9 @@ def trial() -> Iterator[str]:
                 error = true_relmse(state, reference) + reference.relmse
                 ratios.append(noise_ratio(state.noise or 0.0, error, reference.relmse))
             medians.append(median(ratios))
-            every += [ratio for ratio in ratios if isfinite(ratio) and spp >= FEWEST]
+            every[spp] += filter(isfinite, ratios)
         yield f"{path.stem:18}" + "".join(f"{ratio:7.2f}" for ratio in medians)
-    told = calibration(every)
-    yield (f"of {told['pictures']} pictures of {FEWEST} samples or more {told['within']:.1%} are right to {RIGHT}; "
-           f"median {told['median']:.2f}, worst {told['worst']:.2f}")
+    for fewest in FEWEST:
+        told = calibration([ratio for spp in LEVELS if spp >= fewest for ratio in every[spp]])
+        yield (f"of {told['pictures']} pictures of {fewest} samples or more {told['within']:.1%} are right to {RIGHT}; "
+               f"median {told['median']:.2f}, worst {told['worst']:.2f}")
