@@ -1,6 +1,6 @@
 """The file of a checkpoint: a header and arrays, with a checksum, in two generations.
 
-    clrt checkpoint 2\\n
+    clrt checkpoint 3\\n
     JSON in one line: {"header": …, "shapes": {name: [rows, columns …], …}}\\n
     the arrays' bytes, one after the other
     SHA-256 of all that, 32 bytes

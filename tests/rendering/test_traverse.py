@@ -128,9 +128,9 @@ def test_ties_are_broken_alike(device: Device, kind: str) -> None:
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_flat_grid_along_the_axes(device: Device, layout: str) -> None:
-    """Straight down, with zeros of both signs, onto 5000 triangles of one plane: corners, edges, faces, the border."""
-    vertices, faces = rays.grid(50)
-    x, z = np.meshgrid(np.arange(0, 50.25, 0.25), np.arange(0, 50.25, 0.25))
+    """Straight down, with zeros of both signs, onto 1250 triangles of one plane: corners, edges, faces, the border."""
+    vertices, faces = rays.grid(25)
+    x, z = np.meshgrid(np.arange(0, 25.25, 0.25), np.arange(0, 25.25, 0.25))
     origin = np.column_stack([x.ravel(), np.full(x.size, 3.0), z.ravel()])
     scene = Scene(meshes=[Mesh(vertices, faces)])
     probe, no_tree = Probe(device, scene, layout=layout), Probe(device, scene, layout="list")
@@ -141,7 +141,7 @@ def test_flat_grid_along_the_axes(device: Device, layout: str) -> None:
         listed = no_tree("closest_hit", 4, origin * [1, side, 1], down)
         lost.append(np.count_nonzero(found[:, 0] != 1.5))
         other.append(np.count_nonzero(found[:, 3] != listed[:, 3]))
-    assert not any(lost + other), (lost, other)   # of 40 401 each
+    assert not any(lost + other), (lost, other)   # of 10 201 each
     # In the plane itself, along an axis or across: neither hit nor hang.
     inside = origin * [1, 0, 1]
     for along in ([1.0, 0.0, 0.0], [0.0, -0.0, -1.0], [0.6, 0.0, 0.8]):
