@@ -13,8 +13,6 @@ from .tiles import over_pixels, tile_pixels, tile_sums
 LEAST_FALL, MOST_FALL = 2.0, 8.0
 #: And while only two samples are known.
 FIRST_FALL = 2.4
-#: How much lasts of what the fall exceeded LEAST_FALL by, as a power.
-LASTING = 0.6
 TINY = float(np.finfo(np.float64).tiny)
 
 
@@ -26,7 +24,7 @@ class NoiseEstimate:
     hence the mean square of E_n − E_2n is V(n) − V(2n). If V falls by r with each doubling that is (r − 1)·V(2n). The
     last three such differences, over all tiles that have as many samples, tell how fast it fell, beside the samples'
     variance at these times, which falls by 2: what is expected of a pixel was not known alike then, and divides both.
-    As the fall always slows down, towards 2 in the end, r is a geometric mean of both. Blocks of 2^k samples, taken
+    As the fall always slows down, towards 2 in the end, r is the geometric mean of both. Blocks of 2^k samples, taken
     for independent of each other, give V between powers of two. It is never more than the samples' variance gives
     (Film.noise).
 
@@ -113,4 +111,4 @@ class NoiseEstimate:
             return FIRST_FALL
         earlier, its_variance = np.sum(self._changes[level - 1 - steps][:, there], axis=1)
         measured = LEAST_FALL * (earlier * variance / (change * max(its_variance, TINY))) ** (1 / steps)
-        return float(LEAST_FALL * (np.clip(measured, LEAST_FALL, MOST_FALL) / LEAST_FALL) ** LASTING)
+        return float(np.sqrt(LEAST_FALL * np.clip(measured, LEAST_FALL, MOST_FALL)))
