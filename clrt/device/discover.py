@@ -69,7 +69,7 @@ def choose(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
 
 
 def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
-    """The device that `selector` names: a number, an id, "cpu", "gpu" or a unique part of a name.
+    """The device that `selector` names: a number, an id, "cpu", "gpu" or a unique part of its name or its platform's.
 
     Without one the user's (see `preferred_device`), else the best. Raises DeviceError, listing the candidates, where
     none or several match, and UsageError for a configuration file that is none.
@@ -172,8 +172,11 @@ def _failures(info: DeviceInfo) -> str:
 
 
 def _matching(found: Found, selector: str | int | None) -> Found:
-    """What a selector may mean; of a kind of device the best that did not fail."""
+    """What a selector may mean: of a kind of device the best that did not fail; platforms where it names no device."""
     matches = [pair for pair in found if _matches(pair[0], selector)]
+    text = str(selector).strip().lower()
+    if not matches and selector is not None and text and not text.isdigit():
+        matches = [pair for pair in found if text in pair[0].platform.lower()]
     if str(selector).lower() in ("cpu", "gpu", "none"):
         matches = sorted((pair for pair in matches if pair[0].usable), key=lambda pair: pair[0].failed)[:1]
     return matches

@@ -26,8 +26,9 @@ def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[DeviceInfo]
     """A machine with five devices: two alike, and the third cannot be used. Only the list is made up."""
     (tmp_path / "nothing.toml").touch()
     own = find_devices()[0]
-    infos = [replace(own[0], index=i, id=f"{i}a{i}b", name=name, type=kind, chosen=i == 0, usable=i != 2,
-                     why="its driver has no compiler" if i == 2 else "fine") for i, (name, kind) in enumerate(MACHINE)]
+    infos = [replace(own[0], index=i, id=f"{i}a{i}b", name=name, type=kind, platform=f"{name.split()[0]} OpenCL",
+                     chosen=i == 0, usable=i != 2, why="its driver has no compiler" if i == 2 else "fine")
+             for i, (name, kind) in enumerate(MACHINE)]
     monkeypatch.setattr(discover, "find_devices", lambda: [(info, own[1]) for info in infos])
     monkeypatch.delenv("CLRT_DEVICE", raising=False)
     monkeypatch.setenv("CLRT_CONFIG", str(tmp_path / "nothing.toml"))
@@ -36,9 +37,9 @@ def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[DeviceInfo]
 
 @pytest.mark.parametrize(("selector", "index"), [
     (None, 0), (1, 1), ("1", 1), (" 3 ", 3), ("3a3b", 3), ("gpu", 0), ("GPU", 0), ("cpu", 3), ("epyc", 3),
-    ("oclgrind", 4), ("Simulator", 4)])
+    ("oclgrind", 4), ("Simulator", 4), ("epyc opencl", 3)])
 def test_selectors(machine: list[DeviceInfo], selector: str | int | None, index: int) -> None:
-    """A number, an id, a kind, or a part of a name in any case."""
+    """A number, an id, a kind, or a part of a name in any case, else of a platform's."""
     assert choose(selector)[0] is machine[index]
 
 
