@@ -46,7 +46,7 @@ def trial() -> Iterator[str]:
 def measured(scene: str, device: str) -> dict[str, Any]:
     """Of one render: launches of its integrator, their median and longest, and the longest of all other kernels.
 
-    By the device's own clock; where that says nothing, as seen from the host.
+    By the device's own clock; where that says nothing, the longest is as seen from the host, and the median 0.
     """
     import pyopencl as cl
 
