@@ -172,20 +172,13 @@ def _failures(info: DeviceInfo) -> str:
 
 
 def _matching(found: Found, selector: str | int | None) -> Found:
-    """What a selector may mean: of a kind of device the best that did not fail; platforms where it names no device."""
-    matches = [pair for pair in found if _matches(pair[0], selector)]
+    """What a selector may mean: of a kind of device the best that did not fail; a platform where it names no device."""
     text = str(selector).strip().lower()
-    if not matches and selector is not None and text and not text.isdigit():
-        matches = [pair for pair in found if text in pair[0].platform.lower()]
-    if str(selector).lower() in ("cpu", "gpu", "none"):
-        matches = sorted((pair for pair in matches if pair[0].usable), key=lambda pair: pair[0].failed)[:1]
-    return matches
-
-
-def _matches(info: DeviceInfo, selector: str | int | None) -> bool:
-    if selector is None:
-        return info.chosen
-    text = str(selector).strip().lower()
-    if text in ("cpu", "gpu"):
-        return info.type == text
-    return text in (str(info.index), info.id) or (not text.isdigit() and text in info.name.lower())
+    if selector is None or text in ("cpu", "gpu"):
+        of_kind = [pair for pair in found
+                   if pair[0].usable and (pair[0].chosen if selector is None else pair[0].type == text)]
+        return sorted(of_kind, key=lambda pair: pair[0].failed)[:1]
+    if text.isdigit():
+        return [pair for pair in found if text in (str(pair[0].index), pair[0].id)]
+    named = [pair for pair in found if text == pair[0].id or text in pair[0].name.lower()]
+    return named or [pair for pair in found if text in pair[0].platform.lower()]

@@ -52,6 +52,14 @@ def test_wrong_selectors_list_the_devices(machine: list[DeviceInfo], selector: s
         choose(selector)
 
 
+def test_a_kind_is_of_devices_alone(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A platform's name does not make a GPU of its processor."""
+    own = replace(machine[3], platform="GPU and CPU Runtime")
+    monkeypatch.setattr(discover, "find_devices", lambda: [(own, None)])
+    with pytest.raises(DeviceError, match="no usable device matches 'gpu'"):
+        choose("gpu")
+
+
 def test_environment_variable(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch) -> None:
     """CLRT_DEVICE stands in for a selector that is not given; empty is none."""
     monkeypatch.setenv("CLRT_DEVICE", "epyc")
