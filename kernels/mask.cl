@@ -3,6 +3,9 @@
 //
 // __AVX__ and the like are defined where a compiler makes code for such a processor directly.
 
+// That vectors wider than the processor's are passed otherwise on others: nothing here is called from elsewhere.
+#pragma clang diagnostic ignored "-Wpsabi"
+
 #if defined(__AVX__) && !PORTABLE_MASK
 static inline uint mask_bits(int8 mask) { return (uint)__builtin_ia32_movmskps256(as_float8(mask)); }
 static inline uint mask_bits16(int16 mask) { return mask_bits(mask.lo) | mask_bits(mask.hi) << 8; }

@@ -1,10 +1,13 @@
-"""Lets PoCL 3.0, the one that pip installs, run on processors newer than its compiler.
+"""Has PoCL 3.0, the one that pip installs, make code for a processor that its library is made for.
 
-Its LLVM 14 knows no processor after AMD's Zen 3 rightly. Zen 4 it takes for Zen 3, which has no AVX-512, while PoCL
-links its library for AVX-512: LLVM then aborts at the first fma. Later ones it calls "generic", a name that its own
-front end refuses: every program fails with "unknown target CPU 'generic'". The name is a pointer in PoCL's device
-structure, beside the target triple; `name_processor` points it at the best processor that LLVM 14 knows and this
-machine can run. It touches nothing unless exactly one such pair is found.
+The library is one for AVX2, made for Intel's Haswell, one for AVX-512, and so on; LLVM 14 inlines its functions only
+into code for the same processor, or one that has all that it has. For AMD's Zen 1 to 3 and Intel's Alder Lake fma, fabs
+and vload8 stay calls then, and pictures take twice the time and more. Zen 4 is taken for Zen 3, which has no AVX-512,
+and LLVM aborts at the first fma of the library for that. Later ones it calls "generic", a name that its own front end
+refuses: every program fails with "unknown target CPU 'generic'".
+
+The name is a pointer in PoCL's device structure, beside the target triple; `name_processor` points it at the best
+processor of such a library that this machine can run. It touches nothing unless exactly one such pair is found.
 """
 
 from __future__ import annotations
@@ -41,12 +44,15 @@ def best_processor(flags: set[str]) -> str:
 
 
 def is_misnamed(name: str, flags: set[str]) -> bool:
-    """Whether LLVM 14 calls a processor with these instructions by a wrong name."""
-    return name == "generic" or (name == "znver3" and "avx512f" in flags)
+    """Whether LLVM 14 should call a processor with these instructions by another name.
+
+    Those without AVX2 have libraries made for themselves.
+    """
+    return name == "generic" or ("avx2" in flags and name != best_processor(flags))
 
 
 def name_processor(device: cl.Device) -> bool:
-    """Gives the PoCL device a processor name its compiler knows; True where the name was wrong and is replaced."""
+    """Gives the PoCL device the name of its library's processor; True where it had another."""
     if "LLVM 14" not in device.platform.version or not Path("/proc/self/mem").exists():
         return False
     flags = next((set(line.split(":")[1].split()) for line in Path("/proc/cpuinfo").read_text().splitlines()
