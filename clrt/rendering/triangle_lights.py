@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,16 +40,19 @@ def pack_triangle_lights(meshes: list[Mesh], triangles: NDArray[np.float32], tex
     painted = np.array([isinstance(each.material.emission, Texture) for each in meshes], bool)
     texture = np.array([textures.number(each.material.emission) if isinstance(each.material.emission, Texture) else -1
                         for each in meshes], np.int32)
-    around = np.concatenate([np.ones((0, 3)), *map(mean_emission, meshes)])
-    lamps = np.flatnonzero((emission[mesh] * around).any(axis=1))
-    lamps = lamps[(_normals(triangles[lamps].astype(np.float64))[1] / 2).astype(np.float32) > 0]
+    shines: NDArray[np.bool_] = np.any(emission, axis=1)
+    lamps = np.flatnonzero(shines[mesh])
+    around = np.concatenate([np.ones((0, 3)), *map(mean_emission, itertools.compress(meshes, shines))])
+    area = _normals(triangles[lamps].astype(np.float64))[1] / 2
+    seen = (emission[mesh[lamps]] * around).any(axis=1) & (area.astype(np.float32) > 0)
+    lamps, around = lamps[seen], around[seen]
     corners, whole = _joined(triangles[lamps].astype(np.float64), mesh[lamps], lamps, ~painted[mesh[lamps]])
     begins = np.ones(len(lamps), bool)
     begins[1:] = ~whole[:-1]
     light = np.full(len(triangles), -1, np.int32)
     light[lamps] = np.cumsum(begins) - 1
     own = lamps[begins]
-    records, groups = _packed(corners[begins], whole[begins], emission[mesh[own]], around[own])
+    records, groups = _packed(corners[begins], whole[begins], emission[mesh[own]], around[begins])
     records["texture"], records["primitive"] = texture[mesh[own]], own
     return TriangleLights(records, groups, light)
 
