@@ -10,7 +10,7 @@ from .build import DEVICE_BUILDERS
 from .builders import BUILDERS
 from .layouts import NO_RAYS, PACK, Layout
 
-#: Files of the tree layouts, and how many primitives of a leaf they test at a time.
+#: Files of the tree layouts, and how many triangles their records hold.
 TREES = {"bvh8": ("traverse/bvh8.cl", 8), "bvh2": ("traverse/bvh2.cl", 1), "cwbvh": ("traverse/cwbvh.cl", 1),
          "list": ("traverse/list.cl", 1), "packs": ("traverse/packs.cl", PACK)}
 #: Layouts without a tree, whose cost a ray grows with the number of primitives.
@@ -53,13 +53,13 @@ def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
 
 
 def tree_defines(tree: Layout) -> dict[str, int]:
-    """WIDTH, and a STACK_SIZE that this tree's traversal cannot exceed, in steps of 32 so that trees share programs.
+    """PACK_SIZE, and a STACK_SIZE that this tree's traversal cannot exceed, in steps of 32 so that trees share programs.
 
     And COUNT_VISITS, if there is a buffer to count in (kernels/traverse/visits.cl).
     """
     if tree is NO_RAYS:
         return {}
-    defines = {"WIDTH": TREES[tree.name][1], "STACK_SIZE": max(32, -(-tree.stack // 32) * 32)}
+    defines = {"PACK_SIZE": TREES[tree.name][1], "STACK_SIZE": max(32, -(-tree.stack // 32) * 32)}
     return defines | ({"COUNT_VISITS": 1} if "visits" in tree.buffers else {})
 
 

@@ -5,8 +5,21 @@
 // small a volume is no more than that is said once a ray, for corners as far away as any of the scene is.
 #include "geometry/triangle_watertight.cl"
 
+// The triangles that are tested i-th: a pack, or half of one, whose rows begin so much later.
+static inline global const Triangles *pack_at(global const Triangles *packs, int i) {
+#if WIDTH == PACK_SIZE
+    return packs + i;
+#else
+    return (global const Triangles *)((global const float *)(packs + i / 2) + i % 2 * WIDTH);
+#endif
+}
+
 static inline float wide_least(wide x) {
+#if WIDTH == 8
+    float8 eight = x;
+#else
     float8 lo = vload8(0, (const float *)&x), hi = vload8(1, (const float *)&x), eight = lo < hi ? lo : hi;
+#endif
     float4 four = eight.lo < eight.hi ? eight.lo : eight.hi;
     float2 two = four.lo < four.hi ? four.lo : four.hi;
     return two.x < two.y ? two.x : two.y;
@@ -22,7 +35,7 @@ static inline bool meet_packs(const TriangleRay *ray, global const Triangles *pa
     wide t = hit->primitive < 0 ? hit->t : as_float(as_int(hit->t) + 1), u = 0.0f, v = 0.0f;
     wide_mask pack = (wide_mask)(-1), open = (wide_mask)(0);
     for (int i = 0; i < count; ++i) {
-        global const Triangles *leaf = packs + i;
+        global const Triangles *leaf = pack_at(packs, i);
         PACK_CORNERS
         const Sheared a = shear(p0, &sheared_ray), b = shear(p1, &sheared_ray), c = shear(p2, &sheared_ray);
         const Edges edges = edges_of(&a, &b, &c);
@@ -54,7 +67,7 @@ static inline bool meet_packs(const TriangleRay *ray, global const Triangles *pa
     hit->t = least;
     hit->primitive = INT_MAX;
     for (; found; found &= found - 1) {
-        int i = first_bit(found), primitive = packs[((const int *)&pack)[i]].primitive[i];
+        int i = first_bit(found), primitive = pack_at(packs, ((const int *)&pack)[i])->primitive[i];
         if (primitive > hit->primitive) continue;
         hit->primitive = primitive;
         hit->u = ((const float *)&u)[i];

@@ -1,6 +1,15 @@
-// Primitives are tested WIDTH at a time: 1 where they are stored one by one, 8 where a leaf is a pack, 16 without a tree.
-// `wide` holds one float of each; LOAD_WIDE reads a row of a record, whatever the width.
+// Triangles are stored in packs of PACK_SIZE: 1 in trees of single triangles, 8 where a leaf is a pack, 16 without a tree.
+// They are tested WIDTH at a time, all of a pack, but sixteen by halves where no register takes them. `wide` holds one
+// float of each; LOAD_WIDE reads a row of a record, whatever the width.
 #include "mask.cl"
+
+#ifndef WIDTH
+#if PACK_SIZE == 16 && !defined(__AVX512F__)
+#define WIDTH 8
+#else
+#define WIDTH PACK_SIZE
+#endif
+#endif
 
 #if WIDTH == 1
 typedef float wide;

@@ -63,7 +63,7 @@ __attribute__((noinline)) static WideHit settle_rays(const Packet *packet, globa
 }
 
 static inline void hit_pack(const Packet *packet, global const Triangles *pack, Hits *hits) {
-    for (int i = 0; i < WIDTH && pack->primitive[i] >= 0; ++i) {
+    for (int i = 0; i < PACK_SIZE && pack->primitive[i] >= 0; ++i) {
         CORNERS
         ShearedHit sheared = intersect_sheared(p0, p1, p2, &packet->triangles, hits->t);
         WideHit found = sheared.hit;

@@ -1,4 +1,4 @@
-// No tree: a scene of few triangles, sixteen at a time. Where eight would be met in a leaf after its box, this needs no
+// No tree: a scene of few triangles, WIDTH at a time. Where eight would be met in a leaf after its box, this needs no
 // guess of what comes next, which costs a processor more than the triangles.
 #include "traverse/leaf.cl"
 
@@ -10,7 +10,7 @@ static inline TreeRays tree_rays(real3 origin, real3 direction) { return leaf_ra
 __attribute__((noinline)) static void meet_packs_exactly(const LeafRay *leaf, global const Triangles *packs, int count,
                                                          const bool stop_at_first, Hit *hit) {
     for (int i = 0; i < count && !(stop_at_first && hit->primitive >= 0); ++i)
-        hit_triangles(leaf, packs + i, stop_at_first, hit);
+        hit_triangles(leaf, pack_at(packs, i), stop_at_first, hit);
 }
 #endif
 

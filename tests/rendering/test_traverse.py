@@ -228,11 +228,13 @@ for layout in {LAYOUTS}:
     assert done.returncode == 0, f"exit status {done.returncode}\n{done.stderr[-500:]}"
 
 
-@pytest.mark.parametrize(("layout", "triangles"), [("bvh8", 2000), ("packs", 60)])
-def test_portable_mask_gives_the_same_hits(device: Device, layout: str, triangles: int) -> None:
-    """The multiplication that gathers mask bits on processors without an instruction for it."""
+@pytest.mark.parametrize(("layout", "triangles", "other"), [
+    ("bvh8", 2000, "PORTABLE_MASK 1"), ("packs", 60, "PORTABLE_MASK 1"), ("packs", 60, "WIDTH 8"),
+    ("packs", 60, "WIDTH 16")])
+def test_other_instructions_give_the_same_hits(device: Device, layout: str, triangles: int, other: str) -> None:
+    """The multiplication that gathers mask bits where there is no instruction for it, and halves of packs."""
     scene = Scene(meshes=[mesh(soup(triangles, 0.1))], spheres=balls(spheres(50)))
     origin, direction = random_rays(50_000, 8)
-    default, portable = (Probe(device, scene, defines, layout=layout, lanes=8)("closest_hit", 4, origin, direction)
-                         for defines in ("", "#define PORTABLE_MASK 1"))
-    assert np.array_equal(default, portable)
+    hits, others = (Probe(device, scene, defines, layout=layout, lanes=8)("closest_hit", 4, origin, direction)
+                    for defines in ("", f"#define {other}"))
+    assert np.array_equal(hits, others)
