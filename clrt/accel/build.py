@@ -21,8 +21,8 @@ DEVICE_BUILDERS = {"ploc": 0, "reinsertion": 2}
 LARGE = 1 << 14
 #: Up to so many spheres are met one after another by all lanes' rays together (kernels/traverse/lone_spheres.cl).
 FEW_SPHERES = 16
-#: Up to so many triangles are met without a tree as fast as with one, and up to half as many 1.5 times as fast; by halves
-#: of packs (kernels/geometry/wide.cl) 1.2 times.
+#: Up to so many triangles are met without a tree as fast as with one, and up to half as many 1.5 times as fast, or 1.2
+#: times by halves of packs (kernels/geometry/wide.cl).
 FEW = 4 * PACK
 
 

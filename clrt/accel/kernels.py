@@ -53,7 +53,7 @@ def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
 
 
 def tree_defines(tree: Layout) -> dict[str, int]:
-    """PACK_SIZE, and a STACK_SIZE that this tree's traversal cannot exceed, in steps of 32 so that trees share programs.
+    """PACK_SIZE, and a STACK_SIZE that the tree's traversal cannot exceed, in steps of 32 so that trees share programs.
 
     And COUNT_VISITS, if there is a buffer to count in (kernels/traverse/visits.cl).
     """
