@@ -28,7 +28,8 @@ from .work import Work
 FEWEST_TILES = 16
 #: Launches of a pass, about, unless a single sample a pixel takes more.
 PASS_LAUNCHES = 4
-FIRST_LAUNCH_SAMPLES = 1 << 13
+#: Of the first launch, before any has been timed: slow devices take a tenth of a second for twice as many.
+FIRST_LAUNCH_SAMPLES = 1 << 10
 #: Pixels of all kinds are whole numbers of it.
 BLACK = np.zeros(8, np.uint32)
 #: Primitives that a ray meets without a tree in about the time that it takes with one.

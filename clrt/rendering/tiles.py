@@ -39,13 +39,14 @@ def scattered(count: int) -> NDArray[np.intp]:
     """The numbers 0 … count − 1 in an order of which every long stretch is spread evenly over them all.
 
     Runs of RUN stay together; they follow each other by the golden ratio of their count (the three-distance theorem
-    bounds the gaps of a stretch).
+    bounds the gaps of a stretch). The first is in the middle, where a picture is seldom cheaper than elsewhere, as the
+    next launch's size is chosen by it.
     """
     runs = -(-count // RUN)
     step = max(1, round(runs * (5**0.5 - 1) / 2))
     while gcd(step, runs) > 1:
         step += 1
-    order = (np.arange(runs) * step % runs)[:, None] * RUN + np.arange(RUN)
+    order = ((np.arange(runs) * step + runs // 2) % runs)[:, None] * RUN + np.arange(RUN)
     return order[order < count]
 
 
