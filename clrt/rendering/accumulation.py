@@ -109,6 +109,7 @@ class Accumulation(ABC):
         """The film; None where it has not what the work says, as Ctrl-C came between the two."""
         film = self.film()
         if film.samples == self.work_left().rendered(self.size):
+            self.work.settle()
             return film
         _log.warning("interrupted as a launch was being made: the checkpoint from before stays")
         return None

@@ -74,8 +74,9 @@ class Session(Accumulation):
             pixels = (share.end - share.first) * TILE_PIXELS
             self.launch["first_pixel"], self.launch["pixel_count"] = share.first * TILE_PIXELS, pixels
             self.launch["first_sample"], self.launch["sample_count"] = share.samples, share.more
-            self._launches.add(self._launch(), pixels * share.more)
-            self.work.settle()
+            event = self._launch()
+            self.work.settle()    # before it is waited for, which Ctrl-C may end
+            self._launches.add(event, pixels * share.more)
             yield
 
     def _launch(self) -> cl.Event:

@@ -146,10 +146,10 @@ def test_left_by_break(device: Device, tmp_path: Path, adaptive: bool) -> None:
 
 
 @pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
-@pytest.mark.parametrize("launches", [3, 17, 40])
+@pytest.mark.parametrize("launches", [3, 17, 40, *range(5, 12)])
 def test_left_by_a_keyboard_interrupt(device: Device, tmp_path: Path, small_launches: None, adaptive: bool,
                                       launches: int) -> None:
-    """Raised as a launch is waited for, also in the middle of a pass."""
+    """Raised as a launch is waited for, in the middle of a pass or the last of it."""
     left = renderer(device, adaptive=adaptive, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e9)
     raise_after(left, launches)
     with pytest.raises(KeyboardInterrupt):
