@@ -3,7 +3,7 @@
 //
 // __AVX__ and the like are defined where a compiler makes code for such a processor directly.
 
-// That vectors wider than the processor's are passed otherwise on others: nothing here is called from elsewhere.
+// Clang warns where another processor would pass a vector to a function in another way. No other code calls these.
 #pragma clang diagnostic ignored "-Wpsabi"
 
 #if defined(__AVX__) && !PORTABLE_MASK

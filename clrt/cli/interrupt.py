@@ -17,7 +17,7 @@ class Interruptible:
 
     def __enter__(self) -> Interruptible:
         for number in SIGNALS:
-            signal.signal(number, self._first)
+            signal.signal(number, self._heed)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
@@ -25,8 +25,9 @@ class Interruptible:
         for number in SIGNALS:
             signal.signal(number, signal.default_int_handler)
 
-    def _first(self, number: int, frame: FrameType | None) -> None:
-        for each in SIGNALS:
-            signal.signal(each, signal.default_int_handler)
+    def _heed(self, number: int, frame: FrameType | None) -> None:
+        """Python may call it for a second signal while it is in it for the first."""
+        if self.asked:
+            raise KeyboardInterrupt
         self.asked = True
         self._ask()
