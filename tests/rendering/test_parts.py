@@ -36,31 +36,36 @@ def film(device: Device, layout: str) -> tuple[Renderer, bytes]:
     return running, list(running.passes(spp=4))[-1].film.pixels.tobytes()
 
 
+@pytest.fixture(scope="module")
+def whole(device: Device) -> tuple[Renderer, bytes]:
+    return film(device, "bvh8")
+
+
 @pytest.mark.parametrize(("layout", "limit"), [("bvh8", 8), ("bvh8", 24), ("bvh2", 8), ("cwbvh", 8), ("list", 8)])
-def test_in_parts_it_is_the_same_picture(device: Device, monkeypatch: pytest.MonkeyPatch, layout: str,
-                                         limit: int) -> None:
-    """Bit for bit; no buffer is larger than allowed, and of 8 KiB most arrays fill several."""
-    whole, expected = film(device, layout)
-    assert isinstance(whole.session, Session) and whole.compiled.part_bytes is None
+def test_in_parts_it_is_the_same_picture(device: Device, whole: tuple[Renderer, bytes],
+                                         monkeypatch: pytest.MonkeyPatch, layout: str, limit: int) -> None:
+    """Bit for bit, in every layout; no buffer is larger than allowed, and of 8 KiB most arrays fill several."""
+    assert isinstance(whole[0].session, Session) and whole[0].compiled.part_bytes is None
     monkeypatch.setenv(VARIABLE, f"{limit}K")
     running, found = film(device, layout)
     buffers = [each for each in running.session.scene_arguments if isinstance(each, cl.Buffer)]
-    assert isinstance(running.session, Crew) and found == expected
+    assert isinstance(running.session, Crew) and found == whole[1]
     assert max(buffer.size for buffer in buffers) <= limit << 10
     assert len(buffers) > len(running.compiled.buffers) + (0 if limit > 8 else 6)
 
 
-def test_only_the_film_is_too_large(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_the_film_is_too_large(device: Device, whole: tuple[Renderer, bytes],
+                                    monkeypatch: pytest.MonkeyPatch) -> None:
     """Then the program is the one of large buffers, but for where the film's pixels are."""
-    whole, expected = film(device, "bvh8")
     monkeypatch.setenv(VARIABLE, "80K")
     running, found = film(device, "bvh8")
-    assert isinstance(running.session, Crew) and found == expected
-    assert running.compiled.part_bytes is None and running.compiled.source == whole.compiled.source
+    assert isinstance(running.session, Crew) and found == whole[1]
+    assert running.compiled.part_bytes is None and running.compiled.source == whole[0].compiled.source
 
 
-def test_other_kernels_see_the_parts(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = render_guides(film(device, "bvh8")[0].session, 2)
+def test_other_kernels_see_the_parts(device: Device, whole: tuple[Renderer, bytes],
+                                     monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = render_guides(whole[0].session, 2)
     monkeypatch.setenv(VARIABLE, "8K")
     found = render_guides(film(device, "bvh8")[0].session, 2)
     assert all(found[name].tobytes() == expected[name].tobytes() for name in expected)
