@@ -208,19 +208,22 @@ def test_length_of_the_direction_does_not_matter(device: Device, layout: str, le
 
 
 def test_a_ray_that_is_no_ray_hits_nothing(device: Device) -> None:
-    """NaN and infinite places and directions, in a process of their own: what runs off the stack ends the process."""
+    """NaN and infinite places and directions, in a process of their own: what runs off the stack ends the process.
+
+    Its scene needs the programs of the test of any hits, so that PoCL has them."""
     program = f"""
 import numpy as np
 from clrt.device.open import open_device
-from clrt.scene.model import Mesh, Scene, Sphere
-from tests.accel.cases import soup
+from clrt.scene.model import Mesh, Scene
+from tests.accel.cases import soup, spheres
+from tests.rendering.test_traverse import balls
 from clrt.study.probe import Probe
 rays = np.tile([0.5, 0.5, 3.0, 0.1, 0.1, -1.0], (12, 1))
 for i, bad in enumerate((np.nan, np.inf, -np.inf, 0.0)):
     rays[3 * i, :3] = rays[3 * i + 1, 3:] = rays[3 * i + 2] = bad
 mesh = Mesh(soup(100).reshape(-1, 3), np.arange(300, dtype=np.int32).reshape(-1, 3))
 for layout in {LAYOUTS}:
-    probe = Probe(open_device({device.info.index}), Scene(meshes=[mesh], spheres=[Sphere()]), layout=layout)
+    probe = Probe(open_device({device.info.index}), Scene(meshes=[mesh], spheres=balls(spheres(20))), layout=layout)
     out = probe("closest_hit", 4, np.delete(rays, 9, axis=0))
     assert np.all(out[:, 3] == -1), (layout, out)
 """
