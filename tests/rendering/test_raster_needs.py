@@ -72,8 +72,10 @@ def test_where_no_ray_is_followed_there_is_no_tree(device: Device) -> None:
     assert set(np.unique(asked.aovs(with_tree)["object"])) == {-1, 0, 1, 2, 3}
     with pytest.raises(UsageError, match="first_hits=True"):
         renderer.session.guides()
-    for needed in ({"shadows": True}, {"integrator": "local"}, {"first_hits": True}):
-        assert "IN_TREE" in Renderer(scene, device=device.info.index, **needed).compiled.features
+    shaded, local = (replace(scene, render=replace(scene.render, **needed))
+                     for needed in ({"shadows": True}, {"integrator": "local"}))
+    for other, wanted in ((shaded, Choices()), (local, Choices()), (scene, Choices(first_hits=True))):
+        assert "IN_TREE" in compile_scene(other, wanted).features
     for material in (Mirror(), Dielectric(), Diffuse(opacity=0.5)):
         other = replace(scene, spheres=[replace(balls[0], material=material)])
         assert compile_scene(other, Choices()).tree.nodes > 0
