@@ -89,11 +89,14 @@ def instance_hits(device: Device, layout: str, traversal: str) -> Answers:
                                        traversal=traversal))
 
 
-def variants() -> Iterator[dict[str, Any]]:
-    """Choices that are there to compare, each at least once."""
+def variants() -> Iterator[tuple[RenderSettings, dict[str, Any]]]:
+    """Choices that are there to compare, each at least once but the first of its kind, which other work takes; and each
+    other sampler."""
+    settings = [replace(SETTINGS, sampler="stratified", filter="tent"), replace(SETTINGS, sampler="independent")]
     for i, triangle in enumerate(TRIANGLE_TESTS):
         box, sphere, offset = (list(known)[i % len(known)] for known in (BOX_TESTS, SPHERE_TESTS, OFFSETS))
-        yield {"tests": HitTests(triangle, box, sphere), "offset": offset}
+        if i:
+            yield settings[i % 2], {"tests": HitTests(triangle, box, sphere), "offset": offset}
 
 
 def work(device: Device) -> Iterator[tuple[str, Answers]]:
@@ -101,19 +104,19 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     for layout in TREES:
         builder = "ploc" if layout in SHAPES else "sah"
         yield f"scene {layout}", picture(device, scene(), layout=layout, builder=builder)
-    for chosen in variants():
-        yield chosen["tests"].triangle, picture(device, scene(), **chosen)
-    for settings in (replace(SETTINGS, sampler="stratified", filter="tent"), replace(SETTINGS, sampler="independent")):
-        yield settings.sampler, picture(device, replace(scene(), render=settings))
+    for settings, chosen in variants():
+        yield chosen["tests"].triangle, picture(device, replace(scene(), render=settings), **chosen)
     ball = Scene(spheres=[Sphere()], environment=Environment(color=(1, 1, 1)), render=SETTINGS)
     yield "ball", picture(device, replace(ball, lights=lamps(3).lights))
     lit = replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)], render=SETTINGS)
     yield "lamps", picture(device, lit)
     painting = replace(painted(scene()), render=SETTINGS)
-    yield "painted", picture(device, painting)
-    yield "guides of it", {**render_guides(started(device, painting), 2)}
-    for name, sight in sights(painting):
-        yield name, picture(device, sight)
+    seen = dict(sights(painting))
+    yield "painted", picture(device, seen["lens"])
+    yield "guides of it", {**render_guides(started(device, seen["lens"]), 2)}
+    cameras = {"normals": "orthographic", "albedo": "equirectangular"}
+    for name in sorted(seen.keys() - {"lens", *cameras.values()}):
+        yield name, picture(device, replace(seen[name], camera=seen[cameras.get(name, name)].camera))
     yield "shelf", picture(device, replace(shelf(), render=SETTINGS))
     for layout in UPPER_LEVELS:
         yield f"planted {layout}", picture(device, planted(painting), layout=layout)
@@ -122,8 +125,7 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     every = first_hits(apart, scene(), AOVS) | film_aovs(light, AOVS)
     yield "aovs", {"layers": layered(light.mean.astype(np.float32), every)[0]}
     yield "guides", {**render_guides(started(device, scene()), 2)}
-    for layout in SHAPES:
-        build_tree(device, layout, "ploc", soup(0), spheres(30))
+    build_tree(device, device.layout, "ploc", soup(0), spheres(30))
     build_tree(device, device.layout, "reinsertion", soup(120, 0.3))
     for layout, traversal in [*((layout, "single") for layout in TREES), *(("bvh8", way) for way in TRAVERSALS[1:])]:
         yield f"mesh {layout} {traversal}", mesh_hits(device, layout, traversal)
