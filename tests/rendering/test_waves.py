@@ -59,8 +59,8 @@ def test_waves_are_the_same_paths(device: Device, name: str) -> None:
     assert_same(waves, lanes)
 
 
-@pytest.mark.parametrize("chosen", [{"sampler": "sobol", "layout": "bvh8"}, {"sampler": "stratified"},
-                                    {"direct_light": True}], ids=str)
+@pytest.mark.parametrize("chosen", [{"sampler": "sobol", "layout": "bvh8"},
+                                    {"sampler": "stratified", "direct_light": True}], ids=str)
 def test_waves_with_every_choice(device: Device, chosen: dict[str, Any]) -> None:
     lanes, waves = (followed(device, paths, everything(), **chosen) for paths in ("lanes", "waves"))
     assert ("direct" in (waves.pixels.dtype.names or ())) == ("direct_light" in chosen)
