@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 
 from clrt.device.open import Device
 from clrt.scene.lights import DirectionalLight
-from clrt.study.cases.departures import lit_scenes, measure_departures
+from clrt.study.cases import departures
+from clrt.study.cases.departures import lit_scenes
 from clrt.study.cases.distances import distances
 from clrt.study.cases.slivers import sliver_tube
 from clrt.study.cases.spheres import exact_hits, measure_spheres
@@ -18,6 +20,7 @@ from clrt.study.cases.watertight import measure_watertight, misses, placed
 from clrt.study.families import FAMILIES, FIGURES, measure_families
 from clrt.study.numerics import GEOMETRY
 from clrt.study.pictures import measure_pictures
+from clrt.study.row import Row
 from clrt.study.shapes import icosphere
 
 
@@ -34,10 +37,16 @@ def test_other_trees_let_nothing_out_of_slivers(device: Device, layout: str) -> 
     assert misses(Subject(device.info.index, layout=layout), sliver_tube(64), 20_000) == 0
 
 
+def many_are_wrong(rows: Iterable[Row], count: int) -> bool:
+    """Whether more than `count` are, of as many rows as it takes to know."""
+    wrong = 0
+    return any((wrong := wrong + row.wrong) > count for row in rows)
+
+
 @pytest.mark.parametrize("triangle", ["moller_trumbore", "precomputed", "baldwin_weber"])
 def test_triangles_with_cracks_are_found_out(device: Device, triangle: str) -> None:
     subject = Subject(device.info.index, triangle=triangle)
-    assert sum(row.wrong for row in measure_watertight(subject, quick=True)) > 1000
+    assert many_are_wrong(measure_watertight(subject, quick=True), 1000)
 
 
 def test_boxes_without_padding_are_found_out(device: Device) -> None:
@@ -54,9 +63,11 @@ def test_textbook_spheres_are_found_out(device: Device) -> None:
     assert max(row.figure or 0 for row in robust) < 4   # units in the last place
 
 
-def test_fixed_offsets_are_found_out(device: Device) -> None:
+def test_fixed_offsets_are_found_out(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where float32 is coarse."""
+    monkeypatch.setattr(departures, "PLACES", [place for place in departures.PLACES if place[1] > 1e5])
     subject = Subject(device.info.index, offset="fixed")
-    assert sum(row.wrong for row in measure_departures(subject, quick=True)) > 100
+    assert many_are_wrong(departures.measure_departures(subject, quick=True), 100)
 
 
 def test_pictures_off_by_a_hundredth_are_found_out(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
