@@ -161,7 +161,7 @@ def test_albedo_is_a_mean_over_the_pixel() -> None:
     assert not found["albedo"][:, 3:].any()
 
 
-@pytest.mark.parametrize("options", [{}, {"adaptive": True}, {"lanes": 1}, {"filter": "blackman_harris"}], ids=str)
+@pytest.mark.parametrize("options", [{}, {"adaptive": True}, {"lanes": 1, "filter": "blackman_harris"}], ids=str)
 def test_direct_and_indirect_light_add_up_to_the_picture(options: dict[str, Any]) -> None:
     """To the last bit; and the picture is the one that there is without them. Direct light is what paths of two edges
     bring, so it is the picture of depth 2, of the same samples."""
@@ -182,8 +182,8 @@ def test_depth_is_what_the_integrator_of_it_shows(camera: dict[str, Any]) -> Non
     """For every camera; of a lens the ray through its middle."""
     scene = ball_on_floor()
     scene.camera = replace(scene.camera, **camera)
-    _, found = rendered(scene, "depth")
-    shown = clrt.render(scene, spp=1, integrator="depth").pixels[..., 0]
+    pixels, found = rendered(scene, "depth", 1, integrator="depth")
+    shown = pixels[..., 0]
     missed = np.isinf(found["depth"])
     assert 0 < missed.sum() < missed.size and np.array_equal(missed, shown == 0)
     np.testing.assert_allclose(found["depth"][~missed], shown[~missed], rtol=1e-6)
