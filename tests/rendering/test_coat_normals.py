@@ -67,10 +67,14 @@ def film(wo: Doubles, wi: Doubles, n: Doubles, alpha: float) -> Doubles:
 @pytest.mark.parametrize("base", [None, "right", "steep"])
 @pytest.mark.parametrize("coat", [None, "up", "steep"])
 def test_coat_and_base_have_normals_of_their_own(device: Device, base: str | None, coat: str | None) -> None:
-    """coat·film + (1 − coat·F(wo))(1 − coat·F(wi))·base, each by the cosines to its own normal; 0 below the surface."""
+    """coat·film + (1 − coat·F(wo))(1 − coat·F(wi))·base, each by the cosines to its own normal; 0 below the surface.
+
+    Beside a material of both maps, so that all are of one program.
+    """
     bare = MetallicRoughness(color=COLOR, roughness=0.7, metallic=0.5)
-    both = bsdfs(device, [bare, replace(bare, clearcoat=0.8, clearcoat_roughness=0.5, normal_map=texture(base),
-                                        clearcoat_normal_map=texture(coat))])
+    coats = [replace(bare, clearcoat=0.8, clearcoat_roughness=0.5, normal_map=texture(one),
+                     clearcoat_normal_map=texture(other)) for one, other in ((base, coat), ("right", "up"))]
+    both = bsdfs(device, [bare, *coats])
     base_normal, coat_normal = normal(base), normal(coat)
     wo, wi = above(20_000, 1), above(20_000, 2)
     seen_by_all = (wo @ base_normal > 1e-3) & (wo @ coat_normal > 1e-3)

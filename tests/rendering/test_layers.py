@@ -10,7 +10,7 @@ from clrt.rendering.choices import Choices
 from clrt.rendering.compile import compile_scene
 from clrt.scene.materials import MetallicRoughness
 from clrt.scene.model import Scene, Sphere
-from clrt.study.bsdfs import bsdfs, uniform
+from clrt.study.bsdfs import Bsdfs, bsdfs, uniform
 from clrt.study.probe import Doubles
 from clrt.study.scattering import FLIP, above
 
@@ -21,6 +21,13 @@ COLOR = (0.8, 0.5, 0.2)
 WO, WI = above(5000, 1), above(5000, 2)
 H = (WO + WI) / np.linalg.norm(WO + WI, axis=1, keepdims=True)
 COS_H, COS_O, COS_I = np.sum(WO * H, axis=1), WO[:, 2], WI[:, 2]
+
+
+def shown(device: Device, *materials: MetallicRoughness) -> Bsdfs:
+    """They, and one that has all layers, so that all are of one program."""
+    full = MetallicRoughness(clearcoat=0.5, sheen_color=(0.5,) * 3, transmission=0.5, specular=0.5,
+                             specular_color=(0.2,) * 3)
+    return bsdfs(device, [*materials, full])
 
 
 def schlick(f0: float, cosine: Doubles, f90: float = 1.0) -> Doubles:
@@ -44,7 +51,7 @@ def test_coat_lies_over_what_was_there(device: Device) -> None:
     """coat·F·D·G/(4 cos wo) + (1 − coat·F(wo))(1 − coat·F(wi))·f."""
     bare, coated = MetallicRoughness(color=COLOR, roughness=0.7, metallic=0.5), MetallicRoughness(
         color=COLOR, roughness=0.7, metallic=0.5, clearcoat=0.8, clearcoat_roughness=0.5)
-    both = bsdfs(device, [bare, coated])
+    both = shown(device, bare, coated)
     left = (1 - 0.8 * schlick(0.04, COS_O)) * (1 - 0.8 * schlick(0.04, COS_I))
     expected = left[:, None] * both.value(0, WO, WI)[0] + (0.8 * schlick(0.04, COS_H) * ggx(0.25))[:, None]
     check(both.value(1, WO, WI)[0], expected)
@@ -55,7 +62,7 @@ def test_sheen_is_charlies(device: Device, roughness: float) -> None:
     """color·(2 + n)·sin^n/(2 pi)·cos wi/(4 (o + i − o·i)), over E where that exceeds 1; 1 − max·E of the rest."""
     bare = MetallicRoughness(color=COLOR)
     woolly = MetallicRoughness(color=COLOR, sheen_color=(0.9, 0.6, 0.3), sheen_roughness=roughness)
-    both, n, some = bsdfs(device, [bare, woolly]), roughness**-2, slice(1000)
+    both, n, some = shown(device, bare, woolly), roughness**-2, slice(1000)
     wo, wi, cos_o, cos_i = WO[some], WI[some], COS_O[some], COS_I[some]
     e_o, e_i = (sheen.albedo(cosine, n) for cosine in (cos_o, cos_i))
     d = (2 + n) / (2 * np.pi) * (1 - H[some, 2]**2)**(n / 2)
@@ -68,8 +75,8 @@ def test_sheen_is_charlies(device: Device, roughness: float) -> None:
 @pytest.mark.parametrize("roughness", [0.15, 0.4, 1.0])
 def test_fibres_reflect_what_was_fitted(device: Device, roughness: float) -> None:
     """White fibres on black: E by brute force over the hemisphere, where it is below 1."""
-    woolly = bsdfs(device, [MetallicRoughness(color=(0.0,) * 3, specular=0.0, sheen_color=(1.0,) * 3,
-                                              sheen_roughness=roughness)])
+    woolly = shown(device, MetallicRoughness(color=(0.0,) * 3, specular=0.0, sheen_color=(1.0,) * 3,
+                                             sheen_roughness=roughness))
     for cosine in (1.0, 0.7, 0.4):
         wo = np.array([np.sqrt(1 - cosine**2), 0, cosine])
         found = woolly.sample(0, wo, uniform(1 << 16, 1))[1][:, 0].mean()
@@ -86,7 +93,7 @@ def test_transmission_passes_the_bodys_part_straight_on(device: Device) -> None:
     """(1 − F(wo·h))·color·transmission·D·G/(4 cos wo) below; above the body has the rest."""
     solid, sheet = MetallicRoughness(color=COLOR, roughness=0.6), MetallicRoughness(
         color=COLOR, roughness=0.6, transmission=0.7)
-    both = bsdfs(device, [solid, sheet, MetallicRoughness(color=(0.0,) * 3, roughness=0.6)])
+    both = shown(device, solid, sheet, MetallicRoughness(color=(0.0,) * 3, roughness=0.6))
     below = ((1 - schlick(0.04, COS_H)) * ggx(0.36))[:, None] * np.multiply(COLOR, 0.7)
     check(both.value(1, WO, WI * FLIP)[0], below)
     upper = [both.value(which, WO, WI)[0] for which in (0, 1, 2)]
@@ -97,12 +104,12 @@ def test_transmission_passes_the_bodys_part_straight_on(device: Device) -> None:
 def test_specular_scales_f0_and_where_it_ends(device: Device) -> None:
     """F from min(f0·specular_color, 1)·specular to specular; f0 by ior. Metal keeps its own."""
     f0, f90 = (np.array([0.6, 1.0, 2.0]) / 9).clip(0, 1) * 0.4, 0.4    # ((2 − 1)/(2 + 1))² = 1/9
-    black = bsdfs(device, [MetallicRoughness(color=(0.0,) * 3, roughness=0.6, ior=2.0, specular=0.4,
-                                             specular_color=(0.6, 1.0, 2.0))])
+    black = shown(device, MetallicRoughness(color=(0.0,) * 3, roughness=0.6, ior=2.0, specular=0.4,
+                                            specular_color=(0.6, 1.0, 2.0)))
     fresnel = np.column_stack([schlick(f, COS_H, f90) for f in f0])
     check(black.value(0, WO, WI)[0], fresnel * ggx(0.36)[:, None])
-    metals = bsdfs(device, [MetallicRoughness(color=COLOR, metallic=1.0), MetallicRoughness(
-        color=COLOR, metallic=1.0, specular=0.1, specular_color=(0.0,) * 3)])
+    metals = shown(device, MetallicRoughness(color=COLOR, metallic=1.0), MetallicRoughness(
+        color=COLOR, metallic=1.0, specular=0.1, specular_color=(0.0,) * 3))
     check(metals.value(1, WO, WI)[0], metals.value(0, WO, WI)[0])
 
 
