@@ -106,10 +106,10 @@ def test_albedo_and_normals_are_of_the_first_surface() -> None:
     wall.normals = np.tile(np.array([0.6, 0.0, 0.8], np.float32), (4, 1))
     scene = Scene(meshes=[wall], environment=Environment(color=(2, 2, 2)), render=RenderSettings(size=(3, 2)),
                   camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
-    _, found = rendered(scene, "albedo,normal,geometric_normal")
+    _, found = rendered(scene, "albedo,normal,geometric_normal", integrator="depth")
     for name, expected in (("albedo", (0.9, 0.8, 0.5)), ("normal", (0.6, 0, 0.8)), ("geometric_normal", (0, 0, 1))):
         np.testing.assert_allclose(found[name], np.broadcast_to(expected, (2, 3, 3)), rtol=1e-6, atol=1e-7)
-    _, found = rendered(replace(scene, meshes=[]), "albedo,normal,object,depth,position")
+    _, found = rendered(replace(scene, meshes=[]), "albedo,normal,object,depth,position", integrator="depth")
     assert not found["albedo"].any() and not found["normal"].any() and not found["position"].any()
     assert np.all(found["object"] == -1) and np.all(found["depth"] == np.inf)
 
@@ -126,7 +126,7 @@ def test_textures_and_normal_maps_are_seen() -> None:
                   camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
     bent = np.array([204, 128, 204]) / 127.5 - 1
     for names in ("albedo,normal,geometric_normal", "normal"):
-        _, found = rendered(scene, names)
+        _, found = rendered(scene, names, integrator="depth")
         expected: dict[str, Any] = {
             "albedo": (1, 0, 1), "normal": bent / np.linalg.norm(bent), "geometric_normal": (0, 0, 1)}
         for name, aov in found.items():
@@ -143,7 +143,7 @@ def test_what_is_not_there_is_looked_through() -> None:
     scene = Scene(meshes=[wall(0.5, Diffuse(opacity=0.0)), back, wall(-1, Diffuse(color=RED))],
                   environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=(3, 2)),
                   camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
-    _, found = rendered(scene, "object,depth,position,albedo")
+    _, found = rendered(scene, "object,depth,position,albedo", integrator="depth")
     assert np.all(found["object"] == 2)
     np.testing.assert_allclose(found["depth"], 1.9, rtol=1e-6)
     np.testing.assert_allclose(found["position"][..., 2], -1, rtol=1e-6)
@@ -155,7 +155,7 @@ def test_albedo_is_a_mean_over_the_pixel() -> None:
     half = quad([(-2, -2, -1), (0, -2, -1), (0, 2, -1), (-2, 2, -1)], Diffuse(color=RED))
     scene = Scene(meshes=[half], environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=(5, 3)),
                   camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
-    _, found = rendered(scene, "albedo")
+    _, found = rendered(scene, "albedo", integrator="depth")
     np.testing.assert_allclose(found["albedo"][:, 2], np.tile(np.multiply(RED, 0.5), (3, 1)), rtol=0.13)
     np.testing.assert_allclose(found["albedo"][:, :2], np.broadcast_to(RED, (3, 2, 3)), rtol=1e-6)
     assert not found["albedo"][:, 3:].any()
