@@ -75,13 +75,15 @@ def test_normals_of_a_ball(device: Device) -> None:
 
 
 def test_albedo_is_the_materials_own(device: Device) -> None:
-    """Of mirrors, too; the normal is that of the side that is seen."""
+    """Of mirrors, too; the normal is that of the side that is seen. Behind is the like of the other material."""
     camera = Camera(position=(0.0, 0.0, 3.0), fov_degrees=20)
-    for material, color in ((RED, (0.7, 0.2, 0.1)), (Mirror(color=(0.5, 0.6, 0.7)), (0.5, 0.6, 0.7))):
-        wall = quad([(-9, -9, 0), (-9, 9, 0), (9, 9, 0), (9, -9, 0)], material)   # its back
+    materials = {RED: (0.7, 0.2, 0.1), Mirror(color=(0.5, 0.6, 0.7)): (0.5, 0.6, 0.7)}
+    for (material, color), other in zip(materials.items(), reversed(materials)):
+        walls = [quad([(-9, -9, z), (-9, 9, z), (9, 9, z), (9, -9, z)], each)   # their backs
+                 for z, each in ((0, material), (-1, other))]
         for integrator, expected in (("albedo", color), ("normals", (0.0, 0.0, 1.0)), ("depth", (3.0, 3.0, 3.0))):
             settings = RenderSettings(size=(5, 3), spp=2, integrator=integrator)  # type: ignore[arg-type]
-            picture = film(device, Scene(meshes=[wall], camera=camera, render=settings)).mean
+            picture = film(device, Scene(meshes=walls, camera=camera, render=settings)).mean
             np.testing.assert_allclose(picture, np.broadcast_to(expected, picture.shape), rtol=1e-6, atol=1e-7)
 
 
