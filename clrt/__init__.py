@@ -28,10 +28,12 @@ if TYPE_CHECKING:
                                   turntable as turntable)
     from .scene.lights import (DirectionalLight as DirectionalLight, PointLight as PointLight,
                                SpotLight as SpotLight)
-    from .scene.materials import (Dielectric as Dielectric, Diffuse as Diffuse, MetallicRoughness as MetallicRoughness,
-                                  Mirror as Mirror)
+    from .scene.materials import (BlinnPhong as BlinnPhong, Conductor as Conductor, Dielectric as Dielectric,
+                                  Diffuse as Diffuse, MetallicRoughness as MetallicRoughness, Mirror as Mirror,
+                                  Phong as Phong)
     from .scene.model import (Camera as Camera, Environment as Environment, Instance as Instance, Mesh as Mesh,
                               RenderSettings as RenderSettings, Scene as Scene, Sphere as Sphere)
+    from .scene.textures import Picture as Picture, Texture as Texture
     __version__: str
 
 _HOME = {
@@ -45,8 +47,9 @@ _HOME = {
     "rendering.renderer": ("Renderer", "State"),
     "scene.animation": ("Animation", "Keyframe", "frames", "turntable"),
     "scene.lights": ("DirectionalLight", "PointLight", "SpotLight"),
-    "scene.materials": ("Dielectric", "Diffuse", "MetallicRoughness", "Mirror"),
+    "scene.materials": ("BlinnPhong", "Conductor", "Dielectric", "Diffuse", "MetallicRoughness", "Mirror", "Phong"),
     "scene.model": ("Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
+    "scene.textures": ("Picture", "Texture"),
 }
 _MODULES = ("trimesh",)
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}

@@ -13,6 +13,7 @@ from typing import NoReturn
 import click
 
 from ..errors import ClrtError, DeviceError, KernelError, OutputError
+from .options import Group
 from .streams import open_missing, patient_stdout, stdout_problem
 
 STARTED = time.perf_counter()
@@ -23,7 +24,7 @@ OBJECTS = 100_000
 COMMANDS = ("render", "view", "info", "convert", "compare", "devices", "bench", "cache", "doctor")
 
 
-class _Commands(click.Group):
+class _Commands(Group):
     """Commands by name, each imported when it is used."""
 
     def list_commands(self, context: click.Context) -> list[str]:

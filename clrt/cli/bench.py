@@ -13,9 +13,10 @@ from .bench_numerics import numerics_command
 from .bench_peers import peers_command
 from .bench_rays import rays_command
 from .bench_theses import theses_command
+from .options import Group
 
 
-@click.group()
+@click.group(cls=Group)
 def command() -> None:
     """Measure this machine: rays, build, hits, peers, converge, agree, numerics, theses, farm."""
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
-import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -73,24 +74,36 @@ class Sequence:
         self._fps = scene.animation.fps if scene.animation else 0.0
         for video in self.videos:
             check_video(video, size or scene.render.size, self._fps)
-        if self.videos and self.outputs.pictures[-1].parent == spool(self.videos[0]):
-            spool(self.videos[0]).mkdir(exist_ok=True)
         self._of(0).check()
         return replace(scene, camera=next(iter(self._stills.values())), animation=None)
 
     def _of(self, number: int) -> Outputs:
         """What is written of a frame."""
-        report = self.outputs.report and numbered(self.outputs.report, number)
-        return replace(self.outputs, pictures=tuple(numbered(path, number) for path in self.outputs.pictures),
-                       report=report)
+        asked = self.outputs
+        return replace(asked, pictures=tuple(numbered(path, number) for path in asked.pictures),
+                       report=asked.report and numbered(asked.report, number),
+                       spool=asked.spool and numbered(asked.spool, number))
+
+    def check_apart(self, inputs: Iterable[Path]) -> None:
+        """See `Outputs.check_apart`, of every frame and video."""
+        files = {os.path.realpath(path) for path in inputs}
+        for number in self._stills:
+            self._of(number).check_apart(inputs)
+        for video in self.videos:
+            if os.path.realpath(video) in files:
+                raise UsageError(f"{video}: is a file of the scene and a video, one of which would be lost; name "
+                                 "another file")
 
     def left(self, scene: Scene, choices: Choices, goal: object) -> Iterator[tuple[Outputs, Camera]]:
         """Outputs and camera of each frame that is still to be made. Of a picture is known what it was made of."""
+        from ..output.files import make_folder
         from ..output.images import metadata_of
         from ..rendering.identity import facts_of
 
         facts = {**facts_of(scene, choices), "camera": ""}
         asked = self.outputs
+        if asked.spool:
+            make_folder(asked.spool.parent)
         for number, camera in self._stills.items():
             made_of = repr((sorted(facts.items()), camera, goal, asked.denoise, asked.view, asked.exposure, asked.aovs))
             digest = hashlib.sha256(made_of.encode()).hexdigest()
@@ -107,8 +120,11 @@ class Sequence:
         for video in self.videos:
             pattern = next(path for path in self.outputs.pictures if path.suffix.lower() == ".png")
             click.echo(str(write_video(video, [numbered(pattern, number) for number in self._stills], self._fps)))
-        for video in self.videos[:1]:
-            shutil.rmtree(spool(video), ignore_errors=True)
+        if spool := self.outputs.spool:
+            for number in self._stills:
+                numbered(spool, number).unlink(missing_ok=True)
+            with suppress(OSError):   # files of others are in it
+                spool.parent.rmdir()
 
 
 def make_sequence(outputs: Outputs, frames: str | None, resume: bool, single: Mapping[str, object]) -> Sequence:
@@ -121,7 +137,8 @@ def make_sequence(outputs: Outputs, frames: str | None, resume: bool, single: Ma
     videos = tuple(path for path in outputs.pictures if is_video(path))
     pictures = tuple(path for path in outputs.pictures if not is_video(path))
     if videos and not any(path.suffix.lower() == ".png" for path in pictures):
-        pictures += (spool(videos[0]) / "####.png",)
+        spool = videos[0].with_name(f"{videos[0].name}.frames") / "####.png"
+        outputs, pictures = replace(outputs, spool=spool), (*pictures, spool)
     return Sequence(replace(outputs, pictures=pictures), videos, _numbers(frames or "all"), resume)
 
 
@@ -136,11 +153,6 @@ def _numbers(text: str) -> list[int] | None:
             return []
         numbers |= {*range(int(match[1]), int(match[2] or match[1]) + 1, int(match[3] or 1))}
     return sorted(numbers)
-
-
-def spool(video: Path) -> Path:
-    """Where a video's frames are kept until it is written, if they are not asked for themselves."""
-    return video.with_name(f"{video.name}.frames")
 
 
 def numbered(path: Path, number: int) -> Path:

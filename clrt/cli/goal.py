@@ -60,8 +60,8 @@ def time_left(state: State, goal: Goal, rate: float) -> float | None:
     Noise² falls as 1/samples.
     """
     ends = [] if goal.seconds is None else [goal.seconds - state.seconds]
-    if goal.spp is not None:
+    if goal.spp is not None and rate > 0:
         ends.append((goal.spp * state.film.pixels.size - state.film.samples) / rate)
-    if goal.error is not None and state.stops_by:
+    if goal.error is not None and state.stops_by and rate > 0:
         ends.append(((state.stops_by / goal.error) ** 2 - 1) * state.film.samples / rate)
     return max(0.0, min(ends)) if ends else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,6 +50,7 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
     device = _device(selector)
     compiled = compile_scene(content, choices_on(device, choices, lanes) if device else choices, device=device)
     built = compiled.tree
+    film = prod(content.render.size) * compiled.choices.pixel.itemsize
     materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}
     materials |= {instance.material or instance.mesh.material for instance in content.instances}
     report: dict[str, Any] = {
@@ -66,8 +68,8 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
                  "stack": built.stack, "sah_cost": built.sah_cost, "bytes": built.bytes,
                  "build_seconds": built.build_seconds},
         "features": compiled.features, "files": compiled.files, "kernel_bytes": len(compiled.source.encode()),
-        "buffers": {name: array.nbytes for name, (_, array) in compiled.buffers.items()},
-        "bytes": compiled.bytes,
+        "buffers": {**{name: array.nbytes for name, (_, array) in compiled.buffers.items()}, "film": film},
+        "bytes": compiled.bytes + film,
     }
     if seen := seen_first(names):
         program = first_hit_program(compiled, seen)[0]

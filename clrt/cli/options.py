@@ -12,6 +12,18 @@ import click
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+class Group(click.Group):
+    """Commands by name; one that is misspelt is answered with the nearest."""
+
+    def resolve_command(self, context: click.Context, arguments: list[str]
+                        ) -> tuple[str | None, click.Command | None, list[str]]:
+        from ..scene.fields import unknown
+
+        if arguments and not arguments[0].startswith("-") and self.get_command(context, arguments[0]) is None:
+            context.fail(f'command "{arguments[0]}" {unknown(arguments[0], self.list_commands(context))}')
+        return super().resolve_command(context, arguments)
+
+
 class Size(click.ParamType[tuple[int, int]]):
     """WIDTHxHEIGHT in pixels, e.g. 1920x1080."""
 

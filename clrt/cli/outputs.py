@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 class Outputs:
     """inputs: the scene, and the reference if any; pictures: of the end result, with its aovs; denoise: whether
     the raw ones are kept beside them; view, exposure: of .png pictures; header: what is written there beside the
-    report. One that cannot be written keeps none of the others from being written."""
+    report; spool: one of the pictures that is there for a video only: it is not told of, and nothing is kept beside it.
+    One that cannot be written keeps none of the others from being written."""
 
     inputs: tuple[Path, ...]
     pictures: tuple[Path, ...]
@@ -36,6 +37,7 @@ class Outputs:
     report: Path | None
     plot: Path | None
     header: dict[str, Any] = field(default_factory=dict)
+    spool: Path | None = None
     _errors: list[OutputError] = field(default_factory=list)
 
     @property
@@ -43,14 +45,19 @@ class Outputs:
         """Where the raw pictures go, if there are any."""
         from ..output.denoise import raw_path
 
-        return tuple(map(raw_path, self.pictures)) if self.denoise else ()
+        return tuple(map(raw_path, self._kept)) if self.denoise else ()
+
+    @property
+    def _kept(self) -> tuple[Path, ...]:
+        """The pictures that stay."""
+        return tuple(path for path in self.pictures if path != self.spool)
 
     @property
     def beside(self) -> tuple[Path, ...]:
         """Where the AOVs go that are files of their own."""
         from ..output.layers import files_beside
 
-        return tuple(path for picture in self.pictures for path in files_beside(picture, self.aovs).values())
+        return tuple(path for picture in self._kept for path in files_beside(picture, self.aovs).values())
 
     def check(self, checkpoint: Path | None = None) -> None:
         """Finds out before the render whether its results can be written, and over none of its inputs."""
@@ -60,10 +67,11 @@ class Outputs:
         from ..output.view import check_view
 
         check_view(self.view, self.exposure)
-        if self.aovs and all(picture.suffix.lower() == ".hdr" for picture in self.pictures):
-            raise UsageError("an .hdr holds the picture alone; for --aov name an .exr or .png, too, with -o")
-        self._check_distinct(checkpoint)
-        for picture in [*self.pictures, *self.raws, *self.beside]:
+        if self.aovs and all(picture.suffix.lower() == ".hdr" for picture in self._kept):
+            raise UsageError("an .hdr holds the picture alone, as a video does; for --aov name an .exr or .png, too, "
+                             "with -o")
+        self.check_apart((), checkpoint)
+        for picture in [*self._kept, *self.raws, *self.beside]:
             check_writable(picture)
         for other in (self.report, checkpoint):
             if other is not None:
@@ -71,12 +79,14 @@ class Outputs:
         if self.plot is not None:
             check_plot(self.plot)
 
-    def _check_distinct(self, checkpoint: Path | None) -> None:
+    def check_apart(self, inputs: Iterable[Path], checkpoint: Path | None = None) -> None:
+        """Finds out whether results are written over files of the scene, or over each other."""
         named = {"a picture (-o)": self.pictures,
                  "where the raw picture is kept": self.raws, "where an AOV is written": self.beside,
                  "the --report": (self.report,), "the --plot": (self.plot,),
                  "the --checkpoint": (checkpoint,), "the checkpoint before": (checkpoint and Path(f"{checkpoint}~"),)}
-        taken = {os.path.realpath(path): what for path, what in zip(self.inputs, ("the scene", "the reference"))}
+        taken = {os.path.realpath(path): "a file of the scene" for path in inputs}
+        taken |= {os.path.realpath(path): what for path, what in zip(self.inputs, ("the scene", "the reference"))}
         for what, paths in named.items():
             for path in filter(None, paths):
                 if before := taken.get(real := os.path.realpath(path)):
@@ -93,7 +103,9 @@ class Outputs:
         """Writes the pictures, or the raw ones."""
         from ..output.layers import files_beside
 
-        for path in self.raws if raw else self.pictures:
+        if (spool := self.spool) is not None and not raw:
+            self._write(lambda: replace(image, aovs={}).save(spool, view=self.view, exposure=self.exposure), tell=False)
+        for path in self.raws if raw else self._kept:
             if self._write(lambda: image.save(path, view=self.view, exposure=self.exposure)):
                 for other in files_beside(path, image.aovs).values():
                     click.echo(str(other))
@@ -135,10 +147,12 @@ class Outputs:
         if self._errors:
             raise OutputError("; ".join(map(str, self._errors)))
 
-    def _write(self, write: Callable[[], Path]) -> bool:
+    def _write(self, write: Callable[[], Path], tell: bool = True) -> bool:
         """Whether it was written; prints where."""
         try:
-            click.echo(str(write()))
+            path = write()
+            if tell:
+                click.echo(str(path))
         except OutputError as error:
             self._errors.append(error)
             return False

@@ -98,11 +98,12 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     from ..output.data import check_denoisable
     from ..rendering.stops import check_stops, planned_spp
     from ..scene.file import check_scene, load
+    from ..scene.paths import files_read
 
     check_scene(scene)
     beside = _chosen_aovs(aovs) if aovs else ()
-    inputs = (scene,) if reference is None else (scene, reference)
-    results = Outputs(inputs, outputs or (Path(f"{scene.stem}.png"),), beside, denoise, view, exposure, report, plot)
+    named = (scene,) if reference is None else (scene, reference)
+    results = Outputs(named, outputs or (Path(f"{scene.stem}.png"),), beside, denoise, view, exposure, report, plot)
     sequence = make_sequence(results, frames, resume, {"checkpoint": checkpoint, "reference": reference, "plot": plot}
                              ) if frames or turntable else None
     if sequence is None:
@@ -130,9 +131,13 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
           cluster_for(scheduler, local_cluster, progress) as cluster, ThreadPoolExecutor(1) as meanwhile):
         opening = None if cluster else meanwhile.submit(_open, options["device"])
         progress.phase("load")
-        content = load(scene, camera)
-        if sequence is not None:
+        with files_read() as inputs:
+            content = load(scene, camera)
+        if sequence is None:
+            results.check_apart(inputs, checkpoint)
+        else:
             content = sequence.scene(content, size, turntable, fps)
+            sequence.check_apart(inputs)
         expected = None if reference is None else _read_reference(reference, size or content.render.size)
         planned = planned_spp(content.render, spp, seconds, error)
         if denoiser is not None:

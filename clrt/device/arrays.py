@@ -1,4 +1,4 @@
-"""Arrays that live on a device, beside those of numpy."""
+"""Arrays that live on a device, beside those of numpy. What they ask of it may raise DeviceError, or NoRoomError."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 
+from .driver_errors import driver_errors
 from .open import Device
 
 
@@ -28,6 +29,7 @@ class DeviceArray:
     def __len__(self) -> int:
         return self.size
 
+    @driver_errors()
     def read(self, device: Device) -> NDArray[Any]:
         """A copy of the elements, (size,)."""
         values = np.empty(self.size, self.dtype)
@@ -35,6 +37,7 @@ class DeviceArray:
             cl.enqueue_copy(device.queue, values, self.buffer)
         return values
 
+    @driver_errors()
     def write(self, device: Device, values: NDArray[Any] | DeviceArray, first: int = 0) -> None:
         """Puts `values`, of the same dtype, over the elements from `first` on."""
         offset = first * self.dtype.itemsize
@@ -46,12 +49,14 @@ class DeviceArray:
             cl.enqueue_copy(device.queue, self.buffer, np.ascontiguousarray(values), dst_offset=offset)
 
 
+@driver_errors()
 def empty_array(device: Device, dtype: DTypeLike, size: int) -> DeviceArray:
     """A new array whose elements are not defined."""
     kind = np.dtype(dtype)
     return DeviceArray(cl.Buffer(device.context, cl.mem_flags.READ_WRITE, max(1, size) * kind.itemsize), kind, size)
 
 
+@driver_errors()
 def on_device(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
     """The buffer of a device array, or a new one with a copy of a numpy array."""
     if isinstance(array, DeviceArray):
@@ -59,6 +64,7 @@ def on_device(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
     return cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=array)
 
 
+@driver_errors()
 def lent(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
     """A buffer to read from only: on a CPU the numpy array itself, which must not change then; elsewhere `on_device`.
     """

@@ -10,6 +10,7 @@ import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 
 from .arrays import lent
+from .driver_errors import driver_errors
 from .loops import loop_turns
 from .open import Device
 from .pages import advise_huge_pages
@@ -31,6 +32,7 @@ class Blocks:
 
     Every kernel's first arguments are `uint count, uint block`; the program holds build/scan.cl. `peak_bytes` is the
     most memory that its arrays took at a time. Launches are short, so waiting for them need not let signals through.
+    All may raise DeviceError.
     """
 
     def __init__(self, device: Device, source: str) -> None:
@@ -41,6 +43,7 @@ class Blocks:
         self._kernels: dict[str, cl.Kernel] = {}
         self._totals = self.empty(np.uint32, 4)
 
+    @driver_errors()
     def empty(self, dtype: DTypeLike, count: int) -> cl.Buffer:
         """An array of `count` elements, at least one, whose contents are not defined."""
         array = cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, max(1, count) * np.dtype(dtype).itemsize)
@@ -55,6 +58,7 @@ class Blocks:
         """
         return self.upload(np.zeros(count, dtype))
 
+    @driver_errors()
     def upload(self, values: NDArray[Any]) -> cl.Buffer:
         """A copy of `values`."""
         array = self.empty(values.dtype, values.size)
@@ -68,10 +72,12 @@ class Blocks:
             return self.upload(values)
         return self._counted(lent(self.device, np.ascontiguousarray(values)))
 
+    @driver_errors()
     def finish(self) -> None:
         """Waits for all that was asked for."""
         self.device.queue.finish()
 
+    @driver_errors()
     def download(self, array: cl.Buffer, dtype: DTypeLike, count: int, first: int = 0) -> NDArray[Any]:
         """`count` elements of an array, once all that was asked for is done."""
         values = np.empty(count, dtype)
@@ -128,6 +134,7 @@ class Blocks:
         local = 1 if self.device.local_size == 1 else SCAN_ITEMS
         self._launch("scan", arrays * parts, local, (values, np.uint32(count), np.uint32(parts), totals))
 
+    @driver_errors()
     def _launch(self, name: str, groups: int, local: int, values: Sequence[Any], first: int = 0) -> None:
         if name not in self._kernels:
             self._kernels[name] = make_kernel(self.device, self.program, name)

@@ -44,11 +44,16 @@ def write_file(name: str, content: bytes) -> bool:
         folder = cache_folder()
         folder.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(dir=folder, prefix="unfinished-")
+    except (OSError, RuntimeError):
+        return False
+    try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
         os.replace(temporary, folder / name)
         return True
-    except (OSError, RuntimeError):
+    except OSError:
+        with suppress(OSError):
+            os.unlink(temporary)
         return False
 
 

@@ -16,8 +16,9 @@ from contextlib import contextmanager
 
 import pyopencl as cl
 
-from ..errors import DeviceError, HungError, NoRoomError
+from ..errors import DeviceError, HungError
 from .contexts import share_no_more
+from .driver_errors import driver_errors
 from .fork import check_process
 from .open import Device
 from .pulse import VARIABLE, counted_call, note_hang, patience
@@ -87,6 +88,11 @@ class Launches:
         return self._size.units
 
     @property
+    def idle(self) -> bool:
+        """Whether none is in flight."""
+        return not self._running
+
+    @property
     def full(self) -> bool:
         """Whether as many are in flight as should be."""
         return len(self._running) >= IN_FLIGHT
@@ -127,20 +133,16 @@ def run_seconds(event: cl.Event) -> float:
 def run_kernel(device: Device, kernel: cl.Kernel, groups: int) -> None:
     """Runs a kernel, whose arguments are set, on `groups` groups of the device's size, and waits for it."""
     local = device.local_size
-    wait_for(cl.enqueue_nd_range_kernel(device.queue, kernel, (groups * local,), (local,)))
+    with calling():
+        event = cl.enqueue_nd_range_kernel(device.queue, kernel, (groups * local,), (local,))
+    wait_for(event)
 
 
 @contextmanager
 def calling() -> Iterator[None]:
     """Around calls of a driver that should take no time, which are watched; its errors become DeviceErrors."""
-    try:
-        with counted_call():
-            yield
-    except cl.MemoryError as error:
-        raise NoRoomError(f"the device has not enough memory: {error}") from error
-    except cl.Error as error:
-        share_no_more()
-        raise DeviceError(f"the device failed: {error}") from error
+    with driver_errors(), counted_call():
+        yield
 
 
 class Wait:

@@ -14,6 +14,7 @@ import numpy as np
 import pyopencl as cl
 
 from . import cache
+from .driver_errors import driver_errors
 from .open import Device
 from .program import build, compose, make_kernel
 from .verdicts import identity_of
@@ -50,6 +51,7 @@ def turns_source() -> str:
     return compose("", "check/turns.cl", {})
 
 
+@driver_errors()
 def measured_turns(device: Device) -> int | None:
     """How many of TURNS turns a loop takes; None if all, 0 if the loop went wrong in some other way."""
     kernel = make_kernel(device, build(device, turns_source()), "turns")

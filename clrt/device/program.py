@@ -92,8 +92,9 @@ def build(device: Device, source: str) -> BuiltProgram:
     cached = program is not None
     if program is None:
         binary = read_binary(key)
-        cached = binary is not None
-        program = (_from_binary(device, binary) if binary else None) or _compile(device, source)
+        program = _from_binary(device, binary) if binary else None
+        cached = program is not None or binary == b""
+        program = program or _compile(device, source)
         if not program.get_info(cl.program_info.NUM_KERNELS) and remove_damaged():
             program = _compile(device, source)
         if not cached:

@@ -33,6 +33,8 @@ HUGE = 1 << 23
 #: Pixels of a band, about. A worker has its film, which takes as much a pixel there.
 BAND_PIXELS = 1 << 20
 BYTES = 12
+#: Of a band's report, what says nothing of the picture.
+OF_ONE = {"seconds", "samples_per_second", "rays_per_second", "stop_reason", "tile_noise"}
 
 
 @dataclass
@@ -96,7 +98,10 @@ class Banded:
                  for name in ("samples", "rays", "nonfinite_samples", "seconds")}
         squares = [report["samples"] / report["spp"] * report["noise"] ** 2 for report in reports if report["noise"]]
         pixels = self.size[0] * self.size[1]
-        first = reports[0] if reports else {}
+        first = {name: value for name, value in (reports[0] if reports else {}).items() if name not in OF_ONE}
+        reasons = {report["stop_reason"] for report in reports}
+        if len(reasons) == 1:
+            first["stop_reason"] = reasons.pop()
         return {**first, "width": self.size[0], "height": self.size[1], "bands": len(reports),
                 "samples": added["samples"], "rays": added["rays"], "nonfinite_samples": added["nonfinite_samples"],
                 "worker_seconds": added["seconds"], "spp": round(added["samples"] / pixels),

@@ -152,9 +152,9 @@ class Cluster:
         coming = run_coroutine_threadsafe(_fetched(client, future), loop)
         coming.add_done_callback(lambda result: heard.put((key, result)))
 
-    def call(self, worker: str, key: str, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What the function returns there, or raises."""
-        return self._submit(worker, key, function, *arguments).result().result()
+    def ask(self, worker: str, key: str, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """What will be the function's answer there (`remote.Answer`), unless the worker ends before."""
+        return self._submit(worker, key, function, *arguments)
 
     def _submit(self, worker: str, key: str, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         with warnings.catch_warnings():

@@ -246,15 +246,19 @@ class Dispatch:
 
     def _failed(self, task: Task, member: Member, error: Exception) -> None:
         """A worker that fails is left out, and its task given to others, if it may not be what fails."""
-        task.failures += 1
-        if not isinstance(error, LookupError):
-            self._refuse(member, error)
+        if isinstance(error, LookupError):
+            self.meet_again(member)
         else:
-            del self.members[member.address]     # it has a new process behind its address, or forgot the scene
-            self.former.append(member)
+            task.failures += 1
+            self._refuse(member, error)
         if task.failures >= MOST_FAILURES and not isinstance(error, HungError):
             raise DeviceError(f"{task.name} has failed on {task.failures} workers: {error}") from error
         self._repeat(task)
+
+    def meet_again(self, member: Member) -> None:
+        """It has a new process behind its address, or forgot the scene: all that it has at hand will tell so."""
+        if self.members.get(member.address) is member:
+            self.former.append(self.members.pop(member.address))
 
     def _find_scheduler(self) -> Iterator[None]:
         """Waits until the scheduler answers again: what is done is here, and what was in flight is done again."""

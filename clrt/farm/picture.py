@@ -28,6 +28,7 @@ from ..rendering.tiles import TILE_PIXELS, row_by_row, tile_by_tile
 from ..rendering.work import Work
 from ..scene.model import Scene
 from .ahead import Ahead
+from .asking import ask
 from .cluster import Cluster
 from .dispatch import Dispatch
 from .members import BadResult, Member, Task
@@ -92,10 +93,7 @@ class FarmPicture(Accumulation):
 
     def _drawn(self, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
         """Pictures of what is seen first, by one worker (see `remote.draw`)."""
-        member = self.dispatch.wait_for()[0]
-        cluster = self.dispatch.cluster
-        pictures: dict[str, NDArray[Any]] = cluster.call(
-            member.address, f"clrt-draw-{self._parcel.key}-{names}", draw, self._parcel.key, names)
+        pictures: dict[str, NDArray[Any]] = ask(self.dispatch, draw, self._parcel.key, names)
         return pictures
 
     def introduction(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:

@@ -29,7 +29,7 @@ P = ParamSpec("P")
 #: Scenes that a worker keeps; the one that was used longest ago goes first.
 MOST_KEPT = 2
 _renderers: dict[str, ShareRenderer | Simulation] = {}
-_starting = Lock()
+_starting, _table = Lock(), Lock()
 
 
 def identity() -> dict[str, str]:
@@ -90,11 +90,11 @@ def prepare(client: dict[str, str], key: str, text: bytes, digests: list[str], *
     the report, and its proof (`ShareRenderer.proof`). DeviceError, KernelError, SceneError."""
     _check_identity(client)
     with _starting:
-        if key not in _renderers:
-            while len(_renderers) >= MOST_KEPT:
-                del _renderers[next(iter(_renderers))]
-            _renderers[key] = _made(unpack(text, dict(zip(digests, arrays))))
-        renderer = _renderers[key]
+        if (renderer := _found(key)) is None:
+            with _table:
+                for old in list(_renderers)[:len(_renderers) + 1 - MOST_KEPT]:
+                    del _renderers[old]
+            renderer = _renderers[key] = _made(unpack(text, dict(zip(digests, arrays))))
         return {**renderer.introduction(), "report": renderer.report(), "proof": renderer.proof()}
 
 
@@ -160,9 +160,16 @@ def _check_identity(client: dict[str, str]) -> None:
         raise DeviceError(f"it has {told[0]}, this client {told[1]}; install the same clrt on both")
 
 
+def _found(key: str) -> ShareRenderer | Simulation | None:
+    """What is kept under the key, which is then the last to go. Some threads may ask at a time."""
+    with _table:
+        if key in _renderers:
+            _renderers[key] = _renderers.pop(key)
+        return _renderers.get(key)
+
+
 def _renderer(key: str) -> ShareRenderer | Simulation:
-    renderer = _renderers.pop(key, None)
+    renderer = _found(key)
     if renderer is None:
         raise LookupError(f"this worker was not prepared for {key}")
-    _renderers[key] = renderer
     return renderer

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..device.open import Device
 from ..errors import DeviceError, UsageError
+from ..rendering.checkpoint import check_of_none
 from ..rendering.features import warn_of_darkness
 from ..rendering.on_device import SceneOnDevice
 from ..rendering.renderer import Renderer, State
@@ -68,6 +69,7 @@ class FarmRenderer(Renderer):
 
     def look(self, camera: Camera) -> None:
         """Begins another picture. Of many, each is better rendered by one worker (whole_pictures.py)."""
+        check_of_none(self._checkpoints)
         validate(Scene(camera=camera, render=self.settings))
         self.scene = replace(self.scene, camera=camera)
         self.session = self._make_picture()

@@ -19,8 +19,8 @@ from .remote import about, opened
 
 #: Devices do one thing at a time.
 _at_work = Lock()
-#: Tiles of a proof, and of a share at most.
-PROOF_TILES, MOST_TILES = 16, 2048
+#: Tiles of a proof.
+PROOF_TILES = 16
 
 
 class ShareRenderer:

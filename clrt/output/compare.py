@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import SceneError
+from ..errors import SceneError, UsageError
 from ..scene.pictures import read_picture
+from .image import Image
 
 FloatArray = NDArray[np.float32]
+Picture = FloatArray | Image | str | PathLike[str]
 #: Keeps relMSE finite where the reference is dark.
 RELMSE_FLOOR = 0.01
 #: HDR-FLIP sees values up to the largest of float16: the brighter the reference, the more exposures it tries.
@@ -24,11 +27,12 @@ def compare_files(image: Path, reference: Path) -> dict[str, Any]:
     """`compare` for two picture files; FLIP is HDR-FLIP when either is .exr or .hdr. SceneError names the files."""
     pixels, truth = read_picture(image), read_picture(reference)
     _check_sizes(pixels, truth, str(image), str(reference))
-    return compare(pixels, truth, hdr=bool({image.suffix.lower(), reference.suffix.lower()} & {".exr", ".hdr"}))
+    return _measures(pixels, truth, bool({image.suffix.lower(), reference.suffix.lower()} & {".exr", ".hdr"}))
 
 
-def compare(image: FloatArray, reference: FloatArray, *, hdr: bool = True) -> dict[str, Any]:
-    """Measures of the image x against the reference r, both (h, w, 3) float32 linear, computed in float64.
+def compare(image: Picture, reference: Picture, *, hdr: bool = True) -> dict[str, Any]:
+    """Measures of the image x against the reference r, both (h, w, 3) float32 linear, computed in float64; an `Image`,
+    or the path of a picture file, stands for its pixels.
 
     - relmse: mean((x − r)² / (r² + 0.01)); rmse: √mean((x − r)²); max_abs: max |x − r|
     - mean_ratio: mean(x) / mean(r) of each channel; None where mean(r) is 0
@@ -36,9 +40,26 @@ def compare(image: FloatArray, reference: FloatArray, *, hdr: bool = True) -> di
     - nonfinite, nonfinite_reference: how many values of x and of r are NaN or Inf. Where either is, the value is left
       out of all the measures above (for FLIP it is 0 in both); a measure without any value left is None.
 
-    Raises SceneError if the sizes differ.
+    Raises SceneError for a file that cannot be read and if the sizes differ, and UsageError for what is no picture.
     """
-    _check_sizes(image, reference, "the image", "the reference")
+    x, r = _pixels(image, "the image"), _pixels(reference, "the reference")
+    _check_sizes(x, r, "the image", "the reference")
+    return _measures(x, r, hdr)
+
+
+def _pixels(picture: Picture, name: str) -> FloatArray:
+    """(h, w, 3)."""
+    if isinstance(picture, str | PathLike):
+        return read_picture(Path(picture))
+    pixels = picture.pixels if isinstance(picture, Image) else picture
+    if not isinstance(pixels, np.ndarray) or pixels.ndim != 3 or pixels.shape[2] != 3:
+        raise UsageError(f"{name} is {type(pixels).__name__} {getattr(pixels, 'shape', '')}, not (height, width, 3) "
+                         "pixels; give an array of them, a clrt.Image or the path of a picture")
+    return pixels
+
+
+def _measures(image: FloatArray, reference: FloatArray, hdr: bool) -> dict[str, Any]:
+    """See `compare`."""
     valid = np.isfinite(image) & np.isfinite(reference)
     x, r = image[valid].astype(np.float64), reference[valid].astype(np.float64)
     return {

@@ -26,6 +26,14 @@ def check_target(path: Path) -> None:
                           "change its permissions or choose another folder") from error
 
 
+def make_folder(path: Path) -> None:
+    """Makes a folder, unless it is there; raises OutputError."""
+    try:
+        path.mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be made ({error.strerror}); choose another path") from error
+
+
 def _check_kind(path: Path) -> None:
     if path.exists() and not path.is_file():
         raise OutputError(f"{path}: is a device, a pipe or a socket, which is not replaced; name a regular file")

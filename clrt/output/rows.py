@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import OutputError
 from .files import replacing
 from .images import check_writable, rgbe_rounded
 from .view import check_view, to_display
@@ -45,8 +44,8 @@ def write_rows(path: Path, size: tuple[int, int], pieces: Iterable[NDArray[np.fl
         closed, complaint = output.close(), output.geterror()
         if complaint or not closed:
             raise OSError(complaint.splitlines()[0] if complaint else "the writer gave no reason")
-    if row != height:
-        raise OutputError(f"{path}: has {row} of its {height} rows")
+        if row != height:
+            raise OSError(f"there are {row} of its {height} rows")
 
 
 def _samples(piece: NDArray[np.float32], kind: str, view: str, exposure: float) -> NDArray[Any]:

@@ -128,3 +128,9 @@ def open_checkpoints(path: str | Path | None, resume: bool, seconds: float, scen
         return checkpoints, checkpoints.read(scene.render.size)
     checkpoints.warn_of_another()
     return checkpoints, None
+
+
+def check_of_none(checkpoints: Checkpoints | None) -> None:
+    """UsageError where one is kept, before another picture is begun."""
+    if checkpoints is not None:
+        raise UsageError("a checkpoint is of one picture, seen by one camera; make a renderer for each")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..device.arrays import lent, on_host, same_content
 from ..device.background import in_background
+from ..device.driver_errors import driver_errors
 from ..device.launch import calling, wait_for
 from ..device.memory import array_bytes, check_memory, part_count, part_records, parts, size
 from ..device.open import Device
@@ -105,10 +106,11 @@ class SceneOnDevice:
 
     @contextmanager
     def allocating(self) -> Iterator[None]:
-        """Around what takes memory there: NoRoomError where the device has not enough."""
+        """Around what takes memory there: NoRoomError where the device has not enough, DeviceError where it fails."""
         try:
-            yield
-        except cl.MemoryError as error:
+            with driver_errors():
+                yield
+        except NoRoomError as error:
             raise NoRoomError(f"{self.device.info.name}: {size(self.device_bytes)} do not fit: {error}") from error
 
     def look(self, camera: Camera) -> None:

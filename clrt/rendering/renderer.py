@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..accel.kernels import HitTests
 from ..device.open import Device, name_of, open_devices
-from ..errors import DeviceError, UsageError
+from ..errors import DeviceError
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validate import check_is_scene, validate
 from .accumulation import Accumulation
@@ -25,7 +25,7 @@ from .adaptive import FLOOR_SPP, MOST_TIMES_PLANNED
 from .aovs import check_light, chosen_aovs, film_aovs, needs_direct_light, seen_first
 from .bands import Unwanted
 from .camera import camera_file
-from .checkpoint import open_checkpoints
+from .checkpoint import check_of_none, open_checkpoints
 from .choices import WAVE_LANES, Choices, choices_on
 from .compile import CompiledScene
 from .compiler import Compiler
@@ -145,8 +145,7 @@ class Renderer:
         Tree and buffers stay; so does the program, unless a lens or another projection comes in. SceneError where the
         camera is wrong, UsageError where a checkpoint is kept, which is of one picture.
         """
-        if self._checkpoints is not None:
-            raise UsageError("a checkpoint is of one picture, seen by one camera; make a renderer for each")
+        check_of_none(self._checkpoints)
         validate(Scene(camera=camera, render=self.settings))
         self.scene = replace(self.scene, camera=camera)
         files, file = self.compiled.chosen_files["CAMERA"], camera_file(camera, self.settings.integrator)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..device.launch import IN_FLIGHT
 from ..device.open import Device
-from ..errors import DeviceError
+from ..errors import DeviceError, KernelError
 from .compile import CompiledScene
 from .on_device import SceneOnDevice
 from .session import FEWEST_TILES
@@ -35,7 +35,7 @@ _log = logging.getLogger(__name__)
 
 
 class Team:
-    """Renders a scene, compiled for each device. DeviceError where none is left.
+    """Renders a scene, compiled for each device. DeviceError, or the last one's KernelError, where none is left.
 
     launch: see `session.first_launch`; tiles: the most that a film will have; before: see `SceneOnDevice`.
     """
@@ -47,7 +47,7 @@ class Team:
         for device, scene, launch in zip(devices, compiled, launches):
             try:
                 self.workers.append(Worker(device, scene, launch, tiles, before))
-            except DeviceError as error:
+            except (DeviceError, KernelError) as error:
                 if len(devices) == 1:
                     raise
                 _log.warning("%s is left out: %s", device.info.name, error)
@@ -116,6 +116,9 @@ class Team:
                 while share := worker.ended():
                     film[share.rows] = share.pixels
                     count += 1
+                if worker.at and worker.launches.idle:    # Ctrl-C came between a launch and the note of its share
+                    self._take_back(worker, work)
+                    worker.at.clear()
             except DeviceError as error:
                 self._leave_out(worker, work, error)
         return count
@@ -124,8 +127,12 @@ class Team:
         """Has others do what it was at; it is kept, as giving it up might wait for it."""
         self.workers.remove(worker)
         self.lost.append(worker)
-        for share in reversed(worker.at):
-            work.give_back(share.part)
+        self._take_back(worker, work)
         if not self.workers:
             raise error
         _log.warning("%s is left out: %s; the others do its work again", worker.name, error)
+
+    def _take_back(self, worker: Worker, work: Work) -> None:
+        """What it is at is in hand again; nothing of that has come into the film."""
+        for share in reversed(worker.at):
+            work.give_back(share.part)

@@ -88,7 +88,8 @@ def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[
     is none of it.
     """
     if scene.animation is None:
-        raise SceneError(f"{scene.name}: nothing moves; write [[keyframe]] tables, or have it turned (--turntable)")
+        raise SceneError(f"{scene.name}: nothing moves; write [[keyframe]] tables, or have it turned (--turntable, "
+                         "clrt.turntable)")
     if problems := (field_problems(Animation, vars(scene.animation), "animation")
                     or animation_problems(scene.camera, scene.animation)):
         raise SceneError(problems)

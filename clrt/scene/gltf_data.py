@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .gltf_document import Accessor, Document, Sparse, entry, parse_document
+from .paths import note_read
 
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -47,7 +48,7 @@ class GltfData:
             file = self.path.parent / unquote(uri)
             if not file.is_file():
                 raise FileNotFoundError
-            return file.read_bytes()
+            return note_read(file).read_bytes()
         except (OSError, ValueError):
             raise SceneError(f'{user}: cannot read the file "{unquote(uri)[:200]}"; put it beside the model') from None
 

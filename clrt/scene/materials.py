@@ -52,8 +52,10 @@ class Conductor(Material):
         return {"eta": self.eta or eta, "k": self.k or k, "roughness": self.roughness}
 
     def conflicts(self) -> list[str]:
-        alone = (self.eta is None) != (self.k is None)
-        return ["eta: and k belong together; write both, or a preset alone"] if alone else []
+        if (self.eta is None) == (self.k is None):
+            return []
+        given, other = ("k", "eta") if self.eta is None else ("eta", "k")
+        return [f"{given}: is there without {other}; write both, or a preset alone"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,11 +38,10 @@ def parse_map(words: str) -> Map:
 
 
 class Maps:
-    """Reads the maps of one model's libraries, each picture once."""
+    """Reads the maps of one model's libraries, each picture once; their names are relative to the model's folder."""
 
-    def __init__(self, folder: Path) -> None:
-        """folder: what their names are relative to."""
-        self._folder = folder
+    def __init__(self, model: Path) -> None:
+        self._model = model
         self._pictures: dict[str, Picture | None] = {}
 
     def texture(self, words: str) -> Texture | None:
@@ -61,10 +60,10 @@ class Maps:
     def _picture(self, name: str) -> Picture | None:
         if name not in self._pictures:
             try:
-                file = self._folder / name.replace("\\", "/")
+                file = self._model.parent / name.replace("\\", "/")
                 self._pictures[name] = Picture(read_texels(file), name)
             except (SceneError, OSError, ValueError) as error:
-                log.warning("a texture is left out: %s", error)
+                log.warning("%s: a texture is left out: %s", self._model, error)
                 self._pictures[name] = None
         return self._pictures[name]
 

@@ -17,6 +17,7 @@ from ..errors import SceneError
 from .materials import Material
 from .mtl import Entry, left_out, material, read_library
 from .mtl_maps import Maps
+from .paths import note_read
 
 log = logging.getLogger(__name__)
 Floats = NDArray[np.float64]
@@ -174,9 +175,9 @@ def _libraries(path: Path, text: str) -> dict[str, Material]:
                     raise SceneError([f"{library.name}: {problem}" for problem in error.problems]) from None
     if names := left_out(entries):
         log.warning("%s: left out: %s", path, ", ".join(names))
-    maps = Maps(path.parent)
+    maps = Maps(path)
     return {name: material(entry, maps) for name, entry in entries.items()}
 
 
 def _text(path: Path) -> str:
-    return path.read_text(encoding="utf-8", errors="replace")
+    return note_read(path).read_text(encoding="utf-8", errors="replace")

@@ -141,7 +141,10 @@ class SceneReader:
             rest = {key: value for key, value in values.items() if key != "type"}
             rest = {key: self._texture(value, f"{where}.{key}") if isinstance(value, dict) else value
                     for key, value in rest.items()}
-            return self._build(known[str(values["type"])], rest, where)
+            made = self._build(known[str(values["type"])], rest, where)
+            conflicts = made.conflicts() if isinstance(made, Material) else []
+            self.problems += [f"{where}.{conflict}" for conflict in conflicts]
+            return None if conflicts else made
         return None
 
     def _texture(self, values: Table, where: str) -> Texture:
@@ -202,6 +205,8 @@ class SceneReader:
         if table or not field_problems(MeshTable, geometry, where):
             model = self._tried((table or MeshTable(**geometry)).read, self._path.parent, where)
             matrix = self._tried((table or MeshTable()).to_world, where)
+        if matrix is not None and not matrix[:3, :3].any():
+            self.problems.append(f"{where}: its transform leaves nothing but a point; write a scale without 0")
         if model is None or matrix is None:
             model = Model(meshes=[])
         else:

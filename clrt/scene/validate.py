@@ -14,7 +14,7 @@ from .fields import field_problems, show
 from .instance_problems import matrix_problems
 from .instancing import painted
 from .lights import LIGHTS, PointLight, SpotLight
-from .materials import Diffuse, Material
+from .materials import MATERIALS, Diffuse, Material
 from .model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere
 
 #: What a mesh may have for each vertex, and of how many numbers.
@@ -167,7 +167,8 @@ def _others(rows: NDArray[np.bool_]) -> str:
 def _object_problems(value: object, kind: type, where: str) -> list[str]:
     """Whether `value` is a `kind` whose fields keep their limits."""
     if not isinstance(value, kind):
-        return [f"{where}: {show(value)} is no {kind.__name__}; write a clrt.{kind.__name__}"]
+        names = [each.__name__ for each in MATERIALS] if kind is Material else [kind.__name__]
+        return [f"{where}: {show(value)} is no {kind.__name__}; write a clrt.{' or clrt.'.join(names)}"]
     values = {field.name: getattr(value, field.name) for field in fields(type(value))}  # type: ignore[arg-type]
     return field_problems(type(value), values, where)
 

@@ -174,7 +174,8 @@ class _Writer:
         kept = [name for name in groups if name not in changed]
         return [*(["", "[mesh.materials]  # the file's name = the one above"] if changed else []),
                 *(f"{toml_key(name)} = {toml_value(other)}" for name, other in changed.items()),
-                *([f"# The file's own: {', '.join(map(toml_value, kept))}"] if changed and kept else [])]
+                *([f"# The file's own: {', '.join(map(toml_value, theirs))}; [mesh.materials] can name others for them"]
+                  if (theirs := [name for name in kept if name]) else [])]
 
     def _own_objects(self) -> Iterator[str]:
         """What no table says: each mesh in a file beside, hidden where only its instances are seen."""

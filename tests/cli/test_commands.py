@@ -166,6 +166,8 @@ file = "nowhere.ply"
     (("render", "ball.toml", "-o", "r.exr", "--reference", "r.exr"), 2, ["r.exr", "reference"]),
     (("render", "ball.toml", "--size", "60000x60000"), 4, ["60000x60000", "GiB", "--size"]),
     (("compare", "ball.toml", "ball.toml"), 3, ["ball.toml"]),
+    (("rendr", "ball.toml"), 2, ['command "rendr" is unknown; did you mean "render"?']),
+    (("bench", "raiz"), 2, ['command "raiz" is unknown; write one of agree,']),
 ])
 def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], code: int, words: list[str]) -> None:
     scene.with_name("loop.toml").symlink_to("loop.toml")
@@ -187,6 +189,7 @@ def test_info_lists_what_is_compiled_and_uploaded(scene: Path) -> None:
     assert info["spheres"] == 1 and info["triangles"] == 0 and info["materials"] == {"diffuse": 1}
     assert "MATERIAL_DIFFUSE" in info["features"] and "bsdf/diffuse.cl" in info["files"]
     assert sum(info["buffers"].values()) == info["bytes"]
+    assert info["buffers"]["film"] == 64 * 24 * 16
 
 
 def test_info_lists_materials_and_presets(scene: Path) -> None:

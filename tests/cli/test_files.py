@@ -6,11 +6,13 @@ import os
 import stat
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from clrt.errors import CheckpointError, OutputError
 from clrt.farm.manifest import Manifest
 from clrt.output.files import replacing
+from clrt.output.images import write_image
 from clrt.output.scenes import save_scene
 from clrt.scene.file import load
 
@@ -81,6 +83,29 @@ def test_no_file_is_named_twice(folder: Path, options: tuple[str, ...]) -> None:
     code = 3 if "ball" in options else 2
     assert result.returncode == code and result.stdout == "" and "Traceback" not in result.stderr, result.stderr
     assert f"{Path(options[-1])}: is".replace("####", "0000") in result.stderr, result.stderr
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+MODEL = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+
+
+@pytest.mark.parametrize("arguments", [
+    ("a.obj",), ("a.obj", "-o", "b.png", "--report", "a.mtl"), ("ball.toml", "-o", "sky.hdr"),
+    ("ball.toml", "-o", "b.png", "--plot", "paint.png"), ("ball.toml", "--turntable", "2", "-o", "t_####.png"),
+    ("ball.toml", "-o", "b.png", "--checkpoint", "a.obj")], ids=" ".join)
+def test_no_file_of_the_scene_is_replaced(folder: Path, arguments: tuple[str, ...]) -> None:
+    """Models, their libraries, textures and skies, found before the render; a model's name is its texture's, too."""
+    (folder / "a.obj").write_text(MODEL)
+    (folder / "a.mtl").write_text("newmtl m\nmap_Kd a.png\n")
+    textured = 'type = "diffuse"\ncolor = { image = "%s" }\n'
+    (folder / "ball.toml").write_text(
+        '[environment]\nimage = "sky.hdr"\n[materials.a]\n' + textured % "paint.png" + "[materials.b]\n"
+        + textured % "t_0001.png" + '[[sphere]]\nmaterial = "a"\n[[mesh]]\nfile = "a.obj"\nmaterial = "b"\n')
+    for name in ("a.png", "paint.png", "t_0001.png", "sky.hdr"):
+        write_image(folder / name, np.ones((4, 8, 3), np.float32))
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    result = clrt("render", *arguments, "--spp", "1", cwd=folder)
+    assert (result.returncode, result.stdout) == (2, "") and "is a file of the scene and" in result.stderr
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 

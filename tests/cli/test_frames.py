@@ -85,13 +85,13 @@ def test_resume_makes_what_is_missing(flight: Path) -> None:
 
 @pytest.mark.parametrize("suffix", [".gif", ".mp4", ".webm"])
 def test_videos(suffix: str, flight: Path) -> None:
-    """Every frame in its place and time; without .png frames nothing else is left."""
+    """Every frame in its place and time; without .png frames nothing else is told of, or left."""
     from imageio.v3 import imiter, immeta, improps, imread
 
     wanted = "flight.toml", "--turntable", "6", "--fps", "12", "--size", "48x32"
     pictures = [f"flight_{n:04}.png" for n in range(6)]
     assert render(*wanted, "-o", f"v{suffix}", "-o", "flight.png") == [*pictures, f"v{suffix}"]
-    assert render(*wanted, "-o", f"w{suffix}") == [*(f"w{suffix}.frames/{n:04}.png" for n in range(6)), f"w{suffix}"]
+    assert render(*wanted, "-o", f"w{suffix}") == [f"w{suffix}"]
     assert Path(f"v{suffix}").read_bytes() == Path(f"w{suffix}").read_bytes() or suffix == ".webm"
     assert {path.name for path in Path().iterdir()} == {"flight.toml", f"v{suffix}", f"w{suffix}", *pictures}
     plugin = "pillow" if suffix == ".gif" else "FFMPEG"
@@ -103,6 +103,17 @@ def test_videos(suffix: str, flight: Path) -> None:
     still = np.stack([imread(picture) for picture in pictures]).astype(float)
     errors = [[np.abs(a - b).mean() for b in still] for a in shown.astype(float)]
     assert np.argmin(errors, axis=1).tolist() == list(range(6)) and np.diag(errors).max() < 6
+
+
+def test_a_video_removes_its_own_files_alone(flight: Path) -> None:
+    """Whatever else is in the folder of its frames, whether asked for or somebody's."""
+    Path("v.gif.frames").mkdir()
+    Path("v.gif.frames/notes.txt").write_text("mine")
+    assert render("flight.toml", "--frames", "0,1", "-o", "v.gif") == ["v.gif"]
+    assert [path.name for path in Path("v.gif.frames").iterdir()] == ["notes.txt"]
+    asked = ["v.gif.frames/f_0000.png", "v.gif.frames/f_0001.png"]
+    assert render("flight.toml", "--frames", "0,1", "-o", "v.gif", "-o", "v.gif.frames/f_####.png") == [*asked, "v.gif"]
+    assert {str(path) for path in Path("v.gif.frames").iterdir()} == {*asked, "v.gif.frames/notes.txt"}
 
 
 def test_gifs_keep_time(tmp_path: Path) -> None:
@@ -139,7 +150,7 @@ def test_interrupted_frames_are_not_written_and_resume_ends_it(flight: Path) -> 
     (["--frames", "7-5"], 2, "'7-5' names no frames"), (["--frames", "0-4:0"], 2, "0-99:5"),
     (["--frames", "6"], 2, "flight has no frame 6; its frames are 0 to 5"),
     (["--frames", "all", "--checkpoint", "c"], 2, "--checkpoint is for one picture"),
-    (["--fps", "3"], 2, "--turntable"),
+    (["--fps", "3"], 2, "--turntable"), (["--turntable", "2", "-o", "a.gif", "--aov", "depth"], 2, "as a video does"),
     (["--frames", "0", "-o", "a.mp4", "--size", "25x16"], 2, "26x16"), (["-o", "a.gif"], 6, ".gif"),
     (["--frames", "0", "-o", "a.gif", "--fps", "60"], 2, "60 frames a second"),
     (["--frames", "0", "-o", "a.gif", "--fps", "0.0015"], 2, "666.667 s are more than the 655.35"),

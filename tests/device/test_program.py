@@ -149,7 +149,7 @@ def test_compiler_errors_are_told(device: Device) -> None:
         build(device, "kernel void broken() { undeclared = 1; }")
 
 
-@pytest.mark.parametrize("state", ["absent", "stored", "corrupt", "truncated", "empty", "no folder",
+@pytest.mark.parametrize("state", ["absent", "stored", "corrupt", "truncated", "empty", "no folder", "not a binary",
                                    "a folder in its place"])
 def test_a_program_is_built_whatever_the_cache_holds(device: Device, state: str, tmp_path: Path,
                                                      monkeypatch: pytest.MonkeyPatch) -> None:
@@ -175,8 +175,12 @@ def test_a_program_is_built_whatever_the_cache_holds(device: Device, state: str,
     elif state == "a folder in its place":
         stored[0].unlink()
         stored[0].mkdir()
+    elif state == "not a binary":
+        cache.write_binary(stored[0].stem, b"of another driver")
     built = build(device, source)
     assert built.cached == (state == "stored")
+    if state == "not a binary":
+        assert stored[0].read_bytes() == content, "what is refused is replaced"
     assert run_twice(device, built.program) == [2.0, 4.0, 6.0]
 
 

@@ -79,6 +79,13 @@ def test_what_a_compiler_gives_or_raises_comes_through() -> None:
         background.in_background("Fake GPU", lambda: 1 // 0)
 
 
+def test_what_cannot_be_kept_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path))
+    (tmp_path / "a.bin").mkdir()
+    assert not cache.write_file("a.bin", b"1234")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.bin"]
+
+
 def test_everything_that_is_kept_is_of_a_kind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path / "cache"))
     names = ["0a.bin", "1.check.json", "1.bench.json", "2.driver.json", "1.loops.json", "reference-7.npz",

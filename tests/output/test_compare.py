@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.errors import SceneError
+from clrt.errors import SceneError, UsageError
 from clrt.output.compare import compare, compare_files, relmse
+from clrt.output.image import Image
 from clrt.output.images import read_image, write_image
 
 
@@ -135,6 +137,13 @@ def test_files(tmp_path: Path, first: str, second: str, hdr: bool) -> None:
     image, reference = read_image(tmp_path / first), read_image(tmp_path / second)
     assert result == compare(image, reference, hdr=hdr)
     assert result["flip"] != compare(image, reference, hdr=not hdr)["flip"]
+    assert result == compare(tmp_path / first, Image(reference, {}), hdr=hdr)
+
+
+@pytest.mark.parametrize("wrong", [None, np.zeros((2, 2), np.float32), 3.0, [[0.0, 0.0, 0.0]]], ids=str)
+def test_what_is_no_picture(wrong: Any) -> None:
+    with pytest.raises(UsageError, match="the reference is .* give an array of them, a clrt.Image or the path"):
+        compare(picture((1, 1, 1)), wrong)
 
 
 def test_sizes_must_agree(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from clrt.errors import OutputError, UsageError
 from clrt.output.images import RGBE_MAX, check_writable, read_image, rgbe_rounded, write_image
+from clrt.output.rows import write_rows
 from clrt.output.view import to_display
 
 FloatArray = NDArray[np.float32]
@@ -208,6 +209,15 @@ def test_a_failing_write_leaves_the_old_picture(tmp_path: Path, extension: str) 
     assert result.stderr == ""
     assert path.read_text() == "the old picture"
     assert sorted(os.listdir(tmp_path)) == sorted([path.name, "elsewhere"])
+
+
+@pytest.mark.parametrize("extension", ["exr", "hdr", "png"])
+def test_a_picture_without_all_its_rows_replaces_nothing(tmp_path: Path, extension: str) -> None:
+    path = tmp_path / f"a.{extension}"
+    path.write_text("the old picture")
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_rows(path, (4, 32), [np.zeros((16, 4, 3), np.float32)])
+    assert path.read_text() == "the old picture" and os.listdir(tmp_path) == [path.name]
 
 
 def test_a_picture_gets_the_usual_permissions(tmp_path: Path) -> None:

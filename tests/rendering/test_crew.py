@@ -6,10 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyopencl as cl
 import pytest
 
+from clrt.device.driver_errors import driver_errors
+from clrt.device.launch import Launches
 from clrt.device.open import Device
-from clrt.errors import DeviceError
+from clrt.device.program import make_kernel
+from clrt.errors import DeviceError, KernelError
+from clrt.rendering import on_device
 from clrt.rendering.crew import Crew
 from clrt.rendering.renderer import Renderer
 from clrt.rendering.session import Session
@@ -104,3 +109,48 @@ def _fail_after(worker: Worker, where: str, calls: int, monkeypatch: pytest.Monk
         return method(*arguments)
 
     monkeypatch.setattr(worker, where, fails)
+
+
+def test_ctrl_c_among_the_notes_of_a_launch(device: Device, small_launches: None,
+                                            monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a launch is off its list and its share is not, or the other way around: nothing waits for what is not
+    there, and nothing is lost or counted twice."""
+    at_once = renderer(device)
+    run(at_once, spp=24)
+    for method in ("_finish_one", "begin"):
+        running, whole, left = crew(device, 2), getattr(Launches, method), [5]
+
+        def disturbed(launches: Launches, *arguments: Any) -> None:
+            left[0] -= 1
+            if method == "begin" and left[0] == 0:
+                raise KeyboardInterrupt
+            whole(launches, *arguments)
+            if left[0] == 0:
+                raise KeyboardInterrupt
+
+        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+            patch.setattr(Launches, method, disturbed)
+            run(running, spp=24)
+        run(running, spp=24)
+        assert same(at_once, running), method
+
+
+@pytest.mark.parametrize("error", [cl.RuntimeError("OUT_OF_RESOURCES"), KernelError("it has no compiler")], ids=repr)
+def test_one_that_cannot_begin_is_left_out(device: Device, caplog: pytest.LogCaptureFixture, error: Exception,
+                                           monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever its driver says; alone it is an error of clrt's."""
+    make, refused = make_kernel, list[bool]()
+
+    def refuse(*arguments: Any) -> Any:
+        if not refused:
+            refused.append(True)
+            with driver_errors():
+                raise error
+        return make(*arguments)
+
+    monkeypatch.setattr(on_device, "make_kernel", refuse)
+    running = crew(device, 2)
+    assert len(running.session.shares()) == 1 and "is left out" in caplog.text
+    refused.clear()
+    with pytest.raises((DeviceError, KernelError)):
+        renderer(device)

@@ -80,7 +80,7 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "no list": (set_scene(spheres=Sphere()), "is no list; write spheres=[...]"),
     "no mesh": (set_scene(meshes=["ball"]), 'mesh[0]: "ball" is no Mesh'),
     "material": (set_mesh(material=Diffuse(color=(0, 1.5, 0))), "mesh[0].material.color[1]: 1.5 is above 1"),
-    "no material": (set_mesh(material="gold"), 'mesh[0].material: "gold" is no Material'),
+    "no material": (set_mesh(material="gold"), 'mesh[0].material: "gold" is no Material; write a clrt.Diffuse or'),
     "emission": (set_mesh(material=Diffuse(emission=(0, -1, 0))), "mesh[0].material.emission[1]: -1 is below 0"),
     "radius": (set_scene(spheres=[Sphere(), Sphere(radius=0)]), "sphere[1].radius: 0 is not above 0"),
     "sphere type": (set_scene(spheres=[Sphere(radius="1")]), 'sphere[0].radius: "1" is not a number'),  # type: ignore
