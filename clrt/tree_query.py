@@ -105,7 +105,8 @@ class TreeQuery:
         """Every hit at 0 < t < t_max, up to `max_hits` a ray: (k,) indices of rays, and (k,) records of `closest_hit`.
 
         Sorted by ray, then t, then primitive. Each hit is found from the one before by comparing (t, primitive), not
-        by moving the origin, so surfaces that touch or coincide all count, once each.
+        by moving the origin, so surfaces that touch or coincide all count, once each; but none behind one whose t is
+        beyond float32, which is inf.
         """
         if not isinstance(max_hits, int | np.integer) or max_hits < 1:
             raise UsageError(f"max_hits is {max_hits!r}; it must be a whole number, at least 1")

@@ -126,14 +126,16 @@ class Live:
         the lower right. It is an object of the scene that was shown when that was found out. Raises what renders do."""
         with self._changed:
             found = self._picks.ask(x, y)
+            if self._closed:
+                self._picks.cancel()
             self._changed.notify_all()
         return found
 
     def image(self) -> Image:
-        """The newest picture, to be saved; with its report if it is a whole one."""
+        """The newest picture, to be saved; with its whole report if it is of the whole size."""
         with self._changed:
             still, snapshot = self._still, self._snapshot
-        report = render_report(*still) if still else {}
+        report = render_report(*still) if still else {"integrator": snapshot.scene.render.integrator}
         return Image(snapshot.shown, report, None if snapshot.denoised is None else snapshot.pixels)
 
     def close(self) -> None:

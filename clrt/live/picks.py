@@ -6,7 +6,6 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 
-from ..errors import ClrtError
 from ..scene.model import Instance, Mesh, Sphere
 
 Thing = Mesh | Instance | Sphere
@@ -31,10 +30,14 @@ class Picks:
         """Answers all."""
         while self._asked:
             x, y, found = self._asked.popleft()
+            if not found.set_running_or_notify_cancel():
+                continue    # nobody waits for it any more
             try:
-                found.set_result(seen_at(x, y))
-            except ClrtError as error:
+                thing = seen_at(x, y)
+            except Exception as error:    # whatever it is, it is who asked that must know
                 found.set_exception(error)
+            else:
+                found.set_result(thing)
 
     def cancel(self) -> None:
         """Has nobody wait for the others any more."""

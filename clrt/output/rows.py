@@ -10,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .files import replacing
-from .images import check_writable, rgbe_rounded
+from .images import ATTRIBUTES, check_writable, rgbe_rounded
 from .view import check_view, to_display
 
 #: Rows of a block of an .exr that is packed as a whole: every piece but the last must have a multiple of it.
 BLOCK_ROWS = 16
-#: As `write_image` has them.
-ATTRIBUTES: dict[str, dict[str, str | int]] = {".exr": {"compression": "zip"}, ".png": {"png:compressionLevel": 3}}
 
 
 def write_rows(path: Path, size: tuple[int, int], pieces: Iterable[NDArray[np.float32]], *,

@@ -19,10 +19,11 @@ def materials_of(scene: Scene) -> dict[str, Material]:
     users: list[tuple[str, Material | None]] = [(mesh.material_name or mesh.name, mesh.material) for mesh in meshes]
     users += [(instance.name, instance.material) for instance in scene.instances]
     users += [(sphere.name, sphere.material) for sphere in scene.spheres]
+    numbers: dict[str, int] = {}
     for name, material in users:
         if material is not None and id(material) not in known:
             known.add(id(material))
-            named[free_name(name, named)] = material
+            named[free_name(name, named, numbers)] = material
     return named
 
 
@@ -43,9 +44,13 @@ def with_material(scene: Scene, old: Material, new: Material) -> Scene:
                    instances=[changed(instance) for instance in scene.instances])
 
 
-def free_name(name: str, taken: Container[str]) -> str:
-    """The name, or with the first number behind it under which nothing is `taken`."""
-    number, free = 2, name
+def free_name(name: str, taken: Container[str], numbers: dict[str, int] | None = None) -> str:
+    """The name, or with the first number behind it under which nothing is `taken`; numbers: those that were tried of
+    each name, where many are asked for."""
+    number, free = 1, name
     while free in taken:
-        number, free = number + 1, f"{name} {number}"
+        number = max(number + 1, 2 if numbers is None else numbers.get(name, 2))
+        free = f"{name} {number}"
+    if numbers is not None:
+        numbers[name] = number
     return free

@@ -32,7 +32,7 @@ def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[st
     Finds missing and unknown fields, wrong types, values outside the limits of the type, and numbers that float32
     cannot hold (NaN, Inf and beyond). Numbers may be numpy scalars; sequences must be tuples.
     """
-    plain = {name: _plain(value) for name, value in values.items()}
+    plain = {name: plain_value(value) for name, value in values.items()}
     hints = _hints(kind)
     problems: list[str] = []
     for field in fields(kind):
@@ -177,10 +177,10 @@ _LIMITS: dict[type, tuple[str, Callable[[float, float], bool], str, str]] = {
     Lt: ("lt", operator.lt, "is not below", "write less than")}
 
 
-def _plain(value: Any) -> Any:
+def plain_value(value: Any) -> Any:
     """Numpy scalars as Python's, through tuples."""
     if isinstance(value, tuple):
-        return tuple(map(_plain, value))
+        return tuple(map(plain_value, value))
     return value.item() if isinstance(value, np.generic) else value
 
 

@@ -61,6 +61,8 @@ class Materials:
         opacity = _numbered(_unit(pbr.baseColorFactor[3]), base, "alpha")
         if source.alphaMode == "BLEND":
             return replace(made, opacity=opacity)
+        if source.alphaCutoff > 1:    # nothing reaches it (specification 3.9.4)
+            return replace(made, opacity=0.0)
         return replace(made, opacity=opacity, alpha_cutoff=_unit(source.alphaCutoff))
 
     def _layers(self, extensions: looks.MaterialExtensions, primitive: gltf.Primitive, user: str) -> dict[str, Any]:

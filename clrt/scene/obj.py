@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from .editing import free_name
 from .materials import Material
 from .mtl import Entry, left_out, material, read_library
 from .mtl_maps import Maps
@@ -49,7 +50,9 @@ def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
                 "vertices": points[where[0], :3], "faces": numbers[faces], "vertex_normals": _taken(normals, where[2]),
                 "uv": _taken(uv, where[1]), "vertex_colors": None if colors is None else colors[where[0]],
                 "material": libraries.get(name), "material_name": name}
-    return {name if name and len(meshes) > 1 else path.stem: mesh for name, mesh in meshes.items()}
+    if len(meshes) == 1:
+        return {path.stem: mesh for mesh in meshes.values()}
+    return {name or free_name(path.stem, meshes): mesh for name, mesh in meshes.items()}
 
 
 def absolute_indices(text: str) -> str:

@@ -16,15 +16,16 @@ _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
           "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
           "float32": "f4", "float64": "f8"}
-#: With texture coordinates trimesh takes vertices apart.
+#: With texture coordinates trimesh takes vertices apart, and it knows what units colours have.
 _TEXTURE = {"u", "v", "s", "t", "texture_u", "texture_v"}
+_COLORS = {"red", "green", "blue"}
 
 
 def plain_ply(path: Path) -> dict[str, Any] | None:
     """trimesh's keyword arguments for the file: vertices (n, 3), faces (m, 3), and vertex_normals (n, 3) if it has any.
 
-    None for all but an undamaged file of vertices without texture coordinates and then faces, each with three indices
-    and no other list.
+    None for all but an undamaged file of vertices without texture coordinates or colours and then faces, each with
+    three indices and no other list.
     """
     content = path.read_bytes()
     start = content.find(_END) + len(_END)
@@ -35,8 +36,9 @@ def plain_ply(path: Path) -> dict[str, Any] | None:
     except (ValueError, KeyError, IndexError):
         return None
     names, middle = set(vertex.names or ()), start + vertex_count * vertex.itemsize
-    if (not {"x", "y", "z"} <= names or names & _TEXTURE or "corners list" not in (face.names or ())
-            or min(vertex_count, face_count) < 1 or len(content) != middle + face_count * face.itemsize):
+    if (not {"x", "y", "z"} <= names or names & _TEXTURE or _COLORS <= names
+            or "corners list" not in (face.names or ()) or min(vertex_count, face_count) < 1
+            or len(content) != middle + face_count * face.itemsize):
         return None
     vertices = np.frombuffer(content, vertex, vertex_count, start)
     corners = np.frombuffer(content, face, face_count, middle)["corners list"]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .editing import free_name, materials_of
+from .fields import plain_value
 from .glb_writing import mesh_glb
 from .instancing import meshes_by_id
 from .material import Material
@@ -76,8 +77,15 @@ class _Writer:
         self._scene, self._source = scene, scene.source or Source()
         self._folder, self._stem = Path(os.path.realpath(path)).parent, path.stem
         self.files = SceneFiles()
+        tables = [origin.table["file"] for origin in self._source.meshes if "file" in origin.table]
+        #: The names of files here that the scene was read from, and may still show.
+        self._read = {path.name for path in (*tables, *(path for _, path in self._source.files))
+                      if path.parent == self._folder}
         self._names = {id(material): name for name, material in materials_of(scene).items()}
         self._materials = dict(scene.materials)
+        self._named = set(map(id, scene.materials.values()))
+        self._numbers: dict[str, int] = {}
+        self._by_value = {material: name for name, material in reversed(self._materials.items())}
         self._pictures: dict[int, str] = {}
         self._left: dict[tuple[object, ...], list[Mesh | Instance]] = {}
         self._give_back([*scene.meshes, *scene.instances])
@@ -205,15 +213,15 @@ class _Writer:
                 yield f"material = {toml_value(self._name_of(sphere.material))}"
 
     def _is_named(self, material: Material) -> bool:
-        return any(each is material for each in self._scene.materials.values())
+        return id(material) in self._named
 
     def _name_of(self, material: Material) -> str:
         """Its name, under which it will be written."""
         name = self._names.get(id(material), "material")
         if self._materials.get(name) != material:
-            name = next((known for known, each in self._materials.items() if each == material),
-                        free_name(name or UNNAMED, self._materials))
+            name = self._by_value.get(material) or free_name(name or UNNAMED, self._materials, self._numbers)
         self._materials[name] = material
+        self._by_value.setdefault(material, name)
         return name
 
     def _keys(self, table: Mapping[str, Any]) -> Iterator[str]:
@@ -228,7 +236,7 @@ class _Writer:
         if kind is not None:
             yield f"type = {toml_value(kind)}"
         for each in fields(record):
-            value = getattr(record, each.name)
+            value = plain_value(getattr(record, each.name))
             if isinstance(value, Texture):
                 yield f"{each.name} = {self._texture(value)}"
             elif is_plain(value) and (each.name in TELLING or value != each.default):
@@ -236,8 +244,8 @@ class _Writer:
 
     def _texture(self, texture: Texture) -> str:
         """An inline table."""
-        values = {each.name: getattr(texture, each.name) for each in fields(TextureTable) if each.name != "image"
-                  and getattr(texture, each.name) != each.default}
+        values = {each.name: plain_value(getattr(texture, each.name)) for each in fields(TextureTable)
+                  if each.name != "image" and getattr(texture, each.name) != each.default}
         return toml_value({"image": self._picture(texture.picture), **values})
 
     def _picture(self, picture: Picture) -> str:
@@ -252,7 +260,7 @@ class _Writer:
     def _beside(self, name: str, suffix: str) -> str:
         """A file name for something of this name, next to the scene file."""
         clean = re.sub(r"[^\w-]+", "_", name)[:64].strip("_") or "part"
-        taken = {*self.files.models, *self.files.texels, *self.files.pixels}
+        taken = {*self._read, *self.files.models, *self.files.texels, *self.files.pixels}
         number, file = 2, f"{self._stem}.{clean}{suffix}"
         while file in taken:
             number, file = number + 1, f"{self._stem}.{clean}_{number}{suffix}"

@@ -99,8 +99,11 @@ def _squared_error(rows: Doubles) -> Doubles:
 def agreement(scene: Scene, spp: int, seeds: int, device: str | int | None = None) -> dict[str, Any]:
     """`compared` of clrt's pictures of `scene` with Mitsuba's, with the scene's name and size.
 
-    UsageError where Mitsuba is not installed, or cannot draw it.
+    UsageError where Mitsuba is not installed, or cannot draw it, or a picture is smaller than a block.
     """
+    if min(scene.render.size) < BLOCK:
+        width, height = scene.render.size
+        raise UsageError(f"pictures of {width}x{height} pixels have no block of {BLOCK}x{BLOCK}; write a larger --size")
     try:
         from .mitsuba_renderer import contestants
         theirs = contestants(scene)

@@ -120,7 +120,7 @@ class Editor:
             _bring_forward(SPHERES if isinstance(thing, Sphere) else MATERIALS)
 
     def save_picture(self, path: Path) -> None:
-        """Writes the newest whole picture as it is shown (.png), or its light (.exr, .hdr)."""
+        """Writes the newest picture as it is shown (.png), or its light (.exr, .hdr)."""
         look = self.look
         self._beside(path, "is written", lambda: self.live.image().save(path, view=look.view, exposure=look.exposure))
 

@@ -17,6 +17,7 @@ from clrt.device.open import Device
 from clrt.live.history import History
 from clrt.live.live import Live
 from clrt.live.pace import DIVISORS, Pace
+from clrt.live.picks import Picks, Thing
 from clrt.live.settings import Settings
 from clrt.live.snapshot import Snapshot
 from clrt.scene.editing import with_material
@@ -225,3 +226,21 @@ def test_pace() -> None:
 def test_settings_have_limits(wrong: dict[str, Any]) -> None:
     with pytest.raises(clrt.UsageError, match=f"{list(wrong)[0]} is .*; it must be"):
         Settings(**wrong)
+
+
+def test_picks_that_nobody_waits_for() -> None:
+    """One that was given up keeps no other from its answer, nor does an error of any kind; after the end none waits."""
+    picks = Picks()
+    given_up, wrong, last = (picks.ask(x, 0.0) for x in (0.1, 0.2, 0.3))
+    given_up.cancel()
+
+    def seen_at(x: float, y: float) -> Thing | None:
+        if x == 0.2:
+            raise MemoryError("too much")
+        return None
+
+    picks.answer(seen_at)
+    assert last.result(0) is None and isinstance(wrong.exception(0), MemoryError)
+    live = Live(Scene())
+    live.close()
+    assert live.pick(0.5, 0.5).cancelled()

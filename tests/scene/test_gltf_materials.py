@@ -66,6 +66,12 @@ def test_textures_of_every_parameter(tmp_path: Path) -> None:
     assert as_color(material.emission.factor) == pytest.approx((4, 2, 4)) and material.normal_map.factor == 0.5
 
 
+def test_a_cutoff_that_nothing_reaches(tmp_path: Path) -> None:
+    """Above 1 a mask leaves nothing, whatever its opacity."""
+    assert textured((255, 255, 255), tmp_path, alphaMode="MASK", alphaCutoff=1.0).alpha_cutoff == 1
+    assert textured((255, 255, 255), tmp_path, alphaMode="MASK", alphaCutoff=1.5).opacity == 0
+
+
 def test_layers_and_glass(tmp_path: Path) -> None:
     """Extensions by their names; a volume behind a surface that passes all light is glass."""
     texture = {"index": 0}

@@ -257,3 +257,17 @@ def test_stl_is_welded_for_smooth_normals(tmp_path: Path) -> None:
     mesh, = read_mesh(tmp_path / "cube.stl", "smooth")
     assert mesh.normals is not None
     np.testing.assert_allclose(mesh.normals, mesh.vertices / 3**0.5, atol=1e-6)
+
+
+@pytest.mark.parametrize("face", ["3 0 1 2", "4 0 1 2 2"])
+def test_colours_of_ply_files(face: str, tmp_path: Path) -> None:
+    """Whoever reads them."""
+    corners = "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n"
+    properties = "".join(f"property float {axis}\n" for axis in "xyz") + "".join(
+        f"property uchar {color}\n" for color in ("red", "green", "blue"))
+    path = tmp_path / "a.ply"
+    path.write_text(f"ply\nformat ascii 1.0\nelement vertex 3\n{properties}element face 1\n"
+                    f"property list uchar int vertex_indices\nend_header\n{corners}{face}\n")
+    colors = read_mesh(path)[0].colors
+    assert colors is not None
+    np.testing.assert_allclose(colors, np.eye(3), atol=1e-6)

@@ -97,3 +97,10 @@ def test_obj_of_many_forms(tmp_path: Path) -> None:
     piece = parse_obj(tmp_path / "a.obj")["a"]
     np.testing.assert_array_equal(piece["uv"][piece["faces"][0]], [[0, 0], [1, 0], [0, 0]])
     np.testing.assert_array_equal(piece["vertex_colors"][piece["faces"][0]], np.eye(3))
+
+
+def test_a_material_of_the_file_s_own_name(tmp_path: Path) -> None:
+    """Faces before it are another mesh, and none is lost."""
+    path = tmp_path / "box.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nusemtl box\nf 1 3 2\nf 1 2 3\n")
+    assert {name: len(mesh["faces"]) for name, mesh in parse_obj(path).items()} == {"box 2": 1, "box": 2}

@@ -18,7 +18,7 @@ from clrt.scene.editing import materials_of, with_material
 from clrt.scene.file import load
 from clrt.scene.lights import PointLight
 from clrt.scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror
-from clrt.scene.model import Camera, Environment, Instance, Mesh, Scene, Sphere
+from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.textures import Picture, Texture
 from clrt.scene.writing import scene_files, started
 from .glb import Gltf, ball
@@ -182,3 +182,39 @@ def test_what_no_scene_file_can_say_is_written_beside_it(tmp_path: Path) -> None
     assert {path.name for path in tmp_path.iterdir()} == {
         "scene.toml", "scene.all_of_it.glb", "scene.all_of_it_2.glb", "scene.some_wood.png", "scene.sky.exr"}
     check_same(written, again(written, tmp_path / "again.toml"))
+
+
+def test_files_that_are_still_shown_stay(tmp_path: Path) -> None:
+    """New things of the names of old ones get files of their own; a scene saved over itself is all there."""
+    dark, light = (Picture(np.full((2, 2, 4), value, np.uint8), "wood") for value in (10, 200))
+    triangle = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
+    faces, uv = np.array([[0, 1, 2]], np.int32), np.zeros((3, 2), np.float32)
+
+    def mesh(picture: Picture) -> Mesh:
+        return Mesh(triangle, faces, Diffuse(color=Texture(picture=picture)), uv=uv, name="part")
+
+    path = tmp_path / "x.toml"
+    save_scene(Scene(meshes=[mesh(dark)]), path)
+    first = load(path)
+    old = {file: file.read_bytes() for file in tmp_path.iterdir() if file != path}
+    save_scene(replace(first, meshes=[*first.meshes, mesh(light)]), path)
+    assert {file: file.read_bytes() for file in old} == old and len(old) == 2
+    again = [each.material.parameters()["color"] for each in load(path).meshes]
+    assert [each.picture.texels[0, 0, 0] for each in again if isinstance(each, Texture)] == [10, 200]
+
+
+def test_numbers_of_numpy_are_written(tmp_path: Path) -> None:
+    center = tuple(np.array([1.5, 2, 3]))
+    scene = Scene(spheres=[Sphere(center=center)],
+                  render=RenderSettings(spp=np.int64(7)),  # type: ignore[arg-type]
+                  environment=Environment(strength=np.float32(2.5)))  # type: ignore[arg-type]
+    save_scene(scene, tmp_path / "a.toml")
+    again = load(tmp_path / "a.toml")
+    assert (again.spheres[0].center, again.render.spp, again.environment.strength) == ((1.5, 2, 3), 7, 2.5)
+
+
+def test_many_materials_are_named_at_once() -> None:
+    """Each its own name, in a time that goes with their number: the second thousand as fast as the first."""
+    scene = Scene(spheres=[Sphere(material=Diffuse()) for _ in range(30_000)])
+    named = materials_of(scene)
+    assert len(named) == 30_000 and list(named)[:3] == ["sphere", "sphere 2", "sphere 3"]

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.study.agreement import Means, block_means, compared, means_of
+from clrt.errors import UsageError
+from clrt.scene.model import RenderSettings, Scene
+from clrt.study.agreement import Means, agreement, block_means, compared, means_of
 from clrt.study.contestants import Picture
 from clrt.study.significance import FAMILY, sidak
 
@@ -71,3 +73,8 @@ def test_black_agrees_with_black_only() -> None:
     assert compared(means(1, black), means(2, black))["agree"]
     assert not compared(means(1, black), means(2))["agree"]
     assert compared(means(1, lambda mean: 0 * mean), means(2, lambda mean: 0 * mean))["mean_ratio"] == [1, 1, 1]
+
+
+def test_pictures_smaller_than_a_block_are_refused() -> None:
+    with pytest.raises(UsageError, match="64x8 pixels have no block of 16x16"):
+        agreement(Scene(render=RenderSettings(size=(64, 8))), 1, 2, None)
