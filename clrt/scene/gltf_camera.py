@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import gltf_document as gltf
+from .editing import free_name
 from .model import Camera
 from .transform import Matrix, unit
 
@@ -30,7 +31,7 @@ def read_cameras(path: Path, document: gltf.Document, nodes: Iterable[tuple[gltf
         if node.camera is None:
             continue
         source = gltf.entry(document.cameras, node.camera, "camera", "a node")
-        name = gltf.unused(node.name or source.name or f"camera {node.camera}", cameras)
+        name = free_name(node.name or source.name or f"camera {node.camera}", cameras)
         if source.perspective is None and (source.orthographic is None or source.orthographic.ymag == 0):
             log.warning('%s: left out: camera "%s", which has neither an angle nor a height', path, name)
         elif (camera := _placed(source, matrix, middle)) is not None:

@@ -5,12 +5,13 @@ Imported only when a glTF file is read, since it needs pydantic. Unknown propert
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, ValidationError
 
 from ..errors import SceneError
+from .editing import free_name
 from .gltf_looks import Image, Index, Material, Part, Sampler, Texture, Vec3, Vec4
 
 Item = TypeVar("Item")
@@ -202,20 +203,11 @@ def entry(items: Sequence[Item], index: int, name: str, user: str) -> Item:
     return items[index]
 
 
-def unused(name: str, taken: Container[str]) -> str:
-    """The name, with the first number from 2 that makes it none of those that are taken."""
-    new, number = name, 1
-    while new in taken:
-        number += 1
-        new = f"{name} {number}"
-    return new
-
-
 def material_names(document: Document) -> list[str]:
     """What each material is called; no two alike."""
     names: dict[str, None] = {}
     for index, source in enumerate(document.materials):
-        names[unused(source.name or f"material {index}", names)] = None
+        names[free_name(source.name or f"material {index}", names)] = None
     return list(names)
 
 

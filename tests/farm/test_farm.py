@@ -47,12 +47,6 @@ def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
 
 
 @pytest.fixture
-def cluster(processes: Processes) -> Iterator[Cluster]:
-    with connect(processes.address) as connected:
-        yield connected
-
-
-@pytest.fixture
 def small_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
     """So that a pass is many of them."""
     monkeypatch.setattr("clrt.farm.picture.TASK_SECONDS", 0.02)

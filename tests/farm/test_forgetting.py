@@ -19,7 +19,7 @@ from clrt.errors import UsageError
 from clrt.farm import remote
 from clrt.farm.asking import ask
 from clrt.farm.bands import Banded
-from clrt.farm.cluster import Cluster, connect
+from clrt.farm.cluster import Cluster
 from clrt.farm.orders import PictureOrder
 from clrt.farm.processes import Processes
 from clrt.farm.remote import Answer
@@ -37,12 +37,6 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
     with Processes(tmp_path) as started:
         started.add_simulated(1)
         yield started
-
-
-@pytest.fixture
-def cluster(processes: Processes) -> Iterator[Cluster]:
-    with connect(processes.address) as connected:
-        yield connected
 
 
 def sleeper(cluster: Cluster, seed: int, speed: float = 1e7) -> FarmRenderer:

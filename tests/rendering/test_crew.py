@@ -9,10 +9,8 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clrt.device.driver_errors import driver_errors
 from clrt.device.launch import Launches
 from clrt.device.open import Device
-from clrt.device.program import make_kernel
 from clrt.errors import DeviceError, KernelError
 from clrt.rendering import on_device
 from clrt.rendering.crew import Crew
@@ -135,20 +133,20 @@ def test_ctrl_c_among_the_notes_of_a_launch(device: Device, small_launches: None
         assert same(at_once, running), method
 
 
-@pytest.mark.parametrize("error", [cl.RuntimeError("OUT_OF_RESOURCES"), KernelError("it has no compiler")], ids=repr)
-def test_one_that_cannot_begin_is_left_out(device: Device, caplog: pytest.LogCaptureFixture, error: Exception,
-                                           monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever its driver says; alone it is an error of clrt's."""
-    make, refused = make_kernel, list[bool]()
+@pytest.mark.parametrize(("call", "error"), [("lent", cl.RuntimeError("OUT_OF_RESOURCES")),
+                                             ("build", KernelError("it has no compiler"))], ids=repr)
+def test_one_that_cannot_begin_is_left_out(device: Device, caplog: pytest.LogCaptureFixture, call: str,
+                                           error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever its driver says while buffers or programs are made; alone it is an error of clrt's."""
+    make, refused = vars(on_device)[call], list[bool]()
 
     def refuse(*arguments: Any) -> Any:
         if not refused:
             refused.append(True)
-            with driver_errors():
-                raise error
+            raise error
         return make(*arguments)
 
-    monkeypatch.setattr(on_device, "make_kernel", refuse)
+    monkeypatch.setattr(on_device, call, refuse)
     running = crew(device, 2)
     assert len(running.session.shares()) == 1 and "is left out" in caplog.text
     refused.clear()
