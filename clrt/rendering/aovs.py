@@ -52,12 +52,14 @@ def film_aovs(film: Film, names: Iterable[str]) -> dict[str, NDArray[np.generic]
 
     variance is that of a pixel's mean, were its samples independent; NaN of fewer than two.
     """
-    wanted = set(names)
-    pictures: dict[str, NDArray[np.generic]] = {
-        "variance": film.variance.astype(np.float32), "samples": film.pixels["count"].copy()}
+    wanted, pictures = set(names), dict[str, NDArray[np.generic]]()
+    if "variance" in wanted:
+        pictures["variance"] = film.variance.astype(np.float32)
+    if "samples" in wanted:
+        pictures["samples"] = film.pixels["count"].copy()
     if needs_direct_light(wanted):
-        pictures |= zip(LIGHT, split_light(film))
-    return {name: picture for name, picture in pictures.items() if name in wanted}
+        pictures |= {name: picture for name, picture in zip(LIGHT, split_light(film)) if name in wanted}
+    return pictures
 
 
 def split_light(film: Film) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -65,6 +67,6 @@ def split_light(film: Film) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
     Of p − d and p − (p − d), where 0 <= d <= p, one is exact (Sterbenz 1974).
     """
-    picture = film.mean.astype(np.float32)
+    picture = film.picture()
     indirect = picture - np.minimum(film.direct.astype(np.float32), picture)
     return picture - indirect, indirect

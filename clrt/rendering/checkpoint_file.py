@@ -14,8 +14,8 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from math import prod
 from pathlib import Path
@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CheckpointError
+from .past_cache import write_past_cache
 
 #: How those of any version begin.
 FAMILY = b"clrt checkpoint "
@@ -64,13 +65,10 @@ def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, k
     shapes = {name: array.shape for name, array in arrays.items()}
     line = json.dumps({"header": header, "shapes": shapes}).encode() + b"\n"
     try:
-        with open(temporary, "wb") as file:
+        with open(temporary, "wb", buffering=0) as file:
             pieces: list[bytes | memoryview] = [MAGIC, line, *map(_bytes, arrays.values())]
             with ThreadPoolExecutor(1) as other:    # both take their time, and neither needs Python's lock
-                digest = other.submit(_digest, pieces)
-                file.writelines(pieces)
-                file.write(digest.result())
-            file.flush()
+                write_past_cache(file.fileno(), _followed_by(pieces, other.submit(_digest, pieces)))
             os.fsync(file.fileno())
         if keep_older:
             with suppress(FileNotFoundError):
@@ -125,6 +123,11 @@ def _digest(pieces: Iterable[bytes | memoryview]) -> bytes:
     for piece in pieces:
         digest.update(piece)
     return digest.digest()
+
+
+def _followed_by(pieces: Iterable[bytes | memoryview], last: Future[bytes]) -> Iterator[bytes | memoryview]:
+    yield from pieces
+    yield last.result()
 
 
 def _bytes(array: NDArray[Any]) -> memoryview:

@@ -53,15 +53,23 @@ class Film:
         """(height, width, 3): what of the mean came with two path edges at most; only of a film that keeps it apart."""
         return self._mean_of("direct")
 
+    def picture(self) -> NDArray[np.float32]:
+        """(height, width, 3): the mean as it is shown and written, row by row in memory."""
+        picture = np.empty((*self.pixels.shape, 3), np.float32)
+        self._fill_with_mean(picture, "sum")
+        return picture
+
     def _mean_of(self, name: str) -> NDArray[np.float64]:
         mean = _in_planes(np.empty((3, *self.pixels.shape)))
+        self._fill_with_mean(mean, name)
+        return mean
 
+    def _fill_with_mean(self, mean: NDArray[np.floating[Any]], name: str) -> None:
         def fill(rows: slice) -> None:
             pixels = self.pixels[rows]
             mean[rows] = _sums(pixels, name) / np.maximum(pixels["count"], 1)[..., None]
 
         in_bands(mean.shape, fill)
-        return mean
 
     @property
     def variance(self) -> NDArray[np.float64]:
@@ -119,15 +127,22 @@ class Film:
     @property
     def samples(self) -> int:
         """Samples in the film, dropped ones included."""
-        return int(self.pixels["count"].sum(dtype=np.int64)) + self.nonfinite_samples
+        return self._totals["count"] + self.nonfinite_samples
 
     @property
     def nonfinite_samples(self) -> int:
         """How many samples were dropped because they were NaN or infinite."""
-        return int(self.pixels["dropped"].sum(dtype=np.int64))
+        return self._totals["dropped"]
 
     @property
     def rays(self) -> int:
         """Rays traced; each counter wraps at 2³², long after its picture has converged. A tile's may all be
         counted with its first pixel (kernels/wave.cl)."""
-        return int(self.pixels["rays"].sum(dtype=np.int64))
+        return self._totals["rays"]
+
+    @cached_property
+    def _totals(self) -> dict[str, int]:
+        """The counts over all pixels, which lie so far apart that one way through them all takes as long as for one."""
+        names = ("count", "dropped", "rays")
+        sums = in_bands(self.pixels.shape, lambda rows: [self.pixels[name][rows].sum(dtype=np.int64) for name in names])
+        return dict(zip(names, map(int, np.sum(sums, axis=0))))

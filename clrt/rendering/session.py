@@ -19,6 +19,7 @@ from .accumulation import Accumulation
 from .camera import launch_record
 from .compile import CompiledScene
 from .film import Film
+from .host_memory import HostMemory
 from .loop_limit import check_samples
 from .on_device import SceneOnDevice, largest_film
 from .tiles import TILE_PIXELS
@@ -52,6 +53,7 @@ class Session(Accumulation):
             self._film = on_device(device, np.zeros(size[0] * size[1], compiled.choices.pixel))
             self._tiles = on_device(device, np.zeros(1, np.uint32))
             self._scene.warm_up(self._film, self._tiles)
+        self._copies = HostMemory(size[::-1], compiled.choices.pixel)
 
     @property
     def scene(self) -> SceneOnDevice:
@@ -99,7 +101,7 @@ class Session(Accumulation):
     def film(self) -> Film:
         """The film so far; waits for the launches in flight."""
         self.wait()
-        pixels = np.empty(self.size[::-1], self.compiled.choices.pixel)
+        pixels = self._copies.array()
         with calling():
             copied = cl.enqueue_copy(self.device.queue, pixels, self._film, is_blocking=False)
         wait_for(copied)

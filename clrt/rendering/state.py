@@ -42,7 +42,7 @@ class State:
     @cached_property
     def pixels(self) -> NDArray[np.float32]:
         """(height, width, 3) float32, linear Rec. 709."""
-        return self.film.mean.astype(np.float32, order="C")
+        return self.film.picture()
 
 
 def check_reference(reference: object, size: tuple[int, int]) -> None:

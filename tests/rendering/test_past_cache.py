@@ -1,0 +1,56 @@
+"""Files written past the system's cache hold the same bytes, whatever their lengths and whatever the system refuses."""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clrt.rendering.past_cache import CHUNK, write_past_cache
+
+LENGTHS = [[], [0, 1], [CHUNK], [3, CHUNK - 3], [CHUNK + 1], [5, 0, 2 * CHUNK + 7, 100], [4096, 4096, 13]]
+#: The temporary folder's, and one in memory where there is that, whose kernels may not know such writes.
+FOLDERS = [folder for folder in (Path(tempfile.gettempdir()), Path("/dev/shm")) if os.access(folder, os.W_OK)]
+
+
+def written(folder: Path, pieces: list[bytes]) -> bytes:
+    with tempfile.NamedTemporaryFile(dir=folder, buffering=0) as file:
+        write_past_cache(file.fileno(), pieces)
+        assert os.lseek(file.fileno(), 0, os.SEEK_CUR) == sum(map(len, pieces))
+        return Path(file.name).read_bytes()
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=str)
+@pytest.mark.parametrize("lengths", LENGTHS, ids=str)
+def test_the_file_holds_the_pieces(folder: Path, lengths: list[int]) -> None:
+    random = np.random.default_rng(len(lengths))
+    pieces = [random.bytes(length) for length in lengths]
+    assert written(folder, pieces) == b"".join(pieces)
+
+
+@pytest.mark.skipif(not hasattr(os, "O_DIRECT"), reason="this system has no such writes")
+def test_systems_that_refuse_only_when_written(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """They take the wish, and then refuse to write by it."""
+    import fcntl
+
+    write, refused = os.write, []
+
+    def refusing(handle: int, data: memoryview) -> int:
+        if fcntl.fcntl(handle, fcntl.F_GETFL) & os.O_DIRECT:
+            refused.append(len(data))
+            raise OSError(errno.EINVAL, "Invalid argument")
+        return write(handle, data)
+
+    monkeypatch.setattr(os, "write", refusing)
+    pieces = [bytes(range(256)) * (CHUNK // 128)]
+    assert written(tmp_path, pieces) == pieces[0] and refused == [CHUNK]
+
+
+def test_a_full_disk_is_told() -> None:
+    with open("/dev/full", "wb", buffering=0) as file, pytest.raises(OSError) as error:
+        write_past_cache(file.fileno(), [b"1" * 10])
+    assert error.value.errno == errno.ENOSPC
