@@ -36,10 +36,14 @@ def _normals(mesh: Mesh, degrees: float) -> NDArray[np.float32]:
     order = np.argsort(at, kind="stable")
     around = np.bincount(at, minlength=count)
     crowded, least = around[at[order]] > MOST_AROUND, np.cos(np.radians(degrees))
-    sums = weighted.copy()
-    for step in range(1, min(int(around.max(initial=1)), MOST_AROUND)):
-        one, other = order[:-step], order[step:]
-        soft = (at[one] == at[other]) & ~crowded[step:] & (np.einsum("ij,ij->i", own[one], own[other]) >= least)
+    sums, first = weighted.copy(), np.flatnonzero(~crowded)
+    for step in range(1, MOST_AROUND):
+        first = first[first + step < len(order)]
+        first = first[at[order[first]] == at[order[first + step]]]   # those of smaller points have met all others
+        if not len(first):
+            break
+        one, other = order[first], order[first + step]
+        soft = np.einsum("ij,ij->i", own[one], own[other]) >= least
         one, other = one[soft], other[soft]     # in each of them a corner stands once at most
         sums[one] += weighted[other]
         sums[other] += weighted[one]

@@ -103,7 +103,7 @@ def mesh_problems(mesh: object, where: str) -> list[str]:
         if name == "normals":
             bad, fault = bad | ~np.any(array, axis=1), "points nowhere"
         elif name == "colors":
-            bad, fault = bad | np.any(array < 0, axis=1), "is no colour"
+            bad, fault = bad | np.any((array < 0) | (array > 1), axis=1), "is no colour from 0 to 1"
         problems += _row_problems(bad, array, f"{where}: {name}", fault)
     return problems
 

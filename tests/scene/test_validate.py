@@ -69,6 +69,8 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "index above": (set_array("faces", (7, 2), 42), "faces[7] uses vertex 42, but valid are 0 to 41"),
     "index below": (set_array("faces", (7, 0), -1), "faces[7] uses vertex -1, but valid are 0 to 41"),
     "normal": (set_array("normals", 3, 0), "normals[3] = [0.0, 0.0, 0.0] points nowhere"),
+    "colors above 1": (set_mesh(colors=np.full((42, 3), 1.5, np.float32)), "colors[0] = [1.5, 1.5, 1.5] is no colour"),
+    "colors below 0": (set_mesh(colors=np.full((42, 4), -1, np.float32)), "is no colour from 0 to 1 (and 41 more)"),
     "normals": (set_mesh(normals=np.ones((4, 3), np.float32)), "normals has shape (4, 3); it must be (42, 3)"),
     "faces dtype": (set_mesh(faces=np.zeros((1, 3))), "faces has dtype float64; convert it"),
     "faces beyond int32": (set_mesh(faces=np.array([[0, 1, 2**32]])), "faces[0] uses vertex 4294967296, but"),
