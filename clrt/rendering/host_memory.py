@@ -7,6 +7,8 @@ virtual machine whose host has to find it first.
 from __future__ import annotations
 
 import weakref
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -17,24 +19,25 @@ KEPT = 2
 
 
 class HostMemory:
-    """For arrays of one shape and dtype; of KEPT the memory is there from the start, and stays."""
+    """For arrays of one shape and dtype; of KEPT the memory is there from the start, as far as there is any, and stays.
+    """
 
     def __init__(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
         self._shape, self._dtype = shape, dtype
-        self._bytes = int(np.prod(shape)) * dtype.itemsize
-        self._spare = [np.full(self._bytes, 0, np.uint8) for _ in range(KEPT)]    # zeros would not be there yet
+        self._kept: list[NDArray[np.uint8]] = []
+        #: Of each the array that was made in it last, or None where neither that nor a view of it is left.
+        self._users: list[Callable[[], object]] = [lambda: None] * KEPT
+        with suppress(MemoryError):
+            while len(self._kept) < KEPT:
+                self._kept.append(np.full(int(np.prod(shape)) * dtype.itemsize, 0, np.uint8))    # zeros come too late
 
     def array(self) -> NDArray[Any]:
         """An array whose elements are not defined. Its memory is used again when neither it nor a view of it is left.
         """
-        spare = self._spare
-        memory = spare.pop() if spare else np.empty(self._bytes, np.uint8)
-
-        def give_back() -> None:
-            if len(spare) < KEPT:
-                spare.append(memory)
-
-        # Of memory that is no array's: views then are of the array made here, which stays as long as any of them.
-        lent = np.frombuffer(memory.data, self._dtype)
-        weakref.finalize(lent, give_back).atexit = False
-        return lent.reshape(self._shape)
+        for place, memory in enumerate(self._kept):
+            if self._users[place]() is None:
+                # Of memory that is no array's: views then are of the array made here, which stays as long as any.
+                lent = np.frombuffer(memory.data, self._dtype)
+                self._users[place] = weakref.ref(lent)
+                return lent.reshape(self._shape)
+        return np.empty(self._shape, self._dtype)

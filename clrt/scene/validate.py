@@ -79,7 +79,7 @@ def mesh_problems(mesh: object, where: str) -> list[str]:
     """What is wrong with a mesh's arrays.
 
     Refused: other shapes or dtypes than `Mesh` names, no triangles, values that are not finite (used by a face or not),
-    indices outside the vertices, normals of length zero, which point nowhere, and negative colours.
+    indices outside the vertices, normals of length zero, which point nowhere, and colours outside 0 to 1.
     """
     if not isinstance(mesh, Mesh):
         return [f"{where}: {show(mesh)} is no Mesh; write a clrt.Mesh"]
