@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Doubles = NDArray[np.float64]
-#: Pixels on each side of the wider of two windows.
-REACH = 4
+#: Pixels on each side of the narrower and of the wider of two windows.
+NEAR, REACH = 2, 8
+#: The pixels around one in the narrower.
+NEAREST = (2 * NEAR + 1) ** 2 - 1
 
 
 def expected(mean: Doubles, variance: Doubles) -> Doubles:
@@ -15,14 +17,14 @@ def expected(mean: Doubles, variance: Doubles) -> Doubles:
 
     mean, variance: (height + 2 REACH, width + 2 REACH, 3), of the pixels and of those around them.
 
-    It is the mean of the 80 pixels around it, from there on towards the mean of the 8 nearest and then towards its own,
+    It is the mean of the 288 pixels around it, from there on towards that of the 24 nearest and then towards its own,
     each as far as variance cannot explain the difference (James and Stein 1961). So a pixel that is bright by chance
     does not count itself, nor do its neighbours alone, and one beside an edge is not mixed with what is behind that.
     """
     own, own_variance = mean[REACH:-REACH, REACH:-REACH], variance[REACH:-REACH, REACH:-REACH]
     far, far_variance = _around(mean, own, REACH), _around(variance, own_variance, REACH)
-    near, near_variance = _around(mean, own, 1), _around(variance, own_variance, 1)
-    return _towards(_towards(far, near, np.maximum(near_variance, far_variance) / 8), own, own_variance)
+    near, near_variance = _around(mean, own, NEAR), _around(variance, own_variance, NEAR)
+    return _towards(_towards(far, near, np.maximum(near_variance, far_variance) / NEAREST), own, own_variance)
 
 
 def _around(values: Doubles, own: Doubles, reach: int) -> Doubles:

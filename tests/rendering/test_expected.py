@@ -13,7 +13,7 @@ INNER = (slice(REACH, -REACH),) * 2
 def picture(seed: int) -> tuple[Doubles, Doubles]:
     """Two flat halves with noise, and its variance; some pixels are bright by chance, and say so."""
     rng = np.random.default_rng(seed)
-    mean = np.where(np.arange(24)[:, None, None] < 11, 0.2, 3.0) + np.zeros((24, 20, 3))
+    mean = np.where(np.arange(30)[:, None, None] < 14, 0.2, 3.0) + np.zeros((30, 26, 3))
     variance = np.asarray(0.01 * rng.random(mean.shape))
     mean = mean + np.sqrt(variance) * rng.normal(size=mean.shape)
     bright = rng.random(mean.shape[:2]) < 0.03
@@ -30,8 +30,8 @@ def one_by_one(mean: Doubles, variance: Doubles, y: int, x: int, c: int) -> floa
     def part(variance: float, difference: float) -> float:
         return max(1 - variance / difference**2, 0.0)
 
-    far, near = others(mean, REACH), others(mean, 1)
-    around = far + part(max(others(variance, 1), others(variance, REACH)) / 8, near - far) * (near - far)
+    far, near = others(mean, 8), others(mean, 2)
+    around = far + part(max(others(variance, 2), others(variance, 8)) / 24, near - far) * (near - far)
     return float(around + part(variance[y, x, c], mean[y, x, c] - around) * (mean[y, x, c] - around))
 
 
@@ -50,11 +50,11 @@ def test_what_is_known_is_expected() -> None:
 
 
 def test_a_pixel_bright_by_chance_is_not() -> None:
-    """Nor are those beside it, though they are an eighth of it, too."""
-    mean, variance = np.full((20, 20, 3), 0.5), np.full((20, 20, 3), 1e-4)
-    mean[10, 10], variance[10, 10] = 1000.0, 1e6
+    """Nor are those beside it, though a part of it is theirs, too."""
+    mean, variance = np.full((36, 36, 3), 0.5), np.full((36, 36, 3), 1e-4)
+    mean[18, 18], variance[18, 18] = 1000.0, 1e6
     found = expected(mean, variance)
-    assert found[6, 6].max() < 0.6 and found.max() < 20
+    assert found[10, 10].max() < 0.6 and found.max() < 20
     np.testing.assert_allclose(found[1, 1], 0.5)
 
 
@@ -62,4 +62,4 @@ def test_without_any_variance_known_it_is_what_lies_around() -> None:
     mean = picture(1)[0]
     found = expected(mean, np.full_like(mean, np.nan))
     window = mean[:2 * REACH + 1, :2 * REACH + 1]
-    np.testing.assert_allclose(found[0, 0], (window.sum(axis=(0, 1)) - mean[REACH, REACH]) / 80, rtol=1e-12)
+    np.testing.assert_allclose(found[0, 0], (window.sum(axis=(0, 1)) - mean[REACH, REACH]) / 288, rtol=1e-12)
