@@ -8,7 +8,11 @@
 
 #if defined(__AVX__) && !PORTABLE_MASK
 static inline uint mask_bits(int8 mask) { return (uint)__builtin_ia32_movmskps256(as_float8(mask)); }
+#if defined(__AVX512DQ__)
+static inline uint mask_bits16(int16 mask) { return (ushort)__builtin_ia32_cvtd2mask512(mask); }
+#else
 static inline uint mask_bits16(int16 mask) { return mask_bits(mask.lo) | mask_bits(mask.hi) << 8; }
+#endif
 #else
 static inline uint mask_bits(int8 mask) {
     ulong bytes = as_ulong(convert_char8(mask));

@@ -5,7 +5,7 @@ and device agree on every offset. Triangles have the primitives 0 … m − 1, s
 area stay in; they are never hit. A scene without triangles, or without spheres, has no buffer for them.
 
 - list: no tree; leaf_triangles and leaf_spheres in the order of the scene.
-- packs: no tree; packs (of PACK triangles) and leaf_spheres in the order of the scene.
+- packs: no tree; packs (of PACK triangles) group by group, and leaf_spheres in the order of the scene.
 - bvh2: nodes (BVH2_NODE), leaf_triangles and leaf_spheres in the order of the tree.
 - bvh8: nodes (BVH8_NODE), packs (one a triangle leaf), leaf_spheres in the order of the tree.
 - cwbvh: nodes (cwbvh.CWBVH_NODE), leaf_triangles and leaf_spheres in the order of the tree.
@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 from .builders import BUILDERS
 from .cwbvh import MAX_LEAF, compress
+from .grouping import packs_of
 from .tree import FloatArray, IntArray, Tree, join
 from .wide import Wide, collapse, leaf_fields, leaf_reference
 
@@ -51,9 +52,10 @@ TRIANGLE_PAD = 2.0**-21
 #: Unused lanes have NaN vertices and primitive −1.
 TRIANGLE_PACK = np.dtype([("p0", "f4", (3, LANES)), ("p1", "f4", (3, LANES)), ("p2", "f4", (3, LANES)),
                           ("primitive", "i4", LANES)])
-#: extent: no coordinate of the whole list is greater, by amount.
+#: lo, hi: the box of its triangles. Of the whole list: its greatest coordinate, by amount, and how many packs it has.
 LONE_PACK = np.dtype([("p0", "f4", (3, PACK)), ("p1", "f4", (3, PACK)), ("p2", "f4", (3, PACK)),
-                      ("primitive", "i4", PACK), ("extent", "f4"), ("pad", "f4", PACK - 1)])
+                      ("primitive", "i4", PACK), ("lo", "f4", 3), ("hi", "f4", 3), ("extent", "f4"), ("count", "i4"),
+                      ("pad", "f4", PACK - 8)])
 LEAF_SPHERE = np.dtype([("center", "f4", 3), ("radius", "f4"), ("primitive", "i4"), ("pad", "i4", 3)])
 
 #: Primitives of a leaf whose primitives are intersected one by one; Nadolny 2026, 5.4.4 for the midpoint.
@@ -120,10 +122,14 @@ def _list(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
 
 
 def _packs(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
-    first = np.arange(0, len(triangles), PACK, dtype=np.int32)
-    packs = _filled_packs(LONE_PACK, triangles, np.arange(len(triangles), dtype=np.int32), first,
-                          np.minimum(len(triangles) - first, PACK).astype(np.int32))
-    packs["extent"] = np.abs(triangles).max(initial=0.0)
+    low, high = triangle_boxes(triangles)
+    parts = packs_of(low, high, PACK)
+    count = np.array([len(part) for part in parts], np.int32)
+    order = np.concatenate(parts) if parts else np.zeros(0, np.int32)
+    packs = _filled_packs(LONE_PACK, triangles, order, np.cumsum(count, dtype=np.int32) - count, count)
+    for record, part in zip(packs, parts):
+        record["lo"], record["hi"] = low[part].min(axis=0), high[part].max(axis=0)
+    packs["extent"], packs["count"] = np.abs(triangles).max(initial=0.0), len(packs)
     every = np.arange(len(spheres), dtype=np.int32)
     buffers = _filled(packs=packs, leaf_spheres=leaf_spheres(spheres, every, len(triangles)))
     return Layout("packs", buffers, stack=0, nodes=0, depth=0, work=float(len(packs) + len(spheres)))

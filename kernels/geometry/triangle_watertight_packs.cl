@@ -1,17 +1,20 @@
 // One ray against all triangles of a scene that has few, in packs: what geometry/triangle_watertight.cl says, for less
 // where nothing is close. Packs that its line passes by cost no division; what it meets costs no branch.
 //
-// Left to the exact test is whatever may need it: a ray through an edge, and a t that may be no more than rounding. How
-// small a volume is no more than that is said once a ray, for corners as far away as any of the scene is.
+// Left to the exact test is whatever may need it: a ray through an edge, a t that may be no more than rounding, and two at
+// the same t in a lane, as packs are in no order. How small a volume is no more than rounding is said once a ray, for
+// corners as far away as any of the scene is.
 #include "geometry/triangle_watertight.cl"
+
+#define HALVES (PACK_SIZE / WIDTH)
+#define LAST_BIT 31
+
+// Packs are chosen by a bit each; the last is set, and stands for all from there on.
+static inline bool is_chosen(uint chosen, int pack) { return chosen >> (pack < LAST_BIT ? pack : LAST_BIT) & 1; }
 
 // The triangles that are tested i-th: a pack, or half of one, whose rows begin so much later.
 static inline global const Triangles *pack_at(global const Triangles *packs, int i) {
-#if WIDTH == PACK_SIZE
-    return packs + i;
-#else
-    return (global const Triangles *)((global const float *)(packs + i / 2) + i % 2 * WIDTH);
-#endif
+    return (global const Triangles *)((global const float *)(packs + i / HALVES) + i % HALVES * WIDTH);
 }
 
 static inline float wide_least(wide x) {
@@ -25,8 +28,8 @@ static inline float wide_least(wide x) {
     return two.x < two.y ? two.x : two.y;
 }
 
-// The closest hit, or whether there is any. False where that is left open.
-static inline bool meet_packs(const TriangleRay *ray, global const Triangles *packs, int count, const bool stop_at_first,
+// The closest hit in chosen packs, or whether there is any. False where that is left open.
+static inline bool meet_packs(const TriangleRay *ray, global const Triangles *packs, uint chosen, const bool stop_at_first,
                               Hit *hit) {
     // As in intersect_sheared, with reach <= 2 far and depth <= far.
     float far = packs->extent + fabs(ray->ox) + fabs(ray->oy) + fabs(ray->oz);
@@ -34,7 +37,8 @@ static inline bool meet_packs(const TriangleRay *ray, global const Triangles *pa
     // A hit so far is of a primitive behind all these, and gives way to one at the same t.
     wide t = hit->primitive < 0 ? hit->t : as_float(as_int(hit->t) + 1), u = 0.0f, v = 0.0f;
     wide_mask pack = (wide_mask)(-1), open = (wide_mask)(0);
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < packs->count * HALVES; ++i) {
+        if (!is_chosen(chosen, i / HALVES)) continue;
         global const Triangles *leaf = pack_at(packs, i);
         PACK_CORNERS
         const Sheared a = shear(p0, &sheared_ray), b = shear(p1, &sheared_ray), c = shear(p2, &sheared_ray);
@@ -48,6 +52,7 @@ static inline bool meet_packs(const TriangleRay *ray, global const Triangles *pa
         wide_mask ahead = pack_t > 0.0f;
         wide_mask beside = ((WIDE_BITS(a.z) ^ WIDE_BITS(b.z)) | (WIDE_BITS(a.z) ^ WIDE_BITS(c.z))) < 0;
         open |= inside & ((at_a * at_b * at_c == 0.0f)
+                          | (ahead & (pack_t == t))
                           | (beside & (WIDE_ABS(volume) <= rounding) & (ahead | (WIDE_ABS(det) < thin))));
         wide_mask closer = inside & ahead & (pack_t < t);
         t = closer ? pack_t : t;

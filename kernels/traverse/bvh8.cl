@@ -44,7 +44,7 @@ static inline uint enter_boxes(const SlabRay *ray, global const Node *node, floa
 
 typedef struct { LeafRays leaves; SlabRays slabs; } TreeRays;
 
-static inline TreeRays tree_rays(real3 origin, real3 direction) {
+static inline TreeRays tree_rays(const Scene *scene, real3 origin, real3 direction, real t_max) {
     return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
 }
 
@@ -86,7 +86,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
 #if INSTANCES
             if (leaf.ray.instance == IN_WORLD) {
                 Ray object = object_ray(ray, scene->instances, ~reference >> 4);
-                TreeRays object_rays = tree_rays(broadcast(object.origin), broadcast(object.direction));
+                TreeRays object_rays = tree_rays(scene, broadcast(object.origin), broadcast(object.direction), (real)(INFINITY));
                 leaf = leaf_ray(&object_rays.leaves, &object, 0);
                 slabs = slab_ray(&object_rays.slabs, &object, 0);
                 waiting[top] = LEAVE;

@@ -82,7 +82,7 @@ static inline void hit_primitive(const Scene *scene, const LeafRay *ray, int i, 
 
 typedef struct { LeafRays leaves; SlabRays slabs; } TreeRays;
 
-static inline TreeRays tree_rays(real3 origin, real3 direction) {
+static inline TreeRays tree_rays(const Scene *scene, real3 origin, real3 direction, real t_max) {
     return (TreeRays){leaf_rays(origin, direction), slab_rays(direction)};
 }
 

@@ -2,7 +2,9 @@
 #include "traverse/leaf.cl"
 
 typedef LeafRays TreeRays;
-static inline TreeRays tree_rays(real3 origin, real3 direction) { return leaf_rays(origin, direction); }
+static inline TreeRays tree_rays(const Scene *scene, real3 origin, real3 direction, real t_max) {
+    return leaf_rays(origin, direction);
+}
 
 static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
                            const Hit *nearest) {

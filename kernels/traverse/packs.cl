@@ -1,32 +1,72 @@
 // No tree: a scene of few triangles, WIDTH at a time. Where eight would be met in a leaf after its box, this needs no
-// guess of what comes next, which costs a processor more than the triangles.
+// guess of what comes next, which costs a processor more than the triangles. Each pack has a box, which the rays of all
+// lanes meet together.
+#include "geometry/box.cl"
 #include "traverse/leaf.cl"
 
-typedef LeafRays TreeRays;
-static inline TreeRays tree_rays(real3 origin, real3 direction) { return leaf_rays(origin, direction); }
+typedef struct {
+    LeafRays leaves;
+    ireal chosen;   // the packs whose boxes a ray meets: see is_chosen
+} TreeRays;
 
 #if TRIANGLES
+static inline ireal meets_box(const SlabRays *rays, real3 origin, global const Triangles *pack, real t_max) {
+    real t_near = ZERO, t_far = t_max;
+#define PACK_SLABS(axis, o) { \
+        real lo = pack->lo[axis] - o, hi = pack->hi[axis] - o; \
+        real near = (rays->backward[axis] ? hi : lo) * rays->near[axis]; \
+        real far = (rays->backward[axis] ? lo : hi) * rays->far[axis]; \
+        t_near = near > t_near ? near : t_near; \
+        t_far = far < t_far ? far : t_far; \
+    }
+    PACK_SLABS(0, origin.x)
+    PACK_SLABS(1, origin.y)
+    PACK_SLABS(2, origin.z)
+    return t_near <= t_far;
+}
+
+static inline ireal choose_packs(const Scene *scene, real3 origin, real3 direction, real t_max) {
+    int count = RECORD(scene->packs, 0)->count;
+    if (count == 1) return (ireal)(1);
+    SlabRays slabs = slab_rays(direction);
+    ireal chosen = (ireal)(1 << LAST_BIT);
+    for (int i = 0; i < count && i < LAST_BIT; ++i)
+        chosen |= meets_box(&slabs, origin, RECORD(scene->packs, i), t_max) ? (ireal)(1 << i) : (ireal)(0);
+    return chosen;
+}
+
 // Seldom called, unless hits behind others are asked for.
-__attribute__((noinline)) static void meet_packs_exactly(const LeafRay *leaf, global const Triangles *packs, int count,
-                                                         const bool stop_at_first, Hit *hit) {
-    for (int i = 0; i < count && !(stop_at_first && hit->primitive >= 0); ++i)
-        hit_triangles(leaf, pack_at(packs, i), stop_at_first, hit);
+__attribute__((noinline)) static Hit meet_packs_exactly(const LeafRay *leaf, global const Triangles *packs, int count,
+                                                        const bool stop_at_first, Hit hit) {
+    for (int i = 0; i < count && !(stop_at_first && hit.primitive >= 0); ++i)
+        hit_triangles(leaf, pack_at(packs, i), stop_at_first, &hit);
+    return hit;
 }
 #endif
+
+static inline TreeRays tree_rays(const Scene *scene, real3 origin, real3 direction, real t_max) {
+    TreeRays rays;
+    rays.leaves = leaf_rays(origin, direction);
+#if TRIANGLES
+    rays.chosen = choose_packs(scene, origin, direction, t_max);
+#endif
+    return rays;
+}
 
 __attribute__((always_inline))
 static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *ray, int lane, const bool stop_at_first,
                            const Hit *nearest) {
     Hit hit = *nearest;
-    LeafRay leaf = leaf_ray(rays, ray, lane);
+    LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
 #if TRIANGLES
-    int packs = (scene->counts.triangles + WIDTH - 1) / WIDTH;
-    for (int i = 0; i < packs; ++i) VISIT(tests);
+    global const Triangles *packs = RECORD(scene->packs, 0);
+    uint chosen = (uint)LANE_INT(rays->chosen, lane);
+    for (int i = 0; i < packs->count; ++i) if (is_chosen(chosen, i)) VISIT(tests);
 #if NEXT_HIT
-    meet_packs_exactly(&leaf, RECORD(scene->packs, 0), packs, stop_at_first, &hit);
+    hit = meet_packs_exactly(&leaf, packs, packs->count * HALVES, stop_at_first, hit);
 #else
-    if (!meet_packs(&leaf.triangle_ray, RECORD(scene->packs, 0), packs, stop_at_first, &hit))
-        meet_packs_exactly(&leaf, RECORD(scene->packs, 0), packs, stop_at_first, &hit);
+    if (!meet_packs(&leaf.triangle_ray, packs, chosen, stop_at_first, &hit))
+        hit = meet_packs_exactly(&leaf, packs, packs->count * HALVES, stop_at_first, *nearest);
 #endif
 #endif
 #if LEAF_SPHERES

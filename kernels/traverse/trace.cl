@@ -60,7 +60,7 @@ static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction
     u.all = v.all = ZERO;
     primitive.all = hits.primitive;
     instance.all = (ireal)(0);
-    TreeRays rays = tree_rays(origin, direction);
+    TreeRays rays = tree_rays(scene, origin, direction, hits.t);
     for (int lane = 0; lane < LANES; ++lane) {
         if (!LANE_INT(enabled, lane)) continue;
         Ray ray = one_ray(&origin, &direction, &t_max, lane);
@@ -95,7 +95,7 @@ static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, r
     enabled = enabled & !blocked;
 #endif
 #if IN_TREE
-    TreeRays rays = tree_rays(origin, direction);
+    TreeRays rays = tree_rays(scene, origin, direction, t_max);
     IntLanes found;
     found.all = (ireal)(-1);
     for (int lane = 0; lane < LANES; ++lane) {

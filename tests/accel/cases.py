@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from clrt.accel.tree import FloatArray
 from clrt.scene.scaling import unit_for
@@ -55,14 +56,14 @@ def _line(count: int) -> FloatArray:
     return corners
 
 
-def _room() -> FloatArray:
-    """The six sides of a cube from −1 to 1, two triangles each."""
+def box(low: ArrayLike, high: ArrayLike) -> FloatArray:
+    """The six sides of a box, two triangles each."""
     sides = []
     for axis in range(3):
-        for side in (-1, 1):
-            square = np.insert(np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]), axis, side, axis=1)
+        for side in (0, 1):
+            square = np.insert(np.array([[0, 0], [1, 0], [1, 1], [0, 1]]), axis, side, axis=1)
             sides += [square[[0, 1, 2]], square[[0, 2, 3]]]
-    return np.array(sides, np.float32)
+    return np.where(sides, high, low).astype(np.float32)
 
 
 NASTY: dict[str, FloatArray] = {
@@ -96,6 +97,6 @@ SCENES: dict[str, tuple[FloatArray, FloatArray]] = {
     name: (scaled(triangles), NO_SPHERES) for name, triangles in NASTY.items() if len(triangles) > 1}
 SCENES |= {
     "eight": (soup(8), NO_SPHERES), "nine": (soup(9), NO_SPHERES), "blocks": (soup(20_000, 0.01), spheres(37)),
-    "room": (np.concatenate([soup(2000, 0.01) * np.float32(0.3), _room()]), NO_SPHERES),
+    "room": (np.concatenate([soup(2000, 0.01) * np.float32(0.3), box(-1, 1)]), NO_SPHERES),
     "mixed": (soup(600), spheres(300)), "one_of_each": (soup(1), spheres(1)), "spheres": (soup(0), spheres(700)),
     "equal_spheres": (soup(0), np.repeat(spheres(3), 50, axis=0))}

@@ -1,0 +1,47 @@
+"""Few triangles without a tree, in packs that rays pass by: the hits of every triangle tested."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.device.open import Device
+from clrt.scene.model import Scene
+from clrt.study.probe import Probe
+
+from ..accel.cases import box
+from .test_traverse import mesh
+
+Doubles = NDArray[np.float64]
+ROOM = box([-1, 0, -1], [7, 8, 7])
+#: Three boxes that stand on a room's floor, the room, a box that it stands on, and a room that fills a pack: all have
+#: sides at y = 0.
+PARTS = (*(box([2 * x, 0, 0], [2 * x + 1, 1, 1]) for x in range(3)), ROOM, box([-1, -1, -1], [7, 0, 7]),
+         np.concatenate([ROOM, ROOM[:4]]))
+
+
+def rays_at(seed: int) -> tuple[Doubles, Doubles]:
+    """From in and around the room; a quarter straight down through the boxes, on and between their diagonals."""
+    rng = np.random.default_rng(seed)
+    origin, direction = rng.uniform(-3, 9, (40_000, 3)), rng.normal(size=(40_000, 3))
+    origin[::4] = rng.integers(0, 40, (10_000, 3)) / 8 * [1, 0.25, 0.25]
+    direction[::4] = [0, -1, 0]
+    return origin.astype(np.float32).astype(np.float64), direction.astype(np.float32).astype(np.float64)
+
+
+@pytest.mark.parametrize("width", [8, 16])
+@pytest.mark.parametrize("order", [(0, 5), (3, 0), (2, 4, 3, 0, 1), (4, 0, 1, 2, 3)])
+def test_hits_are_those_of_all_triangles(device: Device, order: tuple[int, ...], width: int) -> None:
+    """Of those at the same t the first is taken, though it may be in the last pack, in the lane of the other."""
+    scene = Scene(meshes=[mesh(np.concatenate([PARTS[k] for k in order]))])
+    origin, direction = rays_at(len(order))
+    apart, listed = Probe(device, scene, f"#define WIDTH {width}", layout="packs"), Probe(device, scene, layout="list")
+    assert apart.compiled.tree.buffers["packs"]["count"][0] > 1
+    places = listed.compiled.frame.points(origin)
+    hits, expected = (probe("closest_hit", 4, places, direction) for probe in (apart, listed))
+    assert np.array_equal(hits, expected)
+    assert 1000 < np.count_nonzero(expected[:, 3] < 0) < 20_000
+    limits = np.minimum(expected[:, 0], 5.0) * np.random.default_rng(1).uniform(0.5, 1.5, len(hits))
+    blocked, beyond = (probe("any_hit", 1, places, direction, limits) for probe in (apart, listed))
+    assert np.array_equal(blocked, beyond) and 0.2 < blocked.mean() < 0.8
