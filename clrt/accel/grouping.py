@@ -27,11 +27,12 @@ def _groups(aabb_min: FloatArray, aabb_max: FloatArray, size: int) -> list[NDArr
 
     From one group of all on, that part of a group is made a group of its own which then saves most, as long as one
     does: a room's walls stay together, and what stands in the room leaves them. A ray meets a group as often as the
-    surface of its box has to that of all. The parts that are tried are those that arise as boxes are joined two by two,
+    surface of its box has to that of all, and pays for parts of packs as if they could be had: else nothing would be
+    gained by the first things that leave. The parts that are tried are those that arise as boxes are joined two by two,
     each time to the smallest.
     """
     low, high = aabb_min.astype(np.float64), aabb_max.astype(np.float64)
-    parts, found = _joined(low, high), [np.ones(len(low), bool)]
+    parts = _joined(low, high)
     everything = max(float(_half_area(low.min(axis=0), high.max(axis=0))), float(np.finfo(np.float64).tiny))
 
     def costs(members: BoolArray) -> Doubles:
@@ -39,17 +40,23 @@ def _groups(aabb_min: FloatArray, aabb_max: FloatArray, size: int) -> list[NDArr
         area = _half_area(np.where(there, low, np.inf).min(axis=1), np.where(there, high, -np.inf).max(axis=1))
         return np.asarray(BOX_COST + area / everything * np.maximum(members.sum(axis=1) / size, 1))
 
+    def best_part(group: BoolArray) -> tuple[float, BoolArray]:
+        """What is saved by it, and its members."""
+        inside = parts[~np.any(parts & ~group, axis=1) & np.any(group & ~parts, axis=1)]
+        if not len(inside):
+            return 0.0, group
+        saved = costs(group[None]) - costs(inside) - costs(group & ~inside)
+        return float(saved.max()), inside[saved.argmax()]
+
+    found = [np.ones(len(low), bool)]
+    best = [best_part(found[0])]
     while True:
-        splits = []
-        for k, group in enumerate(found):
-            inside = parts[~np.any(parts & ~group, axis=1) & np.any(group & ~parts, axis=1)]
-            if len(inside):
-                saved = costs(group[None]) - costs(inside) - costs(group & ~inside)
-                splits.append((float(saved.max()), k, inside[saved.argmax()]))
-        saves, k, part = max(splits, key=lambda split: split[0], default=(0.0, 0, found[0]))
-        if saves <= 0:
+        k = max(range(len(found)), key=lambda k: best[k][0])
+        saved, part = best[k]
+        if saved <= 0:
             return [np.flatnonzero(group) for group in found]
         found[k:k + 1] = [found[k] & ~part, part]
+        best[k:k + 1] = [best_part(group) for group in found[k:k + 2]]
 
 
 def _joined(low: Doubles, high: Doubles) -> BoolArray:

@@ -11,11 +11,12 @@ from .bands import in_bands
 from .film import Film
 from .tiles import over_pixels, tile_pixels, tile_sums
 
-#: By how much the squared error falls when samples double: as for independent ones, up to the third power.
+#: By how much the squared error falls when samples double: as for independent ones, up to the third power, where it was
+#: measured.
 LEAST_FALL, MOST_FALL = 2.0, 8.0
 #: And while only two samples are known.
 FIRST_FALL = 2.4
-#: Over how many doublings it is measured, and how far from LEAST_FALL to what was measured it is expected to stay.
+#: Over how many doublings it is measured, and the power of that, over LEAST_FALL, which is expected to last.
 STEPS, LASTING = 3, 2 / 3
 TINY = float(np.finfo(np.float64).tiny)
 
@@ -26,10 +27,10 @@ class NoiseEstimate:
     A pixel's samples are not independent, so their variance says too much. But the two halves of the first 2n samples
     are alike, which is enough: with E_n the mean of the first n and V(n) its squared error, Cov(E_n, E_2n) = V(2n),
     hence the mean square of E_n − E_2n is V(n) − V(2n). If V falls by r with each doubling that is (r − 1)·V(2n). The
-    last four such differences, over all tiles that have as many samples, tell how fast it fell, beside the samples'
-    variance at these times, which falls by 2: what is expected of a pixel was not known alike then, and divides both.
-    As the fall always slows down, towards 2 in the end, r is a geometric mean of both, and nearer to 2 as far as the
-    tiles differ in how fast it fell (James and Stein 1961, as in expected.py). Blocks of 2^k samples, taken
+    last such difference and that of three doublings before, over all tiles that have both, tell how fast it fell,
+    beside the samples' variance at these times, which falls by 2: what is expected of a pixel was not known alike then,
+    and divides both. As the fall always slows down, towards 2 in the end, r is 2 times a power of what it fell faster,
+    and less as far as the tiles differ in that (James and Stein 1961, as in expected.py). Blocks of 2^k samples, taken
     for independent of each other, give V between powers of two. It is never more than the samples' variance gives
     (Film.noise).
 
@@ -107,23 +108,23 @@ class NoiseEstimate:
 
     def _fall(self, level: int) -> float:
         """V(n/2)/V(n) at n = 2^level, over all tiles that came so far."""
-        there = self._level >= level
-        changes, variance = self._changes[level - 1][0, there], np.sum(self._changes[level - 1][1, there])
+        steps = min(level - 1, STEPS)
+        now, earlier = self._changes[level - 1], self._changes[level - 1 - steps]
+        known = np.isfinite(now + earlier).all(axis=0)   # not where a sample was dropped before there were others
+        (changes, variance), (changes_then, variance_then) = now[:, known], earlier[:, known]
         if np.sum(changes) <= 0 or 1 << level > self._planned:
             return LEAST_FALL
         if level < 2:
             return FIRST_FALL
-        steps = min(level - 1, STEPS)
-        earlier, its_variance = self._changes[level - 1 - steps][:, there]
-        fallen = np.sum(earlier) * variance / (np.sum(changes) * max(np.sum(its_variance), TINY))
+        fallen = np.sum(changes_then) / np.sum(changes) * (np.sum(variance) / max(np.sum(variance_then), TINY))
         faster = float(np.log(np.clip(fallen ** (1 / steps), 1, MOST_FALL / LEAST_FALL)))
-        by_chance = _squared_error_of_log_ratio(earlier, changes) / steps**2
+        by_chance = _squared_error_of_log_ratio(changes_then, changes) / steps**2
         lasting = LASTING * (1 - by_chance / faster**2) if faster**2 > by_chance else 0.0
         return LEAST_FALL * exp(lasting * faster)
 
 
 def _squared_error_of_log_ratio(above: NDArray[np.float64], below: NDArray[np.float64]) -> float:
     """The squared standard error of log(Σ above / Σ below), of tiles taken for independent of each other (by the delta
-    method); without bound where there is one tile."""
+    method; the samples' variances are taken for exact); without bound where there is one tile."""
     parts = above / max(np.sum(above), TINY) - below / np.sum(below)
     return float(np.sum(parts**2) * parts.size / (parts.size - 1)) if parts.size > 1 else np.inf

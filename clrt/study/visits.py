@@ -10,7 +10,7 @@ from ..device.records import record
 from ..tree_query import TreeQuery
 from .rays import Rays
 
-#: nodes: those whose children's boxes are met; tests: of what is in leaves, a triangle or a pack of eight.
+#: nodes: those whose children's boxes are met; tests: of what is in leaves, a triangle or a pack.
 VISITS = record(nodes="u4", tests="u4", pad="2u4")
 
 

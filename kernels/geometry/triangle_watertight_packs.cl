@@ -13,8 +13,8 @@
 static inline bool is_chosen(uint chosen, int pack) { return chosen >> (pack < LAST_BIT ? pack : LAST_BIT) & 1; }
 
 // The triangles that are tested i-th: a pack, or half of one, whose rows begin so much later.
-static inline global const Triangles *pack_at(global const Triangles *packs, int i) {
-    return (global const Triangles *)((global const float *)(packs + i / HALVES) + i % HALVES * WIDTH);
+static inline global const Triangles *pack_at(ARRAY(Triangles) packs, int i) {
+    return (global const Triangles *)((global const float *)RECORD(packs, i / HALVES) + i % HALVES * WIDTH);
 }
 
 static inline float wide_least(wide x) {
@@ -29,15 +29,15 @@ static inline float wide_least(wide x) {
 }
 
 // The closest hit in chosen packs, or whether there is any. False where that is left open.
-static inline bool meet_packs(const TriangleRay *ray, global const Triangles *packs, uint chosen, const bool stop_at_first,
+static inline bool meet_packs(const TriangleRay *ray, ARRAY(Triangles) packs, uint chosen, const bool stop_at_first,
                               Hit *hit) {
     // As in intersect_sheared, with reach <= 2 far and depth <= far.
-    float far = packs->extent + fabs(ray->ox) + fabs(ray->oy) + fabs(ray->oz);
+    float far = RECORD(packs, 0)->extent + fabs(ray->ox) + fabs(ray->oy) + fabs(ray->oz);
     float error = T_ERROR * 6.0f * far * far, rounding = error * far, thin = error / THIN;
     // A hit so far is of a primitive behind all these, and gives way to one at the same t.
     wide t = hit->primitive < 0 ? hit->t : as_float(as_int(hit->t) + 1), u = 0.0f, v = 0.0f;
     wide_mask pack = (wide_mask)(-1), open = (wide_mask)(0);
-    for (int i = 0; i < packs->count * HALVES; ++i) {
+    for (int i = 0; i < RECORD(packs, 0)->count * HALVES; ++i) {
         if (!is_chosen(chosen, i / HALVES)) continue;
         global const Triangles *leaf = pack_at(packs, i);
         PACK_CORNERS

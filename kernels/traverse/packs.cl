@@ -29,16 +29,16 @@ static inline ireal choose_packs(const Scene *scene, real3 origin, real3 directi
     int count = RECORD(scene->packs, 0)->count;
     if (count == 1) return (ireal)(1);
     SlabRays slabs = slab_rays(direction);
-    ireal chosen = (ireal)(1 << LAST_BIT);
+    ireal chosen = (ireal)(INT_MIN);   // the last bit
     for (int i = 0; i < count && i < LAST_BIT; ++i)
         chosen |= meets_box(&slabs, origin, RECORD(scene->packs, i), t_max) ? (ireal)(1 << i) : (ireal)(0);
     return chosen;
 }
 
 // Seldom called, unless hits behind others are asked for.
-__attribute__((noinline)) static Hit meet_packs_exactly(const LeafRay *leaf, global const Triangles *packs, int count,
+__attribute__((noinline)) static Hit meet_packs_exactly(const LeafRay *leaf, ARRAY(Triangles) packs,
                                                         const bool stop_at_first, Hit hit) {
-    for (int i = 0; i < count && !(stop_at_first && hit.primitive >= 0); ++i)
+    for (int i = 0; i < RECORD(packs, 0)->count * HALVES && !(stop_at_first && hit.primitive >= 0); ++i)
         hit_triangles(leaf, pack_at(packs, i), stop_at_first, &hit);
     return hit;
 }
@@ -59,14 +59,13 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
 #if TRIANGLES
-    global const Triangles *packs = RECORD(scene->packs, 0);
-    uint chosen = (uint)LANE_INT(rays->chosen, lane);
-    for (int i = 0; i < packs->count; ++i) if (is_chosen(chosen, i)) VISIT(tests);
 #if NEXT_HIT
-    hit = meet_packs_exactly(&leaf, packs, packs->count * HALVES, stop_at_first, hit);
+    hit = meet_packs_exactly(&leaf, scene->packs, stop_at_first, hit);
 #else
-    if (!meet_packs(&leaf.triangle_ray, packs, chosen, stop_at_first, &hit))
-        hit = meet_packs_exactly(&leaf, packs, packs->count * HALVES, stop_at_first, *nearest);
+    uint chosen = (uint)LANE_INT(rays->chosen, lane);
+    for (int i = 0; i < RECORD(scene->packs, 0)->count; ++i) if (is_chosen(chosen, i)) VISIT(tests);
+    if (!meet_packs(&leaf.triangle_ray, scene->packs, chosen, stop_at_first, &hit))
+        hit = meet_packs_exactly(&leaf, scene->packs, stop_at_first, *nearest);
 #endif
 #endif
 #if LEAF_SPHERES

@@ -10,7 +10,9 @@ from scipy.stats import binomtest
 
 from clrt.device.open import Device
 from clrt.errors import UsageError
-from clrt.rendering.film import RELATIVE_FLOOR
+from clrt.rendering.film import RELATIVE_FLOOR, Film
+from clrt.rendering.noise import NoiseEstimate
+from clrt.rendering.records import PIXEL
 from clrt.rendering.renderer import Renderer
 from clrt.rendering.tiles import tile_sums
 from clrt.scene.materials import Diffuse, MetallicRoughness
@@ -58,6 +60,22 @@ def test_noise_is_the_error(device: Device, make: Callable[[], Scene], sampler: 
     assert 1 / 1.5 < min(told) and max(told) < highest
     close = int(np.sum(np.abs(np.log(told)) < np.log(1.2)))
     assert sampler == "stratified" or binomtest(close, len(told), 0.75, alternative="less").pvalue > 1e-3
+
+
+def test_a_sample_that_was_dropped_leaves_the_rest_known() -> None:
+    """A pixel that has one sample of the first two has no variance then; no tile is told less for it later."""
+    samples, estimate = np.random.default_rng(0).random((32, 24, 32, 3)), NoiseEstimate()
+    for spp in (1, 2, 4, 8, 16, 32):
+        kept = np.ones((spp, 24, 32), bool)
+        kept[1:2, 3, 5] = False
+        pixels = np.zeros((24, 32), PIXEL)
+        pixels["count"] = kept.sum(axis=0)
+        for name, power in (("sum", 1), ("square", 2)):
+            pixels[name] = np.sum(samples[:spp] ** power, axis=0, where=kept[..., None])
+        estimate.add(Film(pixels), np.full((3, 4), spp))
+        told = estimate.of_tiles(np.full((3, 4), spp), (32, 24), 90)
+        assert (told is None) == (spp == 1)
+        assert told is None or told == pytest.approx(np.sqrt(1 / 12 / (0.25 + RELATIVE_FLOOR) / spp), rel=0.4)
 
 
 def test_noise_of_a_picture_without_any(device: Device) -> None:

@@ -41,7 +41,8 @@ def whole(device: Device) -> tuple[Renderer, bytes]:
     return film(device, "bvh8")
 
 
-@pytest.mark.parametrize(("layout", "limit"), [("bvh8", 8), ("bvh8", 24), ("bvh2", 8), ("cwbvh", 8), ("list", 8)])
+@pytest.mark.parametrize(("layout", "limit"),
+                         [("bvh8", 8), ("bvh8", 24), ("bvh2", 8), ("cwbvh", 8), ("list", 8), ("packs", 12)])
 def test_in_parts_it_is_the_same_picture(device: Device, whole: tuple[Renderer, bytes],
                                          monkeypatch: pytest.MonkeyPatch, layout: str, limit: int) -> None:
     """Bit for bit, in every layout; no buffer is larger than allowed, and of 8 KiB most arrays fill several."""
