@@ -195,8 +195,8 @@ class TreeQuery:
         """The kernel query_`name`, built when it is first asked for."""
         key = name, traversal, tree_defines(self.tree)["STACK_SIZE"]
         if key not in self._kernels:
-            self._kernels[key] = make_kernel(self.device, build(self.device, self.source(name, traversal)),
-                                             f"query_{name}")
+            program = build(self.device, self.source(name, traversal), self.tree.bytes)
+            self._kernels[key] = make_kernel(self.device, program, f"query_{name}")
         return self._kernels[key]
 
     def source(self, name: str, traversal: str) -> str:

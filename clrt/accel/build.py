@@ -12,7 +12,7 @@ from ..errors import UsageError
 from . import device_builder
 from .builders import BUILDERS
 from .layouts import LEAF_SPHERE, PACK, Layout, pack
-from .tree import FloatArray
+from .tree import FloatArray, Triangles
 from .triangle_forms import in_form
 
 #: Builders that run on the device, by the passes of reinsertion that follow.
@@ -40,7 +40,7 @@ def fitting_layout(device: Device | None, triangles: int, spheres: int, triangle
     return "packs" if packs and few and tree is None else layout
 
 
-def build_tree(device: Device | None, layout: str, builder: str | None, triangles: FloatArray,
+def build_tree(device: Device | None, layout: str, builder: str | None, triangles: Triangles,
                spheres: FloatArray | None = None, triangle: str = "watertight") -> Layout:
     """The tree over triangles (m, 3, 3) and spheres (s, 4), float32, finite, of sizes near 1.
 
@@ -54,7 +54,7 @@ def build_tree(device: Device | None, layout: str, builder: str | None, triangle
     return in_form(_over_corners(device, layout, builder, triangles, spheres), triangle, device)
 
 
-def _over_corners(device: Device | None, layout: str, builder: str | None, triangles: FloatArray,
+def _over_corners(device: Device | None, layout: str, builder: str | None, triangles: Triangles,
                   spheres: FloatArray) -> Layout:
     count = len(triangles) + len(spheres)
     known = [*DEVICE_BUILDERS, *BUILDERS]
@@ -64,7 +64,7 @@ def _over_corners(device: Device | None, layout: str, builder: str | None, trian
         device_can = layout in device_builder.SHAPES and device_builder.fits(device, count)
         builder = "ploc" if device_can and count >= LARGE else "sah"
     if builder not in DEVICE_BUILDERS or device is None or count < 2:
-        return pack(layout, "sah" if builder in DEVICE_BUILDERS else builder, triangles, spheres)
+        return pack(layout, "sah" if builder in DEVICE_BUILDERS else builder, np.asarray(triangles), spheres)
     if layout not in device_builder.SHAPES:
         raise UsageError(f"the builder {builder} makes {', '.join(device_builder.SHAPES)}, not {layout}: "
                          "take the builder sah")

@@ -19,10 +19,10 @@ from ..device.records import record
 from ..errors import NoRoomError, SceneError
 from .cwbvh import CWBVH_NODE, MAX_LEAF, SLOTS
 from .layouts import BVH2_NODE, BVH8_NODE, LANES, LEAF_SIZES, LEAF_SPHERE, LEAF_TRIANGLE, TRIANGLE_PACK
-from .morton import Primitives, sort_primitives
+from .morton import SHAPE, Primitives, sort_primitives
 from .ploc import BINARY_NODE, BinaryTree, cluster
 from .reinsertion import MOVE, reinsert
-from .tree import FloatArray, half_area
+from .tree import FloatArray, Triangles, half_area
 from .wide import EMPTY, MAX_PRIMITIVES
 
 
@@ -81,9 +81,9 @@ def fits(device: Device | None, count: int) -> bool:
     return device is not None and count * LARGEST_ARRAY <= device.info.max_alloc_bytes
 
 
-def build_tree(device: Device, shape: Shape, triangles: FloatArray, spheres: FloatArray,
+def build_tree(device: Device, shape: Shape, triangles: Triangles, spheres: FloatArray,
                reinsertions: int = 0) -> DeviceTree:
-    """The tree over at least two primitives: triangles (m, 3, 3), spheres (s, 4), coordinates finite, below 1e18.
+    """The tree over at least two primitives: triangles, spheres (s, 4), coordinates finite, below 1e18.
 
     reinsertions: passes that make it better. Raises SceneError for more than MAX_PRIMITIVES in all, and NoRoomError.
     """
@@ -92,7 +92,8 @@ def build_tree(device: Device, shape: Shape, triangles: FloatArray, spheres: Flo
     if not fits(device, count):
         raise NoRoomError(f"{count} primitives need larger buffers than the {device.info.max_alloc_bytes} bytes that "
                           f"{device.info.name} allows, to build a tree in: take the builder sah")
-    work = Blocks(device, program_source(shape, len(triangles) > 0, len(spheres) > 0, reinsertions > 0))
+    source = program_source(shape, len(triangles) > 0, len(spheres) > 0, reinsertions > 0)
+    work = Blocks(device, source, count * SHAPE * 4)
     primitives = sort_primitives(work, triangles, spheres)
     tree = cluster(work, primitives)
     if reinsertions:

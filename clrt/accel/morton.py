@@ -9,7 +9,7 @@ import numpy as np
 import pyopencl as cl
 
 from ..device.blocks import Blocks
-from .tree import FloatArray
+from .tree import FloatArray, Triangles
 
 CODE_BITS, DIGIT_BITS = 63, 8
 #: Cells along the longest extent of the centres, less one.
@@ -40,10 +40,10 @@ class Primitives:
 Scene = tuple[cl.Buffer, cl.Buffer, int]  # triangles, spheres, and how many triangles there are
 
 
-def sort_primitives(work: Blocks, triangles: FloatArray, spheres: FloatArray) -> Primitives:
-    """Triangles (m, 3, 3) and spheres (s, 4), float32, along a Morton curve through the centres of their boxes."""
+def sort_primitives(work: Blocks, triangles: Triangles, spheres: FloatArray) -> Primitives:
+    """Triangles and spheres (s, 4), float32, along a Morton curve through the centres of their boxes."""
     count = len(triangles) + len(spheres)
-    scene = work.lend(triangles), work.lend(spheres), len(triangles)
+    scene = work.lend(np.asarray(triangles)), work.lend(spheres), len(triangles)
     try:
         ids = _morton_order(work, scene, count)
         shapes = work.empty(np.float32, SHAPE * count)

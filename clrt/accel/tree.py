@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,14 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
 BoolArray = NDArray[np.bool_]
+
+
+class Triangles(Protocol):
+    """(m, 3, 3) float32 corners: an array, or what makes one when numpy asks, so that nobody has to keep it."""
+
+    def __len__(self) -> int: ...
+
+    def __array__(self, dtype: None = None, /) -> FloatArray: ...
 
 
 @dataclass(frozen=True, eq=False)

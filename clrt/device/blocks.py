@@ -31,13 +31,13 @@ class Blocks:
     """The kernels of one program and the arrays that they share, all on one in-order queue.
 
     Every kernel's first arguments are `uint count, uint block`; the program holds build/scan.cl. `peak_bytes` is the
-    most memory that its arrays took at a time. Launches are short, so waiting for them need not let signals through.
-    All may raise DeviceError.
+    most memory that its arrays took at a time; data_bytes: about what they will take. Launches are short, so waiting
+    for them need not let signals through. All may raise DeviceError.
     """
 
-    def __init__(self, device: Device, source: str) -> None:
+    def __init__(self, device: Device, source: str, data_bytes: int = 0) -> None:
         self.device = device
-        self.program = build(device, source)
+        self.program = build(device, source, data_bytes)
         self.peak_bytes = 0
         self._bytes = 0
         self._kernels: dict[str, cl.Kernel] = {}

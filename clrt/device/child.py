@@ -12,13 +12,13 @@ from typing import IO
 
 
 def start_child(module: str, argument: str, output: IO[bytes] | int, errors: IO[bytes],
-                **variables: str) -> subprocess.Popen[str]:
-    """`python -m module argument`, which finds the same modules as this process wherever it is started; `variables`
-    are added to its environment."""
+                given: IO[bytes] | int = subprocess.DEVNULL, **variables: str) -> subprocess.Popen[str]:
+    """`python -m module argument`, which finds the same modules as this process wherever it is started; given: its
+    standard input; `variables` are added to its environment."""
     path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
     environment = {**os.environ, "PYTHONPATH": path, **variables}
-    return subprocess.Popen([sys.executable, "-P", "-m", module, argument], stdin=subprocess.DEVNULL, stdout=output,
-                            stderr=errors, text=True, encoding="utf-8", env=environment)
+    return subprocess.Popen([sys.executable, "-P", "-m", module, argument], stdin=given, stdout=output, stderr=errors,
+                            text=True, encoding="utf-8", env=environment)
 
 
 def end_child(child: subprocess.Popen[str]) -> None:

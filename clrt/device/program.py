@@ -12,7 +12,6 @@ import hashlib
 import logging
 import re
 import time
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources.abc import Traversable
@@ -20,8 +19,9 @@ from importlib.resources.abc import Traversable
 import pyopencl as cl
 
 from ..errors import KernelError
-from .background import in_background
+from .background import LIMIT, in_background
 from .cache import keep_log, read_binary, write_binary
+from .front_end import LARGE, compile_aside, quietly_built
 from .open import Device
 from .pocl_cache import remove_damaged
 from .sources import kernel_folder
@@ -76,17 +76,20 @@ def files_of(source: str) -> list[str]:
     return re.findall(r'^#line 1 "(.+)"$', source, re.MULTILINE)
 
 
-def build(device: Device, source: str) -> BuiltProgram:
+def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
     """Builds `source` for the device, or takes it from this process or the cache; KernelError with the log if refused.
 
     PoCL keeps what it compiled itself, and asking it for a binary costs as much as compiling, so for it the cache only
     remembers that a program was built before. Where the device has no instruction for fma, kernels/fma.cl comes first.
+    data_bytes: about what the program will work on; beside large data PoCL compiles in a process of its own.
     """
     start = time.perf_counter()
     if not device.fuses:
         source = compose("", "fma.cl", {}) + source
     identity = "\n".join([source, *OPTIONS, device.info.id, device.info.platform_version, device.info.driver])
     key = hashlib.sha256(identity.encode()).hexdigest()
+    keeps_its_own = device.info.platform == "Portable Computing Language"
+    aside = keeps_its_own and data_bytes >= LARGE
     programs = device.shared.programs
     program = programs.pop(key, None)
     cached = program is not None
@@ -94,11 +97,10 @@ def build(device: Device, source: str) -> BuiltProgram:
         binary = read_binary(key)
         program = _from_binary(device, binary) if binary else None
         cached = program is not None or binary == b""
-        program = program or _compile(device, source)
+        program = program or _compile(device, source, aside)
         if not program.get_info(cl.program_info.NUM_KERNELS) and remove_damaged():
             program = _compile(device, source)
         if not cached:
-            keeps_its_own = device.info.platform == "Portable Computing Language"
             write_binary(key, b"" if keeps_its_own else _binary(program))
         device.shared.compiled += not cached
     programs[key] = program
@@ -126,17 +128,19 @@ def _binary(program: cl.Program) -> bytes:
 
 def _from_binary(device: Device, binary: bytes) -> cl.Program | None:
     try:
-        return _quietly_built(cl.Program(device.context, [device.cl], [binary]), [])
+        return quietly_built(cl.Program(device.context, [device.cl], [binary]), [])
     except (cl.Error, ValueError):
         return None  # a driver may refuse an old or damaged binary: compile again
 
 
-def _compile(device: Device, source: str) -> cl.Program:
+def _compile(device: Device, source: str, aside: bool = False) -> cl.Program:
     where, start = f"{device.info.name} ({device.info.platform})", time.perf_counter()
     program = cl.Program(device.context, source)
     try:
         options = OPTIONS + (SIMULATOR_OPTIONS if device.info.type == "simulator" else [])
-        in_background(where, lambda: _quietly_built(program, options))
+        if aside:
+            in_background(where, lambda: compile_aside(device.info.id, source, options, LIMIT))
+        in_background(where, lambda: quietly_built(program, options))
         log = f"built in {time.perf_counter() - start:.2f} s\n{_build_log(device, program)}"
     except cl.Error as error:
         log = str(error).strip()
@@ -156,11 +160,3 @@ def _build_log(device: Device, program: cl.Program) -> str:
         return str(log).strip()
     except (cl.Error, UnicodeDecodeError):
         return ""
-
-
-def _quietly_built(program: cl.Program, options: list[str]) -> cl.Program:
-    """The program, built. pyopencl warns of whatever a compiler says, and Intel's always says something."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", cl.CompilerWarning)
-        program.build(options=options, cache_dir=False)  # type: ignore[arg-type]  # False: pyopencl's own cache off
-    return program

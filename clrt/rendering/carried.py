@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..accel.build import build_tree
 from ..accel.layouts import Layout
+from ..accel.tree import Triangles
 from ..accel.two_level import TwoLevels
 from ..device.open import Device
 from ..scene.model import Environment, Mesh
@@ -37,9 +38,9 @@ class Carried:
             self._sky, self._environment = pack_sky(environment), environment
         return self._sky
 
-    def tree(self, device: Device | None, layout: str, builder: str | None, meshes: list[Mesh], triangles: FloatArray,
+    def tree(self, device: Device | None, layout: str, builder: str | None, meshes: list[Mesh], triangles: Triangles,
              spheres: FloatArray, test: str, placements: Placements) -> Layout:
-        """The tree over the meshes' triangles (m, 3, 3) and spheres (s, 4), and over instances if there are any."""
+        """The tree over the meshes' triangles and spheres (s, 4), and over instances if there are any."""
         names = layout, builder, test, len(placements.materials), len(meshes)
         arrays = [spheres, placements.mesh, placements.starts]  # meshes' own arrays are half as large as triangles
         arrays += [array for mesh in meshes for array in (mesh.vertices, mesh.faces)]

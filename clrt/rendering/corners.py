@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..scene.model import Mesh
 from ..scene.tangents import corner_tangents
+from .geometry import put_corners
 from .records import COLORS, TANGENTS, TEXCOORDS
 
 
@@ -27,12 +28,13 @@ def pack_corners(meshes: Sequence[Mesh], uv_sets: int, normal_maps: bool) -> dic
         own = slice(first, first + len(mesh.faces))
         for i, uv in enumerate([mesh.uv, mesh.uv1][:uv_sets]):
             if uv is not None:
-                _put(texcoords[own, i], "uv", uv[mesh.faces])
+                put_corners(texcoords[own, i], "uv", uv, mesh.faces)
         if mesh.colors is not None:
             colors[own, :, :mesh.colors.shape[1]] = mesh.colors[mesh.faces]
         if mesh.material.bent_by is not None and normal_maps:
             tangent, sign = corner_tangents(mesh, mesh.material.bent_by.uv_set)
-            _put(tangents[own], "t", tangent)
+            for i in range(3):
+                tangents[f"t{i}"][own] = tangent[:, i]
             tangents["sign"][own] = sign
         first += len(mesh.faces)
     buffers: dict[str, tuple[str, NDArray[Any]]] = {}
@@ -43,9 +45,3 @@ def pack_corners(meshes: Sequence[Mesh], uv_sets: int, normal_maps: bool) -> dic
     if len(tangents):
         buffers["tangents"] = ("Tangents", tangents)
     return buffers
-
-
-def _put(records: NDArray[np.void], name: str, corners: NDArray[np.floating]) -> None:
-    """corners (m, 3, k) into the fields name0 … name2."""
-    for i in range(3):
-        records[f"{name}{i}"] = corners[:, i]

@@ -47,9 +47,9 @@ class Emitters:
         return sum(self.counts.values())
 
 
-def pack_emitters(scene: Scene, triangles: NDArray[np.float32], sky: Sky, textures: Textures) -> Emitters:
-    """All lights of the scene that are not black. triangles: (m, 3, 3) float32, the meshes' in order."""
-    flat = pack_triangle_lights(scene.meshes, triangles, textures)
+def pack_emitters(scene: Scene, sky: Sky, textures: Textures) -> Emitters:
+    """All lights of the scene that are not black."""
+    flat = pack_triangle_lights(scene.meshes, textures)
     shines = np.array([any(sphere.material.radiance) for sphere in scene.spheres], bool)
     of_sphere = np.where(shines, len(flat.records) + np.cumsum(shines) - 1, -1).astype(np.int32)
     balls, points, spots = _sphere_lights(scene, textures), _point_lights(scene), _spot_lights(scene)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,36 +12,54 @@ from ..scene.model import Mesh
 from .records import NORMALS, SPHERE, TRIANGLE
 
 
-def corners_of(meshes: Iterable[Mesh]) -> tuple[NDArray[np.float32], dict[int, NDArray[np.float32]]]:
-    """(m, 3, 3) corners of all meshes' triangles, and for smooth meshes by first triangle their (k, 3, 3) normals."""
-    corners, normals, first = [np.zeros((0, 3, 3), np.float32)], {}, 0
-    for mesh in meshes:
-        corners.append(np.take(mesh.vertices, mesh.faces, axis=0))  # as vertices[faces], in a quarter of the time
+class Corners:
+    """The corners of all meshes' triangles, (m, 3, 3) float32, made anew whenever numpy asks for them: they take twice
+    the memory of the meshes, and only as long as somebody holds them."""
+
+    def __init__(self, meshes: Sequence[Mesh]) -> None:
+        self._meshes = meshes
+
+    def __len__(self) -> int:
+        return sum(len(mesh.faces) for mesh in self._meshes)
+
+    def __array__(self, dtype: None = None, copy: bool | None = None) -> NDArray[np.float32]:
+        # take: as vertices[faces], in a quarter of the time.
+        each = [np.take(mesh.vertices, mesh.faces, axis=0) for mesh in self._meshes]
+        return each[0] if len(each) == 1 else np.concatenate([np.zeros((0, 3, 3), np.float32), *each])
+
+
+def triangle_records(meshes: Sequence[Mesh], materials: NDArray[np.int32], lights: NDArray[np.int32]) -> NDArray[Any]:
+    """TRIANGLE records of the meshes' triangles. materials: (meshes,) codes; lights: (m,) numbers."""
+    records = np.zeros(len(lights), TRIANGLE)
+    records["light"], records["normals"] = lights, -1
+    first = smooth = 0
+    for mesh, material in zip(meshes, materials):
+        count = len(mesh.faces)
+        own = records[first:first + count]
+        put_corners(own, "p", mesh.vertices, mesh.faces)
+        own["material"] = material
         if mesh.normals is not None:
-            normals[first] = np.take(mesh.normals, mesh.faces, axis=0)
-        first += len(mesh.faces)
-    return np.concatenate(corners), normals
-
-
-def triangle_records(triangles: NDArray[np.float32], materials: NDArray[np.int32], lights: NDArray[np.int32],
-                     normals: dict[int, NDArray[np.float32]]) -> NDArray[Any]:
-    """TRIANGLE records. materials, lights: (m,) codes and numbers; normals: see `corners_of`."""
-    records = np.zeros(len(triangles), TRIANGLE)
-    records["p0"], records["p1"], records["p2"] = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    records["material"], records["light"], records["normals"] = materials, lights, -1
-    stored = 0
-    for first, smooth in normals.items():
-        records["normals"][first:first + len(smooth)] = np.arange(stored, stored + len(smooth))
-        stored += len(smooth)
+            own["normals"] = np.arange(smooth, smooth + count)
+            smooth += count
+        first += count
     return records
 
 
-def normal_records(normals: dict[int, NDArray[np.float32]]) -> NDArray[Any]:
-    """NORMALS records of the smooth triangles, in order; normals: see `corners_of`."""
-    smooth = np.concatenate(list(normals.values()))
-    records = np.zeros(len(smooth), NORMALS)
-    records["n0"], records["n1"], records["n2"] = smooth[:, 0], smooth[:, 1], smooth[:, 2]
+def normal_records(meshes: Sequence[Mesh]) -> NDArray[Any]:
+    """NORMALS records of the smooth meshes' triangles, in order."""
+    records = np.zeros(sum(len(mesh.faces) for mesh in meshes if mesh.normals is not None), NORMALS)
+    first = 0
+    for mesh in meshes:
+        if mesh.normals is not None:
+            put_corners(records[first:first + len(mesh.faces)], "n", mesh.normals, mesh.faces)
+            first += len(mesh.faces)
     return records
+
+
+def put_corners(records: NDArray[Any], name: str, values: NDArray[np.float32], faces: NDArray[np.int32]) -> None:
+    """The values (n, 3) at each corner into the fields name0 … name2."""
+    for corner in range(3):
+        records[f"{name}{corner}"] = np.take(values, faces[:, corner], axis=0)
 
 
 def sphere_records(spheres: NDArray[np.float32], materials: NDArray[np.int32],

@@ -62,7 +62,7 @@ class SceneOnDevice:
         last = next((each for each in before if each.device is device), None)
         self._warm = last is not None and last._windows == windows and last.compiled.has_text_of(compiled)
         self.program: BuiltProgram = (last.program if last and self._warm
-                                      else build(device, WINDOWS * windows + compiled.source))
+                                      else build(device, WINDOWS * windows + compiled.source, compiled.bytes))
         with self.allocating():
             self._buffers = {name: last and last._buffer(name, array) or self._uploaded(array)
                              for name, (_, array) in compiled.buffers.items()}

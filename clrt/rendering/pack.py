@@ -25,7 +25,7 @@ from .corners import pack_corners
 from .emitters import Emitters, pack_emitters
 from .environment import Sky
 from .filters import filter_quantiles
-from .geometry import corners_of, normal_records, sphere_records, triangle_records
+from .geometry import Corners, normal_records, sphere_records, triangle_records
 from .materials import Materials, pack_materials
 from .placements import Objects, Placements
 from .records import COUNTS
@@ -35,8 +35,8 @@ from .textures import Textures
 class Shapes:
     """The scene in its frame, with those meshes first that only its instances show.
 
-    triangles: (m, 3, 3) float32; normals: see `corners_of`; spheres: (s, 4) float32, center and radius; lone: whether
-    these are so few that no tree holds them.
+    triangles: of all meshes; spheres: (s, 4) float32, center and radius; lone: whether these are so few that no tree
+    holds them.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -46,7 +46,7 @@ class Shapes:
         self.objects = Objects([len(mesh.faces) for mesh in scene.meshes], len(scene.spheres), *of_objects)
         self.placements = Placements(scene.instances, rest=bool(scene.meshes or scene.spheres))
         self.scene = replace(scene, meshes=self.placements.meshes + scene.meshes)
-        self.triangles, self.normals = corners_of(self.scene.meshes)
+        self.triangles = Corners(self.scene.meshes)
         self.spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
         self.lone = 0 < len(self.spheres) <= FEW_SPHERES
 
@@ -83,11 +83,9 @@ class Shapes:
             first = len(self.triangles) - self.placements.before
             buffers["leaf_spheres"] = ("LeafSphere", leaf_spheres(spheres, every, first))
         if len(self.triangles):
-            material = np.repeat(of_meshes, [len(mesh.faces) for mesh in meshes])
-            buffers["triangles"] = ("Triangle", triangle_records(self.triangles, material, emitters.triangle,
-                                                                 self.normals))
-        if len(self.normals):
-            buffers["normals"] = ("Normals", normal_records(self.normals))
+            buffers["triangles"] = ("Triangle", triangle_records(meshes, of_meshes, emitters.triangle))
+        if any(mesh.normals is not None for mesh in meshes):
+            buffers["normals"] = ("Normals", normal_records(meshes))
         if len(spheres):
             buffers["spheres"] = ("Sphere", sphere_records(spheres, of_spheres, emitters.sphere))
         if self.scene.instances:
@@ -127,7 +125,7 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: C
         tree = shapes.tree(choices, device, carried)
         sky = packing.result()
     textures = Textures()
-    emitters = pack_emitters(shapes.scene, shapes.triangles, sky, textures)
+    emitters = pack_emitters(shapes.scene, sky, textures)
     materials = pack_materials(shapes.users, textures)
     buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, tree is not NO_RAYS)
     buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, materials.normal_maps)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..accel.tree import Triangles
 from ..accel.two_level import TwoLevels, inverse
 from ..device.open import Device
 from ..scene.instancing import prototypes
@@ -39,10 +40,10 @@ class Placements:
         self.to_world = np.array([*itself, *(instance.to_world for instance in instances)])
         self.mesh = np.concatenate([np.full(len(itself), len(self.meshes), np.int32), which])
 
-    def levels(self, device: Device | None, layout: str, builder: str | None, triangles: FloatArray,
+    def levels(self, device: Device | None, layout: str, builder: str | None, triangles: Triangles,
                spheres: FloatArray, test: str) -> TwoLevels:
-        """The trees over triangles (m, 3, 3), stored as above, and spheres (s, 4), which belong to the rest."""
-        meshes = np.split(triangles, self.starts[1:])
+        """The trees over triangles, stored as above, and spheres (s, 4), which belong to the rest."""
+        meshes = np.split(np.asarray(triangles), self.starts[1:])
         return TwoLevels(device, layout, builder, meshes, self.mesh, test, spheres)
 
     def records(self, codes: NDArray[np.int32]) -> NDArray[Any]:

@@ -12,6 +12,7 @@ from ..scene.model import Mesh
 from ..scene.textures import Texture
 from .emission import mean_emission
 from .environment import LUMINANCE
+from .geometry import Corners
 from .light_groups import Doubles, LightGroups, flat_lights
 from .records import TRIANGLE_LIGHT
 from .textures import Textures
@@ -30,8 +31,8 @@ class TriangleLights(NamedTuple):
     light: NDArray[np.int32]
 
 
-def pack_triangle_lights(meshes: list[Mesh], triangles: NDArray[np.float32], textures: Textures) -> TriangleLights:
-    """triangles: (m, 3, 3) float32, the meshes' in order. What is black, or has no area in float32, is no light.
+def pack_triangle_lights(meshes: list[Mesh], textures: Textures) -> TriangleLights:
+    """Of the meshes' triangles, in order. What is black, or has no area in float32, is no light.
 
     Those with a texture are never joined, and are chosen by what it holds around them.
     """
@@ -43,13 +44,14 @@ def pack_triangle_lights(meshes: list[Mesh], triangles: NDArray[np.float32], tex
     shines: NDArray[np.bool_] = np.any(emission, axis=1)
     lamps = np.flatnonzero(shines[mesh])
     around = np.concatenate([np.ones((0, 3)), *map(mean_emission, itertools.compress(meshes, shines))])
-    area = _normals(triangles[lamps].astype(np.float64))[1] / 2
+    corners = np.asarray(Corners(list(itertools.compress(meshes, shines)))).astype(np.float64)
+    area = _normals(corners)[1] / 2
     seen = (emission[mesh[lamps]] * around).any(axis=1) & (area.astype(np.float32) > 0)
     lamps, around = lamps[seen], around[seen]
-    corners, whole = _joined(triangles[lamps].astype(np.float64), mesh[lamps], lamps, ~painted[mesh[lamps]])
+    corners, whole = _joined(corners[seen], mesh[lamps], lamps, ~painted[mesh[lamps]])
     begins = np.ones(len(lamps), bool)
     begins[1:] = ~whole[:-1]
-    light = np.full(len(triangles), -1, np.int32)
+    light = np.full(len(mesh), -1, np.int32)
     light[lamps] = np.cumsum(begins) - 1
     own = lamps[begins]
     records, groups = _packed(corners[begins], whole[begins], emission[mesh[own]], around[begins])

@@ -3,11 +3,14 @@
 // 9(4), with the hash of Laine and Karras 2011 and Vegdahl's constants). The error of a smooth integral falls nearly as
 // one over the number of samples, and any 2^k consecutive ones from a multiple of 2^k on are a (0, k, 2)-net.
 //
-// Pixels take blocks of 2^block_bits points of one sequence along the Z curve, so that those of neighbours are
-// stratified together and their errors cancel where eyes and filters average them (Ahmed and Wonka 2020). What does not
-// fit into 32 bits, higher parts of the picture and later blocks, gets sequences of its own; with block_bits = 32, where
-// nobody knows how many samples there will be, each pixel has its own.
+// Pixels of a square take blocks of 2^block_bits points of one sequence along the Z curve, so that those of neighbours
+// are stratified together and their errors cancel where eyes and filters average them (Ahmed and Wonka 2020). Each
+// square, and each later block, has a sequence of its own: errors of pixels that share one rise and fall together, and
+// were that all of them, no change of a picture would tell what its error is (clrt/rendering/noise.py). With
+// block_bits = 32, where nobody knows how many samples there will be, each pixel has its own.
 #include "rng.cl"
+
+#define SQUARE_BITS 10   // of a pixel's number in its square, unless points of so many pixels are too many for 32 bits
 
 typedef struct {
     ureal reversed_index, key;   // the point's number with its bits reversed; the sequence's key
@@ -25,8 +28,9 @@ static inline ureal reverse_bits(ureal x) {
 static inline Sampler sampler_at(ureal pixel, ureal sample, uint seed, uint block_bits) {
     ureal index = sample, sequence = pixel, block = (ureal)(0);
     if (block_bits < 32) {
-        index = pixel << block_bits | (sample & ((1u << block_bits) - 1));
-        sequence = block_bits ? pixel >> (32 - block_bits) : (ureal)(0);
+        uint shared = SQUARE_BITS < 32 - block_bits ? SQUARE_BITS : 32 - block_bits;
+        index = (pixel & ((1u << shared) - 1)) << block_bits | (sample & ((1u << block_bits) - 1));
+        sequence = pixel >> shared;
         block = sample >> block_bits;
     }
     return (Sampler){reverse_bits(index), hash4(sequence, block, (ureal)(seed), (ureal)(0)).y, 0};
