@@ -10,7 +10,7 @@
 // block_bits = 32, where nobody knows how many samples there will be, each pixel has its own.
 #include "rng.cl"
 
-#define SQUARE_BITS 10   // of a pixel's number in its square, unless points of so many pixels are too many for 32 bits
+#define SQUARE_BITS 8   // of a pixel's number in its square, unless points of so many pixels are too many for 32 bits
 
 typedef struct {
     ureal reversed_index, key;   // the point's number with its bits reversed; the sequence's key
