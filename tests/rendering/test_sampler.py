@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
-from scipy.stats import chi2, qmc
+from scipy.stats import chi2, pearsonr, qmc
 
 from clrt.device.open import Device
 from clrt.scene.materials import Diffuse
@@ -57,6 +57,19 @@ def test_neighbours_fill_the_square_together(sobol: Probe, block_bits: int, side
     """The blocks of an aligned square of pixels are one net, wherever it lies on the Z curve."""
     pixels = np.arange(1 << 2 * side_bits)[:, None] + (37 << 2 * side_bits)
     assert fills_all_boxes(draw(sobol, pixels, np.arange(1 << block_bits), 2, block_bits=block_bits))
+
+
+def test_errors_of_squares_know_nothing_of_each_other(sobol: Probe) -> None:
+    """How good a sequence is for an integral, ∫∫ xy here, is by chance: over 128 seeds the mean squared errors of two
+    neighbouring squares of 16 pixels, 16 samples each, do not correlate. Within a square they do, even if it is halved.
+    """
+    n, square, seeds = 16, 256, 128
+    pixels = np.arange(2 * square)[:, None]
+    points = [draw(sobol, pixels, np.arange(n), seed=seed, block_bits=4) for seed in range(seeds)]
+    error = np.array([each.prod(axis=1).reshape(2, square, n).mean(axis=2) - 0.25 for each in points])
+    halves = (error**2).reshape(seeds, 4, square // 2).mean(axis=2)
+    assert pearsonr(halves[:, 0], halves[:, 1]).pvalue < FAMILY
+    assert pearsonr(halves[:, :2].mean(axis=1), halves[:, 2:].mean(axis=1)).pvalue > FAMILY
 
 
 @pytest.mark.parametrize("sampler, power", [("sobol", 3), ("independent", 1)])
