@@ -74,10 +74,11 @@ def run(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command("ball.toml", *arguments), cwd=folder, capture_output=True, text=True)
 
 
-def test_the_error_is_a_tenth(image: clrt.Image, converged: Floats) -> None:
-    """Of eight samples; as much as another hundred would do. It is a twentieth."""
+def test_the_error_is_less_than_an_eighth(image: clrt.Image, converged: Floats) -> None:
+    """Of eight samples; as much as another sixty would do. Of 48 pictures by other seeds it was .086 on average, with a
+    standard deviation of .01."""
     assert image.raw is not None
-    assert relmse(image.pixels, converged) < relmse(image.raw, converged) / 10  # type: ignore[operator]
+    assert relmse(image.pixels, converged) < relmse(image.raw, converged) / 8  # type: ignore[operator]
 
 
 def test_the_raw_picture_is_kept(image: clrt.Image) -> None:
