@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import IO
 
 
-def start_child(module: str, argument: str, output: IO[bytes] | int, errors: IO[bytes],
+def start_child(module: str, argument: str, output: IO[bytes] | int, errors: IO[bytes] | int,
                 given: IO[bytes] | int = subprocess.DEVNULL, **variables: str) -> subprocess.Popen[str]:
     """`python -m module argument`, which finds the same modules as this process wherever it is started; given: its
     standard input; `variables` are added to its environment."""

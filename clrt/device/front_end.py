@@ -25,11 +25,11 @@ LARGE = 1 << 25
 
 def compile_aside(device_id: str, source: str, options: list[str], seconds: float) -> None:
     """Takes so long at most. Whatever goes wrong there will go wrong here, too, where it is told."""
-    with tempfile.TemporaryFile() as given, tempfile.TemporaryFile() as errors:
+    with tempfile.TemporaryFile() as given:
         given.write(json.dumps([source, options]).encode())
         given.seek(0)
         with suppress(OSError):
-            child = start_child(__name__, device_id, subprocess.DEVNULL, errors, given=given)
+            child = start_child(__name__, device_id, subprocess.DEVNULL, subprocess.DEVNULL, given=given)
             try:
                 with suppress(subprocess.TimeoutExpired):
                     child.wait(seconds)
