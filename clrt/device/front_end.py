@@ -17,6 +17,7 @@ from contextlib import suppress
 import pyopencl as cl
 
 from .child import end_child, start_child
+from .heap import give_back
 from .open import open_device
 
 #: From so many bytes on data count as large.
@@ -25,6 +26,7 @@ LARGE = 1 << 25
 
 def compile_aside(device_id: str, source: str, options: list[str], seconds: float) -> None:
     """Takes so long at most. Whatever goes wrong there will go wrong here, too, where it is told."""
+    give_back()     # what packing the data left, as both processes are there for a while
     with tempfile.TemporaryFile() as given:
         given.write(json.dumps([source, options]).encode())
         given.seek(0)
