@@ -48,6 +48,7 @@ def room() -> Scene:
 
 @pytest.fixture
 def live(device: Device) -> Iterator[Live]:
+    contexts.share_no_more()    # one that tests before wore out would be left in the middle, and its programs with it
     with Live(room(), device=device.info.index) as live:
         yield live
 
