@@ -192,11 +192,12 @@ class TreeQuery:
         return "packet" if packets and self.tree.bytes < cache and _coherent(directions) else "pool"
 
     def _kernel(self, name: str, traversal: str) -> cl.Kernel:
-        """The kernel query_`name`, built when it is first asked for."""
+        """The kernel that answers `name`, built when it is first asked for."""
         key = name, traversal, tree_defines(self.tree)["STACK_SIZE"]
         if key not in self._kernels:
             program = build(self.device, self.source(name, traversal), self.tree.bytes)
-            self._kernels[key] = make_kernel(self.device, program, f"query_{name}")
+            self._kernels[key] = make_kernel(self.device, program,
+                                             "query_pool" if traversal == "pool" else f"query_{name}")
         return self._kernels[key]
 
     def source(self, name: str, traversal: str) -> str:
@@ -211,8 +212,8 @@ class TreeQuery:
         values |= {feature: 1 for feature, present in has.items() if present}
         values |= {"packet": {"PACKET_RAYS": 1, "EMPTY": EMPTY}, "single": {},
                    "pool": {"POOL": POOL, "SHARE": SHARE, "STOP_AT_FIRST": int(name == "any_hit")}}[traversal]
-        preamble = "\n".join([defines(values), f"#define QUERY_NAME query_{name}",
-                              typedefs({"Counts": COUNTS, "RayHit": self._hit}), scene_struct(tree_buffers(self.tree))])
+        preamble = "\n".join([defines(values), typedefs({"Counts": COUNTS, "RayHit": self._hit}),
+                              scene_struct(tree_buffers(self.tree))])
         files = tree_files(self.tree.name, self._tests, triangles, spheres, instances=instances)
         return compose(preamble, "query_pool.cl" if traversal == "pool" else "query.cl",
                        files | {"PACKETS": ["traverse/packet.cl"] if traversal == "packet" else []})

@@ -68,7 +68,7 @@ typedef struct { Flight *at_nodes[POOL + 1], *at_leaves[POOL + 1]; } Round;
     }
 
 __attribute__((vec_type_hint(real)))
-kernel void QUERY_NAME(SCENE_PARAMETERS, QUERY_RAYS, global Answer *answers, float unit, uint count) {
+kernel void query_pool(SCENE_PARAMETERS, QUERY_RAYS, global Answer *answers, float unit, uint count) {
     Scene scene = SCENE_ARGUMENTS;
     Flight flights[POOL];
     Round rounds[2], *now = rounds, *then = rounds + 1;

@@ -16,6 +16,8 @@ from .describe import DeviceInfo
 from .discover import choose
 from .pulse import take_any_time
 
+#: The name of PoCL's platform.
+POCL = "Portable Computing Language"
 #: Launches tell how long they ran.
 TIMED = cl.command_queue_properties.PROFILING_ENABLE
 
@@ -45,10 +47,14 @@ class Device:
         return 8 if self.vectors else 1
 
     @property
+    def is_pocl(self) -> bool:
+        """Whether its driver is PoCL, which compiles kernels as they are first launched, and keeps them itself."""
+        return self.info.platform == POCL
+
+    @property
     def packs(self) -> bool:
         """Whether lanes are put side by side by one instruction (kernels/mask.cl), which waves of paths need."""
-        return (self.vectors and self.info.platform == "Portable Computing Language"
-                and platform.machine().lower() in ("x86_64", "amd64"))
+        return self.vectors and self.is_pocl and platform.machine().lower() in ("x86_64", "amd64")
 
     @property
     def fuses(self) -> bool:
@@ -86,7 +92,7 @@ def name_of(devices: Sequence[Device]) -> str:
 def open_device(selector: str | int | None = None) -> Device:
     """Opens the device that `selector` names (see `choose`); DeviceError where that fails."""
     info, device = choose(selector)
-    if info.platform == "Portable Computing Language":
+    if info.platform == POCL:
         pocl.name_processor(device)
     if info.type == "simulator":
         take_any_time()

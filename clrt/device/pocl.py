@@ -16,6 +16,8 @@ import ctypes
 import os
 import shutil
 import struct
+from collections.abc import Set
+from functools import cache
 from pathlib import Path
 
 import pyopencl as cl
@@ -38,12 +40,22 @@ def lacks_linker(device: cl.Device) -> bool:
     return "PoCL 3." in device.platform.version and shutil.which("ld", path=os.environ.get("PATH", "")) is None
 
 
-def best_processor(flags: set[str]) -> str:
+@cache
+def processor_flags() -> frozenset[str]:
+    """The instructions that this machine has, as Linux names them; empty elsewhere."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return frozenset()
+    return next((frozenset(line.split(":")[1].split()) for line in lines if line.startswith("flags")), frozenset())
+
+
+def best_processor(flags: Set[str]) -> str:
     """The best of PROCESSORS whose needs `flags` meet, else the plain "x86-64"."""
     return next((name for name, needs in PROCESSORS.items() if needs <= flags), "x86-64")
 
 
-def is_misnamed(name: str, flags: set[str]) -> bool:
+def is_misnamed(name: str, flags: Set[str]) -> bool:
     """Whether LLVM 14 should call a processor with these instructions by another name.
 
     Those without AVX2 have libraries made for themselves.
@@ -55,8 +67,7 @@ def name_processor(device: cl.Device) -> bool:
     """Gives the PoCL device the name of its library's processor; True where it had another."""
     if "LLVM 14" not in device.platform.version or not Path("/proc/self/mem").exists():
         return False
-    flags = next((set(line.split(":")[1].split()) for line in Path("/proc/cpuinfo").read_text().splitlines()
-                  if line.startswith("flags")), set())
+    flags = processor_flags()
     found = [offset for offset, text, neighbour in _strings(device.int_ptr)
              if is_misnamed(text, flags) and neighbour.startswith("x86_64")]
     if len(found) != 1:

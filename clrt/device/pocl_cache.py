@@ -7,6 +7,7 @@ import os
 import shutil
 import struct
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 
 #: What LLVM's bitcode begins with.
@@ -14,7 +15,8 @@ BITCODE = b"BC\xc0\xde"
 
 
 def kept_programs() -> Path:
-    """The folder; in it are folders of two letters, and in those one for each program."""
+    """The folder; in it are folders of two letters, in those one for each program, and beside them one for each kernel
+    of those that were built of bitcode (see bitcode.py)."""
     if folder := os.environ.get("POCL_CACHE_DIR"):
         return Path(folder)
     cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
@@ -25,7 +27,7 @@ def remove_damaged() -> int:
     """How many programs were damaged; they are compiled again when they are needed."""
     removed = 0
     with suppress(OSError, RuntimeError):   # it may not be ours to read, and there may be no home
-        for program in kept_programs().glob("[A-Z][A-Z]/*"):
+        for program in chain(kept_programs().glob("[A-Z][A-Z]/*"), kept_programs().glob("*_*")):
             if not all(map(_is_whole, program.rglob("*"))):
                 shutil.rmtree(program, ignore_errors=True)
                 removed += 1

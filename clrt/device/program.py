@@ -20,9 +20,11 @@ import pyopencl as cl
 
 from ..errors import KernelError
 from .background import LIMIT, in_background
+from .bitcode import find_bitcode, name_kernels, takes_bitcode
 from .cache import keep_log, read_binary, write_binary
 from .front_end import LARGE, compile_aside, quietly_built
 from .open import Device
+from .pocl import best_processor, processor_flags
 from .pocl_cache import remove_damaged
 from .sources import kernel_folder
 
@@ -37,11 +39,13 @@ MOST_KEPT = 32
 
 @dataclass(frozen=True)
 class BuiltProgram:
-    """A program ready to run. `cached`: it was not compiled from source; `build_seconds`: what getting it took."""
+    """A program ready to run. `cached`: it was not compiled from source; `build_seconds`: what getting it took;
+    `ending`: of its kernels' names (see bitcode.py)."""
 
     program: cl.Program
     build_seconds: float
     cached: bool
+    ending: str
 
 
 def compose(preamble: str, entry: str, choices: Mapping[str, Sequence[str]], folder: Traversable | None = None) -> str:
@@ -79,29 +83,24 @@ def files_of(source: str) -> list[str]:
 def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
     """Builds `source` for the device, or takes it from this process or the cache; KernelError with the log if refused.
 
-    PoCL keeps what it compiled itself, and asking it for a binary costs as much as compiling, so for it the cache only
-    remembers that a program was built before. Where the device has no instruction for fma, kernels/fma.cl comes first.
-    data_bytes: about what the program will work on; beside large data PoCL compiles in a process of its own.
+    PoCL keeps the kernels that it compiled itself; what is kept for it is bitcode, or only that a program was built
+    before. Where the device has no instruction for fma, kernels/fma.cl comes first. data_bytes: about what the program
+    will work on; beside large data PoCL's front end runs in a process of its own.
     """
     start = time.perf_counter()
     if not device.fuses:
         source = compose("", "fma.cl", {}) + source
-    identity = "\n".join([source, *OPTIONS, device.info.id, device.info.platform_version, device.info.driver])
-    key = hashlib.sha256(identity.encode()).hexdigest()
-    keeps_its_own = device.info.platform == "Portable Computing Language"
-    aside = keeps_its_own and data_bytes >= LARGE
-    programs = device.shared.programs
+    key, programs = program_key(device, source), device.shared.programs
+    ending = f"_{key[:32]}" if takes_bitcode(device.info.platform_version) else ""
     program = programs.pop(key, None)
     cached = program is not None
     if program is None:
-        binary = read_binary(key)
-        program = _from_binary(device, binary) if binary else None
+        binary, named = read_binary(key), name_kernels(source, ending)
+        program = _from_binary(device, binary)
         cached = program is not None or binary == b""
-        program = program or _compile(device, source, aside)
+        program = program or _built(device, key, named, ending, device.is_pocl and data_bytes >= LARGE)
         if not program.get_info(cl.program_info.NUM_KERNELS) and remove_damaged():
-            program = _compile(device, source)
-        if not cached:
-            write_binary(key, b"" if keeps_its_own else _binary(program))
+            program = _built(device, key, named, ending)
         device.shared.compiled += not cached
     programs[key] = program
     for old in list(programs)[:-MOST_KEPT]:
@@ -109,48 +108,68 @@ def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
     seconds = time.perf_counter() - start
     log.info("program of %d files %s in %.2f s", len(files_of(source)), "found" if cached else "built", seconds)
     log.debug("its files: %s", " ".join(files_of(source)))
-    return BuiltProgram(program, seconds, cached)
+    return BuiltProgram(program, seconds, cached, ending)
 
 
 def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
     """The kernel `name` of a program; KernelError where the driver fails only now."""
     try:
-        return cl.Kernel(built.program, name)
+        return cl.Kernel(built.program, name + built.ending)
     except cl.Error as error:
-        where = f"{device.info.name} ({device.info.platform})"
-        raise KernelError(f"{where} cannot create kernel {name}: {error}") from error
+        raise KernelError(f"{_where(device)} cannot create kernel {name}: {error}") from error
 
 
-def _binary(program: cl.Program) -> bytes:
-    binaries: list[bytes] = program.get_info(cl.program_info.BINARIES)  # type: ignore[assignment]
-    return binaries[0]
+def program_key(device: Device, source: str) -> str:
+    """What the cache calls the program. Machines may share one, and not all processors of a name have the same
+    instructions."""
+    identity = [source, *OPTIONS, device.info.id, device.info.platform_version, device.info.driver,
+                best_processor(processor_flags())]
+    return hashlib.sha256("\n".join(identity).encode()).hexdigest()
 
 
-def _from_binary(device: Device, binary: bytes) -> cl.Program | None:
+def _built(device: Device, key: str, source: str, ending: str, aside: bool = False) -> cl.Program:
+    """Built of its source; what it may be built of another time is in the cache then."""
+    if aside:
+        in_background(_where(device), lambda: compile_aside(device.info.id, source, OPTIONS, LIMIT))
+    program, other = _compile(device, source), None
+    if device.is_pocl:
+        binary = find_bitcode(ending) or b"" if ending else b""
+        other = _from_binary(device, binary)    # now, too, so that its kernels are compiled once
+        write_binary(key, binary if other else b"")
+    else:
+        binaries: list[bytes] = program.get_info(cl.program_info.BINARIES)  # type: ignore[assignment]
+        write_binary(key, binaries[0])
+    return other or program
+
+
+def _from_binary(device: Device, binary: bytes | None) -> cl.Program | None:
     try:
-        return quietly_built(cl.Program(device.context, [device.cl], [binary]), [])
+        return quietly_built(cl.Program(device.context, [device.cl], [binary]), []) if binary else None
     except (cl.Error, ValueError):
         return None  # a driver may refuse an old or damaged binary: compile again
 
 
-def _compile(device: Device, source: str, aside: bool = False) -> cl.Program:
-    where, start = f"{device.info.name} ({device.info.platform})", time.perf_counter()
+def _compile(device: Device, source: str) -> cl.Program:
+    start = time.perf_counter()
     program = cl.Program(device.context, source)
     try:
         options = OPTIONS + (SIMULATOR_OPTIONS if device.info.type == "simulator" else [])
-        if aside:
-            in_background(where, lambda: compile_aside(device.info.id, source, options, LIMIT))
-        in_background(where, lambda: quietly_built(program, options))
+        in_background(_where(device), lambda: quietly_built(program, options))
         log = f"built in {time.perf_counter() - start:.2f} s\n{_build_log(device, program)}"
     except cl.Error as error:
         log = str(error).strip()
-        raise KernelError(f"{where} cannot build the kernel:\n{log}") from error
+        raise KernelError(f"{_where(device)} cannot build the kernel:\n{log}") from error
     except KernelError as error:
         log = str(error)
         raise
     finally:
-        keep_log("build", f"{where}, driver {device.info.driver}\n{', '.join(files_of(source))}\n{log}")
+        keep_log("build", f"{_where(device)}, driver {device.info.driver}\n{', '.join(files_of(source))}\n{log}")
     return program
+
+
+def _where(device: Device) -> str:
+    """For messages."""
+    return f"{device.info.name} ({device.info.platform})"
 
 
 def _build_log(device: Device, program: cl.Program) -> str:

@@ -24,7 +24,7 @@ def rendered(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, bytes]:
                           POCL_CACHE_DIR=str(folder / "kept"))
     done = subprocess.run([*RENDER, "picture.png"], cwd=folder, env=places, capture_output=True, text=True, timeout=200)
     assert done.returncode == 0, done.stderr
-    kernel, = (folder / "kept").rglob("wave.so")
+    kernel, = (folder / "kept").rglob("wave*.so")
     return done.stderr, kernel.read_bytes()
 
 

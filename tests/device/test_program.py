@@ -21,7 +21,7 @@ from clrt.check import probe
 from clrt.device import cache
 from clrt.device.loops import turns_source
 from clrt.device.open import Device
-from clrt.device.program import build, compose, files_of
+from clrt.device.program import BuiltProgram, build, compose, files_of, make_kernel
 from clrt.errors import KernelError
 from clrt.rendering.aovs import AOVS
 from clrt.rendering.choices import OFFSETS, Choices
@@ -131,16 +131,19 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     assert sorted(used) == FILES
 
 
-def test_programs_build_without_a_warning(device: Device, capfd: pytest.CaptureFixture[str]) -> None:
+def test_programs_build_without_a_warning(device: Device, capfd: pytest.CaptureFixture[str], tmp_path: Path,
+                                          monkeypatch: pytest.MonkeyPatch) -> None:
     """They would land on the user's terminal, in the middle of the progress bar. What drivers say besides is theirs."""
     scene = everything()
     scene.spheres = scene.spheres + [type(scene.spheres[0])(material=material)
                                      for kind in MATERIALS for material in variants(kind)]
     compiled = compile_scene(scene, Choices(device.lanes, device.layout, direct_light=True))
-    for source in (compiled.source, compiled.source_of("guides.cl"), first_hit_program(compiled, AOVS)[0]):
-        built = build(device, source + "\n// its own text, so that no cache has it")
-        log = built.program.get_build_info(device.cl, cl.program_build_info.LOG)  # type: ignore[no-untyped-call]
-        assert not re.findall(r".*\.cl:\d+:\d+: warning.*", log)
+    sources = compiled.source, compiled.source_of("guides.cl"), first_hit_program(compiled, AOVS)[0]
+    for number, source in enumerate(sources):
+        monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path / str(number)))
+        build(device, f"{source}\n// its own text, so that no cache has it")
+        log = cache.kept_logs()["build"]
+        assert "\nbuilt in " in log and not re.findall(r".*\.cl:\d+:\d+: warning.*", log)
     assert "warning" not in capfd.readouterr().err
 
 
@@ -181,13 +184,13 @@ def test_a_program_is_built_whatever_the_cache_holds(device: Device, state: str,
     assert built.cached == (state == "stored")
     if state == "not a binary":
         assert stored[0].read_bytes() == content, "what is refused is replaced"
-    assert run_twice(device, built.program) == [2.0, 4.0, 6.0]
+    assert run_twice(device, built) == [2.0, 4.0, 6.0]
 
 
-def run_twice(device: Device, twice: cl.Program) -> list[float]:
+def run_twice(device: Device, built: BuiltProgram) -> list[float]:
     x = np.array([1, 2, 3], np.float32)
     buffer = cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=x)
-    kernel = cl.Kernel(twice, "twice")
+    kernel = make_kernel(device, built, "twice")
     kernel.set_args(buffer)
     cl.enqueue_nd_range_kernel(device.queue, kernel, (3,), None)
     cl.enqueue_copy(device.queue, x, buffer)

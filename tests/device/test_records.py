@@ -10,7 +10,7 @@ import pytest
 
 from clrt.accel import cwbvh, layouts, triangle_forms
 from clrt.device.open import Device
-from clrt.device.program import build
+from clrt.device.program import build, make_kernel
 from clrt.device.records import c_typedef, record
 from clrt.rendering import records
 from clrt.scene.materials import MATERIALS
@@ -42,7 +42,7 @@ def test_device_agrees_with_numpy(device: Device) -> None:
                    for field in dtype.names or ()]
     writes = "".join(f"out[{i}] = {place};" for i, place in enumerate(places))
     source = "\n".join([*texts, f"kernel void sizes(global uint *base, global uint *out) {{ {writes} }}"])
-    kernel = cl.Kernel(build(device, source).program, "sizes")
+    kernel = make_kernel(device, build(device, source), "sizes")
     found = np.zeros(len(places), np.uint32)
     scratch, out = (cl.Buffer(device.context, cl.mem_flags.READ_WRITE, size) for size in (4096, found.nbytes))
     kernel.set_args(scratch, out)
