@@ -8,9 +8,9 @@ from dataclasses import fields
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from annotated_types import Ge, Gt, Le, Lt
 
 from ..scene.fields import show
+from ..scene.limits import Ge, Gt, Le, Lt
 from ..scene.material import SHARED
 from ..scene.materials import MATERIALS, Material
 from ..scene.presets import F0_PRESETS
@@ -70,7 +70,7 @@ def _values(hint: Any) -> Iterator[str]:
         number = next(_values(parts[0])).removeprefix("a number")
         yield f"{len(parts)} numbers{', each' * bool(number)}{number}"
     elif origin is Annotated:
-        words = {type(limit): f"{getattr(limit, type(limit).__name__.lower()):g}" for limit in parts[1:]}
+        words = {type(limit): f"{limit.bound:g}" for limit in parts[1:]}
         limits = f"{words[Ge]} to {words[Le]}" if {Ge, Le} <= set(words) else " and ".join(
             f"{LIMITS[limit]} {bound}" for limit, bound in words.items())
         yield f"a number {limits}"

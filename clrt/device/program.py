@@ -95,12 +95,12 @@ def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
     program = programs.pop(key, None)
     cached = program is not None
     if program is None:
-        binary, named = read_binary(key), name_kernels(source, ending)
+        binary = read_binary(key)
         program = _from_binary(device, binary)
         cached = program is not None or binary == b""
-        program = program or _built(device, key, named, ending, device.is_pocl and data_bytes >= LARGE)
+        program = program or _built(device, key, source, ending, device.is_pocl and data_bytes >= LARGE)
         if not program.get_info(cl.program_info.NUM_KERNELS) and remove_damaged():
-            program = _built(device, key, named, ending)
+            program = _built(device, key, source, ending)
         device.shared.compiled += not cached
     programs[key] = program
     for old in list(programs)[:-MOST_KEPT]:
@@ -129,6 +129,7 @@ def program_key(device: Device, source: str) -> str:
 
 def _built(device: Device, key: str, source: str, ending: str, aside: bool = False) -> cl.Program:
     """Built of its source; what it may be built of another time is in the cache then."""
+    source = name_kernels(source, ending)
     if aside:
         in_background(_where(device), lambda: compile_aside(device.info.id, source, OPTIONS, LIMIT))
     program, other = _compile(device, source), None

@@ -7,11 +7,11 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from annotated_types import Gt, Lt
 
 from ..errors import SceneError, UsageError
 from .curves import Doubles, smooth
 from .fields import field_problems
+from .limits import Gt, Lt
 from .material import tuples_for_lists
 from .textures import NonNegative
 

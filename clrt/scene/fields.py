@@ -14,8 +14,8 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
-from annotated_types import Ge, Gt, Le, Lt
 
+from .limits import Ge, Gt, Le, Limit, Lt
 from .textures import Texture
 
 #: Fields whose values are no plain data; whoever holds them checks them.
@@ -147,12 +147,12 @@ def _factor(plain: Any, texture: Texture) -> Any:
     return get_args(plain)[0] if one else plain
 
 
-def _outside(limits: Iterable[Any], value: float, path: str) -> Iterator[str]:
-    """The limits (annotated_types) that a number does not keep."""
+def _outside(limits: Iterable[Limit], value: float, path: str) -> Iterator[str]:
+    """The limits that a number does not keep."""
     for limit in limits:
-        name, keeps, is_wrong, remedy = _LIMITS[type(limit)]
-        if not keeps(value, bound := getattr(limit, name)):
-            yield f"{path}: {show(value)} {is_wrong} {bound}; {remedy} {bound}"
+        keeps, is_wrong, remedy = _LIMITS[type(limit)]
+        if not keeps(value, limit.bound):
+            yield f"{path}: {show(value)} {is_wrong} {limit.bound}; {remedy} {limit.bound}"
 
 
 def _fault(kind: Any, value: Any) -> str:
@@ -171,10 +171,9 @@ _REMEDIES = {float: "is not a number; write one without quotes",
              str: "is not a text; write it in quotes",
              bool: "is neither true nor false; write one of them",
              tuple: "is not a list; write the numbers in brackets"}
-_LIMITS: dict[type, tuple[str, Callable[[float, float], bool], str, str]] = {
-    Ge: ("ge", operator.ge, "is below", "write at least"), Le: ("le", operator.le, "is above", "write at most"),
-    Gt: ("gt", operator.gt, "is not above", "write more than"),
-    Lt: ("lt", operator.lt, "is not below", "write less than")}
+_LIMITS: dict[type, tuple[Callable[[float, float], bool], str, str]] = {
+    Ge: (operator.ge, "is below", "write at least"), Le: (operator.le, "is above", "write at most"),
+    Gt: (operator.gt, "is not above", "write more than"), Lt: (operator.lt, "is not below", "write less than")}
 
 
 def plain_value(value: Any) -> Any:

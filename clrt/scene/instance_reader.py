@@ -8,11 +8,11 @@ from math import prod
 from typing import Annotated, Any
 
 import numpy as np
-from annotated_types import Ge, Le
 from numpy.typing import NDArray
 
 from ..errors import SceneError
 from .fields import show, unknown
+from .limits import Ge, Le
 from .materials import Material
 from .model import Instance, Model
 from .placing import Placing

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-from annotated_types import Ge, Gt, Le, Lt
 
+from .limits import Ge, Gt, Le, Lt
 from .material import Radiance, tuples_for_lists
 
 Length = Annotated[float, Gt(0)]

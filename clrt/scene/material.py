@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, ClassVar, Self
 
-from annotated_types import Ge, Le
 
+from .limits import Ge, Le
 from .textures import NonNegative, Texture
 
 Unit = Annotated[float, Ge(0), Le(1)]

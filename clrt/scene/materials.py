@@ -1,7 +1,7 @@
 """Materials: plain data, one dataclass each. A material's behaviour is `kernels/bsdf/<kernel>.cl`.
 
 To add one: write its kernel file, write its dataclass here and list it in MATERIALS. The scene file, the validation,
-the packing and the tests of every BSDF find it in that list. Field types carry their limits (annotated-types), which
+the packing and the tests of every BSDF find it in that list. Field types carry their limits (limits.py), which
 `validate` checks for scenes from files and from Python alike. The largest has a file of its own.
 """
 
@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from math import log
 from typing import Annotated, ClassVar
 
-from annotated_types import Ge, Gt, Le
 
+from .limits import Ge, Gt, Le
 from .material import Albedo as Albedo, Material as Material, Parameter, Unit
 from .metallic_roughness import MetallicRoughness as MetallicRoughness
 from .presets import CONDUCTORS, ConductorPreset

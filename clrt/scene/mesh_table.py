@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge, Le, Lt
 
 from ..errors import SceneError
 from .creases import creased
 from .instancing import meshes_by_id
+from .limits import Ge, Le, Lt
 from .materials import Diffuse
 from .meshes import read_model
 from .model import Instance, Mesh, Model, Vector

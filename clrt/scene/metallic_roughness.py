@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from math import log1p
 from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
-from annotated_types import Ge, Le
 
+from .limits import Ge, Le
 from .material import ALPHA_MIN, Albedo, Material, Parameter, Radiance, Unit
 from .microfacets import fitted_loss, multiple_scattering
 from .presets import F0_PRESETS, Preset

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt, Le, Lt
 from numpy.typing import NDArray
 
 from ..errors import ClrtError
 from .animation import Animation
 from .lights import Light
+from .limits import Ge, Gt, Le, Lt
 from .material import tuples_for_lists
 from .materials import Diffuse, Material
 from .numbers import real_array, whole_array

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, TypeVar
 
 import numpy as np
-from annotated_types import Ge, Lt
 from numpy.typing import NDArray
+
+from .limits import Ge, Lt
 
 Channel = Literal["red", "green", "blue", "alpha"]
 Wrap = Literal["repeat", "mirror", "clamp"]

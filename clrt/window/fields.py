@@ -15,9 +15,9 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
-from annotated_types import Ge, Gt, Le, Lt
 from imgui_bundle import imgui
 
+from ..scene.limits import Ge, Gt, Le, Lt
 from ..scene.textures import Texture
 
 Value = TypeVar("Value")
@@ -153,12 +153,12 @@ def limits_of(hint: Any) -> Limits | None:
     if _base(hint) not in (int, float):
         return None
     limits = Limits()
-    for bound in getattr(hint, "__metadata__", ()):
-        number = getattr(bound, type(bound).__name__.lower())
-        if isinstance(bound, Ge | Gt):
-            limits = limits._replace(least=number if isinstance(bound, Ge) else _next(number, inf, hint))
-        elif isinstance(bound, Le | Lt):
-            limits = limits._replace(most=number if isinstance(bound, Le) else _next(number, -inf, hint))
+    for limit in getattr(hint, "__metadata__", ()):
+        if isinstance(limit, Ge | Gt):
+            least = limit.bound if isinstance(limit, Ge) else _next(limit.bound, inf, hint)
+            limits = limits._replace(least=least)
+        elif isinstance(limit, Le | Lt):
+            limits = limits._replace(most=limit.bound if isinstance(limit, Le) else _next(limit.bound, -inf, hint))
     return limits
 
 

@@ -7,8 +7,8 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 import pytest
-from annotated_types import Ge, Le
 
+from clrt.scene.limits import Ge, Le
 from clrt.scene.materials import Albedo, Diffuse, Material, MetallicRoughness
 from clrt.study.bsdfs import COSINES, plain_variants, view, views, worded_variants
 

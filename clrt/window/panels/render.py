@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import Annotated, Any
 
-from annotated_types import Ge, Le
 from imgui_bundle import imgui
 
 from ...accel.kernels import BUILDER_NAMES, TREES, TRIANGLE_TESTS
 from ...live.settings import Settings
 from ...output.view import VIEWS
+from ...scene.limits import Ge, Le
 from ..editor import Editor
 from ..fields import choose, edit, edit_fields
 from ..tone_mapping import Look
