@@ -144,8 +144,7 @@ def _numbers(kind: type[Material], name: str) -> tuple[Any, ...]:
     if isinstance(default, tuple):
         return (COLOR,)
     plain = next((part for part in get_args(hint) if get_origin(part) is Annotated), hint)   # of a number or a texture
-    limits = [getattr(limit, end) for limit in get_args(plain)[1:] for end in ("ge", "gt", "le", "lt")
-              if hasattr(limit, end)]
+    limits = [limit.bound for limit in get_args(plain)[1:]]
     return (min(limits), sum(limits) / 2, max(limits)) if len(limits) == 2 else (default,)
 
 
