@@ -54,20 +54,35 @@ def build_tree(device: Device | None, layout: str, builder: str | None, triangle
     return in_form(_over_corners(device, layout, builder, triangles, spheres), triangle, device)
 
 
-def _over_corners(device: Device | None, layout: str, builder: str | None, triangles: Triangles,
-                  spheres: FloatArray) -> Layout:
-    count = len(triangles) + len(spheres)
+def builder_source(device: Device, layout: str, builder: str | None, triangles: int, spheres: int) -> str | None:
+    """The program that builds the tree over so many; None where that is done in numpy. UsageError as `build_tree`."""
+    builder = _fitting_builder(device, layout, builder, triangles + spheres)
+    if builder not in DEVICE_BUILDERS:
+        return None
+    return device_builder.program_source(device_builder.SHAPES[layout], triangles > 0, spheres > 0,
+                                         DEVICE_BUILDERS[builder] > 0)
+
+
+def _fitting_builder(device: Device | None, layout: str, builder: str | None, count: int) -> str:
     known = [*DEVICE_BUILDERS, *BUILDERS]
     if builder not in (None, *known):
         raise UsageError(f"there is no tree builder {builder!r}: take one of {', '.join(known)}")
     if builder is None:
         device_can = layout in device_builder.SHAPES and device_builder.fits(device, count)
         builder = "ploc" if device_can and count >= LARGE else "sah"
-    if builder not in DEVICE_BUILDERS or device is None or count < 2:
-        return pack(layout, "sah" if builder in DEVICE_BUILDERS else builder, np.asarray(triangles), spheres)
-    if layout not in device_builder.SHAPES:
+    if builder in DEVICE_BUILDERS and (device is None or count < 2):
+        return "sah"
+    if builder in DEVICE_BUILDERS and layout not in device_builder.SHAPES:
         raise UsageError(f"the builder {builder} makes {', '.join(device_builder.SHAPES)}, not {layout}: "
                          "take the builder sah")
+    return builder
+
+
+def _over_corners(device: Device | None, layout: str, builder: str | None, triangles: Triangles,
+                  spheres: FloatArray) -> Layout:
+    builder = _fitting_builder(device, layout, builder, len(triangles) + len(spheres))
+    if builder not in DEVICE_BUILDERS or device is None:
+        return pack(layout, builder, np.asarray(triangles), spheres)
     start = time.perf_counter()
     shape = device_builder.SHAPES[layout]
     tree = device_builder.build_tree(device, shape, triangles, spheres, DEVICE_BUILDERS[builder])

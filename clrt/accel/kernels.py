@@ -53,13 +53,13 @@ def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
 
 
 def tree_defines(tree: Layout) -> dict[str, int]:
-    """PACK_SIZE, and a STACK_SIZE that the tree's traversal cannot exceed, in steps of 32 so that trees share programs.
+    """PACK_SIZE, and a STACK_SIZE that the tree's traversal cannot exceed, in steps of 64 so that trees share programs.
 
     And COUNT_VISITS, if there is a buffer to count in (kernels/traverse/visits.cl).
     """
     if tree is NO_RAYS:
         return {}
-    defines = {"PACK_SIZE": TREES[tree.name][1], "STACK_SIZE": max(32, -(-tree.stack // 32) * 32)}
+    defines = {"PACK_SIZE": TREES[tree.name][1], "STACK_SIZE": max(64, -(-tree.stack // 64) * 64)}
     return defines | ({"COUNT_VISITS": 1} if "visits" in tree.buffers else {})
 
 

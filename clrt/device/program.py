@@ -15,6 +15,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources.abc import Traversable
+from threading import current_thread
 
 import pyopencl as cl
 
@@ -22,7 +23,7 @@ from ..errors import KernelError
 from .background import LIMIT, in_background
 from .bitcode import find_bitcode, name_kernels, takes_bitcode
 from .cache import keep_log, read_binary, write_binary
-from .front_end import LARGE, compile_aside, quietly_built
+from .aside import LARGE, compile_aside, quietly_built
 from .open import Device
 from .pocl import best_processor, processor_flags
 from .pocl_cache import remove_damaged
@@ -88,13 +89,14 @@ def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
     will work on; beside large data PoCL's front end runs in a process of its own.
     """
     start = time.perf_counter()
-    if not device.fuses:
-        source = compose("", "fma.cl", {}) + source
+    source = _whole(device, source)
     key, programs = program_key(device, source), device.shared.programs
-    ending = f"_{key[:32]}" if takes_bitcode(device.info.platform_version) else ""
+    ending = _ending(device, key)
     program = programs.pop(key, None)
     cached = program is not None
     if program is None:
+        if ahead := device.shared.ahead.pop(key, None):
+            in_background(_where(device), ahead.join)
         binary = read_binary(key)
         program = _from_binary(device, binary)
         cached = program is not None or binary == b""
@@ -111,6 +113,23 @@ def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
     return BuiltProgram(program, seconds, cached, ending)
 
 
+def is_kept(device: Device, source: str) -> bool:
+    """Whether `build` will not have to compile it."""
+    key = program_key(device, _whole(device, source))
+    return key in device.shared.programs or read_binary(key) is not None
+
+
+def compile_ahead(device: Device, source: str) -> None:
+    """Has PoCL's front end compile in another process what `build` will soon be asked for, and waits for that."""
+    if is_kept(device, source):
+        return
+    whole = _whole(device, source)
+    key = program_key(device, whole)
+    named = name_kernels(whole, _ending(device, key))
+    device.shared.ahead[key] = current_thread()
+    compile_aside(device.info.id, named, OPTIONS, LIMIT)
+
+
 def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
     """The kernel `name` of a program; KernelError where the driver fails only now."""
     try:
@@ -125,6 +144,16 @@ def program_key(device: Device, source: str) -> str:
     identity = [source, *OPTIONS, device.info.id, device.info.platform_version, device.info.driver,
                 best_processor(processor_flags())]
     return hashlib.sha256("\n".join(identity).encode()).hexdigest()
+
+
+def _whole(device: Device, source: str) -> str:
+    """With what the device lacks."""
+    return source if device.fuses else compose("", "fma.cl", {}) + source
+
+
+def _ending(device: Device, key: str) -> str:
+    """Of the names of kernels."""
+    return f"_{key[:32]}" if takes_bitcode(device.info.platform_version) else ""
 
 
 def _built(device: Device, key: str, source: str, ending: str, aside: bool = False) -> cl.Program:

@@ -17,6 +17,7 @@ from ..device.program import compose, files_of
 from ..scene.model import Camera, Scene
 from ..scene.scaling import Frame, camera_in
 from ..scene.validate import validate
+from .ahead import begin_program
 from .carried import Carried
 from .choices import Choices
 from .features import WITH_LIGHT, features_of, files_for, preamble_of
@@ -99,6 +100,8 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     was made for the scene before.
     """
     validate(scene)
+    if device is not None and entry is None:
+        begin_program(scene, choices, device, lambda scene, choices: compile_scene(scene, choices).source)
     packed = pack_scene(scene, choices, device, carried or Carried())
     features = features_of(packed, choices, device is not None and loop_turns(device) is not None)
     part_bytes = needed_parts((array for _, array in packed.buffers.values()), device.info) if device else None

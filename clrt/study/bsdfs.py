@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..device.open import Device
 from ..scene.material import ALPHA_MIN, SHARED
+from ..scene.limits import Limit
 from ..scene.materials import MATERIALS, Material
 from ..scene.model import Scene, Sphere
 from .probe import Doubles, Probe
@@ -144,7 +145,7 @@ def _numbers(kind: type[Material], name: str) -> tuple[Any, ...]:
     if isinstance(default, tuple):
         return (COLOR,)
     plain = next((part for part in get_args(hint) if get_origin(part) is Annotated), hint)   # of a number or a texture
-    limits = [limit.bound for limit in get_args(plain)[1:]]
+    limits = [limit.bound for limit in get_args(plain)[1:] if isinstance(limit, Limit)]
     return (min(limits), sum(limits) / 2, max(limits)) if len(limits) == 2 else (default,)
 
 

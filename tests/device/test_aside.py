@@ -10,7 +10,7 @@ from pathlib import Path
 import pyopencl
 import pytest
 
-from clrt.device.front_end import LARGE, compile_aside
+from clrt.device.aside import LARGE, compile_aside
 from clrt.device.open import Device
 from clrt.device.program import OPTIONS, build, make_kernel
 from clrt.errors import KernelError

@@ -7,12 +7,14 @@ makes is put where PoCL keeps its programs, so this one finds it there and has k
 
 from __future__ import annotations
 
+import atexit
 import json
 import subprocess
 import sys
 import tempfile
 import warnings
 from contextlib import suppress
+from functools import partial
 
 import pyopencl as cl
 
@@ -32,11 +34,14 @@ def compile_aside(device_id: str, source: str, options: list[str], seconds: floa
         given.seek(0)
         with suppress(OSError):
             child = start_child(__name__, device_id, subprocess.DEVNULL, subprocess.DEVNULL, given=given)
+            end = partial(end_child, child)
+            atexit.register(end)    # this process may end meanwhile
             try:
                 with suppress(subprocess.TimeoutExpired):
                     child.wait(seconds)
             finally:
-                end_child(child)
+                end()
+                atexit.unregister(end)
 
 
 def quietly_built(program: cl.Program, options: list[str]) -> cl.Program:

@@ -1,0 +1,63 @@
+"""A scene's program, begun before its tree: where the tree's builder has to be compiled, too, that takes as long.
+
+What is compiled does not depend on how many triangles a mesh has, so it is found out with one of each. Where that
+should be wrong the program is compiled when it is needed, as ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from threading import Thread
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..accel.build import FEW_SPHERES, builder_source, fitting_layout
+from ..device.aside import LARGE
+from ..device.open import Device
+from ..device.program import compile_ahead, is_kept
+from ..errors import ClrtError
+from ..scene.model import Mesh, Scene
+from .choices import Choices
+
+PER_VERTEX = ("vertices", "normals", "uv", "uv1", "colors", "tangents")
+
+
+def begin_program(scene: Scene, choices: Choices, device: Device, source: Callable[[Scene, Choices], str]) -> None:
+    """Has another process compile what `source` makes of a scene, where that saves time, and takes little memory."""
+    count, spheres = sum(len(mesh.faces) for mesh in scene.meshes), len(scene.spheres)
+    in_tree = spheres if spheres > FEW_SPHERES else 0
+    layout = choices.layout or fitting_layout(device, count, in_tree, choices.tests.triangle, False, choices.tree)
+    builder = builder_source(device, layout, choices.builder, count, in_tree)
+    if not device.is_pocl or scene.instances or builder is None or is_kept(device, builder) or _bytes(scene) > LARGE:
+        return
+
+    def compiled() -> None:
+        with suppress(ClrtError):   # it will come again, where it is told
+            compile_ahead(device, source(outline(scene), replace(choices, layout=layout)))
+
+    Thread(target=compiled, daemon=True, name="clrt compiles ahead").start()
+
+
+def outline(scene: Scene) -> Scene:
+    """The scene with one triangle of each mesh that is no lamp."""
+    return replace(scene, meshes=[mesh if any(mesh.material.radiance) else _one_triangle(mesh)
+                                  for mesh in scene.meshes])
+
+
+def _one_triangle(mesh: Mesh) -> Mesh:
+    arrays: dict[str, Any] = {name: getattr(mesh, name) for name in PER_VERTEX}
+    return replace(mesh, faces=np.arange(3, dtype=np.int32)[None],
+                   **{name: values[mesh.faces[0]] for name, values in arrays.items() if values is not None})
+
+
+def _bytes(scene: Scene) -> int:
+    """Of its arrays, which are packed twice."""
+    arrays: list[NDArray[Any] | None] = [getattr(mesh, name) for mesh in scene.meshes
+                                         for name in ("faces", *PER_VERTEX)]
+    materials = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
+    arrays += [p.texels for p in {texture.picture for each in materials for texture in each.textures()}]
+    return sum(array.nbytes for array in arrays if array is not None)
