@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -104,7 +103,6 @@ def build_tree(device: Device, shape: Shape, triangles: Triangles, spheres: Floa
     return _write(work, shape, plan, levels, stack)
 
 
-@cache
 def program_source(shape: Shape, triangles: bool, spheres: bool, reinsertions: bool) -> str:
     """The builder's program, for scenes with triangles, with spheres, and for trees that are made better."""
     values = {"CHILDREN": shape.children, "LEAF_SIZE": shape.leaf_size, "PACK": shape.pack, "EMPTY": EMPTY,

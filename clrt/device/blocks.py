@@ -21,8 +21,9 @@ WORK_ITEMS = {"cpu": 16, "gpu": 512}
 SMALLEST_BLOCK = {"cpu": 256, "gpu": 16}
 #: Turns that the loops of a kernel may take for one item.
 ITEM_TURNS = 1024
-#: Items that a launch takes on each compute unit, at most.
-LAUNCH_ITEMS = 1 << 17
+#: Items that a launch takes on each compute unit, at most. On a CPU, where PoCL compiles a kernel once more for those
+#: that do not begin at 0, as many as take a tenth of a second.
+LAUNCH_ITEMS = {"cpu": 1 << 20, "gpu": 1 << 17}
 #: Work-items that scan together where that pays, as in build/scan.cl, and what they get at least.
 SCAN_ITEMS, SCAN_PART = 256, 8192
 
@@ -91,10 +92,14 @@ class Blocks:
             self._bytes -= array.size
             array.release()
 
+    @property
+    def _kind(self) -> str:
+        return "cpu" if self.device.info.type == "cpu" else "gpu"
+
     def block(self, count: int) -> int:
         """How many items each work-item gets."""
-        kind = "cpu" if self.device.info.type == "cpu" else "gpu"
-        block = max(SMALLEST_BLOCK[kind], -(-count // (WORK_ITEMS[kind] * self.device.info.compute_units)))
+        units = self.device.info.compute_units
+        block = max(SMALLEST_BLOCK[self._kind], -(-count // (WORK_ITEMS[self._kind] * units)))
         turns = loop_turns(self.device)
         return block if turns is None else max(1, min(block, turns // ITEM_TURNS))
 
@@ -108,7 +113,7 @@ class Blocks:
         block, local = self.block(count), self.device.local_size
         values = np.uint32(count), np.uint32(block), *map(_scalar, arguments)
         groups = -(-self.number(count) // local)
-        most = max(1, LAUNCH_ITEMS * self.device.info.compute_units // (block * local))
+        most = max(1, LAUNCH_ITEMS[self._kind] * self.device.info.compute_units // (block * local))
         for first in range(0, groups, most):
             self._launch(name, min(most, groups - first), local, values, first)
 

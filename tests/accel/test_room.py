@@ -48,7 +48,7 @@ def test_short_launches_build_the_same_tree(device: Device, monkeypatch: pytest.
     """Cut into launches of few items each."""
     triangles = soup(5_000, 0.1)
     trees = [build_tree(device, "bvh8", "reinsertion", triangles)]
-    monkeypatch.setattr("clrt.device.blocks.LAUNCH_ITEMS", 100)
+    monkeypatch.setattr("clrt.device.blocks.LAUNCH_ITEMS", {"cpu": 100, "gpu": 100})
     trees.append(build_tree(device, "bvh8", "reinsertion", triangles))
     whole, cut = ({name: array.read(device).tobytes() for name, array in tree.buffers.items()} for tree in trees)
     assert whole == cut
