@@ -153,13 +153,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             return
         if opening is not None:
             options["device"] = opening.result()
-
-        def begin(phase: str) -> None:
-            progress.phase(phase)
-            if phase == "compile" and not print_kernel:
-                results.prepare()
-
-        renderer = make_renderer(cluster, content, spp=planned, on_phase=begin, **options)
+        renderer = make_renderer(cluster, content, spp=planned, on_phase=progress.phase, **options)
         if print_kernel:
             click.echo(renderer.compiled.source)
             return
@@ -215,6 +209,7 @@ def _render(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, den
     """Renders to the goal, or until it is interrupted, and writes the results; of an interrupted frame none."""
     guides = renderer.session.guides() if denoiser else {}
     progress.phase("render", device=renderer.name, device_bytes=renderer.session.device_bytes)
+    results.prepare()
     for state in renderer.passes(spp=goal.spp, time=goal.seconds, error=goal.error, reference=expected):
         progress.workers(renderer.session.shares())
         progress.state(state, goal)
