@@ -23,6 +23,8 @@ from ..errors import ClrtError
 from ..scene.model import Mesh, Scene
 from .choices import Choices
 
+#: By how much more memory a scene takes once it is packed, about.
+PACKED = 6
 PER_VERTEX = ("vertices", "normals", "uv", "uv1", "colors", "tangents")
 
 
@@ -32,7 +34,8 @@ def begin_program(scene: Scene, choices: Choices, device: Device, source: Callab
     in_tree = spheres if spheres > FEW_SPHERES else 0
     layout = choices.layout or fitting_layout(device, count, in_tree, choices.tests.triangle, False, choices.tree)
     builder = builder_source(device, layout, choices.builder, count, in_tree)
-    if not device.is_pocl or scene.instances or builder is None or is_kept(device, builder) or _bytes(scene) > LARGE:
+    if (not device.is_pocl or scene.instances or builder is None or is_kept(device, builder)
+            or PACKED * _bytes(scene) > LARGE):
         return
 
     def compiled() -> None:
