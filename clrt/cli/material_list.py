@@ -8,7 +8,6 @@ from dataclasses import fields
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-
 from ..scene.fields import show
 from ..scene.limits import Ge, Gt, Le, Lt
 from ..scene.material import SHARED

@@ -29,19 +29,18 @@ LARGE = 1 << 25
 def compile_aside(device_id: str, source: str, options: list[str], seconds: float) -> None:
     """Takes so long at most. Whatever goes wrong there will go wrong here, too, where it is told."""
     give_back()     # what packing the data left, as both processes are there for a while
-    with tempfile.TemporaryFile() as given:
+    with suppress(OSError), tempfile.TemporaryFile() as given:
         given.write(json.dumps([source, options]).encode())
         given.seek(0)
-        with suppress(OSError):
-            child = start_child(__name__, device_id, subprocess.DEVNULL, subprocess.DEVNULL, given=given)
-            end = partial(end_child, child)
-            atexit.register(end)    # this process may end meanwhile
-            try:
-                with suppress(subprocess.TimeoutExpired):
-                    child.wait(seconds)
-            finally:
-                end()
-                atexit.unregister(end)
+        child = start_child(__name__, device_id, subprocess.DEVNULL, subprocess.DEVNULL, given=given)
+        end = partial(end_child, child)
+        atexit.register(end)    # this process may end meanwhile
+        try:
+            with suppress(subprocess.TimeoutExpired):
+                child.wait(seconds)
+        finally:
+            end()
+            atexit.unregister(end)
 
 
 def quietly_built(program: cl.Program, options: list[str]) -> cl.Program:

@@ -30,6 +30,14 @@ def cache_folder() -> Path:
     return Path(user_cache_dir("clrt"))
 
 
+def can_keep() -> bool:
+    """Whether files can be written there."""
+    with suppress(OSError, RuntimeError):
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        return os.access(cache_folder(), os.W_OK)
+    return False
+
+
 def read_file(name: str) -> bytes | None:
     """What is kept under `name`, or None."""
     try:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import atexit
 import ctypes
 from dataclasses import dataclass, field
-from threading import Thread
+from threading import Event
 
 import pyopencl as cl
 from pyopencl import Context
@@ -21,12 +21,12 @@ MOST_COMPILED = 40
 
 @dataclass(eq=False)
 class Shared:
-    """A context; programs: those of it that were used last, by their key; ahead: who has others compiled by another
-    process; compiled: how many programs were compiled in it."""
+    """A context; programs: those of it that were used last, by their key; ahead: of what another process
+    compiles, whether it is done; compiled: how many programs were compiled in it."""
 
     context: Context
     programs: dict[str, cl.Program] = field(default_factory=dict)
-    ahead: dict[str, Thread] = field(default_factory=dict)
+    ahead: dict[str, Event] = field(default_factory=dict)
     compiled: int = 0
 
     @property

@@ -2,28 +2,30 @@
 
 A program's text is a preamble (records, choices, features) followed by whole kernel files. `#include "file.cl"` is
 resolved here, each file once, and `#include NAME` stands for the files that the scene chose for NAME, possibly none.
-So the text holds what the scene needs and nothing else; `--print-kernel` shows exactly what is compiled; and the
-known troubles with -I (spaces in paths, driver caches that ignore included files) cannot arise.
+So the text holds what the scene needs and nothing else; `--print-kernel` shows exactly what is compiled, but for what
+ends kernels' names (bitcode.py); and the known troubles with -I (spaces in paths, driver caches that ignore included
+files) cannot arise.
 """
 
 from __future__ import annotations
 
 import hashlib
 import logging
+import os
 import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources.abc import Traversable
-from threading import current_thread
+from threading import Event
 
 import pyopencl as cl
 
 from ..errors import KernelError
+from .aside import LARGE, compile_aside, quietly_built
 from .background import LIMIT, in_background
 from .bitcode import find_bitcode, name_kernels, takes_bitcode
-from .cache import keep_log, read_binary, write_binary
-from .aside import LARGE, compile_aside, quietly_built
+from .cache import can_keep, keep_log, read_binary, write_binary
 from .open import Device
 from .pocl import best_processor, processor_flags
 from .pocl_cache import remove_damaged
@@ -96,7 +98,7 @@ def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
     cached = program is not None
     if program is None:
         if ahead := device.shared.ahead.pop(key, None):
-            in_background(_where(device), ahead.join)
+            in_background(_where(device), ahead.wait)
         binary = read_binary(key)
         program = _from_binary(device, binary)
         cached = program is not None or binary == b""
@@ -121,13 +123,15 @@ def is_kept(device: Device, source: str) -> bool:
 
 def compile_ahead(device: Device, source: str) -> None:
     """Has PoCL's front end compile in another process what `build` will soon be asked for, and waits for that."""
-    if is_kept(device, source):
+    if is_kept(device, source) or not can_keep() or os.environ.get("POCL_KERNEL_CACHE") == "0":
         return
     whole = _whole(device, source)
-    key = program_key(device, whole)
-    named = name_kernels(whole, _ending(device, key))
-    device.shared.ahead[key] = current_thread()
-    compile_aside(device.info.id, named, OPTIONS, LIMIT)
+    key, done = program_key(device, whole), Event()
+    device.shared.ahead[key] = done
+    try:
+        compile_aside(device.info.id, name_kernels(whole, _ending(device, key)), OPTIONS, LIMIT)
+    finally:
+        done.set()
 
 
 def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:

@@ -6,6 +6,7 @@ should be wrong the program is compiled when it is needed, as ever.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
@@ -23,26 +24,36 @@ from ..errors import ClrtError
 from ..scene.model import Mesh, Scene
 from .choices import Choices
 
-#: By how much more memory a scene takes once it is packed, about.
-PACKED = 6
+#: By how much more memory a scene takes once it is packed, about; and the most that may be in an outline.
+PACKED, MOST = 3, 1000
 PER_VERTEX = ("vertices", "normals", "uv", "uv1", "colors", "tangents")
 
 
 def begin_program(scene: Scene, choices: Choices, device: Device, source: Callable[[Scene, Choices], str]) -> None:
     """Has another process compile what `source` makes of a scene, where that saves time, and takes little memory."""
+    if not device.is_pocl or scene.instances or _processors() < 2:
+        return
     count, spheres = sum(len(mesh.faces) for mesh in scene.meshes), len(scene.spheres)
     in_tree = spheres if spheres > FEW_SPHERES else 0
     layout = choices.layout or fitting_layout(device, count, in_tree, choices.tests.triangle, False, choices.tree)
-    builder = builder_source(device, layout, choices.builder, count, in_tree)
-    if (not device.is_pocl or scene.instances or builder is None or is_kept(device, builder)
-            or PACKED * _bytes(scene) > LARGE):
-        return
+    with suppress(ClrtError):   # what is wrong will be told where it matters
+        outlined = outline(scene)
+        builder = builder_source(device, layout, choices.builder, count, in_tree)
+        if (builder is None or is_kept(device, builder) or PACKED * _bytes(scene) > LARGE
+                or sum(len(mesh.faces) for mesh in outlined.meshes) + spheres > MOST):
+            return
+        Thread(target=_compile, args=(device, outlined, replace(choices, layout=layout), source), daemon=True,
+               name="clrt compiles ahead").start()
 
-    def compiled() -> None:
-        with suppress(ClrtError):   # it will come again, where it is told
-            compile_ahead(device, source(outline(scene), replace(choices, layout=layout)))
 
-    Thread(target=compiled, daemon=True, name="clrt compiles ahead").start()
+def _compile(device: Device, outlined: Scene, choices: Choices, source: Callable[[Scene, Choices], str]) -> None:
+    with suppress(ClrtError):   # it will come again
+        compile_ahead(device, source(outlined, choices))
+
+
+def _processors() -> int:
+    """That this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def outline(scene: Scene) -> Scene:
@@ -63,4 +74,5 @@ def _bytes(scene: Scene) -> int:
                                          for name in ("faces", *PER_VERTEX)]
     materials = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]
     arrays += [p.texels for p in {texture.picture for each in materials for texture in each.textures()}]
+    arrays.append(scene.environment.image)
     return sum(array.nbytes for array in arrays if array is not None)

@@ -93,14 +93,15 @@ class CompiledScene:
 
 
 def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
-                  device: Device | None = None, carried: Carried | None = None) -> CompiledScene:
+                  device: Device | None = None, carried: Carried | None = None,
+                  ahead: bool = False) -> CompiledScene:
     """Validates and packs `scene` for the kernel file `entry`; SceneError lists all that is wrong with it.
 
     entry: None for the scene's integrator; device: where large trees are built, if given; carried: what
-    was made for the scene before.
+    was made for the scene before; ahead: whether its program will be built on that device.
     """
     validate(scene)
-    if device is not None and entry is None:
+    if ahead and device is not None:
         begin_program(scene, choices, device, lambda scene, choices: compile_scene(scene, choices).source)
     packed = pack_scene(scene, choices, device, carried or Carried())
     features = features_of(packed, choices, device is not None and loop_turns(device) is not None)

@@ -32,8 +32,8 @@ class Compiler:
         """The last one, if it is for these devices, or another."""
         return last if last and last.devices == devices else cls(devices)
 
-    def compile(self, scene: Scene, choices: list[Choices]) -> list[CompiledScene]:
-        """The scene for each device with its choices.
+    def compile(self, scene: Scene, choices: list[Choices], ahead: bool = False) -> list[CompiledScene]:
+        """The scene for each device with its choices; ahead: see `compile_scene`.
 
         Where all but the camera and PASSING settings are the very same objects as before, only these are looked at.
         """
@@ -43,18 +43,19 @@ class Compiler:
             compiled = [each.seen_by(scene.camera, file) for each in self._last[2]]
         else:
             self._last = None
-            compiled = self._anew(scene, choices)
+            compiled = self._anew(scene, choices, ahead)
         self._last = scene, choices, compiled
         return compiled
 
-    def _anew(self, scene: Scene, choices: list[Choices]) -> list[CompiledScene]:
+    def _anew(self, scene: Scene, choices: list[Choices], ahead: bool) -> list[CompiledScene]:
         """Once for those devices that agree, unless trees were built on a device."""
         compiled: list[CompiledScene] = []
         for choice, device, carried in zip(choices, self.devices, self._carried):
             alike = [done for done, other, chosen in zip(compiled, self.devices, choices) if chosen == choice
                      and (other.layout, other.info.max_alloc_bytes) == (device.layout, device.info.max_alloc_bytes)
                      and all(isinstance(array, np.ndarray) for _, array in done.buffers.values())]
-            compiled.append(alike[0] if alike else compile_scene(scene, choice, device=device, carried=carried))
+            compiled.append(alike[0] if alike else compile_scene(scene, choice, device=device, carried=carried,
+                                                                 ahead=ahead))
         return compiled
 
 

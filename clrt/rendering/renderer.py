@@ -104,8 +104,8 @@ class Renderer:
         self.device, *_ = self.devices = open_devices(device)
         on_phase("build")
         self._compiler: Compiler = Compiler.after(before._compiler if before else None, self.devices)
-        self._compiled = self._compiler.compile(self.scene, [choices_on(each, self.choices, lanes)
-                                                             for each in self.devices])
+        choices = [choices_on(each, self.choices, lanes) for each in self.devices]
+        self._compiled = self._compiler.compile(self.scene, choices, ahead=len(choices) == 1)
         warn_of_darkness(self.scene, self.compiled.features)
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-
 from .limits import Ge, Gt, Le, Lt
 from .material import Radiance, tuples_for_lists
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, ClassVar, Self
 
-
 from .limits import Ge, Le
 from .textures import NonNegative, Texture
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from math import log
 from typing import Annotated, ClassVar
 
-
 from .limits import Ge, Gt, Le
 from .material import Albedo as Albedo, Material as Material, Parameter, Unit
 from .metallic_roughness import MetallicRoughness as MetallicRoughness

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from math import log1p
 from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
-
 from .limits import Ge, Le
 from .material import ALPHA_MIN, Albedo, Material, Parameter, Radiance, Unit
 from .microfacets import fitted_loss, multiple_scattering

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..device.open import Device
-from ..scene.material import ALPHA_MIN, SHARED
 from ..scene.limits import Limit
+from ..scene.material import ALPHA_MIN, SHARED
 from ..scene.materials import MATERIALS, Material
 from ..scene.model import Scene, Sphere
 from .probe import Doubles, Probe

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,10 @@ import pytest
 
 import clrt
 from clrt.device.open import Device
+from clrt.device.program import build, compile_ahead
+from clrt.errors import UsageError
 from clrt.output.images import read_image
+from clrt.rendering import ahead
 from clrt.rendering.ahead import outline
 from clrt.rendering.choices import Choices
 from clrt.rendering.compile import compile_scene
@@ -42,3 +46,38 @@ def test_each_program_is_compiled_once(tmp_path: Path) -> None:
                         picture], cwd=tmp_path, env=places, check=True, capture_output=True, timeout=200)
         assert len(list((tmp_path / "kept").rglob("program.bc"))) == 2
     assert np.array_equal(read_image(tmp_path / "cold.exr"), read_image(tmp_path / "warm.exr"))
+
+
+def test_what_is_refused_is_refused_as_without(device: Device) -> None:
+    """A scene of two triangles needs no tree, but one with instances does."""
+    one = clrt.Mesh(np.eye(4, 3, dtype=np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+    scene = clrt.Scene(meshes=[one], instances=[clrt.Instance(one, np.eye(3, 4) * (2 + i)) for i in range(40)])
+    compiled = compile_scene(scene, Choices(device.lanes, builder="ploc"), device=device, ahead=True)
+    assert compiled.tree.name == device.layout
+    with pytest.raises(UsageError, match="the builder ploc makes"):
+        compile_scene(clrt.Scene(meshes=[one]), Choices(device.lanes, layout="list", builder="ploc"), device=device,
+                      ahead=True)
+
+
+def test_without_a_temporary_folder_it_is_compiled_here(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = "kernel void without_a_folder(global int *x) { x[0] = 1; }"
+    with monkeypatch.context() as none:
+        none.setattr("tempfile.tempdir", "/no/such/folder")
+        compile_ahead(device, source)
+    assert build(device, source).program.num_kernels == 1 and not device.shared.ahead
+
+
+@pytest.mark.parametrize("size, begun", [(16, 1), (2048, 0)])
+def test_large_scenes_are_left_alone(device: Device, monkeypatch: pytest.MonkeyPatch, size: int, begun: int) -> None:
+    """Here one with a large sky: what it takes would be taken twice."""
+    asked: list[str] = []
+    monkeypatch.setattr(ahead, "compile_ahead", lambda device, source: asked.append(source))
+    monkeypatch.setattr(ahead, "is_kept", lambda device, source: False)
+    monkeypatch.setattr(ahead, "Thread", lambda target, args, **_: threading.Timer(0.0, target, args))
+    scene = clrt.load(MODEL)
+    scene.environment = clrt.Environment(image=np.ones((size, 2 * size, 3), np.float32))
+    compiled = compile_scene(scene, Choices(device.lanes, device.layout), device=device, ahead=True)
+    for thread in threading.enumerate():
+        if isinstance(thread, threading.Timer):
+            thread.join()
+    assert asked == [compiled.source] * begun
