@@ -2,52 +2,58 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-Doubles = NDArray[np.float64]
-#: Pixels on each side of the narrower and of the wider of two windows.
+Floats = NDArray[np.floating[Any]]
+#: Pixels on each side of the narrower and of the wider of two windows: powers of two.
 NEAR, REACH = 2, 8
 #: The pixels around one in the narrower.
 NEAREST = (2 * NEAR + 1) ** 2 - 1
+#: Single precision holds the sum of the squares of so much light over a window.
+BRIGHTEST = 1e18
 
 
-def expected(mean: Doubles, variance: Doubles) -> Doubles:
-    """(height, width, 3): of pixels whose surroundings are there, too.
+def expected(mean: Floats, variance: Floats) -> Floats:
+    """(height, width, 3), as precise as what is given: of pixels whose surroundings are there, too.
 
-    mean, variance: (height + 2 REACH, width + 2 REACH, 3), of the pixels and of those around them.
+    mean, variance: (height + 2 REACH, width + 2 REACH, 3), of the pixels and of those around them. In single
+    precision, of which half as much goes through the caches, up to BRIGHTEST and its square.
 
     It is the mean of the 288 pixels around it, from there on towards that of the 24 nearest and then towards its own,
     each as far as variance cannot explain the difference (James and Stein 1961). So a pixel that is bright by chance
     does not count itself, nor do its neighbours alone, and one beside an edge is not mixed with what is behind that.
     """
-    own, own_variance = mean[REACH:-REACH, REACH:-REACH], variance[REACH:-REACH, REACH:-REACH]
-    far, far_variance = _around(mean, own, REACH), _around(variance, own_variance, REACH)
-    near, near_variance = _around(mean, own, NEAR), _around(variance, own_variance, NEAR)
-    return _towards(_towards(far, near, np.maximum(near_variance, far_variance) / NEAREST), own, own_variance)
+    far, near = _around(mean, REACH), _around(mean, NEAR)
+    of_near = np.maximum(_around(variance, NEAR), _around(variance, REACH))
+    around = _towards(far, near, of_near / of_near.dtype.type(NEAREST))
+    return _towards(around, mean[REACH:-REACH, REACH:-REACH], variance[REACH:-REACH, REACH:-REACH])
 
 
-def _around(values: Doubles, own: Doubles, reach: int) -> Doubles:
-    """Means of the windows around each pixel, without its `own` value; `values` lie REACH beyond these on all sides."""
-    within = slice(REACH - reach, len(values) - REACH + reach)
-    across = slice(REACH - reach, values.shape[1] - REACH + reach)
-    span = 2 * reach + 1
-    sums = _sums_of(_sums_of(values[within, across], span).swapaxes(0, 1), span).swapaxes(0, 1)
-    return (sums - own) / (span**2 - 1)
+def _around(values: Floats, reach: int) -> Floats:
+    """Means of the windows around each pixel, without the pixel itself. It is never added, and there is no running
+    sum: what is taken away again leaves its rounding, more than all light around a pixel a million times as bright."""
+    column = _beside(values, reach)
+    window = _beside((column + values[REACH:-REACH]).swapaxes(0, 1), reach).swapaxes(0, 1)
+    window += column[:, REACH:-REACH]
+    window /= (2 * reach + 1) ** 2 - 1
+    return window
 
 
-def _sums_of(values: Doubles, span: int) -> Doubles:
-    """Sums of so many (a power of two, and one) in a row along the first axis. No running sum: its rounding would take
-    the light of a pixel a million times as bright far along the row."""
+def _beside(values: Floats, reach: int) -> Floats:
+    """Sums of the `reach` rows above and below each but the REACH first and last."""
     sums, count = values, 1
-    while count < span - 1:
+    while count < reach:
         sums = sums[:-count] + sums[count:]
         count *= 2
-    return sums[:-1] + values[count:]
+    height = len(values) - 2 * REACH
+    return sums[REACH - reach:][:height] + sums[REACH + 1:][:height]
 
 
-def _towards(start: Doubles, end: Doubles, variance: Doubles) -> Doubles:
+def _towards(start: Floats, end: Floats, variance: Floats) -> Floats:
     """From `start` towards `end`, of which `variance` is known; not at all where it is NaN."""
-    difference = end - start
     with np.errstate(divide="ignore", invalid="ignore"):
-        return start + np.fmax(1 - variance / difference**2, 0) * difference
+        by_chance = np.fmin(variance / (end - start) ** 2, 1)
+    return by_chance * start + (1 - by_chance) * end

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from clrt.rendering.expected import REACH, Doubles, expected
+from clrt.rendering.expected import BRIGHTEST, REACH, expected
+
+Doubles = NDArray[np.float64]
 
 INNER = (slice(REACH, -REACH),) * 2
 
@@ -63,3 +66,13 @@ def test_without_any_variance_known_it_is_what_lies_around() -> None:
     found = expected(mean, np.full_like(mean, np.nan))
     window = mean[:2 * REACH + 1, :2 * REACH + 1]
     np.testing.assert_allclose(found[0, 0], (window.sum(axis=(0, 1)) - mean[REACH, REACH]) / 288, rtol=1e-12)
+
+
+@pytest.mark.parametrize("bright", [1e6, 1e12, BRIGHTEST])
+def test_single_precision_is_enough(bright: float) -> None:
+    """Also beside a pixel that is brighter by far: its light is in no sum that it is taken out of again."""
+    mean, variance = picture(0)
+    mean[14, 12], variance[14, 12] = bright, bright**2
+    found = expected(mean.astype(np.float32), variance.astype(np.float32))
+    assert found.dtype == np.float32
+    np.testing.assert_allclose(found, expected(mean, variance), rtol=2e-5)
