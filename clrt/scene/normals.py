@@ -61,23 +61,26 @@ def smooth_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 def corner_normals(vertices: FloatArray, faces: IntArray) -> NDArray[np.float64]:
     """(3m, 3), by face and corner: the face's normal, as long as its angle there; 0 where the face has no area."""
-    parts = [slice(first, first + PART) for first in range(0, len(faces), PART)]
+    axes, weighted = vertices.T.astype(np.float64, order="C"), np.empty((3, len(faces), 3))
+
+    def fill(first: int) -> None:
+        part = slice(first, first + PART)
+        _weigh(axes.take(faces[part].T, axis=1), weighted[:, part].swapaxes(1, 2))
+
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        weighted = list(pool.map(lambda part: _corner_normals(vertices, faces[part]), parts))
-    return np.concatenate([np.zeros((0, 3)), *weighted])
+        list(pool.map(fill, range(0, len(faces), PART)))
+    return weighted.reshape(3, -1).T
 
 
-def _corner_normals(vertices: FloatArray, faces: IntArray) -> NDArray[np.float64]:
-    positions = [vertices[faces[:, corner]].astype(np.float64) for corner in range(3)]
-    edges = [positions[(corner + 1) % 3] - positions[corner] for corner in range(3)]
-    areas = np.cross(edges[0], edges[1])
-    doubled_area, normals = np.sqrt(np.einsum("ij,ij->i", areas, areas)), unit(areas)
-    weighted = np.empty((len(faces), 3, 3))
-    for corner in range(3):
-        # atan2 is exact for needles too, unlike the arc cosine; |a x b| is the same at all three corners.
-        angles = np.arctan2(doubled_area, -np.einsum("ij,ij->i", edges[corner], edges[corner - 1]))
-        weighted[:, corner] = angles[:, None] * normals
-    return weighted.reshape(-1, 3)
+def _weigh(positions: NDArray[np.float64], weighted: NDArray[np.float64]) -> None:
+    """Fills in what faces have at their corners, from the positions of these: all (x to z, corner, face)."""
+    edges = np.roll(positions, -1, axis=1) - positions
+    areas = np.cross(edges[:, 0], edges[:, 1], axis=0)
+    doubled_area = np.sqrt(np.sum(areas**2, axis=0))
+    normals = areas / np.where(doubled_area > 0, doubled_area, 1)
+    # atan2 is exact for needles too, unlike the arc cosine; |a x b| is the same at all three corners.
+    angles = np.arctan2(doubled_area, -np.sum(edges * np.roll(edges, 1, axis=1), axis=0))
+    np.multiply(normals[:, None], angles, out=weighted)
 
 
 def weld(vertices: FloatArray) -> tuple[NDArray[np.int64], int]:
