@@ -94,7 +94,7 @@ class Outputs:
                 taken[real] = what
 
     def prepare(self) -> None:
-        """Loads what writes pictures while the device is at work, so that nothing waits for it in the end."""
+        """Loads what writes pictures beside all else, so that nothing waits for it in the end."""
         from ..output.images import load_writer
 
         threading.Thread(target=load_writer).start()

@@ -129,7 +129,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         scheduler = local_cluster = None
     with (make_progress(progress_kind, quiet) as progress,
           cluster_for(scheduler, local_cluster, progress) as cluster, ThreadPoolExecutor(1) as meanwhile):
-        opening = None if cluster else meanwhile.submit(_open, options["device"])
+        opening = None if cluster else meanwhile.submit(_open, options["device"], results)
         progress.phase("load")
         with files_read() as inputs:
             content = load(scene, camera)
@@ -178,12 +178,15 @@ def _chosen_aovs(names: tuple[str, ...]) -> tuple[str, ...]:
     return chosen_aovs(",".join(names))
 
 
-def _open(selectors: tuple[str, ...] | None) -> list[Device]:
-    """The devices, and all that renders on them loaded: half of it is waiting for files, and needs no scene."""
+def _open(selectors: tuple[str, ...] | None, results: Outputs) -> list[Device]:
+    """The devices, and all that renders on them and writes pictures loaded: half of it is waiting for files, and needs
+    no scene."""
     from ..device.open import open_devices
-    from ..rendering import renderer  # noqa: F401
 
-    return open_devices(selectors)
+    devices = open_devices(selectors)
+    results.prepare()
+    from ..rendering import renderer  # noqa: F401
+    return devices
 
 
 def _denoiser() -> Denoiser:
@@ -209,7 +212,6 @@ def _render(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, den
     """Renders to the goal, or until it is interrupted, and writes the results; of an interrupted frame none."""
     guides = renderer.session.guides() if denoiser else {}
     progress.phase("render", device=renderer.name, device_bytes=renderer.session.device_bytes)
-    results.prepare()
     for state in renderer.passes(spp=goal.spp, time=goal.seconds, error=goal.error, reference=expected):
         progress.workers(renderer.session.shares())
         progress.state(state, goal)
