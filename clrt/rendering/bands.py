@@ -20,20 +20,23 @@ class Unwanted(Exception):
     """Nobody waits any more for what was being made of a picture."""
 
 
-def in_bands(size: tuple[int, ...], work: Callable[[slice], T], unwanted: Callable[[], bool] = lambda: False,
-             ) -> list[T]:
-    """What `work` returns for the rows of each band of a picture, (height, width, …), from the top down; several run at
-    a time. No tile is in two bands. Unwanted as soon as it is. `work` must not call this itself."""
+def bands_of(size: tuple[int, ...]) -> list[slice]:
+    """The rows of each band of a picture, (height, width, …), from the top down. No tile is in two."""
     height, width = size[:2]
     step = max(1, PIXELS // (width * TILE)) * TILE
-    bands = [slice(first, min(first + step, height)) for first in range(0, height, step)]
+    return [slice(first, min(first + step, height)) for first in range(0, height, step)]
 
+
+def in_bands(size: tuple[int, ...], work: Callable[[slice], T], unwanted: Callable[[], bool] = lambda: False,
+             ) -> list[T]:
+    """What `work` returns for the rows of each band of a picture; several run at a time. Unwanted as soon as it is.
+    `work` must not call this itself."""
     def wanted(rows: slice) -> T:
         if unwanted():
             raise Unwanted
         return work(rows)
 
-    return list(_pool(os.getpid()).map(wanted, bands))
+    return list(_pool(os.getpid()).map(wanted, bands_of(size)))
 
 
 @cache

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.model import Environment
-from .records import ENVIRONMENT, SKY_TEXEL
+from .bands import bands_of
+from .records import ENVIRONMENT, SKY_STEP, SKY_TEXEL
 from .steps import steps
 
 Doubles = NDArray[np.float64]
@@ -46,37 +47,51 @@ def pack_sky(environment: Environment) -> Sky:
         color = np.asarray(environment.color) * environment.strength
         record["color"] = color
         return Sky("light/constant_sky.cl", {"environment": ("Environment", record)}) if color.any() else Sky(None, {})
-    radiance = image.astype(np.float64) * environment.strength
-    if not radiance.any():
+    if not image.any() or not environment.strength:
         return Sky(None, {})
-    height, width = radiance.shape[:2]
+    height, width = image.shape[:2]
     angle = np.radians(environment.rotation_degrees)
     record["width"], record["height"] = width, height
     record["rotation_cos"], record["rotation_sin"] = np.cos(angle), np.sin(angle)
-    texels = np.zeros(width * height, SKY_TEXEL)
-    texels["radiance"] = radiance.reshape(-1, 3)
+    texels = np.zeros((height, width), SKY_TEXEL)
+    weights = _fill_radiance(texels, image, environment.strength)   # as yet the mean of each texel
     buffers: dict[str, tuple[str, NDArray[Any]]] = {
-        "environment": ("Environment", record), "sky_texels": ("SkyTexel", texels)}
-    mean, solid_angle = _texel_means(radiance @ LUMINANCE), _solid_angles(height, width)
-    total = np.sum(mean * solid_angle)
-    weights = np.maximum(mean - total / (4 * np.pi), 0) * solid_angle
-    if weights.sum() <= UNEVEN * total:
+        "environment": ("Environment", record), "sky_texels": ("SkyTexel", texels.ravel())}
+    solid_angle = _solid_angles(height, width)
+    total = np.sum(weights * solid_angle)
+    weights -= total / (4 * np.pi)
+    np.maximum(weights, 0, out=weights)
+    weights *= solid_angle
+    of_rows = weights.sum(axis=1)
+    if of_rows.sum() <= UNEVEN * total:
         return Sky("light/image_sky.cl", buffers)
-    columns, in_row = steps(np.where(weights.any(axis=1, keepdims=True), weights, 1.0))
-    rows, of_rows = steps(weights.sum(axis=1))
-    texels["density"] = (of_rows[:, None] * in_row).ravel() * (width * height)
-    buffers["sky_steps"] = ("SkyStep", np.concatenate([columns.ravel(), rows]))
-    return Sky("light/image_sky.cl", buffers, _irradiance(weights, angle))
+    irradiance = _irradiance(weights, angle)
+    weights[of_rows == 0] = 1       # never drawn
+    table = np.empty(height * width + height, SKY_STEP)
+    density = steps(weights, table[:height * width].reshape(height, width))
+    density *= steps(of_rows[None], table[height * width:][None]).T
+    texels["density"] = density * (width * height)
+    buffers["sky_steps"] = ("SkyStep", table)
+    return Sky("light/image_sky.cl", buffers, irradiance)
 
 
-def _texel_means(luminance: Doubles) -> Doubles:
-    """(h, w): mean of the bilinear luminance over each texel.
+def _fill_radiance(texels: NDArray[np.void], image: NDArray[np.float32], strength: float) -> Doubles:
+    """Fills it in, and returns (h, w): the mean of the bilinear luminance over each texel.
 
     Between texel centres the bilinear weights average to 1/8, 3/4, 1/8 over a texel, in each direction.
     """
-    rows = 0.75 * luminance + 0.125 * (np.roll(luminance, 1, axis=1) + np.roll(luminance, -1, axis=1))
-    padded = np.pad(rows, ((1, 1), (0, 0)), mode="edge")
-    return np.asarray(0.75 * rows + 0.125 * (padded[:-2] + padded[2:]))
+    height, width = texels.shape
+    across = np.empty((height, width))
+    for rows in bands_of(across.shape):
+        radiance = image[rows].astype(np.float64) * strength
+        texels["radiance"][rows] = radiance
+        luminance = radiance @ LUMINANCE
+        across[rows] = 0.75 * luminance + 0.125 * (np.roll(luminance, 1, axis=1) + np.roll(luminance, -1, axis=1))
+    mean = np.empty((height, width))
+    for rows in bands_of(across.shape):
+        near = across[np.arange(rows.start - 1, rows.stop + 1).clip(0, height - 1)]
+        mean[rows] = 0.75 * near[1:-1] + 0.125 * (near[:-2] + near[2:])
+    return mean
 
 
 def _solid_angles(height: int, width: int) -> Doubles:

@@ -5,27 +5,37 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .records import SKY_STEP
+from .bands import bands_of
 
 #: Of the kernels' random numbers, which are multiples of its inverse.
 LEVELS = 1 << 24
 
 
-def steps(weights: NDArray[np.float64]) -> tuple[NDArray[np.void], NDArray[np.float64]]:
-    """SKY_STEPs (..., n) and probabilities (..., n) for weights (..., n) >= 0, each row with a positive sum.
+def steps(weights: NDArray[np.float64], table: NDArray[np.void]) -> NDArray[np.float64]:
+    """Fills a table of SKY_STEPs (rows, n); the probabilities (rows, n) for weights (rows, n) >= 0, each row with a
+    positive sum.
 
     Step i ends at `top`, the share of all weights up to its own, rounded to 1/LEVELS: then numbers of 24 bits fall into
     it exactly as often as its probability says, the difference of two tops. `start`: the step into which i/n falls
     (Chen and Asau 1974, "On Generating Random Variates from an Empirical Distribution").
     """
-    n = weights.shape[-1]
-    total = np.cumsum(weights, axis=-1)
-    tops = np.round(total / total[..., -1:] * LEVELS)
-    table = np.zeros(weights.shape, SKY_STEP)
-    table["top"] = tops / LEVELS
+    probabilities = np.empty(weights.shape)
+    for rows in bands_of(weights.shape):
+        tops = np.cumsum(weights[rows], axis=1)
+        tops /= tops[:, -1:].copy()
+        tops *= LEVELS
+        np.round(tops, out=tops)
+        table["top"][rows] = tops / LEVELS
+        table["start"][rows] = _starts(tops)
+        probabilities[rows] = np.diff(tops, prepend=0, axis=1) / LEVELS
+    return probabilities
+
+
+def _starts(tops: NDArray[np.float64]) -> NDArray[np.intp]:
+    """(rows, n): for each i the step into which i/n falls."""
+    count, n = tops.shape
     # The first i/n at or beyond each step's end; 1/LEVELS more, since the kernels' product u·n may be rounded up.
-    rows = np.arange(tops.size // n)[:, None] * (n + 1)
-    first = np.minimum(np.ceil((tops.reshape(-1, n) + 1) * (n / LEVELS)).astype(np.int64), n)
-    before = np.bincount((rows + first).ravel(), minlength=rows.size * (n + 1)).reshape(-1, n + 1)[:, :n]
-    table["start"] = np.cumsum(before, axis=1).reshape(weights.shape)
-    return table, np.diff(tops, prepend=0, axis=-1) / LEVELS
+    first = np.minimum(np.ceil((tops + 1) * (n / LEVELS)).astype(np.intp), n)
+    first += np.arange(count)[:, None] * (n + 1)
+    before = np.bincount(first.ravel(), minlength=count * (n + 1)).reshape(count, n + 1)
+    return np.cumsum(before[:, :n], axis=1)

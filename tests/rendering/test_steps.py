@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.rendering.records import SKY_STEP
 from clrt.rendering.steps import LEVELS, steps
 
 RNG = np.random.default_rng(0)
@@ -20,13 +21,23 @@ WEIGHTS = {
     "peak": np.where(np.arange(2000) == 777, 1e6, 1.0),
     "tiny": np.where(np.arange(5) == 2, 1e-12, 1.0),
     "rows": RNG.random((5, 300))**8,
+    "bands": RNG.random((90, 1024)),
 }
+
+
+def table_of(weights: NDArray[np.float64]) -> tuple[NDArray[np.void], NDArray[np.float64]]:
+    """The table for rows of weights, or for a single one, and the probabilities."""
+    rows = np.atleast_2d(weights)
+    table = np.empty(rows.shape, SKY_STEP)
+    probabilities = steps(rows, table)
+    return table, probabilities
 
 
 @pytest.mark.parametrize("weights", WEIGHTS.values(), ids=WEIGHTS)
 def test_probabilities(weights: NDArray[np.float64]) -> None:
     """Whole numbers of levels, each within one of the exact share, that add up to 1; what has no weight has none."""
-    table, probability = steps(weights)
+    table, probability = table_of(weights)
+    weights = np.atleast_2d(weights)
     assert np.all(probability * LEVELS % 1 == 0) and np.all(probability >= 0) and np.all(probability[weights == 0] == 0)
     assert np.all(probability.sum(axis=-1) == 1) and np.all(table["top"][..., -1] == 1)
     assert np.abs(probability - weights / weights.sum(axis=-1, keepdims=True)).max() <= 1 / LEVELS
@@ -36,9 +47,8 @@ def test_probabilities(weights: NDArray[np.float64]) -> None:
 @pytest.mark.parametrize("weights", WEIGHTS.values(), ids=WEIGHTS)
 def test_searches_start_in_time(weights: NDArray[np.float64]) -> None:
     """At or before the step that each u falls into, u·n being a float32 product; and hardly before it on average."""
-    rows = np.atleast_2d(weights)
-    table, _ = steps(rows)
-    n = rows.shape[1]
+    table, _ = table_of(weights)
+    n = table.shape[1]
     edges = np.round(np.arange(n) / n * LEVELS)[:, None] + np.arange(-2, 3)    # where that product may be rounded up
     levels = np.concatenate([edges.ravel(), RNG.integers(0, LEVELS, 1 << 16), [0, LEVELS - 1]])
     u = (levels[(levels >= 0) & (levels < LEVELS)] / LEVELS).astype(np.float32)
