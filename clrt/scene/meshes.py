@@ -143,6 +143,8 @@ def _triangles(polygons: NDArray[np.int64], name: str) -> NDArray[np.int64]:
     """Polygons of k corners, (m, k), as fans of k − 2 triangles."""
     if polygons.ndim != 2 or polygons.shape[1] < 3:
         raise SceneError(f'mesh "{name}": its faces have fewer than 3 corners; export triangles')
+    if polygons.shape[1] == 3:
+        return polygons
     fans = [polygons[:, [0, corner, corner + 1]] for corner in range(1, polygons.shape[1] - 1)]
     return np.stack(fans, axis=1).reshape(-1, 3)
 
