@@ -20,7 +20,7 @@ from ..errors import NoRoomError, SceneError
 from .cwbvh import CWBVH_NODE, MAX_LEAF, SLOTS
 from .layouts import BVH2_NODE, BVH8_NODE, LANES, LEAF_SIZES, LEAF_SPHERE, LEAF_TRIANGLE, TRIANGLE_PACK
 from .morton import SHAPE, Primitives, sort_primitives
-from .ploc import BINARY_NODE, BinaryTree, cluster
+from .ploc import BINARY_NODE, SLOW, BinaryTree, cluster
 from .reinsertion import MOVE, reinsert
 from .tree import FloatArray, Triangles, half_area
 from .wide import EMPTY, MAX_PRIMITIVES
@@ -106,8 +106,9 @@ def build_tree(device: Device, shape: Shape, triangles: Triangles, spheres: Floa
 def program_source(shape: Shape, triangles: bool, spheres: bool, reinsertions: bool) -> str:
     """The builder's program, for scenes with triangles, with spheres, and for trees that are made better."""
     values = {"CHILDREN": shape.children, "LEAF_SIZE": shape.leaf_size, "PACK": shape.pack, "EMPTY": EMPTY,
-              "LANES": math.prod(shape.leaf["primitive"].shape), "TRIANGLES": int(triangles), "SPHERES": int(spheres),
-              "GROUPS": int(shape.compressed), "ONE_KIND": int(shape.compressed and triangles and spheres)}
+              "SLOW": SLOW, "LANES": math.prod(shape.leaf["primitive"].shape), "TRIANGLES": int(triangles),
+              "SPHERES": int(spheres), "GROUPS": int(shape.compressed),
+              "ONE_KIND": int(shape.compressed and triangles and spheres)}
     records = {"BinaryNode": BINARY_NODE, "Move": MOVE, "World": WORLD, "Node": shape.node, "Triangles": shape.leaf,
                "LeafSphere": LEAF_SPHERE}
     files = {"REINSERTION": ["build/reinsert.cl"] if reinsertions else [],

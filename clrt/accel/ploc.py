@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +15,9 @@ from .morton import Primitives
 BINARY_NODE = record(lo="3f4", left="i4", hi="3f4", right="i4")
 #: How far clusters look for partners, as in ploc.cl.
 RADIUS = 8
-#: A round that joins fewer than one cluster in SLOW is followed by one that joins all neighbours, so that depth and
-#: time are bounded for any input, nested boxes included.
-SLOW = 16
+#: One work-group does the rounds of so FEW clusters. A round that joins fewer than one in SLOW is followed by one
+#: that joins all neighbours, so that depth and time are bounded for any input, nested boxes included.
+FEW, SLOW = 2048, 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,7 @@ def cluster(work: Blocks, primitives: Primitives) -> BinaryTree:
     work.run("first_clusters", clusters, *primitives.arguments, *now)
     rounds: list[int] = []
     forced = False
-    while clusters > 1:
+    while clusters > FEW:
         work.run("nearest_clusters", clusters, *now, int(forced), nearest)
         offsets = work.empty(np.uint32, 2 * work.number(clusters))
         work.run("count_pairs", clusters, nearest, offsets)
@@ -55,8 +56,13 @@ def cluster(work: Blocks, primitives: Primitives) -> BinaryTree:
         forced = joined * SLOW < clusters
         rounds.append(joined)
         clusters, now, later = stay, later, now
-    work.free(now[0], nearest, *(later or ())[:1])
-    return BinaryTree(nodes, rounds)
+    later = later or _columns(work, clusters)
+    most = 4 + int(math.log(FEW) / -math.log(1 - 1 / SLOW))
+    made = work.empty(np.uint32, 1 + most)
+    work.run_together("last_rounds", clusters, int(forced), nearest, *now, *later, nodes, sum(rounds), made)
+    number, *joins = work.download(made, np.uint32, 1 + most).tolist()
+    work.free(now[0], later[0], nearest, made)
+    return BinaryTree(nodes, rounds + joins[:number])
 
 
 def _columns(work: Blocks, count: int) -> tuple[cl.Buffer, int]:

@@ -117,6 +117,10 @@ class Blocks:
         for first in range(0, groups, most):
             self._launch(name, min(most, groups - first), local, values, first)
 
+    def run_together(self, name: str, *arguments: Any) -> None:
+        """Runs kernel `name` in one work-group, of SCAN_ITEMS items where that pays."""
+        self._launch(name, 1, self._group, tuple(map(_scalar, arguments)))
+
     def scan(self, values: cl.Buffer, count: int, arrays: int = 1) -> None:
         """Turns each of `arrays` arrays of `count` numbers, one after another in `values`, into what stood before it.
 
@@ -136,8 +140,11 @@ class Blocks:
         return [int(total) for total in self.download(self._totals, np.uint32, arrays)]
 
     def _scan(self, values: cl.Buffer, count: int, arrays: int, parts: int, totals: cl.Buffer) -> None:
-        local = 1 if self.device.local_size == 1 else SCAN_ITEMS
-        self._launch("scan", arrays * parts, local, (values, np.uint32(count), np.uint32(parts), totals))
+        self._launch("scan", arrays * parts, self._group, (values, np.uint32(count), np.uint32(parts), totals))
+
+    @property
+    def _group(self) -> int:
+        return 1 if self.device.local_size == 1 else SCAN_ITEMS
 
     @driver_errors()
     def _launch(self, name: str, groups: int, local: int, values: Sequence[Any], first: int = 0) -> None:

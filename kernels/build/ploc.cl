@@ -4,7 +4,9 @@
 // Clusters lie in Morton order. In each round every cluster looks RADIUS places to both sides for its nearest, and those
 // that are nearest to each other become one. A cluster is a column of seven rows, `pitch` apart: its box (lo x, y, z, hi
 // x, y, z), and as an integer its node << 4 | the number of its primitives, at most MANY; ~p stands for primitive p.
-// RADIUS columns that are far from everything precede the first cluster and follow the last.
+// RADIUS columns that are far from everything precede the first cluster and follow the last. A round that joins fewer
+// than one cluster in SLOW is followed by one that joins all neighbours, so that depth and time are bounded for any input,
+// nested boxes included.
 #include "build/primitives.cl"
 #include "mask.cl"
 
@@ -67,35 +69,28 @@ static inline float8 distances(global const float *row, uint pitch, Box box, flo
     return fma(-saved, areas, fma(x, y + z, y * z));
 }
 
-// Where each cluster's nearest is: the difference of their indices. Of equally near ones the first by the exclusive or of
-// both indices: that is an order of all pairs, so the nearest pair of all chooses itself, and where all are equal
+// Where the nearest of cluster i is: the difference of their indices. Of equally near ones the first by the exclusive or
+// of both indices: that is an order of all pairs, so the nearest pair of all chooses itself, and where all are equal
 // neighbours pair up. With `forced` they do, whatever their boxes: rounds of that kind halve the clusters.
-kernel void nearest_clusters(uint count, uint block, global const float *clusters, uint pitch, uint forced,
-                             global char *nearest) {
-    uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
-    for (uint i = first; i < end; ++i) {
-        if (forced) {
-            nearest[i] = (i ^ 1) < count ? (int)(i ^ 1) - (int)i : 0;
-            continue;
-        }
-        Box box = cluster_box(clusters, pitch, i);
-        float area = half_area(box);
-        int size = cluster_node(clusters, pitch, i) & MANY;
-        float8 before = distances(clusters + i, pitch, box, area, size);
-        float8 after = distances(clusters + i + RADIUS + 1, pitch, box, area, size);
-        float8 eight = before < after ? before : after;
-        float4 four = eight.lo < eight.hi ? eight.lo : eight.hi;
-        float2 two = four.lo < four.hi ? four.lo : four.hi;
-        float least = two.x < two.y ? two.x : two.y;
-        uint equal = mask_bits(before == least) | mask_bits(after == least) << RADIUS;
-        uint first_of_equal = 0xffffffff;
-        for (; equal; equal &= equal - 1) {
-            int slot = first_bit(equal);
-            uint other = i - RADIUS + slot + (slot >= RADIUS);
-            first_of_equal = (other ^ i) < first_of_equal ? other ^ i : first_of_equal;
-        }
-        nearest[i] = (int)(first_of_equal ^ i) - (int)i;
+static inline int nearest_of(global const float *clusters, uint pitch, uint count, uint forced, uint i) {
+    if (forced) return (i ^ 1) < count ? (int)(i ^ 1) - (int)i : 0;
+    Box box = cluster_box(clusters, pitch, i);
+    float area = half_area(box);
+    int size = cluster_node(clusters, pitch, i) & MANY;
+    float8 before = distances(clusters + i, pitch, box, area, size);
+    float8 after = distances(clusters + i + RADIUS + 1, pitch, box, area, size);
+    float8 eight = before < after ? before : after;
+    float4 four = eight.lo < eight.hi ? eight.lo : eight.hi;
+    float2 two = four.lo < four.hi ? four.lo : four.hi;
+    float least = two.x < two.y ? two.x : two.y;
+    uint equal = mask_bits(before == least) | mask_bits(after == least) << RADIUS;
+    uint first_of_equal = 0xffffffff;
+    for (; equal; equal &= equal - 1) {
+        int slot = first_bit(equal);
+        uint other = i - RADIUS + slot + (slot >= RADIUS);
+        first_of_equal = (other ^ i) < first_of_equal ? other ^ i : first_of_equal;
     }
+    return (int)(first_of_equal ^ i) - (int)i;
 }
 
 // The step to the cluster that i is joined with, 0 if it stays alone.
@@ -104,31 +99,19 @@ static inline int partner(global const char *nearest, uint i) {
     return nearest[i + step] == -step ? step : 0;
 }
 
-// In each block: counts[block] clusters that stay, counts[blocks + block] pairs that are joined.
-kernel void count_pairs(uint count, uint block, global const char *nearest, global uint *counts) {
-    uint me = get_global_id(0), blocks = (count + block - 1) / block;
-    if (me >= blocks) return;
-    uint first = me * block, end = first + block < count ? first + block : count;
-    uint stay = 0, pairs = 0;
+// Of the clusters first … end − 1, x: how many stay; y: pairs that are joined.
+static inline uint2 count_of(global const char *nearest, uint first, uint end) {
+    uint2 counts = {0, 0};
     for (uint i = first; i < end; ++i) {
         int step = partner(nearest, i);
-        stay += step >= 0;
-        pairs += step > 0;
+        counts += (uint2)(step >= 0, step > 0);
     }
-    counts[me] = stay;
-    counts[blocks + me] = pairs;
+    return counts;
 }
 
-// The clusters of the next round; new nodes are numbered from `node` on.
-kernel void join_pairs(uint count, uint block, global const char *nearest, global const uint *offsets,
-                       global const uint *totals, global const float *clusters, uint pitch, global float *next,
-                       uint next_pitch, global BinaryNode *nodes, uint node) {
-    uint me = get_global_id(0), blocks = (count + block - 1) / block;
-    if (me >= blocks) return;
-    uint first = me * block, end = first + block < count ? first + block : count;
-    uint place = offsets[me];
-    node += offsets[blocks + me];
-    if (me == 0) put_margins(next, next_pitch, totals[0]);
+// Puts those of them that stay at `place` and on, in the next round; new nodes are numbered from `node` on.
+static inline void join(global const char *nearest, uint first, uint end, global const float *clusters, uint pitch,
+                        global float *next, uint next_pitch, uint place, global BinaryNode *nodes, uint node) {
     for (uint i = first; i < end; ++i) {
         int step = partner(nearest, i);
         if (step < 0) continue;
@@ -145,4 +128,67 @@ kernel void join_pairs(uint count, uint block, global const char *nearest, globa
         }
         put_cluster(next, next_pitch, place++, box, left);
     }
+}
+
+kernel void nearest_clusters(uint count, uint block, global const float *clusters, uint pitch, uint forced,
+                             global char *nearest) {
+    uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
+    for (uint i = first; i < end; ++i) nearest[i] = nearest_of(clusters, pitch, count, forced, i);
+}
+
+// In each block: counts[block] clusters that stay, counts[blocks + block] pairs that are joined.
+kernel void count_pairs(uint count, uint block, global const char *nearest, global uint *counts) {
+    uint me = get_global_id(0), blocks = (count + block - 1) / block;
+    if (me >= blocks) return;
+    uint2 mine = count_of(nearest, me * block, me * block + block < count ? me * block + block : count);
+    counts[me] = mine.x;
+    counts[blocks + me] = mine.y;
+}
+
+// The clusters of the next round; new nodes are numbered from `node` on.
+kernel void join_pairs(uint count, uint block, global const char *nearest, global const uint *offsets,
+                       global const uint *totals, global const float *clusters, uint pitch, global float *next,
+                       uint next_pitch, global BinaryNode *nodes, uint node) {
+    uint me = get_global_id(0), blocks = (count + block - 1) / block;
+    if (me >= blocks) return;
+    if (me == 0) put_margins(next, next_pitch, totals[0]);
+    join(nearest, me * block, me * block + block < count ? me * block + block : count, clusters, pitch, next,
+         next_pitch, offsets[me], nodes, node + offsets[blocks + me]);
+}
+
+// All further rounds by one work-group: of few clusters none takes as long as the launches of its kernels. rounds[0]
+// becomes their number, and from rounds[1] on there is how many nodes each of them made.
+kernel void last_rounds(uint count, uint forced, global char *nearest, global float *clusters, uint pitch,
+                        global float *next, uint next_pitch, global BinaryNode *nodes, uint node, global uint *rounds) {
+    local uint2 counts[SCAN_ITEMS];
+    uint me = get_local_id(0), items = get_local_size(0), made = 0;
+    while (count > 1) {
+        uint share = (count + items - 1) / items, first = me * share < count ? me * share : count;
+        uint end = first + share < count ? first + share : count;
+        for (uint i = first; i < end; ++i) nearest[i] = nearest_of(clusters, pitch, count, forced, i);
+        barrier(CLK_GLOBAL_MEM_FENCE);
+        counts[me] = count_of(nearest, first, end);
+        barrier(CLK_LOCAL_MEM_FENCE);
+        uint2 before = {0, 0}, all = {0, 0};
+        for (uint i = 0; i < items; ++i) {
+            before += i < me ? counts[i] : (uint2)(0, 0);
+            all += counts[i];
+        }
+        if (me == 0) {
+            put_margins(next, next_pitch, all.x);
+            rounds[++made] = all.y;
+        }
+        join(nearest, first, end, clusters, pitch, next, next_pitch, before.x, nodes, node + before.y);
+        barrier(CLK_GLOBAL_MEM_FENCE | CLK_LOCAL_MEM_FENCE);
+        forced = all.y * SLOW < count;
+        count = all.x;
+        node += all.y;
+        global float *done = clusters;
+        uint done_pitch = pitch;
+        clusters = next;
+        pitch = next_pitch;
+        next = done;
+        next_pitch = done_pitch;
+    }
+    if (me == 0) rounds[0] = made;
 }

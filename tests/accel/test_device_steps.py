@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.accel import ploc
 from clrt.accel.device_builder import SHAPES, Shape, program_source
 from clrt.accel.layouts import sphere_boxes
 from clrt.accel.morton import CODE_BITS, radix_sort, sort_primitives
@@ -29,6 +30,19 @@ def test_clusters_form_a_tree_of_bounded_depth(device: Device, case: str) -> Non
     tree.check()
     most = max(2 * math.log2(len(tree.sphere)), math.log(len(tree.sphere)) / -math.log(1 - 1 / SLOW))
     assert len(tree.rounds) <= most + 3
+
+
+@pytest.mark.parametrize("case", SCENES)
+@pytest.mark.parametrize("gpu", [False, True], ids=["alone", "together"])
+def test_the_last_rounds_are_those_of_many(device: Device, case: str, gpu: bool,
+                                           monkeypatch: pytest.MonkeyPatch) -> None:
+    """One work-group, of one item or of many, makes the nodes that launches for each round make."""
+    device = like_gpu(device) if gpu else device
+    few = binary(device, "bvh8", case)
+    monkeypatch.setattr(ploc, "FEW", 2)
+    many = binary(device, "bvh8", case)
+    assert few.rounds == many.rounds
+    np.testing.assert_array_equal(few.nodes, many.nodes)
 
 
 def chance(low: NDArray[Any], high: NDArray[Any], scene_low: NDArray[Any], scene_high: NDArray[Any]) -> NDArray[Any]:
