@@ -35,7 +35,18 @@ def test_version_is_the_package_s() -> None:
     assert clrt.__version__ == setup["metadata"]["version"]
 
 
+HEAVY = "print(*sorted({'numpy', 'pyopencl', 'pydantic', 'trimesh', 'rich'} & set(sys.modules)))"
+
+
 def test_import_loads_nothing_heavy() -> None:
-    code = "import sys, clrt; print(*sorted({'numpy', 'pyopencl', 'pydantic', 'trimesh', 'rich'} & set(sys.modules)))"
-    result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    result = subprocess.run([sys.executable, "-c", f"import sys, clrt; {HEAVY}"],
+                            check=True, capture_output=True, text=True)
+    assert result.stdout.strip() == ""
+
+
+def test_the_process_that_watches_a_render_loads_nothing_heavy() -> None:
+    """What it has in its memory the one that renders, its fork, copies page by page."""
+    code = f"import sys, clrt.cli.render as r; r.guarded = lambda advice: sys.exit({HEAVY}); r.command"
+    result = subprocess.run([sys.executable, "-c", f"{code}; from clrt.cli import main; main(['render', 'a.toml'])"],
+                            check=True, capture_output=True, text=True)
     assert result.stdout.strip() == ""

@@ -17,9 +17,9 @@ class Group(click.Group):
 
     def resolve_command(self, context: click.Context, arguments: list[str]
                         ) -> tuple[str | None, click.Command | None, list[str]]:
-        from ..scene.fields import unknown
-
         if arguments and not arguments[0].startswith("-") and self.get_command(context, arguments[0]) is None:
+            from ..scene.fields import unknown  # with numpy, which no command that is known needs as yet
+
             context.fail(f'command "{arguments[0]}" {unknown(arguments[0], self.list_commands(context))}')
         return super().resolve_command(context, arguments)
 
