@@ -9,6 +9,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -19,21 +20,27 @@ KEPT = 2
 
 
 class HostMemory:
-    """For arrays of one shape and dtype; of KEPT the memory is there from the start, as far as there is any, and stays.
-    """
+    """For arrays of one shape and dtype; of KEPT the memory is found from the start on, beside what comes first, as far
+    as there is any, and stays."""
 
     def __init__(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
         self._shape, self._dtype = shape, dtype
         self._kept: list[NDArray[np.uint8]] = []
         #: Of each the array that was made in it last, or None where neither that nor a view of it is left.
         self._users: list[Callable[[], object]] = [lambda: None] * KEPT
+        self._search = Thread(target=self._find)
+        self._search.start()
+
+    def _find(self) -> None:
+        size = int(np.prod(self._shape)) * self._dtype.itemsize
         with suppress(MemoryError):
             while len(self._kept) < KEPT:
-                self._kept.append(np.full(int(np.prod(shape)) * dtype.itemsize, 0, np.uint8))    # zeros come too late
+                self._kept.append(np.full(size, 0, np.uint8))    # zeros come too late
 
     def array(self) -> NDArray[Any]:
         """An array whose elements are not defined. Its memory is used again when neither it nor a view of it is left.
         """
+        self._search.join()
         for place, memory in enumerate(self._kept):
             if self._users[place]() is None:
                 # Of memory that is no array's: views then are of the array made here, which stays as long as any.

@@ -46,6 +46,7 @@ class Session(Accumulation):
         film_bytes = size[0] * size[1] * compiled.choices.pixel.itemsize
         if film_bytes > largest_film(device, compiled):
             raise NoRoomError(f"{device.info.name}: a film of {size[0]}x{size[1]} has no room in a buffer")
+        self._copies = HostMemory(size[::-1], compiled.choices.pixel)
         launch = first_launch(compiled, size, max_depth, seed, planned_spp)
         self._scene = SceneOnDevice(device, compiled, launch, film_bytes, before=before)
         self._launches = Launches(first_launch_samples(compiled))
@@ -53,7 +54,6 @@ class Session(Accumulation):
             self._film = on_device(device, np.zeros(size[0] * size[1], compiled.choices.pixel))
             self._tiles = on_device(device, np.zeros(1, np.uint32))
             self._scene.warm_up(self._film, self._tiles)
-        self._copies = HostMemory(size[::-1], compiled.choices.pixel)
 
     @property
     def scene(self) -> SceneOnDevice:

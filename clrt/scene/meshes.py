@@ -18,7 +18,6 @@ from .materials import Diffuse
 from .instancing import baked
 from .model import Mesh, Model
 from .normals import Normals, choose_normals
-from .obj import parse_obj
 from .paths import check_file
 from .pictures import linear_from_srgb
 from .ply import plain_ply
@@ -60,6 +59,7 @@ def _parse(path: Path, suffix: str) -> dict[str, Any]:
         with np.errstate(all="ignore"), path.open("rb") as file:
             parts: dict[str, Any]
             if suffix == ".obj":
+                from .obj import parse_obj
                 parts = {"geometry": parse_obj(path)}
             elif suffix == ".ply" and (plain := plain_ply(path)):
                 parts = plain
