@@ -15,8 +15,8 @@ from .morton import Primitives
 BINARY_NODE = record(lo="3f4", left="i4", hi="3f4", right="i4")
 #: How far clusters look for partners, as in ploc.cl.
 RADIUS = 8
-#: One work-group does the rounds of so FEW clusters. A round that joins fewer than one in SLOW is followed by one
-#: that joins all neighbours, so that depth and time are bounded for any input, nested boxes included.
+#: One work-group does the rounds of so FEW clusters. A round that joins fewer than one in SLOW is followed by one that
+#: halves them, as in ploc.cl.
 FEW, SLOW = 2048, 16
 
 
@@ -57,6 +57,7 @@ def cluster(work: Blocks, primitives: Primitives) -> BinaryTree:
         rounds.append(joined)
         clusters, now, later = stay, later, now
     later = later or _columns(work, clusters)
+    # Not even every second round joins fewer than one in SLOW.
     most = 4 + int(math.log(FEW) / -math.log(1 - 1 / SLOW))
     made = work.empty(np.uint32, 1 + most)
     work.run_together("last_rounds", clusters, int(forced), nearest, *now, *later, nodes, sum(rounds), made)

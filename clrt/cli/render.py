@@ -130,6 +130,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     with (make_progress(progress_kind, quiet) as progress,
           cluster_for(scheduler, local_cluster, progress) as cluster, ThreadPoolExecutor(1) as meanwhile):
         opening = None if cluster else meanwhile.submit(_open, options["device"], results)
+        if cluster:
+            results.prepare()
         progress.phase("load")
         with files_read() as inputs:
             content = load(scene, camera)

@@ -31,7 +31,7 @@ SCAN_ITEMS, SCAN_PART = 256, 8192
 class Blocks:
     """The kernels of one program and the arrays that they share, all on one in-order queue.
 
-    Every kernel's first arguments are `uint count, uint block`; the program holds build/scan.cl. `peak_bytes` is the
+    Kernels that `run` runs take `uint count, uint block` first; the program holds build/scan.cl. `peak_bytes` is the
     most memory that its arrays took at a time; data_bytes: about what they will take. Launches are short, so waiting
     for them need not let signals through. All may raise DeviceError.
     """

@@ -54,13 +54,13 @@ def pack_sky(environment: Environment) -> Sky:
     record["width"], record["height"] = width, height
     record["rotation_cos"], record["rotation_sin"] = np.cos(angle), np.sin(angle)
     texels = np.zeros((height, width), SKY_TEXEL)
-    weights = _fill_radiance(texels, image, environment.strength)   # as yet the mean of each texel
+    mean = _fill_radiance(texels, image, environment.strength)
     buffers: dict[str, tuple[str, NDArray[Any]]] = {
         "environment": ("Environment", record), "sky_texels": ("SkyTexel", texels.ravel())}
     solid_angle = _solid_angles(height, width)
-    total = np.sum(weights * solid_angle)
-    weights -= total / (4 * np.pi)
-    np.maximum(weights, 0, out=weights)
+    total = np.sum(mean * solid_angle)
+    mean -= total / (4 * np.pi)
+    weights = np.maximum(mean, 0, out=mean)
     weights *= solid_angle
     of_rows = weights.sum(axis=1)
     if of_rows.sum() <= UNEVEN * total:
@@ -76,7 +76,7 @@ def pack_sky(environment: Environment) -> Sky:
 
 
 def _fill_radiance(texels: NDArray[np.void], image: NDArray[np.float32], strength: float) -> Doubles:
-    """Fills it in, and returns (h, w): the mean of the bilinear luminance over each texel.
+    """Fills in the texels' radiance, and returns (h, w): the mean of the bilinear luminance over each.
 
     Between texel centres the bilinear weights average to 1/8, 3/4, 1/8 over a texel, in each direction.
     """

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bands import in_bands
-from .expected import BRIGHTEST, REACH, expected
+from .expected import REACH, expected
 from .tiles import tile_sums
 
 #: Added to the squared reference in relMSE, so that black pixels do not divide by zero.
@@ -29,10 +29,9 @@ def _sums(pixels: NDArray[Any], name: str) -> NDArray[np.float64]:
     return _in_planes(total)
 
 
-def _padded(values: NDArray[np.float64], rows: tuple[int, int], scale: float) -> NDArray[np.float32]:
-    """Over `scale`, with REACH columns on both sides, and so many rows above and below, as those at the edge."""
-    planes = (np.moveaxis(values, -1, 0) / scale).astype(np.float32)
-    return _in_planes(np.pad(planes, [(0, 0), rows, (REACH, REACH)], "edge"))
+def _padded(values: NDArray[np.float64], rows: tuple[int, int]) -> NDArray[np.float64]:
+    """With REACH columns on both sides, and so many rows above and below, as those at the edge."""
+    return _in_planes(np.pad(np.moveaxis(values, -1, 0), [(0, 0), rows, (REACH, REACH)], "edge"))
 
 
 class Film:
@@ -119,9 +118,7 @@ class Film:
             there = slice(max(rows.start - REACH, 0), min(rows.stop + REACH, height))
             beyond = (there.start - rows.start + REACH, rows.stop + REACH - there.stop)
             variance = self._variance(there)
-            scale = max(float(mean[there].max()) / BRIGHTEST, 1.0)
-            found = expected(_padded(mean[there], beyond, scale), _padded(variance, beyond, scale**2))
-            squared = np.square(found, dtype=np.float64) * scale**2 + RELATIVE_FLOOR
+            squared = expected(_padded(mean[there], beyond), _padded(variance, beyond)) ** 2 + RELATIVE_FLOOR
             relative[rows] = np.sqrt(squared)
             return tile_sums(variance[rows.start - there.start:][:rows.stop - rows.start] / squared)
 

@@ -46,9 +46,9 @@ class Session(Accumulation):
         film_bytes = size[0] * size[1] * compiled.choices.pixel.itemsize
         if film_bytes > largest_film(device, compiled):
             raise NoRoomError(f"{device.info.name}: a film of {size[0]}x{size[1]} has no room in a buffer")
-        self._copies = HostMemory(size[::-1], compiled.choices.pixel)
         launch = first_launch(compiled, size, max_depth, seed, planned_spp)
         self._scene = SceneOnDevice(device, compiled, launch, film_bytes, before=before)
+        self._copies = HostMemory(size[::-1], compiled.choices.pixel)   # all else has found room
         self._launches = Launches(first_launch_samples(compiled))
         with self._scene.allocating():
             self._film = on_device(device, np.zeros(size[0] * size[1], compiled.choices.pixel))

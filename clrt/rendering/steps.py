@@ -12,8 +12,8 @@ LEVELS = 1 << 24
 
 
 def steps(weights: NDArray[np.float64], table: NDArray[np.void]) -> NDArray[np.float64]:
-    """Fills a table of SKY_STEPs (rows, n); the probabilities (rows, n) for weights (rows, n) >= 0, each row with a
-    positive sum.
+    """Fills a table of SKY_STEPs (rows, n) for weights (rows, n) >= 0, each row with a positive sum; returns their
+    probabilities (rows, n).
 
     Step i ends at `top`, the share of all weights up to its own, rounded to 1/LEVELS: then numbers of 24 bits fall into
     it exactly as often as its probability says, the difference of two tops. `start`: the step into which i/n falls

@@ -109,7 +109,8 @@ static inline uint2 count_of(global const char *nearest, uint first, uint end) {
     return counts;
 }
 
-// Puts those of them that stay at `place` and on, in the next round; new nodes are numbered from `node` on.
+// Puts those of the clusters first … end − 1 that stay at `place` and on, in the next round; new nodes are numbered from
+// `node` on.
 static inline void join(global const char *nearest, uint first, uint end, global const float *clusters, uint pitch,
                         global float *next, uint next_pitch, uint place, global BinaryNode *nodes, uint node) {
     for (uint i = first; i < end; ++i) {

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from clrt.rendering.expected import BRIGHTEST, REACH, expected
-
-Doubles = NDArray[np.float64]
+from clrt.rendering.expected import REACH, SINGLE_MOST, Doubles, expected
 
 INNER = (slice(REACH, -REACH),) * 2
+#: Of sums in single precision over a window.
+PRECISION = 1e-5
 
 
 def picture(seed: int) -> tuple[Doubles, Doubles]:
@@ -27,15 +26,16 @@ def picture(seed: int) -> tuple[Doubles, Doubles]:
 
 def one_by_one(mean: Doubles, variance: Doubles, y: int, x: int, c: int) -> float:
     def others(values: Doubles, reach: int) -> float:
-        window = values[y - reach:y + reach + 1, x - reach:x + reach + 1, c]
-        return float((window.sum() - values[y, x, c]) / (window.size - 1))
+        window = values[y - reach:y + reach + 1, x - reach:x + reach + 1, c].copy()
+        window[reach, reach] = 0
+        return float(window.sum() / (window.size - 1))
 
-    def part(variance: float, difference: float) -> float:
-        return max(1 - variance / difference**2, 0.0)
+    def towards(start: float, end: float, variance: float) -> float:
+        by_chance = min(variance / (end - start) ** 2, 1.0)
+        return by_chance * start + (1 - by_chance) * end
 
-    far, near = others(mean, 8), others(mean, 2)
-    around = far + part(max(others(variance, 2), others(variance, 8)) / 24, near - far) * (near - far)
-    return float(around + part(variance[y, x, c], mean[y, x, c] - around) * (mean[y, x, c] - around))
+    around = towards(others(mean, 8), others(mean, 2), max(others(variance, 2), others(variance, 8)) / 24)
+    return float(towards(around, mean[y, x, c], variance[y, x, c]))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -44,7 +44,7 @@ def test_as_one_by_one(seed: int) -> None:
     found = expected(mean, variance)
     for y, x, c in np.ndindex(found.shape):
         each = one_by_one(mean, variance, y + REACH, x + REACH, c)
-        assert found[y, x, c] == pytest.approx(each, rel=1e-9, abs=1e-9)
+        assert found[y, x, c] == pytest.approx(each, rel=PRECISION)
 
 
 def test_what_is_known_is_expected() -> None:
@@ -65,14 +65,19 @@ def test_without_any_variance_known_it_is_what_lies_around() -> None:
     mean = picture(1)[0]
     found = expected(mean, np.full_like(mean, np.nan))
     window = mean[:2 * REACH + 1, :2 * REACH + 1]
-    np.testing.assert_allclose(found[0, 0], (window.sum(axis=(0, 1)) - mean[REACH, REACH]) / 288, rtol=1e-12)
+    np.testing.assert_allclose(found[0, 0], (window.sum(axis=(0, 1)) - mean[REACH, REACH]) / 288, rtol=PRECISION)
 
 
-@pytest.mark.parametrize("bright", [1e6, 1e12, BRIGHTEST])
-def test_single_precision_is_enough(bright: float) -> None:
-    """Also beside a pixel that is brighter by far: its light is in no sum that it is taken out of again."""
+@pytest.mark.parametrize("samples", [2, 4, 64])
+@pytest.mark.parametrize("bright", [1e4, 1e7, 1e9, 1e12, 1e15, 1e3 * SINGLE_MOST])
+def test_single_precision_is_enough_around_a_pixel(bright: float, samples: int) -> None:
+    """Of a pixel that is bright by one of its samples and of those around it, whose light is in no sum that it is taken
+    out of again."""
     mean, variance = picture(0)
-    mean[14, 12], variance[14, 12] = bright, bright**2
-    found = expected(mean.astype(np.float32), variance.astype(np.float32))
-    assert found.dtype == np.float32
-    np.testing.assert_allclose(found, expected(mean, variance), rtol=2e-5)
+    drawn = np.full(samples, 5.0)
+    drawn[0] = bright
+    mean[10, 12], variance[10, 12] = drawn.mean(), drawn.var(ddof=1) / samples
+    found = expected(mean, variance)
+    for y, x in np.ndindex(found.shape[:2]):
+        each, its_own = one_by_one(mean, variance, y + REACH, x + REACH, 0), (y + REACH, x + REACH) == (10, 12)
+        assert found[y, x, 0] == pytest.approx(each, rel=PRECISION, abs=4e-16 * bright * its_own)
