@@ -118,8 +118,12 @@ class Blocks:
             self._launch(name, min(most, groups - first), local, values, first)
 
     def run_together(self, name: str, *arguments: Any) -> None:
-        """Runs kernel `name` in one work-group, of SCAN_ITEMS items where that pays."""
-        self._launch(name, 1, self._group, tuple(map(_scalar, arguments)))
+        """Runs kernel `name` in one work-group, where that pays of SCAN_ITEMS items, or as many as have registers."""
+        values = tuple(map(_scalar, arguments))
+        with driver_errors():
+            most = self._kernel(name, values).get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE,
+                                                                  self.device.cl)
+        self._launch(name, 1, min(self._group, most), values)
 
     def scan(self, values: cl.Buffer, count: int, arrays: int = 1) -> None:
         """Turns each of `arrays` arrays of `count` numbers, one after another in `values`, into what stood before it.
@@ -148,13 +152,17 @@ class Blocks:
 
     @driver_errors()
     def _launch(self, name: str, groups: int, local: int, values: Sequence[Any], first: int = 0) -> None:
+        kernel = self._kernel(name, values)
+        kernel.set_args(*values)
+        cl.enqueue_nd_range_kernel(self.device.queue, kernel, (groups * local,), (local,), (first * local,))
+
+    def _kernel(self, name: str, values: Sequence[Any]) -> cl.Kernel:
+        """Made at its first launch, for values of these types."""
         if name not in self._kernels:
             self._kernels[name] = make_kernel(self.device, self.program, name)
             # Without types pyopencl finds out what each value is at every launch, by exceptions.
             self._kernels[name].set_arg_types([None if isinstance(v, cl.Buffer) else v.dtype for v in values])
-        self._kernels[name].set_args(*values)
-        cl.enqueue_nd_range_kernel(self.device.queue, self._kernels[name], (groups * local,), (local,),
-                                   (first * local,))
+        return self._kernels[name]
 
     @property
     def totals(self) -> cl.Buffer:
