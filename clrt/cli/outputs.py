@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import threading
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
@@ -92,12 +91,6 @@ class Outputs:
                 if before := taken.get(real := os.path.realpath(path)):
                     raise UsageError(f"{path}: is {before} and {what}, one of which would be lost; name another file")
                 taken[real] = what
-
-    def prepare(self) -> None:
-        """Loads what writes pictures beside all else, so that nothing waits for it in the end."""
-        from ..output.images import load_writer
-
-        threading.Thread(target=load_writer).start()
 
     def save(self, image: Image, raw: bool = False) -> None:
         """Writes the pictures, or the raw ones."""

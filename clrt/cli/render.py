@@ -96,6 +96,9 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     if click.get_current_context().obj == PROGRAM:
         guarded(advice)
     from ..output.data import check_denoisable
+    from ..output.writer import load_writer
+
+    load_writer()
     from ..rendering.stops import check_stops, planned_spp
     from ..scene.file import check_scene, load
     from ..scene.paths import files_read
@@ -129,9 +132,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         scheduler = local_cluster = None
     with (make_progress(progress_kind, quiet) as progress,
           cluster_for(scheduler, local_cluster, progress) as cluster, ThreadPoolExecutor(1) as meanwhile):
-        opening = None if cluster else meanwhile.submit(_open, options["device"], results)
-        if cluster:
-            results.prepare()
+        opening = None if cluster else meanwhile.submit(_open, options["device"])
         progress.phase("load")
         with files_read() as inputs:
             content = load(scene, camera)
@@ -180,13 +181,11 @@ def _chosen_aovs(names: tuple[str, ...]) -> tuple[str, ...]:
     return chosen_aovs(",".join(names))
 
 
-def _open(selectors: tuple[str, ...] | None, results: Outputs) -> list[Device]:
-    """The devices, and all that renders on them and writes pictures loaded: half of it is waiting for files, and needs
-    no scene."""
+def _open(selectors: tuple[str, ...] | None) -> list[Device]:
+    """The devices, and all that renders on them loaded: half of it is waiting for files, and needs no scene."""
     from ..device.open import open_devices
 
     devices = open_devices(selectors)
-    results.prepare()
     from ..rendering import renderer  # noqa: F401
     return devices
 

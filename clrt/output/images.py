@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import ctypes
 import logging
-import os
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from difflib import get_close_matches
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -84,17 +80,6 @@ def write_image(path: Path, pixels: FloatArray, *, metadata: Mapping[str, str] |
             _write(path, samples, {**about, **ATTRIBUTES[".exr"]}, names)
     for name, other in files_beside(path, aovs).items():
         _write_png(other, drawn(name, aovs[name], view, exposure), about)
-
-
-def load_writer() -> None:
-    """Loads the library that writes pictures, at a time when that harms nobody. Most of what it takes is for the
-    system's loader, which is asked past Python's import: that would hold Python's lock meanwhile."""
-    spec = find_spec("OpenImageIO")
-    for folder in spec.submodule_search_locations or () if spec else ():
-        for library in Path(folder).glob("OpenImageIO.*.so"):
-            with suppress(TypeError, AttributeError):   # not on Windows
-                ctypes.CDLL(None).dlopen(os.fsencode(library), os.RTLD_NOW)
-    import OpenImageIO  # noqa: F401
 
 
 def _tell_flaws(path: Path, pixels: FloatArray) -> None:
