@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -47,7 +46,7 @@ def replacing(path: Path) -> Iterator[Path]:
     A link stays a link: the file it points to is replaced. What is no regular file never is: OutputError.
     """
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".clrt-{secrets.token_hex(8)}{path.suffix.lower()}")
+    temporary = target.with_name(f".clrt-{os.urandom(8).hex()}{path.suffix.lower()}")
     try:
         yield temporary
         _check_kind(target)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 import tempfile
 import threading
@@ -65,6 +64,8 @@ class _Process:
     """A process that runs scene.decoding. `owner`: the process that started it; a forked one must not talk to it."""
 
     def __init__(self) -> None:
+        import subprocess    # most scenes need none
+
         path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
         self.owner = os.getpid()
         self._popen = subprocess.Popen(
