@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 #: Row 0 on top and columns from the left, the only order in use; of widths that run lengths can code.
 _HEADER = re.compile(rb"#\?(?:RADIANCE|RGBE)\n(?:[^\n]{0,4096}\n){0,1000}?\n-Y (\d{1,6}) \+X (\d{1,5})\n")
 _SCALED = re.compile(rb"^(?:EXPOSURE|COLORCORR|FORMAT=32-bit_rle_xyze)", re.MULTILINE)
+_BYTES = [bytes((value,)) for value in range(256)]
 
 
 def read_radiance(path: Path) -> NDArray[np.float32] | None:
@@ -49,13 +50,14 @@ def _row(content: bytes, start: int, size: int) -> tuple[bytes | None, int]:
     try:
         while missing > 0:
             count = content[start]
+            first = start + 1
             if count > 128:
                 count -= 128
-                parts.append(content[start + 1:start + 2] * count)
+                parts.append(_BYTES[content[first]] * count)
                 start += 2
             else:
-                parts.append(content[start + 1:start + 1 + count])
-                start += 1 + count
+                start = first + count
+                parts.append(content[first:start])
             missing -= count or size + 1
     except IndexError:
         return None, start
