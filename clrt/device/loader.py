@@ -31,9 +31,14 @@ def load(libraries: Sequence[str] | None) -> list[cl.Platform]:
 
 
 def _platforms() -> list[cl.Platform]:
-    """Of the drivers that are loaded now, past pyopencl: that holds Python's lock meanwhile, 6 ms for PoCL."""
+    """Of the drivers that are loaded now, past pyopencl: that holds Python's lock meanwhile, 6 ms for PoCL, and 5 as it
+    is first asked for its devices."""
     with suppress(OSError, AttributeError):
-        ctypes.CDLL(cl._cl.__file__).clGetPlatformIDs(0, None, ctypes.byref(ctypes.c_uint()))
+        loader, count = ctypes.CDLL(cl._cl.__file__), ctypes.c_uint()
+        loader.clGetPlatformIDs(0, None, ctypes.byref(count))
+        for platform in cl.get_platforms():
+            loader.clGetDeviceIDs(ctypes.c_void_p(platform.int_ptr), ctypes.c_uint64(cl.device_type.ALL), 0, None,
+                                  ctypes.byref(count))
     return cl.get_platforms()
 
 
