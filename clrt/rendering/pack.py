@@ -73,7 +73,8 @@ class Shapes:
         return carried.tree(device, layout, choices.builder, self.scene.meshes, self.triangles, in_tree, test,
                             self.placements)
 
-    def buffers(self, codes: NDArray[np.int32], emitters: Emitters, rays: bool) -> dict[str, tuple[str, Any]]:
+    def buffers(self, codes: NDArray[np.int32], emitters: Emitters, normals: NDArray[Any],
+                rays: bool) -> dict[str, tuple[str, Any]]:
         """What surfaces are made of; codes: of the users' materials; rays: whether any is followed."""
         meshes, spheres = self.scene.meshes, self.spheres
         of_meshes, of_spheres, of_instances = np.split(codes, np.cumsum([len(meshes), len(spheres)]))
@@ -85,7 +86,7 @@ class Shapes:
         if len(self.triangles):
             buffers["triangles"] = ("Triangle", triangle_records(meshes, of_meshes, emitters.triangle))
         if any(mesh.normals is not None for mesh in meshes):
-            buffers["normals"] = ("Normals", normal_records(meshes))
+            buffers["normals"] = ("Normals", normals)
         if len(spheres):
             buffers["spheres"] = ("Sphere", sphere_records(spheres, of_spheres, emitters.sphere))
         if self.scene.instances:
@@ -123,11 +124,12 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: C
     with ThreadPoolExecutor(1) as beside:  # a sky takes as long as a tree, and neither needs all cores
         packing = beside.submit(carried.sky, scene.environment)
         tree = shapes.tree(choices, device, carried)
+        normals = normal_records(shapes.scene.meshes)
         sky = packing.result()
     textures = Textures()
     emitters = pack_emitters(shapes.scene, sky, textures)
     materials = pack_materials(shapes.users, textures)
-    buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, tree is not NO_RAYS)
+    buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, normals, tree is not NO_RAYS)
     buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, materials.normal_maps)
     buffers |= materials.buffers | textures.buffers() | emitters.buffers | sky.buffers
     if scene.render.filter != "box":
