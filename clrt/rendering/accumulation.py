@@ -16,7 +16,7 @@ from ..scene.model import Camera, Scene
 from .compile import CompiledScene
 from .film import Film
 from .on_device import SceneOnDevice
-from .tiles import tile_pixels, tiles_of
+from .tiles import mean_samples, tiles_of
 from .work import Work
 
 _log = logging.getLogger(__name__)
@@ -40,8 +40,7 @@ class Accumulation(ABC):
     @property
     def samples_done(self) -> int:
         """Samples a pixel, the mean over all, rounded."""
-        width, height = self.size
-        return round(int(np.sum(self.tile_samples * tile_pixels(self.size))) / (width * height))
+        return mean_samples(self.tile_samples, self.size)
 
     def render(self, samples: int) -> Iterator[None]:
         """Adds the next `samples` samples to every pixel, in bounded launches; yields after each.
@@ -57,6 +56,10 @@ class Accumulation(ABC):
         """Adds a pass: as many samples to every pixel as there is `room` for after those done, `pass_limit` at most;
         otherwise like `render`. Of more samples than are done room tells what may follow; 0 where nothing does."""
         yield from self.render(max(1, min(room(self.samples_done), self.pass_limit())))
+
+    def advance_ahead(self, room: Callable[[int], int]) -> Iterator[None] | None:
+        """Like `advance`, but the first launch is made now; None where that would have to wait for something."""
+        return None
 
     def double(self, tiles: NDArray[np.intp]) -> Iterator[None]:
         """Doubles the samples of these tiles, by their number in `tile_samples`; otherwise like `render`."""

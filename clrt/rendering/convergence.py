@@ -13,6 +13,7 @@ from .film import Film
 from .kept import Kept
 from .noise import NoiseEstimate
 from .state import State, relmse
+from .tiles import mean_samples
 
 
 class Convergence:
@@ -29,21 +30,22 @@ class Convergence:
         """Goes on from what was kept."""
         self.noise, self.history = kept.noise, kept.history
 
-    def state(self, film: Film, picture: Accumulation, seconds: float, reference: NDArray[np.float32] | None,
+    def state(self, film: Film, tile_samples: NDArray[np.int64], seconds: float, reference: NDArray[np.float32] | None,
               in_haste: bool) -> State:
-        """Of the picture's film after so many seconds; in haste the estimate leaves out what it does not know yet."""
-        tile_samples = picture.tile_samples
+        """Of the film, with samples (rows, columns) of each tile, after so many seconds; in haste the estimate leaves
+        out what it does not know yet."""
         if not in_haste:
             self.noise.add(film, tile_samples)
         noise = self.noise.at(self.last.film if in_haste and self.history else film, tile_samples)
-        of_tiles = self.noise.of_tiles(tile_samples, picture.size, self._percentile)
-        self.last = State(picture.samples_done, seconds, noise, relmse(film, reference), film, of_tiles)
+        of_tiles = self.noise.of_tiles(tile_samples, film.size, self._percentile)
+        spp = mean_samples(tile_samples, film.size)
+        self.last = State(spp, seconds, noise, relmse(film, reference), film, of_tiles)
         return self.last
 
-    def record(self, film: Film, picture: Accumulation, seconds: float, reference: NDArray[np.float32] | None = None,
-               in_haste: bool = False) -> State:
+    def record(self, film: Film, tile_samples: NDArray[np.int64], seconds: float,
+               reference: NDArray[np.float32] | None = None, in_haste: bool = False) -> State:
         """The state, which enters the history unless it was made in haste."""
-        state = self.state(film, picture, seconds, reference, in_haste)
+        state = self.state(film, tile_samples, seconds, reference, in_haste)
         entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
         if not in_haste:
             self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
@@ -57,4 +59,4 @@ class Convergence:
         """Records what a picture has that was last seen in haste, unless it is in the middle of a pass."""
         done = picture.samples_done
         if done and not picture.work.parts and done != (self.history[-1]["spp"] if self.history else 0):
-            self.record(picture.film(), picture, seconds)
+            self.record(picture.film(), picture.tile_samples, seconds)

@@ -43,6 +43,12 @@ class Film:
     def __init__(self, pixels: NDArray[Any]) -> None:
         self.pixels = pixels
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height)."""
+        height, width = self.pixels.shape
+        return width, height
+
     @cached_property
     def mean(self) -> NDArray[np.float64]:
         """(height, width, 3): mean of the samples kept; 0 where there are none."""

@@ -162,7 +162,8 @@ class Renderer:
 
         It ends at `spp` samples a pixel, after `time` seconds or at a noise of `error` (√relMSE), whatever comes
         first; without any of them at the renderer's `spp`, or else the scene's. Call it again to go on. Where it is
-        left before its end (`break`, Ctrl-C) a checkpoint is written, too. reference: (height, width, 3).
+        left before its end (`break`, Ctrl-C) a checkpoint is written, too; without one the picture may be ahead of the
+        last state, as the next launch runs while a state is made. reference: (height, width, 3).
         """
         check_reference(reference, self.session.size)
         try:
@@ -181,9 +182,12 @@ class Renderer:
         self.stop_reason = self._reached(spp, time, error)
         if self.stop_reason is not None:
             yield self.state(reference)
-        next_state = 0.0
+        room = partial(pass_room, spp=spp, error=error, even_to=FLOOR_SPP if self.settings.adaptive else None)
+        next_state, begun = 0.0, None
         while self.stop_reason is None:
-            self._run_pass(spp, time, error)
+            launches = self._adaptive_pass(spp) if self._adapts else begun or self.session.advance(room)
+            self._run_pass(launches, time)
+            begun = None
             if self._abandoned.is_set():
                 return
             now, done = clock.perf_counter(), self.session.samples_done
@@ -196,27 +200,29 @@ class Renderer:
                 continue
             self.session.wait()
             self.seconds = clock.perf_counter() - self._clock
-            film, state = self.session.film(), None
+            film, tile_samples, state = self.session.film(), self.session.tile_samples, None
+            if self.stop_reason is None and not (looks or self.settings.adaptive or self._checkpoints):
+                begun = self.session.advance_ahead(room)    # runs while the state is made
             if not self._in_haste:
                 film.unwanted = lambda: self._abandoned.is_set() or self._interrupted and self.stop_reason is None
                 with suppress(Unwanted):
-                    state = self._convergence.record(film, self.session, self.seconds, reference)
+                    state = self._convergence.record(film, tile_samples, self.seconds, reference)
                 del film.unwanted   # each would keep the other
             if self._abandoned.is_set():
                 return
             self._heed_interrupt()
             if state is None:
                 self._keep(film, last=True)
-                state = self._convergence.record(film, self.session, self.seconds, reference, in_haste=True)
+                state = self._convergence.record(film, tile_samples, self.seconds, reference, in_haste=True)
             else:
                 if self.stop_reason is None and looks and low_enough(state.stops_by, error):
                     self.stop_reason = "error"
                 self._keep(film, last=self.stop_reason is not None)
             next_state = now + max(STATE_SECONDS, STATE_COST * (clock.perf_counter() - now))
-            stop = self.stop_reason
+            before = self.stop_reason, self.session.samples_done
             yield state
-            if (self.stop_reason, self.session.samples_done) != (stop, state.spp):    # another call went on meanwhile
-                self.stop_reason = self._reached(spp, time, error)
+            if (self.stop_reason, self.session.samples_done) != before:    # another call went on meanwhile
+                self.stop_reason, begun = self._reached(spp, time, error), None
 
     def interrupt(self) -> None:
         """Has `passes` end after the launches in flight, with a state and a checkpoint; for signal handlers, too."""
@@ -228,7 +234,8 @@ class Renderer:
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
-        return self._convergence.state(self.session.film(), self.session, self.seconds, reference, self._in_haste)
+        film, tile_samples = self.session.film(), self.session.tile_samples
+        return self._convergence.state(film, tile_samples, self.seconds, reference, self._in_haste)
 
     def aovs(self, state: State) -> dict[str, NDArray[np.generic]]:
         """The pictures beside the state's, by the names and in the order that they were asked for."""
@@ -245,10 +252,9 @@ class Renderer:
         looks = done and error is not None and self._is_check(done) and not self.session.work.parts
         return "error" if looks and low_enough(self.state().stops_by, error) else None
 
-    def _run_pass(self, spp: int | None, time: float | None, error: float | None) -> None:
+    def _run_pass(self, launches: Iterator[None], time: float | None) -> None:
         """One pass; sets the stop reason where `time` is over or it is interrupted, maybe inside the pass."""
-        room = partial(pass_room, spp=spp, error=error, even_to=FLOOR_SPP if self.settings.adaptive else None)
-        for _ in self._adaptive_pass(spp) if self._adapts else self.session.advance(room):
+        for _ in launches:
             self.seconds = clock.perf_counter() - self._clock
             self._heed_interrupt()
             if self._abandoned.is_set() or self._in_haste:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,12 @@ class Session(Accumulation):
     def longest_launch(self) -> float:
         """Seconds of the launch that took longest."""
         return self._launches.longest
+
+    def advance_ahead(self, room: Callable[[int], int]) -> Iterator[None] | None:
+        """See Accumulation; only while no launch is in flight."""
+        launches = self.advance(room)
+        next(launches)
+        return chain((None,), launches)
 
     def _begin_work(self) -> None:
         if len(self.work.tiles):

@@ -28,6 +28,12 @@ def tile_pixels(size: tuple[int, int]) -> NDArray[np.int64]:
     return np.outer(rows, columns)
 
 
+def mean_samples(tile_samples: NDArray[np.int64], size: tuple[int, int]) -> int:
+    """Samples a pixel of a picture of (width, height), the mean over all, rounded."""
+    width, height = size
+    return round(int(np.sum(tile_samples * tile_pixels(size))) / (width * height))
+
+
 def tile_sums(values: NDArray[np.floating[Any]]) -> NDArray[np.float64]:
     """(rows, columns) sums over the tiles of values (height, width) or (height, width, k)."""
     (height, width), pixels = values.shape[:2], values if values.ndim == 2 else values.sum(axis=2, dtype=np.float64)

@@ -13,6 +13,7 @@ from clrt.device.open import Device
 from clrt.errors import UsageError
 from clrt.rendering.renderer import Renderer
 from clrt.rendering.report import render_report
+from clrt.rendering.state import State
 from clrt.scene.lights import PointLight
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 
@@ -104,9 +105,31 @@ def test_what_was_planned_is_where_it_ends(renderer: Renderer, device: Device) -
     assert list(planned.passes())[-1].spp == 6
 
 
-@pytest.mark.parametrize("other, rest", [(2, [4, 8, 12]), (8, [12]), (40, [])])
+def test_launches_run_while_a_state_is_made(renderer: Renderer) -> None:
+    """But after the last one, and where an error is looked at."""
+    def ahead(state: State) -> bool:
+        return bool(renderer.session.work.parts) or renderer.session.samples_done > state.spp
+
+    *states, last = [ahead(state) for state in renderer.passes()]
+    assert states and all(states) and not last
+    assert not any(ahead(state) for state in renderer.passes(spp=20, error=1e-9))
+
+
+@pytest.mark.parametrize("left_at", [1, 4, 8])
+def test_left_at_a_state_it_goes_on(renderer: Renderer, device: Device, left_at: int) -> None:
+    """To the same picture, and with each state in the history once."""
+    for state in renderer.passes():
+        if state.spp == left_at:
+            break
+    *_, last = renderer.passes()
+    *_, at_once = Renderer(renderer.scene, device=device.info.index).passes()
+    assert last.film.pixels.tobytes() == at_once.film.pixels.tobytes() and last.noise == at_once.noise
+    assert [entry["spp"] for entry in renderer.history if entry["spp"] in (1, 2, 4, 8, 12)] == [1, 2, 4, 8, 12]
+
+
+@pytest.mark.parametrize("other, rest", [(2, [8, 12]), (8, [12]), (40, [])])
 def test_two_that_take_turns(renderer: Renderer, other: int, rest: list[int]) -> None:
-    """Each goes on from what is there to its own end."""
+    """Each goes on from what is there, which may be ahead of the last state, to its own end."""
     first = renderer.passes(spp=12)
     while next(first).spp < 2:
         pass
