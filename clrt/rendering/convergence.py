@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from .accumulation import Accumulation
 from .adaptive import tiles_to_double
+from .bands import Unwanted
 from .film import Film
 from .kept import Kept
 from .noise import NoiseEstimate
@@ -50,6 +52,17 @@ class Convergence:
         if not in_haste:
             self.history.append(entry if state.relmse is None else {**entry, "relmse": state.relmse})
         return state
+
+    def record_if_wanted(self, film: Film, tile_samples: NDArray[np.int64], seconds: float,
+                         reference: NDArray[np.float32] | None, unwanted: Callable[[], bool]) -> State | None:
+        """Like `record`; None as soon as it is unwanted."""
+        film.unwanted = unwanted
+        try:
+            return self.record(film, tile_samples, seconds, reference)
+        except Unwanted:
+            return None
+        finally:
+            del film.unwanted   # each would keep the other
 
     def tiles_to_double(self, tile_samples: NDArray[np.int64], spp: int | None) -> NDArray[np.intp]:
         """See `adaptive.tiles_to_double`; of the newest state."""

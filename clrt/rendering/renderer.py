@@ -23,7 +23,6 @@ from ..scene.validate import check_is_scene, validate
 from .accumulation import Accumulation
 from .adaptive import FLOOR_SPP, MOST_TIMES_PLANNED
 from .aovs import check_light, chosen_aovs, film_aovs, needs_direct_light, seen_first
-from .bands import Unwanted
 from .camera import camera_file
 from .checkpoint import check_of_none, open_checkpoints
 from .choices import WAVE_LANES, Choices, choices_on
@@ -162,8 +161,7 @@ class Renderer:
 
         It ends at `spp` samples a pixel, after `time` seconds or at a noise of `error` (√relMSE), whatever comes
         first; without any of them at the renderer's `spp`, or else the scene's. Call it again to go on. Where it is
-        left before its end (`break`, Ctrl-C) a checkpoint is written, too; without one the picture may be ahead of the
-        last state, as the next launch runs while a state is made. reference: (height, width, 3).
+        left early (`break`, Ctrl-C) it writes a checkpoint, or else is a launch ahead. reference: (height, width, 3).
         """
         check_reference(reference, self.session.size)
         try:
@@ -185,9 +183,8 @@ class Renderer:
         room = partial(pass_room, spp=spp, error=error, even_to=FLOOR_SPP if self.settings.adaptive else None)
         next_state, begun = 0.0, None
         while self.stop_reason is None:
-            launches = self._adaptive_pass(spp) if self._adapts else begun or self.session.advance(room)
+            launches, begun = self._adaptive_pass(spp) if self._adapts else begun or self.session.advance(room), None
             self._run_pass(launches, time)
-            begun = None
             if self._abandoned.is_set():
                 return
             now, done = clock.perf_counter(), self.session.samples_done
@@ -200,14 +197,12 @@ class Renderer:
                 continue
             self.session.wait()
             self.seconds = clock.perf_counter() - self._clock
-            film, tile_samples, state = self.session.film(), self.session.tile_samples, None
+            film, tile_samples = self.session.film(), self.session.tile_samples
             if self.stop_reason is None and not (looks or self.settings.adaptive or self._checkpoints):
                 begun = self.session.advance_ahead(room)    # runs while the state is made
-            if not self._in_haste:
-                film.unwanted = lambda: self._abandoned.is_set() or self._interrupted and self.stop_reason is None
-                with suppress(Unwanted):
-                    state = self._convergence.record(film, tile_samples, self.seconds, reference)
-                del film.unwanted   # each would keep the other
+            state = None if self._in_haste else self._convergence.record_if_wanted(
+                film, tile_samples, self.seconds, reference,
+                lambda: self._abandoned.is_set() or self._interrupted and self.stop_reason is None)
             if self._abandoned.is_set():
                 return
             self._heed_interrupt()
