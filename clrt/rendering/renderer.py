@@ -208,7 +208,7 @@ class Renderer:
             self._heed_interrupt()
             if state is None:
                 self._keep(film, last=True)
-                state = self._convergence.record(film, tile_samples, self.seconds, reference, in_haste=True)
+                state = self._convergence.record(film, tile_samples, self.seconds, reference, in_haste=begun is None)
             else:
                 if self.stop_reason is None and looks and low_enough(state.stops_by, error):
                     self.stop_reason = "error"
