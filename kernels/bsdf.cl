@@ -87,10 +87,13 @@ static inline ireal same_side(real cos_ns, real cos_ng) {
 static inline ireal keeps_its_side(const BsdfSample *sample, real cos_ng) { return same_side(sample->wi.z, cos_ng); }
 
 #if TRANSMISSION_LOBES
-// The normal by which lights are chosen: none where the material spreads light from behind the surface, too.
+// The normal by which lights are chosen: 0 where this material, not only its type, scatters light from behind the surface.
 static inline real3 choosing_normal(const Bsdf *bsdf, real3 n) {
     real3 chosen = n;
-#define SPREADING(name, number) chosen = choose(bsdf->type == number, splat(ZERO), chosen);
+#define SPREADING(name, number) { \
+        ireal is_type = bsdf->type == number; \
+        if (ANY(is_type)) chosen = choose(is_type & name##_transmits(&bsdf->name), splat(ZERO), chosen); \
+    }
     SPREADING_TYPES(SPREADING)
     return chosen;
 }

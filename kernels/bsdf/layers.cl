@@ -88,6 +88,10 @@ static inline LayerShares layer_shares(const struct metallic_roughness *m, real3
                          some ? share.base * inverse : ONE};
 }
 
+#if THROUGH
+static inline ireal metallic_roughness_transmits(const struct metallic_roughness *m) { return largest(m->through) > 0.0f; }
+#endif
+
 static inline real3 metallic_roughness_eval(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), coat_o = IN_COAT(m, wo), coat_i = IN_COAT(m, wi);
     real3 value = scale(base_eval(m, base_o, base_i), under_sheen(m, base_o, base_i));

@@ -24,6 +24,8 @@ static inline real rough_dielectric(const struct dielectric *m, real3 wo, real3 
     return possible ? pdf : ZERO;
 }
 
+static inline ireal dielectric_transmits(const struct dielectric *m) { return m->alpha > 0.0f; }
+
 static inline real3 dielectric_eval(const struct dielectric *m, real3 wo, real3 wi) {
     real3 weight;
     real pdf = rough_dielectric(m, wo, wi, &weight);

@@ -1,8 +1,10 @@
-// Which light is sampled: each by its importance at the point, and a part of the choices evenly, since a bright one may be
-// hidden. Many of finite extent are represented by groups, and a tree leads on from there.
+// Light sampling: each light is chosen by its importance at the point, and a part of the choices is uniform, because a
+// bright light may be occluded. Many lights of finite extent are represented by groups, from which a light BVH leads on.
 //
-// The first CHOICES of the groups are chosen from. The last INFINITE_LIGHTS of these are infinite lights, whose irradiance
-// is about intensity + n·axis.
+// The rule: the probability of a light is 0 only where the light contributes nothing. Delta lights are found by light
+// sampling alone, so a probability of 0 anywhere else would lose them without a trace.
+//
+// The first CHOICES of the groups are chosen from. The last INFINITE_LIGHTS of these are infinite lights.
 #include "sampler.cl"
 #include "light/importance.cl"
 #include LIGHT_TREE_FILE
@@ -11,10 +13,7 @@
 
 static inline void light_chances(const Scene *scene, real3 p, real3 n, real *chances) {
     for (int i = 0; i < CHOICES - INFINITE_LIGHTS; ++i) chances[i] = importance(scene, (ireal)(i), p, n);
-    for (int i = CHOICES - INFINITE_LIGHTS; i < CHOICES; ++i) {
-        real3 axis = GATHER3(scene->light_groups, (ireal)(i), .axis);
-        chances[i] = maximum(GATHER(real, scene->light_groups, (ireal)(i), .intensity) + dot3(n, axis), ZERO);
-    }
+    for (int i = CHOICES - INFINITE_LIGHTS; i < CHOICES; ++i) chances[i] = infinite_importance(scene, (ireal)(i), n);
     make_chances(chances, CHOICES, EVENLY);
 }
 

@@ -3,8 +3,10 @@
 // A group is what lies in a sphere and shines within 90 degrees, spots within less, of normals that lie in a cone. Its
 // importance is the irradiance by it as if all came from its middle, with both cosines at their best: 0 only where it can
 // bring none (after Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", eq. 3).
-// World frame.
+// World frame. n: unit, on the side of the surface that is lit, or 0 where light from either side counts.
 #include "vector.cl"
+
+#define LEAST_IMPORTANCE 1e-30f   // of a group that can bring light: below, sums and quotients would lose it
 
 // The best cosine towards a sphere of radius r; `along` is distance·cos for its middle. Not quite that of the angle less
 // the sphere's own, but easier, 0 for the same spheres, and as good to choose by.
@@ -26,24 +28,37 @@ static inline ireal is_reached(real along, real distance, real r, real cos_reach
 }
 #endif
 
-// Of scene->light_groups[group] at p. n: unit, on the side of the surface that is lit, or 0 where light from either side
-// counts. Inlined, or it costs half as much again.
+// Whether light from behind the surface counts, too.
+static inline ireal is_lit_from_both_sides(real3 n) {
+#if TRANSMISSION_LOBES
+    return dot3(n, n) == 0.0f;
+#else
+    return NO_LANES;
+#endif
+}
+
+// Of scene->light_groups[group] at p. Inlined, or it costs half as much again.
 __attribute__((always_inline)) static inline real importance(const Scene *scene, ireal group, real3 p, real3 n) {
     real3 d = sub(GATHER3(scene->light_groups, group, .center), p), axis = GATHER3(scene->light_groups, group, .axis);
     real r = GATHER(real, scene->light_groups, group, .radius);
     real d2 = maximum(dot3(d, d), (real)(1e-30f)), distance = sqrt(d2);
-    real lit = best_cosine(dot3(n, d), distance, r);
-#if TRANSMISSION_LOBES
-    lit = dot3(n, n) > 0.0f ? lit : ONE;
-#endif
+    real lit = is_lit_from_both_sides(n) ? ONE : best_cosine(dot3(n, d), distance, r);
     real along = along_cone(-dot3(axis, d), distance, GATHER(real, scene->light_groups, group, .cos_cone));
     real shining = best_cosine(along, distance, r);
-    real brought = GATHER(real, scene->light_groups, group, .intensity) * lit * shining / maximum(d2, r * r);
-    ireal brings = (lit > 0.0f) & (shining > 0.0f);
+    real intensity = GATHER(real, scene->light_groups, group, .intensity);
+    real brought = maximum(intensity * lit * shining / maximum(d2, r * r), (real)(LEAST_IMPORTANCE));
+    ireal brings = (intensity > 0.0f) & (lit > 0.0f) & (shining > 0.0f);
 #if LIGHT_SPOT
     brings = brings & is_reached(along, distance, r, GATHER(real, scene->light_groups, group, .cos_reach));
 #endif
     return brings ? brought : ZERO;
+}
+
+// The same of an infinite light, whose irradiance is about intensity + n·axis, or 0 if that is below.
+static inline real infinite_importance(const Scene *scene, ireal group, real3 n) {
+    real3 axis = GATHER3(scene->light_groups, group, .axis);
+    real directed = is_lit_from_both_sides(n) ? length3(axis) : dot3(n, axis);
+    return maximum(GATHER(real, scene->light_groups, group, .intensity) + directed, ZERO);
 }
 
 // Makes chances, which add up to 1, of the importances of n things. A part of them, `evenly`, is shared alike by all that
