@@ -2,8 +2,8 @@
 //
 // One work-item takes LANES pixels and averages `sample_count` camera rays of each. Rays go on from mirrors and glass,
 // there by the likelier of reflection and refraction, since guides are to be free of noise. The first surface that is
-// neither is what is seen, as Open Image Denoise asks, its albedo tinted by their colors. The sky has its radiance, up
-// to 1, for albedo, and no normal. World frame.
+// neither is what is seen, as Open Image Denoise asks, its albedo tinted by their colors. The sky, suns included,
+// has its radiance, up to 1, for albedo, and no normal. World frame.
 //
 // To add one: a field of the record GUIDE (clrt/rendering/records.py), its like in Seen, and what it is, below.
 #include "camera.cl"
@@ -22,11 +22,10 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
         Surface surface;
         Hits hits = first_surface(scene, &origin, direction, active, sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
-#if SKY
+#if BACKDROP
         ireal escaped = active & !hit;
         if (ANY(escaped)) {
-            real pdf;
-            real3 sky = sky_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO)), &pdf);
+            real3 sky = backdrop_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO)));
             real3 bounded = vector(minimum(sky.x, ONE), minimum(sky.y, ONE), minimum(sky.z, ONE));
             seen.albedo = choose(escaped, mul(tint, bounded), seen.albedo);
         }

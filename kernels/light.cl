@@ -66,6 +66,9 @@ static inline real3 emitter_radiance(const Scene *scene, real3 p, real3 n, real3
 }
 #endif
 
+// Whether a ray that misses everything may find light: that of the sky, or of suns with a size.
+#define BACKDROP (SKY || LIGHT_SUN)
+
 #if SKY
 // Radiance that arrives along wi from the sky, and the density with which light_sample would have chosen wi at p.
 static inline real3 escaped_radiance(const Scene *scene, real3 p, real3 n, real3 wi, real *pdf) {
@@ -74,5 +77,41 @@ static inline real3 escaped_radiance(const Scene *scene, real3 p, real3 n, real3
     *pdf *= light_probability(scene, p, n, (ireal)(scene->counts.lights - 1));   // the sky is the last light
 #endif
     return radiance;
+}
+#endif
+
+#if BACKDROP
+// Radiance that arrives along wi from the sky and all suns.
+static inline real3 backdrop_radiance(const Scene *scene, real3 wi) {
+    real3 radiance = splat(ZERO);
+    real pdf;
+#if SKY
+    radiance = sky_radiance(scene, wi, &pdf);
+#endif
+#if LIGHT_SUN
+    for (int sun = 0; sun < scene->counts.sun_lights; ++sun) radiance = add(radiance, sun_radiance(scene, sun, wi, &pdf));
+#endif
+    return radiance;
+}
+
+// The same at p, each light weighted against the light sample that could have found it there: wi was drawn from the
+// surface with density `pdf`, or is the only direction that counts where `specular`.
+static inline real3 backdrop_light(const Scene *scene, real3 p, real3 n, real3 wi, real pdf, ireal specular) {
+    real3 light = splat(ZERO);
+    real other;
+#if SKY
+    real3 radiance = escaped_radiance(scene, p, n, wi, &other);
+    light = scale(radiance, specular ? ONE : power_heuristic(pdf, other));
+#endif
+#if LIGHT_SUN
+    int first = scene->counts.lights - scene->counts.sky_lights - scene->counts.sun_lights;
+    for (int sun = 0; sun < scene->counts.sun_lights; ++sun) {
+        real3 disc = sun_radiance(scene, sun, wi, &other);
+        if (!ANY(other > 0.0f)) continue;
+        other *= light_probability(scene, p, n, (ireal)(first + sun));
+        light = add(light, scale(disc, specular ? ONE : power_heuristic(pdf, other)));
+    }
+#endif
+    return light;
 }
 #endif

@@ -13,7 +13,7 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
         ireal hit = active & (hits.primitive >= 0);
         absorb(&path, hit ? hits.t : (real)(INFINITY));
         L = add(L, emitted_light(scene, &path, &surface, hits.t, hit));
-        L = add(L, sky_light(scene, &path, active & !hit));
+        L = add(L, escaped_light(scene, &path, active & !hit));
 #if DIRECT_LIGHT
         if (depth <= 2) *direct = L;
 #endif

@@ -110,14 +110,14 @@ __attribute__((noinline)) static void trace(const Scene *scene, Wave *w, int cou
     w->rays += count;
 }
 
-// Packs those that hit something, and has the others see the sky.
+// Packs those that hit something, and has the others see what lies behind everything.
 __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int count) {
     int arrived = 0, escaped = 0;
     for (int i = 0; i < count; i += LANES) {
         Arrival a;
         LOAD(a, w->arrivals, i)
         ireal active = lanes_of(i, count), hit = active & (a.hits.primitive >= 0), missed = active & !hit;
-#if SKY
+#if BACKDROP
         if (ANY(missed)) PACK(a.travel, missed, w->escapes, escaped)
 #endif
         if (ANY(missed) || arrived < i) PACK(a, hit, w->arrivals, arrived)
@@ -128,7 +128,7 @@ __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int c
         Travel travel;
         LOAD(travel, w->escapes, i)
         absorb(&travel.path, (real)(INFINITY));
-        add_light(w, travel.slot, sky_light(scene, &travel.path, lanes_of(i, escaped)));
+        add_light(w, travel.slot, escaped_light(scene, &travel.path, lanes_of(i, escaped)));
     }
     return arrived;
 }

@@ -3,7 +3,7 @@
 //
 // Perfect mirrors and smooth glass are followed, glass at random by either way. On the first surface that is neither falls
 //   the light of every lamp, point and beam that a shadow ray finds in sight: points and beams cast hard shadows; of lamps
-//   with an area a point is drawn for every sample, as the path integrator does; NO_SHADOWS: of all lamps, unasked;
+//   with an area, and suns with a size, a point is drawn for every sample, as the path integrator does; NO_SHADOWS: of all lamps, unasked;
 //   ambient light: the sky's, as if nothing stood in its way.
 // World frame; L in W·sr⁻¹·m⁻².
 #include "camera.cl"
@@ -15,12 +15,12 @@
 static inline real3 seen_light(const Scene *scene, real3 origin, real3 direction, const Surface *surface, real t, ireal hit,
                                ireal escaped) {
     real3 L = splat(ZERO);
-    real pdf;
 #if EMITTERS
+    real pdf;
     L = choose(hit, emitter_radiance(scene, origin, direction, direction, t, surface, hit, &pdf), L);
 #endif
-#if SKY
-    if (ANY(escaped)) L = choose(escaped, sky_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO)), &pdf), L);
+#if BACKDROP
+    if (ANY(escaped)) L = choose(escaped, backdrop_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO))), L);
 #endif
     return L;
 }

@@ -14,14 +14,16 @@ from ..scene.textures import Texture
 from .environment import LUMINANCE, Sky
 from .light_choice import LightChoice, pack_choice
 from .light_groups import Doubles, joined, round_lights, spot_lights
-from .records import DIRECTIONAL_LIGHT, POINT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT
+from .records import DIRECTIONAL_LIGHT, POINT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT, SUN_LIGHT
 from .textures import Textures
 from .triangle_lights import pack_triangle_lights
 
 #: The types in the order of their lights' numbers, infinite ones last; the kernel file is light/<name>.cl, the sky's is
 #: chosen by pack_sky.
-TYPES = ("triangle", "sphere", "point", "spot", "directional", "sky")
+TYPES = ("triangle", "sphere", "point", "spot", "directional", "sun", "sky")
 SURFACES = ("triangle", "sphere")
+#: A directional light of a smaller full angle is a point: float32 has too few directions inside its disc.
+SMALLEST_DEGREES = 1e-4
 #: Over no less does a spot fall off in its cosine, or a range in its square: its inverse is a number of float32.
 STEEPEST = 1e-30
 
@@ -53,11 +55,12 @@ def pack_emitters(scene: Scene, sky: Sky, textures: Textures) -> Emitters:
     shines = np.array([any(sphere.material.radiance) for sphere in scene.spheres], bool)
     of_sphere = np.where(shines, len(flat.records) + np.cumsum(shines) - 1, -1).astype(np.int32)
     balls, points, spots = _sphere_lights(scene, textures), _point_lights(scene), _spot_lights(scene)
-    beams = _directional_lights(scene)
-    records = {"triangle": flat.records, "sphere": balls, "point": points, "spot": spots, "directional": beams}
+    beams, suns = _directional_lights(scene), _suns(scene)
+    records = {"triangle": flat.records, "sphere": balls, "point": points, "spot": spots, "directional": beams,
+               "sun": suns}
     counts = {kind: len(array) for kind, array in records.items() if len(array)}
-    infinite = _doubles(beams, "towards") * _luminance(beams, "irradiance")[:, None]
-    infinite = np.column_stack([np.zeros(len(beams)), infinite])
+    infinite = np.vstack([_irradiance(_doubles(beams, "towards"), np.zeros(len(beams)), _luminance(beams, "irradiance")),
+                          _irradiance_of_suns(suns)])
     if sky.irradiance is not None:
         counts["sky"], infinite = 1, np.vstack([infinite, sky.irradiance])
     radius = _doubles(balls, "radius")
@@ -109,12 +112,41 @@ def _per_range2(lamp: PointLight | SpotLight) -> float:
 
 
 def _directional_lights(scene: Scene) -> NDArray[Any]:
-    suns = [light for light in scene.lights if isinstance(light, DirectionalLight) and any(light.irradiance)]
-    records = np.zeros(len(suns), DIRECTIONAL_LIGHT)
-    for record, sun in zip(records, suns):
-        record["towards"] = -np.asarray(sun.direction) / np.linalg.norm(sun.direction)
-        record["irradiance"] = sun.irradiance
+    beams = [light for light in _directional(scene) if light.angle_degrees < SMALLEST_DEGREES]
+    records = np.zeros(len(beams), DIRECTIONAL_LIGHT)
+    for record, beam in zip(records, beams):
+        record["towards"], record["irradiance"] = _towards(beam), beam.irradiance
     return records
+
+
+def _suns(scene: Scene) -> NDArray[Any]:
+    suns = [light for light in _directional(scene) if light.angle_degrees >= SMALLEST_DEGREES]
+    records = np.zeros(len(suns), SUN_LIGHT)
+    for record, sun in zip(records, suns):
+        record["towards"], record["radiance"] = _towards(sun), sun.radiance
+        record["height"] = 2 * np.sin(np.radians(sun.angle_degrees) / 4) ** 2   # 1 − cos x, as of spots
+    return records
+
+
+def _directional(scene: Scene) -> list[DirectionalLight]:
+    return [light for light in scene.lights if isinstance(light, DirectionalLight) and any(light.irradiance)]
+
+
+def _towards(light: DirectionalLight) -> Doubles:
+    return np.asarray(-np.asarray(light.direction) / np.linalg.norm(light.direction))
+
+
+def _irradiance_of_suns(records: NDArray[Any]) -> Doubles:
+    """As `_irradiance`, so that a disc of which a part is above the horizon brings something: sin h + sin a is more than
+    the sine of what is highest in it, h + a, where h is its middle's elevation and a half its angle."""
+    height = _doubles(records, "height")
+    sine2 = height * (2 - height)
+    return _irradiance(_doubles(records, "towards"), np.sqrt(sine2), np.pi * sine2 * _luminance(records, "radiance"))
+
+
+def _irradiance(towards: Doubles, least: Doubles, luminance: Doubles) -> Doubles:
+    """(n, 4) a scalar and a vector of each of n infinite lights, for `pack_choice`: luminance·(least + n·towards)."""
+    return np.asarray(np.column_stack([least, towards]) * luminance[:, None])
 
 
 def _doubles(records: NDArray[Any], name: str) -> Doubles:

@@ -34,6 +34,8 @@ POINT_LIGHT = record(position="3f4", pad="i4", intensity="3f4", per_range2="f4")
 #: outer: 1 − the cosine of the outer cone's angle; slope: 1 over what the inner one's is less.
 SPOT_LIGHT = record(position="3f4", outer="f4", axis="3f4", slope="f4", intensity="3f4", per_range2="f4")
 DIRECTIONAL_LIGHT = record(towards="3f4", pad0="i4", irradiance="3f4", pad1="i4")
+#: height: 1 − the cosine of half its angle.
+SUN_LIGHT = record(towards="3f4", height="f4", radiance="3f4", pad="i4")
 
 ENVIRONMENT = record(color="3f4", pad="f4", width="i4", height="i4", rotation_cos="f4", rotation_sin="f4")
 SKY_TEXEL = record(radiance="3f4", density="f4")
@@ -41,7 +43,7 @@ SKY_TEXEL = record(radiance="3f4", density="f4")
 SKY_STEP = np.dtype([("top", "f4"), ("start", "i4")])
 
 COUNTS = record(triangles="i4", spheres="i4", lights="i4", triangle_lights="i4", sphere_lights="i4", point_lights="i4",
-                spot_lights="i4", directional_lights="i4", sky_lights="i4", pad="3i4")
+                spot_lights="i4", directional_lights="i4", sun_lights="i4", sky_lights="i4", pad="2i4")
 PIXEL = record(sum="3f4", count="u4", sum_error="3f4", dropped="u4", square="3f4", rays="u4", square_error="3f4",
                pad="u4")
 LAUNCH = record(position="3f4", width="u4", right="3f4", height="u4", up="3f4", max_depth="i4", forward="3f4",

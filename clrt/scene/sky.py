@@ -14,7 +14,7 @@ ZENITH, HORIZON, GROUND = (0.15, 0.22, 0.36), (0.52, 0.54, 0.55), (0.05, 0.046, 
 FADE = 12.0
 
 #: From the upper left of someone who looks along −Z. With the sky, white paper facing the sun has a radiance near 1.
-SUN = DirectionalLight(direction=(0.8, -1.0, -0.55), irradiance=(2.6, 2.4, 2.05))
+SUN = DirectionalLight(direction=(0.8, -1.0, -0.55), irradiance=(2.6, 2.4, 2.05), angle_degrees=0.53)
 
 
 def default_sky(height: int = 32) -> Environment:

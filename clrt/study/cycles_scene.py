@@ -178,7 +178,7 @@ def _light(data: Any, light: Light) -> tuple[Any, NDArray[np.float64]]:
         return made, frame_of_axes(np.eye(3), light.position)
     assert isinstance(light, DirectionalLight)
     made = data.lights.new("light", "SUN")
-    made.angle, made.energy, made.color = 0.0, 1.0, light.irradiance
+    made.angle, made.energy, made.color = np.radians(light.angle_degrees), 1.0, light.irradiance
     z = -np.asarray(light.direction) / np.linalg.norm(light.direction)
     x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x /= np.linalg.norm(x)

@@ -115,6 +115,8 @@ def _light(light: Light) -> Plugin:
         return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
     if isinstance(light, SpotLight):
         return _spot(light)
+    if light.angle_degrees:
+        raise UsageError("light: Mitsuba has no sun with a size; leave out angle_degrees")
     return {"type": "directional", "direction": list(light.direction), "irradiance": rgb(light.irradiance)}
 
 

@@ -5,7 +5,8 @@
 //                                                      and directions, which no ray meets by chance)
 //   NAME_light_radiance(scene, index, wi, surface)     what arrives along wi from the surface that the ray met
 //
-// The sky is met by missing everything: sky_radiance(scene, wi, &pdf) gives what arrives, and that density.
+// The sky is met by missing everything: sky_radiance(scene, wi, &pdf) gives what arrives, and that density; likewise
+// sun_radiance(scene, sun, wi, &pdf) of each sun that has a size.
 //
 // World frame; wi: unit, from p to the light; u in [0,1)², from which directions follow without jumps as far as they can.
 // They draw no random numbers themselves: a lane's numbers must not depend on what its neighbours chose.
