@@ -59,7 +59,7 @@ def pack_emitters(scene: Scene, sky: Sky, textures: Textures) -> Emitters:
     records = {"triangle": flat.records, "sphere": balls, "point": points, "spot": spots, "directional": beams,
                "sun": suns}
     counts = {kind: len(array) for kind, array in records.items() if len(array)}
-    infinite = np.vstack([_irradiance(_doubles(beams, "towards"), np.zeros(len(beams)), _luminance(beams, "irradiance")),
+    infinite = np.vstack([_irradiance(beams, np.zeros(len(beams)), _luminance(beams, "irradiance")),
                           _irradiance_of_suns(suns)])
     if sky.irradiance is not None:
         counts["sky"], infinite = 1, np.vstack([infinite, sky.irradiance])
@@ -137,16 +137,16 @@ def _towards(light: DirectionalLight) -> Doubles:
 
 
 def _irradiance_of_suns(records: NDArray[Any]) -> Doubles:
-    """As `_irradiance`, so that a disc of which a part is above the horizon brings something: sin h + sin a is more than
-    the sine of what is highest in it, h + a, where h is its middle's elevation and a half its angle."""
+    """As `_irradiance`, so that a disc of which a part is above the horizon brings something: sin h + sin a is no less
+    than the sine of what is highest in it, h + a, where h is its middle's elevation and a half its angle."""
     height = _doubles(records, "height")
     sine2 = height * (2 - height)
-    return _irradiance(_doubles(records, "towards"), np.sqrt(sine2), np.pi * sine2 * _luminance(records, "radiance"))
+    return _irradiance(records, np.sqrt(sine2), np.pi * sine2 * _luminance(records, "radiance"))
 
 
-def _irradiance(towards: Doubles, least: Doubles, luminance: Doubles) -> Doubles:
+def _irradiance(records: NDArray[Any], least: Doubles, luminance: Doubles) -> Doubles:
     """(n, 4) a scalar and a vector of each of n infinite lights, for `pack_choice`: luminance·(least + n·towards)."""
-    return np.asarray(np.column_stack([least, towards]) * luminance[:, None])
+    return np.asarray(np.column_stack([least, _doubles(records, "towards")]) * luminance[:, None])
 
 
 def _doubles(records: NDArray[Any], name: str) -> Doubles:

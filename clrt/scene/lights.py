@@ -44,7 +44,7 @@ class DirectionalLight:
 
     @property
     def radiance(self) -> Radiance:
-        """That of its disc: irradiance/(pi sin²(angle/2)), as the disc's projected solid angle has it. Not for a point."""
+        """Radiance of its disc: the irradiance over the projected solid angle, pi sin²(angle/2); not for a point."""
         solid_angle = pi * sin(radians(self.angle_degrees) / 2) ** 2
         red, green, blue = (value / solid_angle for value in self.irradiance)
         return red, green, blue
