@@ -3,7 +3,8 @@
 //
 // Perfect mirrors and smooth glass are followed, glass at random by either way. On the first surface that is neither falls
 //   the light of every lamp, point and beam that a shadow ray finds in sight: points and beams cast hard shadows; of lamps
-//   with an area, and suns with a size, a point is drawn for every sample, as the path integrator does; NO_SHADOWS: of all lamps, unasked;
+//   with an area, and suns with a size, a point is drawn for every sample, as the path integrator does; NO_SHADOWS: of all
+//   lamps, unasked;
 //   ambient light: the sky's, as if nothing stood in its way.
 // World frame; L in W·sr⁻¹·m⁻².
 #include "camera.cl"

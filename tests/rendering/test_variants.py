@@ -47,6 +47,7 @@ def everything() -> Scene:
                  Sphere(center=(0.7, 0.35, 2.0), radius=0.35, material=Dielectric())],
         lights=[PointLight(position=(3.0, 2.0, 2.0), intensity=(5.0, 5.0, 9.0)),
                 DirectionalLight(direction=(1.0, -2.0, -1.0), irradiance=(0.5, 0.4, 0.3)),
+                DirectionalLight(direction=(-1.0, -2.0, -1.0), irradiance=(0.2, 0.3, 0.4), angle_degrees=20.0),
                 SpotLight(position=(-3.0, 3.0, 2.0), direction=(1.0, -1.0, -0.5), intensity=(9.0, 9.0, 5.0))],
         environment=Environment(image=sky, rotation_degrees=30.0),
         camera=Camera(position=(0.0, 2.0, 6.0), look_at=(0.0, 1.0, 0.0)),
