@@ -66,12 +66,12 @@ static inline real3 emitted_light(const Scene *scene, const Path *path, const Su
 #endif
 }
 
-// … and what lies behind everything: the sky, and suns.
+// … and the environment: the sky, and suns with a size.
 static inline real3 escaped_light(const Scene *scene, const Path *path, ireal escaped) {
-#if BACKDROP
+#if ENVIRONMENT
     if (!ANY(escaped)) return splat(ZERO);
     real3 wi = choose(escaped, path->wi, vector(ZERO, ONE, ZERO));   // an idle lane's may be NaN, and so its texel
-    real3 light = backdrop_light(scene, path->p, path->n, wi, path->pdf, path->specular);
+    real3 light = environment_light(scene, path->p, path->n, wi, path->pdf, path->specular);
     return choose(escaped, at_eye(path, light), splat(ZERO));
 #else
     return splat(ZERO);
@@ -121,7 +121,7 @@ static inline real3 light_along(const Scene *scene, const ShadowRay *ray, ireal 
 // could meet.
 static inline ireal go_on(Path *path, const Surface *surface, const Shading *shading, ireal active, int depth,
                           int max_depth, Sampler *sampler) {
-#if !(EMITTERS || BACKDROP)
+#if !(EMITTERS || ENVIRONMENT)
     if (depth + 1 >= max_depth) return NO_LANES;
 #endif
     real2 u = next_2d(sampler), choice = next_2d(sampler);

@@ -22,10 +22,10 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
         Surface surface;
         Hits hits = first_surface(scene, &origin, direction, active, sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
-#if BACKDROP
+#if ENVIRONMENT
         ireal escaped = active & !hit;
         if (ANY(escaped)) {
-            real3 sky = backdrop_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO)));
+            real3 sky = environment_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO)));
             real3 bounded = vector(minimum(sky.x, ONE), minimum(sky.y, ONE), minimum(sky.z, ONE));
             seen.albedo = choose(escaped, mul(tint, bounded), seen.albedo);
         }

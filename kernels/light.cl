@@ -66,8 +66,8 @@ static inline real3 emitter_radiance(const Scene *scene, real3 p, real3 n, real3
 }
 #endif
 
-// Whether a ray that misses everything may find light: that of the sky, or of suns with a size.
-#define BACKDROP (SKY || LIGHT_SUN)
+// Whether a ray that escapes may find light: of the sky, or of suns with a size.
+#define ENVIRONMENT (SKY || LIGHT_SUN)
 
 #if SKY
 // Radiance that arrives along wi from the sky, and the density with which light_sample would have chosen wi at p.
@@ -80,9 +80,9 @@ static inline real3 escaped_radiance(const Scene *scene, real3 p, real3 n, real3
 }
 #endif
 
-#if BACKDROP
+#if ENVIRONMENT
 // Radiance that arrives along wi from the sky and all suns.
-static inline real3 backdrop_radiance(const Scene *scene, real3 wi) {
+static inline real3 environment_radiance(const Scene *scene, real3 wi) {
     real3 radiance = splat(ZERO);
     real pdf;
 #if SKY
@@ -94,9 +94,9 @@ static inline real3 backdrop_radiance(const Scene *scene, real3 wi) {
     return radiance;
 }
 
-// The same at p, each light weighted against the light sample that could have found it there: wi was drawn from the
-// surface with density `pdf`, or is the only direction that counts where `specular`.
-static inline real3 backdrop_light(const Scene *scene, real3 p, real3 n, real3 wi, real pdf, ireal specular) {
+// The same at p, the radiance of each light with its MIS weight: wi was sampled by the BSDF with density `pdf`, or is a
+// specular direction, which light sampling cannot find.
+static inline real3 environment_light(const Scene *scene, real3 p, real3 n, real3 wi, real pdf, ireal specular) {
     real3 light = splat(ZERO);
     real other;
 #if SKY

@@ -110,14 +110,14 @@ __attribute__((noinline)) static void trace(const Scene *scene, Wave *w, int cou
     w->rays += count;
 }
 
-// Packs those that hit something, and has the others see what lies behind everything.
+// Packs the paths that hit something, and adds the light of the environment to those that escape.
 __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int count) {
     int arrived = 0, escaped = 0;
     for (int i = 0; i < count; i += LANES) {
         Arrival a;
         LOAD(a, w->arrivals, i)
         ireal active = lanes_of(i, count), hit = active & (a.hits.primitive >= 0), missed = active & !hit;
-#if BACKDROP
+#if ENVIRONMENT
         if (ANY(missed)) PACK(a.travel, missed, w->escapes, escaped)
 #endif
         if (ANY(missed) || arrived < i) PACK(a, hit, w->arrivals, arrived)

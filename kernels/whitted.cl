@@ -2,9 +2,8 @@
 // Improved Illumination Model for Shaded Display"; Nadolny 3.1 to 3.3, Suchiński 7.4 and 7.5).
 //
 // Perfect mirrors and smooth glass are followed, glass at random by either way. On the first surface that is neither falls
-//   the light of every lamp, point and beam that a shadow ray finds in sight: points and beams cast hard shadows; of lamps
-//   with an area, and suns with a size, a point is drawn for every sample, as the path integrator does; NO_SHADOWS: of all
-//   lamps, unasked;
+//   the light of every light that a shadow ray finds visible: delta lights cast hard shadows; of area lights, and suns with
+//   a size, a point is sampled per sample, as the path integrator does; NO_SHADOWS: the light of all, without shadow rays;
 //   ambient light: the sky's, as if nothing stood in its way.
 // World frame; L in W·sr⁻¹·m⁻².
 #include "camera.cl"
@@ -20,8 +19,8 @@ static inline real3 seen_light(const Scene *scene, real3 origin, real3 direction
     real pdf;
     L = choose(hit, emitter_radiance(scene, origin, direction, direction, t, surface, hit, &pdf), L);
 #endif
-#if BACKDROP
-    if (ANY(escaped)) L = choose(escaped, backdrop_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO))), L);
+#if ENVIRONMENT
+    if (ANY(escaped)) L = choose(escaped, environment_radiance(scene, choose(escaped, direction, vector(ZERO, ONE, ZERO))), L);
 #endif
     return L;
 }

@@ -22,7 +22,7 @@ from .triangle_lights import pack_triangle_lights
 #: chosen by pack_sky.
 TYPES = ("triangle", "sphere", "point", "spot", "directional", "sun", "sky")
 SURFACES = ("triangle", "sphere")
-#: A directional light of a smaller full angle is a point: float32 has too few directions inside its disc.
+#: A directional light of a smaller angle is a delta light: float32 has too few directions inside its disc.
 SMALLEST_DEGREES = 1e-4
 #: Over no less does a spot fall off in its cosine, or a range in its square: its inverse is a number of float32.
 STEEPEST = 1e-30
@@ -137,15 +137,19 @@ def _towards(light: DirectionalLight) -> Doubles:
 
 
 def _irradiance_of_suns(records: NDArray[Any]) -> Doubles:
-    """As `_irradiance`, so that a disc of which a part is above the horizon brings something: sin h + sin a is no less
-    than the sine of what is highest in it, h + a, where h is its middle's elevation and a half its angle."""
+    """Return (n, 4), as `_irradiance`: an upper bound that is 0 only where the whole disc is below the horizon.
+
+    The highest point of a disc has the elevation h + a, where h is that of its centre and a half its angle, and
+    sin(h + a) <= sin h + sin a.
+    """
     height = _doubles(records, "height")
     sine2 = height * (2 - height)
     return _irradiance(records, np.sqrt(sine2), np.pi * sine2 * _luminance(records, "radiance"))
 
 
 def _irradiance(records: NDArray[Any], least: Doubles, luminance: Doubles) -> Doubles:
-    """(n, 4) a scalar and a vector of each of n infinite lights, for `pack_choice`: luminance·(least + n·towards)."""
+    """Return (n, 4), for `pack_choice`: a scalar and a vector of each of n infinite lights whose irradiance at a normal
+    is about luminance·(least + normal·towards)."""
     return np.asarray(np.column_stack([least, _doubles(records, "towards")]) * luminance[:, None])
 
 

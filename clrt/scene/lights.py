@@ -30,8 +30,8 @@ class PointLight:
 class DirectionalLight:
     """Light from infinitely far away that travels along `direction`; `irradiance`: W/m² on a surface facing it.
 
-    angle_degrees: the full angle of the disc that it comes from, which the camera and mirrors see and which blurs its
-    shadows; 0 for a point, which nothing but shadow rays finds. The sun's is 0.53 as seen from the earth.
+    angle_degrees: the angular diameter of its disc, which is visible to the camera and in reflections and softens
+    shadows; 0 (or less than 1e-4) for a delta light, which shadow rays alone find. The sun's is 0.53.
     """
 
     kernel: ClassVar[str] = "directional"

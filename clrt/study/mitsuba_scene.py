@@ -17,14 +17,18 @@ from ..errors import UsageError
 from ..scene.instancing import unfolded
 from ..scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ..scene.materials import Dielectric
-from ..scene.model import Environment, Mesh, Scene, Sphere
+from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
 from ..scene.textures import Texture
 from .mitsuba_bsdfs import Plugin, bsdf, color, medium, rgb
 
 #: How near and far the camera sees, of the distance to where it looks.
 NEAR, FAR = 1e-4, 1e6
+#: How far away the disc of a sun is, of that distance.
+SUN_DISTANCE = 1e5
 #: Of the picture that a spot throws, in which its falloff is told: texels a side, and the widest cone.
 SPOT_TEXELS, SPOT_DEGREES = 2048, 80
+#: The widest sun whose disc is no larger than twice its distance.
+SUN_DEGREES = 90
 
 
 def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
@@ -40,14 +44,14 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
                        "integrator": {"type": "volpath" if absorbs else "path", "max_depth": depth}}
     plugins |= {f"{'mesh' if isinstance(owner, Mesh) else 'sphere'}{i}": _surface(owner)
                 for kind in (Mesh, Sphere) for i, owner in enumerate(each for each in owners if isinstance(each, kind))}
-    plugins |= {f"light{i}": _light(light) for i, light in enumerate(scene.lights)}
+    plugins |= {f"light{i}": _light(light, scene.camera) for i, light in enumerate(scene.lights)}
     return plugins | _environment(scene.environment)
 
 
 def _sensor(scene: Scene, sampler: str) -> Plugin:
     """The camera and its film: pixels are means over their own squares."""
     camera, (width, height) = scene.camera, scene.render.size
-    distance = float(np.linalg.norm(np.subtract(camera.look_at, camera.position)))
+    distance = _distance(camera)
     to_world = _frame(camera.position, np.subtract(camera.look_at, camera.position), camera.up)
     lens: Plugin = {"type": "perspective", "fov": camera.fov_degrees, "fov_axis": "y"}
     if camera.projection == "equirectangular":
@@ -108,7 +112,12 @@ def _sphere(sphere: Sphere) -> Plugin:
     return {"type": "sphere", "to_world": place}
 
 
-def _light(light: Light) -> Plugin:
+def _distance(camera: Camera) -> float:
+    """From the camera to where it looks."""
+    return float(np.linalg.norm(np.subtract(camera.look_at, camera.position)))
+
+
+def _light(light: Light, camera: Camera) -> Plugin:
     if not isinstance(light, DirectionalLight) and light.range is not None:
         raise UsageError("light: Mitsuba is not told of ranges")
     if isinstance(light, PointLight):
@@ -116,8 +125,26 @@ def _light(light: Light) -> Plugin:
     if isinstance(light, SpotLight):
         return _spot(light)
     if light.angle_degrees:
-        raise UsageError("light: Mitsuba has no sun with a size; leave out angle_degrees")
+        return _sun(light, camera)
     return {"type": "directional", "direction": list(light.direction), "irradiance": rgb(light.irradiance)}
+
+
+def _sun(light: DirectionalLight, camera: Camera) -> Plugin:
+    """A disc so far away that it is seen in one direction from everywhere; Mitsuba has no emitter for it."""
+    if light.angle_degrees > SUN_DEGREES:
+        raise UsageError(f"light: Mitsuba is compared with suns of up to {SUN_DEGREES} degrees; this one has "
+                         f"angle_degrees = {light.angle_degrees:g}")
+    far = SUN_DISTANCE * _distance(camera)
+    towards = -np.asarray(light.direction) / np.linalg.norm(light.direction)
+    radius = far * tan(radians(light.angle_degrees) / 2)
+    place = _frame(camera.look_at + far * towards, light.direction, _up_for(light.direction))
+    return {"type": "disk", "to_world": place @ np.diag([radius, radius, 1, 1]),
+            "emitter": {"type": "area", "radiance": rgb(light.radiance)}}
+
+
+def _up_for(direction: Any) -> tuple[float, float, float]:
+    """An axis that is not along the direction."""
+    return (0.0, 1.0, 0.0) if abs(direction[1]) < 0.9 * float(np.linalg.norm(direction)) else (1.0, 0.0, 0.0)
 
 
 def _spot(light: SpotLight) -> Plugin:
@@ -128,9 +155,8 @@ def _spot(light: SpotLight) -> Plugin:
     off = np.hypot(across[:, None], across) * tan(radians(light.outer_degrees))
     inner, outer = cos(radians(light.inner_degrees)), cos(radians(light.outer_degrees))
     falloff = np.clip((1 / np.sqrt(1 + off**2) - outer) / (inner - outer), 0, 1) ** 2
-    up = (0.0, 1.0, 0.0) if abs(light.direction[1]) < 0.9 * float(np.linalg.norm(light.direction)) else (1.0, 0.0, 0.0)
-    return {"type": "spot", "to_world": _frame(light.position, light.direction, up), "intensity": rgb(light.intensity),
-            "cutoff_angle": light.outer_degrees, "beam_width": light.outer_degrees,
+    return {"type": "spot", "to_world": _frame(light.position, light.direction, _up_for(light.direction)),
+            "intensity": rgb(light.intensity), "cutoff_angle": light.outer_degrees, "beam_width": light.outer_degrees,
             "texture": {"type": "bitmap", "bitmap": np.repeat(falloff[..., None], 3, 2).astype(np.float32),
                         "raw": True, "wrap_mode": "clamp"}}
 

@@ -1,4 +1,4 @@
-// Parallel light from infinitely far away, from the unit vector `towards`. A sun with a size is in sun.cl. World frame.
+// A delta light infinitely far away; `towards` is the unit vector to it. A sun with a size is in sun.cl. World frame.
 #include "light/interface.cl"
 
 static inline LightSample directional_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {

@@ -6,7 +6,7 @@
 // World frame. n: unit, on the side of the surface that is lit, or 0 where light from either side counts.
 #include "vector.cl"
 
-#define LEAST_IMPORTANCE 1e-30f   // of a group that can bring light: below, sums and quotients would lose it
+#define LEAST_IMPORTANCE 1e-30f   // of a group that can contribute: a smaller one could underflow in sums and quotients
 
 // The best cosine towards a sphere of radius r; `along` is distance·cos for its middle. Not quite that of the angle less
 // the sphere's own, but easier, 0 for the same spheres, and as good to choose by.
@@ -46,15 +46,15 @@ __attribute__((always_inline)) static inline real importance(const Scene *scene,
     real along = along_cone(-dot3(axis, d), distance, GATHER(real, scene->light_groups, group, .cos_cone));
     real shining = best_cosine(along, distance, r);
     real intensity = GATHER(real, scene->light_groups, group, .intensity);
-    real brought = maximum(intensity * lit * shining / maximum(d2, r * r), (real)(LEAST_IMPORTANCE));
-    ireal brings = (intensity > 0.0f) & (lit > 0.0f) & (shining > 0.0f);
+    real irradiance = maximum(intensity * lit * shining / maximum(d2, r * r), (real)(LEAST_IMPORTANCE));
+    ireal contributes = (intensity > 0.0f) & (lit > 0.0f) & (shining > 0.0f);
 #if LIGHT_SPOT
-    brings = brings & is_reached(along, distance, r, GATHER(real, scene->light_groups, group, .cos_reach));
+    contributes = contributes & is_reached(along, distance, r, GATHER(real, scene->light_groups, group, .cos_reach));
 #endif
-    return brings ? brought : ZERO;
+    return contributes ? irradiance : ZERO;
 }
 
-// The same of an infinite light, whose irradiance is about intensity + n·axis, or 0 if that is below.
+// The importance of an infinite light, whose irradiance is about max(intensity + n·axis, 0).
 static inline real infinite_importance(const Scene *scene, ireal group, real3 n) {
     real3 axis = GATHER3(scene->light_groups, group, .axis);
     real directed = is_lit_from_both_sides(n) ? length3(axis) : dot3(n, axis);

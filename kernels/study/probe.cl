@@ -232,9 +232,9 @@ kernel void probe_sky(SCENE_PARAMETERS, uint n, global const float *in, global f
 #if LIGHT_SUN
 // in: p (3), n (3), wi (3), density -> out: radiance (3) from the sky and all suns, and what of it counts (3) where wi was
 // drawn with that density
-kernel void probe_backdrop(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+kernel void probe_environment(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
-    put3(out, n, 0, backdrop_radiance(&scene, ROW3(in, 6)));
-    put3(out, n, 3, backdrop_light(&scene, ROW3(in, 0), ROW3(in, 3), ROW3(in, 6), ROW(in, 9), NO_LANES));
+    put3(out, n, 0, environment_radiance(&scene, ROW3(in, 6)));
+    put3(out, n, 3, environment_light(&scene, ROW3(in, 0), ROW3(in, 3), ROW3(in, 6), ROW(in, 9), NO_LANES));
 }
 #endif

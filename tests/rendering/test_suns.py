@@ -86,7 +86,7 @@ def test_what_is_sampled_is_what_is_seen(device: Device) -> None:
     sure = np.all(np.abs(angles / (2 * np.sin(half / 2)) - 1) > margin, axis=1)
     assert sure.mean() > 0.95
     found = np.random.default_rng(1).uniform(0.1, 3, COUNT) * out[:, 6]
-    seen = probe("backdrop", 6, np.zeros((COUNT, 3)), normal, out[:, :3], found)
+    seen = probe("environment", 6, np.zeros((COUNT, 3)), normal, out[:, :3], found)
     sky = np.array([0.1, 0.2, 0.3])
     np.testing.assert_allclose(seen[sure, :3], (inside @ radiance + sky)[sure], rtol=1e-5)
     weights = found[:, None]**2 / (found[:, None]**2 + densities**2)

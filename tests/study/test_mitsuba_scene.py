@@ -175,6 +175,21 @@ def test_lights_keep_their_units() -> None:
     assert "sky" not in told, "a black sky would be sampled as often as the others"
 
 
+@pytest.mark.parametrize("direction", [(0.0, -1.0, 0.0), (-3.0, 1.0, 2.0)])
+def test_suns_are_far_discs(direction: tuple[float, float, float]) -> None:
+    """Seen from where the camera looks, of their angle, their normal towards it, with the radiance of a cone."""
+    sun = DirectionalLight(direction=direction, irradiance=(3, 2, 1), angle_degrees=0.53)
+    told = mitsuba_scene(Scene(lights=[sun], camera=Camera(position=(1, 2, 8), look_at=(1, 2, 3))))["light0"]
+    place, half = told["to_world"], np.radians(0.53) / 2
+    middle = place[:3, 3] - (1, 2, 3)
+    np.testing.assert_allclose(middle / np.linalg.norm(middle), -np.array(direction) / np.linalg.norm(direction))
+    np.testing.assert_allclose(np.linalg.norm(place[:3, :2], axis=0) / np.linalg.norm(middle), np.tan(half))
+    np.testing.assert_allclose(place[:3, 2], np.array(direction) / np.linalg.norm(direction), atol=1e-12)
+    np.testing.assert_allclose(told["emitter"]["radiance"]["value"], np.array([3, 2, 1]) / (np.pi * np.sin(half)**2))
+    with pytest.raises(UsageError, match="angle_degrees = 120"):
+        mitsuba_scene(Scene(lights=[replace(sun, angle_degrees=120.0)]))
+
+
 def test_skies_turn_counter_clockwise_seen_from_above() -> None:
     constant = mitsuba_scene(Scene(environment=Environment(color=(1, 2, 3), strength=0.5)))
     assert constant["sky"] == {"type": "constant", "radiance": {"type": "rgb", "value": [0.5, 1, 1.5]}}
