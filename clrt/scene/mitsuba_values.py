@@ -1,0 +1,169 @@
+"""Values in Mitsuba's XML: numbers, colors, spectra and transforms from the attributes of an element."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from .cie import rgb_of_spectrum
+from .transform import scaling, translation, unit
+
+Doubles = NDArray[np.float64]
+Attributes = Mapping[str, str]
+
+
+class Color(NamedTuple):
+    """<rgb>: linear Rec. 709."""
+
+    values: tuple[float, float, float]
+
+
+class Spectrum(NamedTuple):
+    """<spectrum>: values at increasing wavelengths in nm; one value and no wavelengths for a constant one."""
+
+    wavelengths: tuple[float, ...]
+    values: tuple[float, ...]
+
+
+def rgb(value: float | Color | Spectrum, *, emitted: bool = False, bounded: bool = False) -> tuple[float, float, float]:
+    """The color that Mitsuba's `rgb` variants make of a value. emitted: of a radiance or the like, for which spectra
+    are relative to equal energy; bounded: of a reflectance, at most 1."""
+    if isinstance(value, Color):
+        return value.values
+    if isinstance(value, Spectrum) and value.wavelengths:
+        colors = rgb_of_spectrum(value.wavelengths, value.values, lit=not emitted)
+        return min(colors[0], 1.0), min(colors[1], 1.0), min(colors[2], 1.0) if bounded else colors
+    if isinstance(value, Spectrum) and emitted:
+        red, green, blue = rgb_of_spectrum((0, 1e4), value.values * 2, lit=False)
+        return red, green, blue
+    number = value.values[0] if isinstance(value, Spectrum) else float(value)
+    return number, number, number
+
+
+def numbers(text: str) -> list[float]:
+    """The numbers of a list that is separated by commas or spaces. ValueError for what is no finite number."""
+    found = [float(word) for word in text.replace(",", " ").split()]
+    if not np.isfinite(found).all():
+        raise ValueError(text)
+    return found
+
+
+def integer(text: str) -> int:
+    return int(text.strip())
+
+
+def boolean(text: str) -> bool:
+    return {"true": True, "false": False}[text.strip().lower()]
+
+
+def color(text: str) -> Color:
+    """Three numbers, one for grey, or a hexadecimal sRGB color such as #ff8000."""
+    if text.strip().startswith("#"):
+        from .pictures import linear_from_srgb
+        encoded = np.array([int(text.strip()[i:i + 2], 16) for i in (1, 3, 5)], np.float32)
+        red, green, blue = linear_from_srgb(encoded / 255).tolist()
+        return Color((red, green, blue))
+    values = numbers(text)
+    red, green, blue = values * 3 if len(values) == 1 else values
+    return Color((red, green, blue))
+
+
+def spectrum(text: str) -> Spectrum:
+    """A constant, or pairs of a wavelength and a value."""
+    if ":" not in text:
+        (value,) = numbers(text)
+        return Spectrum((), (value,))
+    pairs = [numbers(pair.replace(":", " ")) for pair in text.replace(",", " ").split()]
+    wavelengths, values = (tuple(row) for row in zip(*pairs, strict=True))
+    if np.any(np.diff(wavelengths) <= 0) or len(wavelengths) < 2:
+        raise ValueError(text)
+    return Spectrum(wavelengths, values)
+
+
+def vector(attributes: Attributes, missing: float = 0.0) -> tuple[float, float, float]:
+    """Three numbers: as `value`, where one number stands for all, or as x, y and z."""
+    if "value" in attributes:
+        values = numbers(attributes["value"])
+        values = values * 3 if len(values) == 1 else values
+    else:
+        values = [numbers(attributes[axis])[0] if axis in attributes else missing for axis in "xyz"]
+    x, y, z = values
+    return x, y, z
+
+
+def transform(steps: list[tuple[str, Attributes]]) -> Doubles:
+    """The 4x4 matrix of a <transform>: its steps in the order in which they are written, acting on column vectors."""
+    matrix = np.eye(4)
+    for name, attributes in steps:
+        matrix = STEPS[name](attributes) @ matrix
+    return matrix
+
+
+def _rotate(attributes: Attributes) -> Doubles:
+    """Counter-clockwise by `angle` degrees for whom the axis points at (Rodrigues)."""
+    x, y, z = unit(np.array(vector(attributes))).tolist()
+    angle = np.radians(numbers(attributes["angle"])[0])
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    matrix = np.eye(4)
+    matrix[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return matrix
+
+
+def look_at(origin: Doubles, target: Doubles, up: Doubles) -> Doubles:
+    """From local axes, +z forward, +y up and +x to the left, to the world."""
+    forward = unit(target - origin)
+    left = unit(np.cross(up, forward))
+    if not (forward.any() and left.any()):
+        raise ValueError("up")
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([left, np.cross(forward, left), forward, origin])
+    return matrix
+
+
+def _look_at(attributes: Attributes) -> Doubles:
+    up = attributes.get("up", "0 1 0")
+    return look_at(*(np.array(vector({"value": text})) for text in (attributes["origin"], attributes["target"], up)))
+
+
+def _matrix(attributes: Attributes) -> Doubles:
+    """Rows of 4x4 or 3x3 numbers."""
+    values = numbers(attributes["value"])
+    size = {16: 4, 9: 3}[len(values)]
+    matrix = np.eye(4)
+    matrix[:size, :size] = np.reshape(values, (size, size))
+    if matrix[3].tolist() != [0, 0, 0, 1]:
+        raise ValueError("not affine")
+    return matrix
+
+
+STEPS: dict[str, Callable[[Attributes], Doubles]] = {
+    "translate": lambda attributes: translation(vector(attributes)),
+    "scale": lambda attributes: scaling(vector(attributes, missing=1.0)),
+    "rotate": _rotate, "lookat": _look_at, "matrix": _matrix}
+
+Value = bool | int | float | str | Color | Spectrum | tuple[float, float, float] | Doubles
+_READERS: dict[str, tuple[Callable[[str], Value], str]] = {
+    "float": (lambda text: float(numbers(text)[0]), "a number"), "integer": (integer, "a whole number"),
+    "boolean": (boolean, "true or false"), "string": (str, "a text"), "rgb": (color, "three numbers"),
+    "spectrum": (spectrum, 'a number, or pairs such as "400:0.2, 700:0.8"')}
+
+
+def value_of(element: Element, where: str) -> Value:
+    """The value of an element that is no plugin. SceneError names what is wrong with it."""
+    attributes = element.attrib
+    try:
+        if element.tag in ("point", "vector"):
+            return vector(attributes)
+        if element.tag == "transform":
+            return transform([(step.tag, step.attrib) for step in element])
+        return _READERS[element.tag][0](attributes["value"])
+    except (ValueError, KeyError, IndexError):
+        wanted = _READERS[element.tag][1] if element.tag in _READERS else (
+            f"steps out of {', '.join(STEPS)}" if element.tag == "transform" else "three numbers")
+        given = attributes.get("value", "of these steps" if element.tag == "transform" else "of these attributes")
+        raise SceneError(f'{where}: <{element.tag}> "{given}" cannot be read; write {wanted}') from None
