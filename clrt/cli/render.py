@@ -55,7 +55,8 @@ RIGHT = 1.2
               help="What to compute.")
 @click.option("--shadows/--no-shadows", default=None, help="Whether local and raster ask what stands before lights.")
 @click.option("--sampler", type=click.Choice(["sobol", "stratified", "independent"]), help="Where samples come from.")
-@click.option("--filter", "pixel_filter", type=click.Choice(["box", "tent", "blackman_harris"]), help="Pixel filter.")
+@click.option("--filter", "pixel_filter", type=click.Choice(["box", "tent", "blackman_harris", "gaussian"]),
+              help="Pixel filter.")
 @click.option("--adaptive", is_flag=True, default=None, help="More samples where the error is larger.")
 @click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error by.")
 @click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what was done.")

@@ -1,7 +1,8 @@
-"""Read a scene: a TOML scene file, or a bare model under a default camera and sky."""
+"""Read a scene: a TOML scene file, one of Mitsuba's XML, or a bare model under a default camera and sky."""
 
 from __future__ import annotations
 
+import logging
 import tomllib
 from os import PathLike
 from pathlib import Path
@@ -17,8 +18,10 @@ from .toml import SceneReader, camera_problems
 from .validate import scene_problems
 
 
+log = logging.getLogger(__name__)
+
 def load(path: str | Path, camera: str | None = None) -> Scene:
-    """The scene in a .toml file, or a model file's meshes with a camera that frames them, a sky and a sun.
+    """The scene in a .toml file or in Mitsuba's .xml, or a model file's meshes with a camera that frames them, a sky and a sun.
 
     A glTF model's own first camera and lights are used if it has any. camera: the name of one in a model file instead.
     Raises one SceneError with all mistakes in the file, each as "FILE: object: value is wrong; remedy".
@@ -27,7 +30,7 @@ def load(path: str | Path, camera: str | None = None) -> Scene:
         raise SceneError(f"{path!r} is no path of a scene; name a file, such as \"scene.toml\"")
     path = Path(path)
     check_scene(path)
-    scene, problems = _load_toml(path) if path.suffix.lower() == ".toml" else (_load_model(path), [])
+    scene, problems = _READERS.get(path.suffix.lower(), _load_model)(path)
     if camera is not None:
         scene.camera = scene.cameras.get(camera, scene.camera)
         problems += camera_problems(camera, scene.cameras, "--camera")
@@ -41,17 +44,17 @@ def check_scene(path: Path) -> None:
     """Raise SceneError unless there is a file at `path`, with the name of a scene or a model."""
     is_model = path.suffix.lower() in SUFFIXES
     check_file(path, "model" if is_model else "scene")
-    if not is_model and path.suffix.lower() != ".toml":
-        raise SceneError(f"{path}: a scene must be one of .toml, {', '.join(SUFFIXES)}; convert it")
+    if not is_model and path.suffix.lower() not in _READERS:
+        raise SceneError(f"{path}: a scene must be one of {', '.join((*_READERS, *SUFFIXES))}; convert it")
 
 
-def _load_model(path: Path) -> Scene:
+def _load_model(path: Path) -> tuple[Scene, list[str]]:
     """A bare model under the default sky, with its lights or the sun, and its first camera or one that frames it."""
     model = read_model(path)
     camera = next(iter(model.cameras.values()), None) or frame(model.meshes, model.instances)
     return Scene(meshes=model.meshes, instances=model.instances, camera=camera, cameras=model.cameras,
                  environment=default_sky(), lights=model.lights or [SUN], name=path.stem,
-                 source=source_of_model(path, model))
+                 source=source_of_model(path, model)), []
 
 
 def _load_toml(path: Path) -> tuple[Scene, list[str]]:
@@ -63,3 +66,18 @@ def _load_toml(path: Path) -> tuple[Scene, list[str]]:
     reader = SceneReader(path, document)
     scene = reader.scene()
     return scene, reader.problems
+
+
+def _load_mitsuba(path: Path) -> tuple[Scene, list[str]]:
+    """The scene, whose models that are near Mitsuba's and not the same are logged."""
+    from .mitsuba_reader import read_mitsuba
+    try:
+        scene, differences = read_mitsuba(path)
+    except SceneError as error:
+        raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+    for difference in differences:
+        log.warning("%s: %s", path, difference)
+    return scene, []
+
+
+_READERS = {".toml": _load_toml, ".xml": _load_mitsuba}

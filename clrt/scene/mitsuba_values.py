@@ -36,8 +36,8 @@ def rgb(value: float | Color | Spectrum, *, emitted: bool = False, bounded: bool
     if isinstance(value, Color):
         return value.values
     if isinstance(value, Spectrum) and value.wavelengths:
-        colors = rgb_of_spectrum(value.wavelengths, value.values, lit=not emitted)
-        return min(colors[0], 1.0), min(colors[1], 1.0), min(colors[2], 1.0) if bounded else colors
+        red, green, blue = rgb_of_spectrum(value.wavelengths, value.values, lit=not emitted)
+        return (min(red, 1.0), min(green, 1.0), min(blue, 1.0)) if bounded else (red, green, blue)
     if isinstance(value, Spectrum) and emitted:
         red, green, blue = rgb_of_spectrum((0, 1e4), value.values * 2, lit=False)
         return red, green, blue

@@ -29,7 +29,7 @@ Pixels = Annotated[int, Ge(1), Le(65536)]
 Projection = Literal["perspective", "orthographic", "equirectangular"]
 Integrator = Literal["path", "direct", "local", "raster", "normals", "albedo", "depth"]
 Sampler = Literal["sobol", "stratified", "independent"]
-Filter = Literal["box", "tent", "blackman_harris"]
+Filter = Literal["box", "tent", "blackman_harris", "gaussian"]
 
 
 @dataclass(frozen=True, kw_only=True)

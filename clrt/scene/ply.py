@@ -21,11 +21,33 @@ _TEXTURE = {"u", "v", "s", "t", "texture_u", "texture_v"}
 _COLORS = {"red", "green", "blue"}
 
 
+Records = np.ndarray[tuple[int], np.dtype[np.void]]
+
+
 def plain_ply(path: Path) -> dict[str, Any] | None:
     """trimesh's keyword arguments for the file: vertices (n, 3), faces (m, 3), and vertex_normals (n, 3) if it has any.
 
     None for all but an undamaged file of vertices without texture coordinates or colours and then faces, each with
     three indices and no other list.
+    """
+    records = ply_records(path)
+    if records is None:
+        return None
+    vertices, faces = records
+    names = set(vertices.dtype.names or ())
+    if names & _TEXTURE or _COLORS <= names:
+        return None
+    parts = {"vertices": np.column_stack([vertices[axis] for axis in ("x", "y", "z")]),
+             "faces": faces["corners list"]["indices"].astype(np.int64)}
+    if {"nx", "ny", "nz"} <= names:
+        parts["vertex_normals"] = np.column_stack([vertices[axis] for axis in ("nx", "ny", "nz")])
+    return parts
+
+
+def ply_records(path: Path) -> tuple[Records, Records] | None:
+    """Vertices with at least x, y and z, and faces, whose indices are ["corners list"]["indices"], (m, 3).
+
+    None for all but an undamaged file of both alone, in this order, whose faces have three indices and no other list.
     """
     content = path.read_bytes()
     start = content.find(_END) + len(_END)
@@ -35,20 +57,13 @@ def plain_ply(path: Path) -> dict[str, Any] | None:
             content, start = np.array(content[start:].split(), np.float64).tobytes(), 0
     except (ValueError, KeyError, IndexError):
         return None
-    names, middle = set(vertex.names or ()), start + vertex_count * vertex.itemsize
-    if (not {"x", "y", "z"} <= names or names & _TEXTURE or _COLORS <= names
-            or "corners list" not in (face.names or ()) or min(vertex_count, face_count) < 1
-            or len(content) != middle + face_count * face.itemsize):
+    middle = start + vertex_count * vertex.itemsize
+    if (not {"x", "y", "z"} <= set(vertex.names or ()) or "corners list" not in (face.names or ())
+            or min(vertex_count, face_count) < 1 or len(content) != middle + face_count * face.itemsize):
         return None
     vertices = np.frombuffer(content, vertex, vertex_count, start)
-    corners = np.frombuffer(content, face, face_count, middle)["corners list"]
-    if np.any(corners["count"] != 3):
-        return None
-    parts = {"vertices": np.column_stack([vertices[axis] for axis in ("x", "y", "z")]),
-             "faces": corners["indices"].astype(np.int64)}
-    if {"nx", "ny", "nz"} <= names:
-        parts["vertex_normals"] = np.column_stack([vertices[axis] for axis in ("nx", "ny", "nz")])
-    return parts
+    faces = np.frombuffer(content, face, face_count, middle)
+    return None if np.any(faces["corners list"]["count"] != 3) else (vertices, faces)
 
 
 def _elements(header: list[str]) -> list[tuple[int, np.dtype[np.void]]]:

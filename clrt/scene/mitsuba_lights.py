@@ -1,0 +1,68 @@
+"""Mitsuba's emitters that are no shapes: point, directional, constant and envmap."""
+
+from __future__ import annotations
+
+from math import atan2, degrees
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .lights import DirectionalLight, Light, PointLight
+from .mitsuba_values import Doubles, rgb
+from .mitsuba_xml import Plugin
+from .model import Environment
+from .pictures import read_picture
+
+#: Rows that an environment map is resampled to at least, by a whole factor.
+ROWS = 1024
+#: How far the transform of an environment may be from a turn about +Y.
+TURN = 1e-6
+
+
+def light(plugin: Plugin) -> Light:
+    """A point or directional light. UnsupportedError for others."""
+    if plugin.kind == "point":
+        x, y, z = plugin.point("position") or plugin.transform("to_world")[:3, 3].tolist()
+        plugin.used.add("to_world")
+        return PointLight(position=(x, y, z), intensity=rgb(plugin.color("intensity", 1.0), emitted=True))
+    if plugin.kind == "directional":
+        x, y, z = plugin.point("direction") or plugin.transform("to_world")[:3, 2].tolist()
+        plugin.used.add("to_world")
+        return DirectionalLight(direction=(x, y, z), irradiance=rgb(plugin.color("irradiance", 1.0), emitted=True))
+    plugin.refuse_kind("point, directional, constant, envmap, or area on a shape")
+
+
+def environment(plugin: Plugin) -> Environment:
+    """The sky of a constant or envmap emitter."""
+    if plugin.kind == "constant":
+        return Environment(color=rgb(plugin.color("radiance", 1.0), emitted=True))
+    plugin.used.add("mis_compensation")
+    image = rows_at_middles(read_picture(Path(plugin.value("filename", str, ""))))
+    return Environment(image=image, strength=plugin.value("scale", float, 1.0),
+                       rotation_degrees=_turn(plugin, plugin.transform("to_world")))
+
+
+def _turn(plugin: Plugin, to_world: Doubles) -> float:
+    """Degrees about +Y."""
+    angle = atan2(to_world[0, 2], to_world[0, 0])
+    c, s = np.cos(angle), np.sin(angle)
+    if np.abs(to_world[:3, :3] - [[c, 0, s], [0, 1, 0], [-s, 0, c]]).max() > TURN:
+        plugin.refuse("is turned about another axis than y", "turn the scene and its camera, so that y is up",
+                      "envmap turned about x or z")
+    return degrees(angle)
+
+
+def rows_at_middles(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The same sky, (h, w, 3), of at least ROWS rows, interpolated linearly from those given.
+
+    Mitsuba's H rows are at row/(H − 1) from pole to pole; those of clrt at (row + ½)/h.
+    """
+    cells = len(image) - 1
+    if cells < 1:
+        return image
+    count = cells * -(-ROWS // cells)
+    at = (np.arange(count) + 0.5) / count * cells
+    above = np.minimum(at.astype(int), cells - 1)
+    share = (at - above).astype(np.float32)[:, None, None]
+    return np.asarray(image[above] * (1 - share) + image[above + 1] * share, np.float32)

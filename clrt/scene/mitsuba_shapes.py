@@ -1,0 +1,209 @@
+"""Mitsuba's shapes as meshes, spheres and instances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import SceneError
+from .mitsuba_materials import Look, MaterialReader, absorbing
+from .mitsuba_primitives import cube, cylinder, disk, rectangle, sphere
+from .mitsuba_textures import Attribute, TextureReader
+from .mitsuba_values import Doubles, look_at
+from .mitsuba_xml import Plugin
+from .meshes import read_model
+from .model import FloatArray, Instance, Mesh, Sphere
+from .normals import smooth_normals
+from .ply import ply_records
+from .transform import transform_mesh
+from .validate import index_problems
+
+PRIMITIVES: dict[str, Callable[[], Mesh]] = {
+    "rectangle": rectangle, "cube": cube, "disk": disk, "cylinder": cylinder, "sphere": sphere}
+FILES = ("obj", "ply")
+#: How far a transform may be from turning, moving and scaling evenly.
+UNEVEN = 1e-5
+Part = Mesh | Sphere
+Attributes = Mapping[str, FloatArray]
+
+
+class ShapeReader:
+    """Reads the shapes of one scene."""
+
+    def __init__(self, textures: TextureReader, materials: MaterialReader) -> None:
+        self._textures = textures
+        self._materials = materials
+        self._groups: dict[Plugin, list[Part]] = {}
+
+    def parts(self, plugin: Plugin) -> Iterator[Part | Instance]:
+        """What a <shape> draws; nothing for a group, which its instances draw."""
+        if plugin.kind == "instance":
+            yield from self._instances(plugin)
+        elif plugin.kind != "shapegroup":
+            yield from self._shape(plugin)
+
+    def _shape(self, plugin: Plugin) -> Iterator[Part]:
+        if plugin.kind not in (*PRIMITIVES, *FILES):
+            plugin.refuse_kind(", ".join((*PRIMITIVES, *FILES, "shapegroup", "instance")))
+        to_world = plugin.transform("to_world")
+        look = self._lit(plugin, self._look(plugin))
+        if plugin.value("flip_normals", bool, False):
+            plugin.refuse("flip_normals is not supported", "turn the shape's faces", "flip_normals")
+        if plugin.kind == "sphere":
+            to_world = to_world @ _ball(plugin)
+            if ball := _sphere(to_world, look, plugin.where):
+                yield ball
+                return
+        elif plugin.kind == "cylinder":
+            to_world = to_world @ _between(plugin)
+        if plugin.kind in PRIMITIVES:
+            pieces: list[tuple[Mesh, Attributes]] = [(PRIMITIVES[plugin.kind](), {})]
+        else:
+            pieces = list(_from_file(plugin))
+        for mesh, attributes in pieces:
+            yield _dressed(transform_mesh(mesh, to_world), look, attributes, plugin)
+
+    def _look(self, plugin: Plugin) -> Look:
+        bsdfs = plugin.all("bsdf")
+        look = self._materials.look(bsdfs[-1] if bsdfs else None)
+        for medium in plugin.all("medium"):
+            look = look._replace(material=absorbing(look.material, medium))
+        return look
+
+    def _lit(self, plugin: Plugin, look: Look) -> Look:
+        """With the light of an area emitter."""
+        for emitter in plugin.all("emitter"):
+            if emitter.kind != "area":
+                emitter.refuse_kind("area on a shape")
+            radiance = self._textures.color(emitter, "radiance", 1.0, emitted=True)
+            if isinstance(radiance, Attribute):
+                emitter.refuse("radiance is an attribute", "write a color or a bitmap", "radiance by an attribute")
+            look = look._replace(material=replace(look.material, emission=radiance))
+        return look
+
+    def _instances(self, plugin: Plugin) -> Iterator[Instance | Sphere]:
+        groups = plugin.all("shape")
+        if len(groups) != 1 or groups[0].kind != "shapegroup":
+            raise SceneError(f"{plugin.where}: refers to no shapegroup; write one <ref> to one")
+        to_world = plugin.transform("to_world")
+        if groups[0] not in self._groups:
+            self._groups[groups[0]] = [part for shape in groups[0].all("shape") for part in self._shape(shape)]
+        for part in self._groups[groups[0]]:
+            if isinstance(part, Mesh):
+                yield Instance(part, to_world, name=plugin.where)
+                continue
+            place = np.eye(4)
+            place[:3, :3] *= part.radius
+            place[:3, 3] = part.center
+            moved = _sphere(to_world @ place, Look(part.material), plugin.where)
+            if moved is None:
+                plugin.refuse("stretches a sphere", "scale evenly", "stretched sphere")
+            yield moved
+
+
+def _ball(plugin: Plugin) -> Doubles:
+    """Radius and center, of a sphere of radius 1."""
+    matrix = np.eye(4)
+    matrix[:3, :3] *= plugin.value("radius", float, 1.0)
+    matrix[:3, 3] = plugin.point("center") or (0.0, 0.0, 0.0)
+    return matrix
+
+
+def _between(plugin: Plugin) -> Doubles:
+    """From p0 to p1, of a cylinder along z."""
+    start, end = np.array(plugin.point("p0") or (0, 0, 0)), np.array(plugin.point("p1") or (0, 0, 1))
+    radius, along = plugin.value("radius", float, 1.0), end - start
+    up = (1, 0, 0) if abs(along[0]) < 0.9 * np.linalg.norm(along) else (0, 1, 0)
+    try:
+        frame = look_at(start, end, np.array(up, np.float64))
+    except ValueError:
+        raise SceneError(f"{plugin.where}: p0 and p1 are one point; move one") from None
+    return frame @ np.diag([radius, radius, float(np.linalg.norm(along)), 1.0])
+
+
+def _sphere(to_world: Doubles, look: Look, name: str) -> Sphere | None:
+    """A sphere of radius 1 in the world, where it stays one and nothing on it tells how it is turned."""
+    linear = to_world[:3, :3]
+    squares = linear.T @ linear
+    radius = float(np.cbrt(abs(np.linalg.det(linear))))
+    if look.material.textures() or np.abs(squares - radius**2 * np.eye(3)).max() > UNEVEN * radius**2:
+        return None
+    x, y, z = to_world[:3, 3].tolist()
+    return Sphere(center=(x, y, z), radius=radius, material=look.material, name=name)
+
+
+def _from_file(plugin: Plugin) -> Iterator[tuple[Mesh, Attributes]]:
+    """The meshes of a file, with smooth normals where it has none, as Mitsuba makes them."""
+    path = Path(plugin.value("filename", str, ""))
+    flat = plugin.value("face_normals", bool, False)
+    downward = plugin.value("flip_tex_coords", bool, plugin.kind == "obj")
+    own = _ply(path) if plugin.kind == "ply" else None
+    for mesh, attributes in [own] if own else [(mesh, {}) for mesh in read_model(path).meshes]:
+        if mesh.uv is not None and downward != (own is None):
+            mesh.uv[:, 1] = 1 - mesh.uv[:, 1]
+        mesh.colors, mesh.tangents = None, None
+        if flat:
+            mesh.normals = None
+        elif mesh.normals is None:
+            mesh.normals = smooth_normals(mesh.vertices, mesh.faces)
+        yield mesh, attributes
+
+
+def _ply(path: Path) -> tuple[Mesh, Attributes] | None:
+    """A plain PLY file with all of its attributes; None for others."""
+    records = ply_records(path)
+    if records is None:
+        return None
+    vertex, face = records
+
+    def columns(*names: str) -> FloatArray | None:
+        names_there = vertex.dtype.names or ()
+        if not set(names) <= {*names_there}:
+            return None
+        return np.column_stack([vertex[name] for name in names]).astype(np.float32)
+
+    vertices = columns("x", "y", "z")
+    assert vertices is not None  # or it were not plain
+    faces = face["corners list"]["indices"]
+    if problems := index_problems(faces, len(vertices), f'mesh "{path.stem}"'):
+        raise SceneError([f"{path}: {problem}" for problem in problems])
+    uv = next((found for pair in ("uv", "st") if (found := columns(*pair)) is not None), None)
+    mesh = Mesh(vertices, faces.astype(np.int32), name=path.stem,
+                normals=columns("nx", "ny", "nz"), uv=uv)
+    attributes = {f"{prefix}_{name}": values for prefix, table in (("vertex", vertex), ("face", face))
+                  for name, values in _attributes(table).items()}
+    return mesh, attributes
+
+
+def _attributes(table: np.ndarray[tuple[int], np.dtype[np.void]]) -> dict[str, FloatArray]:
+    """Of columns color_0, color_1 … the arrays (n, k), by name."""
+    groups: dict[str, list[str]] = {}
+    for column in table.dtype.names or ():
+        name, _, place = column.rpartition("_")
+        if name and place.isdigit() or name and place in "rgb":
+            groups.setdefault(name, []).append(column)
+    return {name: np.column_stack([table[column] for column in columns]).astype(np.float32)
+            for name, columns in groups.items()}
+
+
+def _dressed(mesh: Mesh, look: Look, attributes: Attributes, plugin: Plugin) -> Mesh:
+    """In its material, and in the colors of an attribute: one of faces takes their corners apart."""
+    mesh = replace(mesh, material=look.material, name=plugin.where)
+    if mesh.uv is None and look.material.textures():
+        raise SceneError(f"{plugin.where}: has a texture and no texture coordinates; add them to the file")
+    if look.attribute is None:
+        return mesh
+    name, low, high = look.attribute
+    if name not in attributes:
+        raise SceneError(f'{plugin.where}: has no attribute "{name}"; the file has '
+                         f"{', '.join(sorted(attributes)) or 'none'}")
+    colors = (np.array(low) + attributes[name] * np.subtract(high, low)).clip(0, 1).astype(np.float32)
+    if name.startswith("vertex_"):
+        return replace(mesh, colors=colors)
+    corners = mesh.faces.ravel()
+    apart = {key: None if (array := getattr(mesh, key)) is None else array[corners] for key in ("normals", "uv")}
+    return replace(mesh, vertices=mesh.vertices[corners], faces=np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
+                   colors=np.repeat(colors, 3, axis=0), **apart)
