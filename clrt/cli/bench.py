@@ -9,6 +9,7 @@ from .bench_build import build_command
 from .bench_converge import converge_command
 from .bench_farm import farm_command
 from .bench_hits import hits_command
+from .bench_mitsuba_data import mitsuba_data_command
 from .bench_numerics import numerics_command
 from .bench_peers import peers_command
 from .bench_rays import rays_command
@@ -18,9 +19,9 @@ from .options import Group
 
 @click.group(cls=Group)
 def command() -> None:
-    """Measure this machine: rays, build, hits, peers, converge, agree, numerics, theses, farm."""
+    """Measure this machine: rays, build, hits, peers, converge, agree, mitsuba-data, numerics, theses, farm."""
 
 
 for each in (rays_command, build_command, hits_command, peers_command, converge_command, agree_command,
-             numerics_command, theses_command, farm_command):
+             mitsuba_data_command, numerics_command, theses_command, farm_command):
     command.add_command(each)

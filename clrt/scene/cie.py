@@ -65,7 +65,7 @@ FINE = np.linspace(SHORTEST, LONGEST, 4701)
 
 
 def rgb_of_spectrum(wavelengths: Sequence[float], values: Sequence[float], *, lit: bool) -> tuple[float, float, float]:
-    """Linear Rec. 709 of a spectrum given at increasing wavelengths in nm, linear between them and 0 beyond; not below 0.
+    """Linear Rec. 709 of a spectrum given at increasing wavelengths in nm, linear between them, 0 beyond; at least 0.
 
     lit: of a reflectance under D65, which is (1, 1, 1) where it reflects all; else of a radiance, whose Y is 1 where it
     is 1 at all wavelengths.

@@ -20,8 +20,9 @@ from .validate import scene_problems
 
 log = logging.getLogger(__name__)
 
+
 def load(path: str | Path, camera: str | None = None) -> Scene:
-    """The scene in a .toml file or in Mitsuba's .xml, or a model file's meshes with a camera that frames them, a sky and a sun.
+    """The scene in a .toml or Mitsuba's .xml file, or a model file's meshes with a camera that frames them, a sky and a sun.
 
     A glTF model's own first camera and lights are used if it has any. camera: the name of one in a model file instead.
     Raises one SceneError with all mistakes in the file, each as "FILE: object: value is wrong; remedy".

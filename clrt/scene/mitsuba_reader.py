@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from math import atan, degrees, hypot, radians, tan
 from pathlib import Path
 from typing import NamedTuple, TypeVar
@@ -152,8 +153,7 @@ def _integrator(plugin: Plugin, settings: RenderSettings) -> RenderSettings:
     depth = plugin.value("max_depth", int, -1)
     if plugin.value("hide_emitters", bool, False):
         plugin.refuse("hide_emitters is not supported", "leave it out", "hide_emitters")
-    return RenderSettings(size=settings.size, spp=settings.spp, filter=settings.filter,
-                          integrator=INTEGRATORS[plugin.kind], max_depth=ENDLESS if depth < 0 else max(depth, 1))
+    return replace(settings, integrator=INTEGRATORS[plugin.kind], max_depth=ENDLESS if depth < 0 else max(depth, 1))
 
 
 def _camera(plugin: Plugin, size: tuple[int, int]) -> Camera:
@@ -166,12 +166,12 @@ def _camera(plugin: Plugin, size: tuple[int, int]) -> Camera:
     lengths = _lengths(plugin, to_world)
     distance = plugin.value("focus_distance", float, 1.0)
     seen = position + distance * forward / lengths[2]
-    camera = {"position": tuple(position.tolist()), "look_at": tuple(seen.tolist()), "up": tuple(up.tolist())}
+    camera = Camera(position=position.tolist(), look_at=seen.tolist(), up=up.tolist())
     if plugin.kind == "orthographic":
-        return Camera(**camera, projection="orthographic", view_height=2 * lengths[0] / aspect)
+        return replace(camera, projection="orthographic", view_height=2 * lengths[0] / aspect)
     radius = plugin.value("aperture_radius", float, 0.0)
-    return Camera(**camera, fov_degrees=_vertical_fov(plugin, aspect), aperture_radius=radius,
-                  focus_distance=distance if radius else None)
+    return replace(camera, fov_degrees=_vertical_fov(plugin, aspect), aperture_radius=radius,
+                   focus_distance=distance if radius else None)
 
 
 def _lengths(plugin: Plugin, to_world: Doubles) -> tuple[float, float, float]:

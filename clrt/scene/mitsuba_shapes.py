@@ -204,6 +204,6 @@ def _dressed(mesh: Mesh, look: Look, attributes: Attributes, plugin: Plugin) -> 
     if name.startswith("vertex_"):
         return replace(mesh, colors=colors)
     corners = mesh.faces.ravel()
-    apart = {key: None if (array := getattr(mesh, key)) is None else array[corners] for key in ("normals", "uv")}
+    normals, uv = (None if array is None else array[corners] for array in (mesh.normals, mesh.uv))
     return replace(mesh, vertices=mesh.vertices[corners], faces=np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
-                   colors=np.repeat(colors, 3, axis=0), **apart)
+                   colors=np.repeat(colors, 3, axis=0), normals=normals, uv=uv)

@@ -66,7 +66,7 @@ def color(text: str) -> Color:
     if text.strip().startswith("#"):
         from .pictures import linear_from_srgb
         encoded = np.array([int(text.strip()[i:i + 2], 16) for i in (1, 3, 5)], np.float32)
-        red, green, blue = linear_from_srgb(encoded / 255).tolist()
+        red, green, blue = linear_from_srgb(encoded / np.float32(255)).tolist()
         return Color((red, green, blue))
     values = numbers(text)
     red, green, blue = values * 3 if len(values) == 1 else values

@@ -54,7 +54,7 @@ class Plugin:
         self.used.add(name)
         value = self.values.get(name, default)
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
-            return kind(value)
+            value = float(value)
         if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
             raise SceneError(f'{self.where}: "{name}" is not a {kind.__name__}; write one')
         return value

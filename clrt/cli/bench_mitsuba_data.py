@@ -1,0 +1,76 @@
+"""`clrt bench mitsuba-data`: Mitsuba's own test scenes beside their references."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+@click.command("mitsuba-data")
+@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@click.option("--scene", "scenes", multiple=True, metavar="TEXT", help="Only scenes whose names hold this; repeatable.")
+@click.option("--samples", type=click.IntRange(min=1), default=2_000_000, show_default=True,
+              help="Samples per picture, as in Mitsuba's tests.")
+@click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
+              help="Write clrt's picture, the reference, and the difference of the two times 4 there, as PNG.")
+@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+def mitsuba_data_command(folder: Path, scenes: tuple[str, ...], samples: int, pictures: Path | None,
+                         device: str | None, json_file: Path | None) -> None:
+    """Render the test scenes in DIR, a checkout of github.com/mitsuba-renderer/mitsuba-data, and test them against
+    their references by Mitsuba's own Z-tests.
+
+    Scenes that clrt cannot express are listed with what is missing. Exit code 1 where one fails.
+    """
+    from ..errors import UsageError
+    from ..output.files import check_target
+    from ..output.report import write_report
+    from ..study.mitsuba_data import cases, judge
+
+    if json_file is not None:
+        check_target(json_file)
+    chosen = [case for case in cases(folder) if not scenes or any(text in case.name for text in scenes)]
+    if not chosen:
+        raise UsageError(f"--scene {scenes[0]}: is in no scene's name; leave it out to see all")
+    rows = []
+    for line in HEAD:
+        click.echo(line)
+    for judged in judge(chosen, samples, device):
+        click.echo(_line(judged.row))
+        rows.append(judged.row)
+        if pictures is not None and judged.ours is not None:
+            _write_pictures(pictures / f"{judged.row['scene'].replace('/', '.')}.png", judged.ours, judged.theirs)
+    results = [row["result"] for row in rows]
+    click.echo("  " + ", ".join(f"{results.count(word)} {word}" for word in dict.fromkeys(results)))
+    if json_file is not None:
+        write_report(json_file, {"scenes": rows})
+        click.echo(str(json_file))
+    if {"failed", "not read"} & {*results}:
+        raise SystemExit(1)
+
+
+HEAD = [f"{'':62}{'result':10}{'rejected':>10}  {'mean over the reference’s':26}{'noise':>8}{'blocks':>9}{'p':>9}",
+        "  rejected: pixels and channels that are further off than chance, at most 0.25 % for a pass;",
+        "  noise: standard error of a block of 8x8 pixels; blocks: off by more than chance, of all; p: of the least",
+        "  likely one, corrected for their number"]
+
+
+def _line(row: Mapping[str, Any]) -> str:
+    if row["missing"]:
+        return f"{row['scene']:62}{row['result']}: {', '.join(row['missing'])}"
+    means = " ".join(f"{ratio:.5f}" for ratio in row["mean_ratio"])
+    blocks = f"{row['blocks_rejected']}/{row['blocks']}"
+    return (f"{row['scene']:62}{row['result']:10}{row['rejected'] / row['tests']:10.3%}  {means:26}{row['noise']:8.3%}"
+            f"{blocks:>9}{row['block_p']:9.2g}" + "".join(f"  {each}" for each in row["differences"]))
+
+
+def _write_pictures(path: Path, ours: Any, theirs: Any) -> None:
+    import numpy as np
+
+    from ..output.image import Image
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image(np.concatenate([ours, theirs, 4 * np.abs(ours - theirs)], axis=1), {}).save(path)

@@ -1,0 +1,140 @@
+"""Scenes of github.com/mitsuba-renderer/mitsuba-data beside their references, as Mitsuba's own test_renders.py does.
+
+Each reference is a mean over REFERENCE_SPP samples with the variance of one, pixel by pixel. A picture of BUDGET samples
+passes by Mitsuba's rule if at most 1 − ACCEPTED of its pixels and channels are further off than chance allows at
+LEVEL, corrected for their number (Šidák). That leaves biases of a pixel's standard error unseen; so the mean luminances
+of blocks are tested as well, by the spread of pictures with different seeds. (Not their colors: white is 1.0011, 0.9997,
+0.9997 in the references of white skies.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.discover import choose
+from ..errors import SceneError, UsageError
+from ..scene.cie import RGB_FROM_XYZ
+from ..scene.mitsuba_reader import MitsubaScene, read_mitsuba
+from ..scene.mitsuba_xml import UnsupportedError
+from ..scene.pictures import read_picture
+from ..scene.validate import validate
+from .agreement import block_means
+from .bias import ROUNDING
+from .contestants import choices_on
+from .significance import FAMILY, corrected, mean_test, sidak, t_test
+
+Doubles = NDArray[np.float64]
+
+#: Mitsuba's own: samples of a picture, of a reference, the least variance that is believed, significance, and what
+#: part of the pixels and channels must pass.
+BUDGET, REFERENCE_SPP, LEAST_VARIANCE, LEVEL, ACCEPTED = 2_000_000, 32_000, 1e-4, 0.01, 0.9975
+#: Pictures with seeds of their own that the budget is split into, and pixels along a block's side.
+SEEDS, BLOCK = 16, 8
+
+
+class Case(NamedTuple):
+    """A scene, and the pictures of its mean and its variance in linear Rec. 709."""
+
+    scene: Path
+    mean: Path
+    variance: Path
+
+    @property
+    def name(self) -> str:
+        """Folder and file, without ending."""
+        return f"{self.scene.parent.name}/{self.scene.stem}"
+
+
+class Judged(NamedTuple):
+    """A line of the table, and ours beside theirs, (h, w, 3) each, where there is a picture."""
+
+    row: dict[str, Any]
+    ours: NDArray[np.float32] | None = None
+    theirs: NDArray[np.float32] | None = None
+
+
+def cases(folder: Path) -> list[Case]:
+    """Those of a checkout: scenes that have a reference. UsageError where there are none."""
+    found = []
+    for scene in sorted((folder / "tests" / "scenes").glob("*/*.xml")):
+        stem = scene.parent / "refs" / f"{scene.stem.rpartition('_')[0]}_ref_rgb"
+        case = Case(scene, stem.with_suffix(".exr"), stem.with_name(stem.name + "_var.exr"))
+        if case.mean.is_file() and case.variance.is_file():
+            found.append(case)
+    if not found:
+        raise UsageError(f"{folder}: has no tests/scenes with references; clone github.com/mitsuba-renderer/mitsuba-data")
+    return found
+
+
+def judge(found: list[Case], budget: int = BUDGET, device: str | int | None = None) -> Iterator[Judged]:
+    """Each case in turn: rendered and tested, or what it needs that clrt lacks."""
+    number = choose(device)[0].index
+    for case in found:
+        row: dict[str, Any] = {"scene": case.name}
+        try:
+            read = read_mitsuba(case.scene)
+            validate(read.scene)
+        except UnsupportedError as error:
+            yield Judged(row | {"result": "not expressible", "missing": error.features, "problems": error.problems})
+        except SceneError as error:
+            yield Judged(row | {"result": "not read", "missing": [str(error)], "problems": error.problems})
+        else:
+            yield _rendered(row, case, read, budget, number)
+
+
+def _rendered(row: dict[str, Any], case: Case, read: MitsubaScene, budget: int, device: int) -> Judged:
+    theirs, variance = read_picture(case.mean), read_picture(case.variance)
+    height, width = theirs.shape[:2]
+    if read.scene.render.size != (width, height):
+        raise UsageError(f"{case.mean}: has {width}x{height} pixels, but its scene {read.scene.render.size}")
+    spp = max(budget // (width * height) // SEEDS, 1)
+    renderer = choices_on(read.scene, [device], {"clrt": {}})["clrt"]
+    pictures = np.array([renderer(spp, seed).pixels for seed in range(SEEDS)], np.float64)
+    row |= {"result": "failed", "missing": [], "differences": read.differences, "size": [width, height],
+            "spp": spp * SEEDS}
+    row |= pixel_test(_xyz(pictures.mean(0)), _xyz(theirs), _xyz(variance), spp * SEEDS)
+    row |= block_test(_xyz(pictures), _xyz(theirs), _xyz(variance))
+    row |= {"mean_ratio": _ratio(pictures.mean((0, 1, 2)), theirs.astype(np.float64).mean((0, 1)))}
+    if row["passes"]:
+        row["result"] = "passed"
+    return Judged(row, pictures.mean(0).astype(np.float32), theirs)
+
+
+def pixel_test(ours: Doubles, theirs: Doubles, variance: Doubles, spp: int) -> dict[str, Any]:
+    """Mitsuba's rule for pictures (h, w, 3) in XYZ. passes; rejected, tests: pixels and channels."""
+    p = mean_test(ours, np.maximum(variance, LEAST_VARIANCE), spp, theirs)
+    rejected = np.count_nonzero(p <= sidak(LEVEL, p.size // 3))
+    return {"passes": bool(p.size - rejected >= ACCEPTED * p.size), "rejected": int(rejected), "tests": p.size}
+
+
+def block_test(ours: Doubles, theirs: Doubles, variance: Doubles) -> dict[str, Any]:
+    """The same reference beside the means of blocks in pictures with different seeds, (seeds, h, w, 3).
+
+    block_p: the least p-value by Student's t, corrected; blocks_rejected of `blocks`; noise: the median standard error
+    of a block over its mean.
+    """
+    own = np.array([block_means(each, BLOCK)[..., 1] for each in ours])
+    expected = block_means(theirs, BLOCK)[..., 1]
+    squared = own.var(0) / (len(own) - 1) + (ROUNDING * expected) ** 2 + block_means(
+        np.maximum(variance, 0), BLOCK)[..., 1] / (BLOCK**2 * REFERENCE_SPP)
+    difference = own.mean(0) - expected
+    error = np.sqrt(squared)
+    t = np.divide(difference, error, out=np.zeros_like(difference), where=error > 0)
+    p = np.array([corrected(t_test(each, len(own) - 1), t.size) for each in t.ravel().tolist()]).reshape(t.shape)
+    p[(error == 0) & (difference != 0)] = 0
+    lit = expected > 0
+    return {"block_p": float(p.min()), "blocks": p.size, "blocks_rejected": int(np.count_nonzero(p < FAMILY)),
+            "noise": float(np.median(error[lit] / expected[lit])) if lit.any() else 0.0}
+
+
+def _xyz(pixels: NDArray[Any]) -> Doubles:
+    return np.asarray(pixels.astype(np.float64) @ np.linalg.inv(RGB_FROM_XYZ).T)
+
+
+def _ratio(ours: Doubles, theirs: Doubles) -> list[float]:
+    return np.divide(ours, theirs, out=np.ones(3), where=theirs > 0).tolist()
