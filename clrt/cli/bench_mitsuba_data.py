@@ -59,12 +59,13 @@ HEAD = [f"{'':62}{'result':10}{'rejected':>10}  {'mean over the reference’s':2
 
 
 def _line(row: Mapping[str, Any]) -> str:
-    if row["missing"]:
+    if "tests" not in row:
         return f"{row['scene']:62}{row['result']}: {', '.join(row['missing'])}"
     means = " ".join(f"{ratio:.5f}" for ratio in row["mean_ratio"])
     blocks = f"{row['blocks_rejected']}/{row['blocks']}"
+    missing = f"  {row['judged']:.0%} of the pixels, without {', '.join(row['missing'])}" if row["missing"] else ""
     return (f"{row['scene']:62}{row['result']:10}{row['rejected'] / row['tests']:10.3%}  {means:26}{row['noise']:8.3%}"
-            f"{blocks:>9}{row['block_p']:9.2g}" + "".join(f"  {each}" for each in row["differences"]))
+            f"{blocks:>9}{row['block_p']:9.2g}{missing}" + "".join(f"  {each}" for each in row["differences"]))
 
 
 def _write_pictures(path: Path, ours: Any, theirs: Any) -> None:

@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 def load(path: str | Path, camera: str | None = None) -> Scene:
-    """The scene in a .toml or Mitsuba's .xml file, or a model file's meshes with a camera that frames them, a sky and a sun.
+    """The scene in a .toml or Mitsuba's .xml file, or a model file's meshes under a sky and a sun before a camera.
 
     A glTF model's own first camera and lights are used if it has any. camera: the name of one in a model file instead.
     Raises one SceneError with all mistakes in the file, each as "FILE: object: value is wrong; remedy".
@@ -73,7 +73,7 @@ def _load_mitsuba(path: Path) -> tuple[Scene, list[str]]:
     """The scene, whose models that are near Mitsuba's and not the same are logged."""
     from .mitsuba_reader import read_mitsuba
     try:
-        scene, differences = read_mitsuba(path)
+        scene, differences, _ = read_mitsuba(path)
     except SceneError as error:
         raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
     for difference in differences:

@@ -71,7 +71,7 @@ class MaterialReader:
 
     def _normalmap(self, plugin: Plugin) -> Look:
         if plugin.value("use_shadowing_function", bool, True):
-            self.differences.append(f"{plugin.where}: bent normals without Mitsuba's shadowing function")
+            self.differences.append(f"{plugin.where}: normal map without Mitsuba's shadowing function")
         plugin.value("flip_invalid_normals", bool, True)
         look = self.look(_only(plugin))
         normals = self._textures.normals(plugin, "normalmap")
@@ -108,7 +108,10 @@ class MaterialReader:
             plugin.refuse(f'material "{name}" is not known', f"write eta and k, or one of {', '.join(METALS)}",
                           f"metal {name}")
         eta, k = METALS[name] if name else (rgb(plugin.color("eta", 0.0)), rgb(plugin.color("k", 1.0)))
-        return Look(Conductor(eta=eta, k=k, roughness=0.0 if plugin.kind == "conductor" else self._roughness(plugin)))
+        if plugin.kind == "roughconductor":
+            return Look(Conductor(eta=eta, k=k, roughness=self._roughness(plugin)))
+        self.differences.append(f"{plugin.where}: smooth metal has alpha 0.0001, and shows lights without a size")
+        return Look(Conductor(eta=eta, k=k, roughness=0.0))
 
     def _roughness(self, plugin: Plugin) -> float:
         """√alpha, of GGX with one alpha."""

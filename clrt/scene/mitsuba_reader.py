@@ -11,6 +11,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from ..errors import SceneError
+from .material import Material
 from .mitsuba_lights import environment, light
 from .mitsuba_materials import MaterialReader
 from .mitsuba_shapes import ShapeReader
@@ -39,27 +40,30 @@ IMMATERIAL = {"rr_depth", "near_clip", "far_clip", "pixel_format", "component_fo
 
 
 class MitsubaScene(NamedTuple):
-    """differences: where a model of clrt is near Mitsuba's and not the same, a sentence each."""
+    """differences: where a model of clrt is near Mitsuba's and not the same, a sentence each. missing: what the
+    materials lack that others stand in for, by the name of the mesh or sphere."""
 
     scene: Scene
     differences: list[str]
+    missing: dict[str, list[str]]
 
 
-def read_mitsuba(path: Path) -> MitsubaScene:
+def read_mitsuba(path: Path, stand_in: Material | None = None) -> MitsubaScene:
     """The scene in an XML file of Mitsuba 3, as its `rgb` variants render it.
 
-    Raises SceneError for what is malformed, and UnsupportedError with all that clrt has no counterpart for.
+    stand_in: instead of materials that are not supported. Raises SceneError for what is malformed, and UnsupportedError
+    with all that clrt has no counterpart for.
     """
-    return _Reader().scene(read_xml(path), path.stem)
+    return _Reader(stand_in).scene(read_xml(path), path.stem)
 
 
 class _Reader:
-    def __init__(self) -> None:
+    def __init__(self, stand_in: Material | None) -> None:
         self._problems: list[str] = []
         self._features: list[str] = []
         textures = TextureReader()
         self._materials = MaterialReader(textures)
-        self._shapes = ShapeReader(textures, self._materials)
+        self._shapes = ShapeReader(textures, self._materials, stand_in)
 
     def scene(self, root: Plugin, name: str) -> MitsubaScene:
         parts = [part for plugin in root.all("shape") for part in self._tried(self._parts, plugin) or []]
@@ -77,7 +81,7 @@ class _Reader:
             camera = self._tried(lambda plugin: _camera(plugin, settings.size), sensor) or camera
         for integrator in root.all("integrator"):
             settings = self._tried(lambda plugin: _integrator(plugin, settings), integrator) or settings
-        if not self._problems:
+        if not self._problems and not self._shapes.missing:
             self._note_unread(root)
         if self._features:
             raise UnsupportedError(self._problems, self._features)
@@ -86,7 +90,7 @@ class _Reader:
         scene = Scene(meshes=_of(parts, Mesh), spheres=_of(parts, Sphere), instances=_of(parts, Instance),
                       lights=[each for each in lights if each], environment=next(filter(None, skies), Environment()),
                       camera=camera, render=settings, name=name)
-        return MitsubaScene(scene, self._materials.differences)
+        return MitsubaScene(scene, self._materials.differences, self._shapes.missing)
 
     def _parts(self, plugin: Plugin) -> list[Mesh | Sphere | Instance]:
         return list(self._shapes.parts(plugin))

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import SceneError
+from .material import Material
 from .mitsuba_materials import Look, MaterialReader, absorbing
 from .mitsuba_primitives import cube, cylinder, disk, rectangle, sphere
 from .mitsuba_textures import Attribute, TextureReader
 from .mitsuba_values import Doubles, look_at
-from .mitsuba_xml import Plugin
+from .mitsuba_xml import Plugin, UnsupportedError
 from .meshes import read_model
 from .model import FloatArray, Instance, Mesh, Sphere
 from .normals import smooth_normals
@@ -31,11 +32,17 @@ Attributes = Mapping[str, FloatArray]
 
 
 class ShapeReader:
-    """Reads the shapes of one scene."""
+    """Reads the shapes of one scene.
 
-    def __init__(self, textures: TextureReader, materials: MaterialReader) -> None:
+    stand_in: a material for shapes whose own is not supported; without one these are refused. missing: what these
+    lack, by the name of the mesh or sphere.
+    """
+
+    def __init__(self, textures: TextureReader, materials: MaterialReader, stand_in: Material | None) -> None:
         self._textures = textures
         self._materials = materials
+        self._stand_in = stand_in
+        self.missing: dict[str, list[str]] = {}
         self._groups: dict[Plugin, list[Part]] = {}
 
     def parts(self, plugin: Plugin) -> Iterator[Part | Instance]:
@@ -67,6 +74,16 @@ class ShapeReader:
             yield _dressed(transform_mesh(mesh, to_world), look, attributes, plugin)
 
     def _look(self, plugin: Plugin) -> Look:
+        """Of the shape's BSDF and what is inside; or what stands in for it."""
+        try:
+            return self._own_look(plugin)
+        except UnsupportedError as error:
+            if self._stand_in is None:
+                raise
+            self.missing[plugin.where] = error.features
+            return Look(self._stand_in)
+
+    def _own_look(self, plugin: Plugin) -> Look:
         bsdfs = plugin.all("bsdf")
         look = self._materials.look(bsdfs[-1] if bsdfs else None)
         for medium in plugin.all("medium"):
