@@ -52,7 +52,7 @@ def mitsuba_data_command(folder: Path, scenes: tuple[str, ...], samples: int, pi
         raise SystemExit(1)
 
 
-HEAD = [f"{'':62}{'result':10}{'rejected':>10}  {'mean over the reference’s':26}{'noise':>8}{'blocks':>9}{'p':>9}",
+HEAD = [f"{'':67}{'result':10}{'rejected':>10}  {'mean over the reference’s':26}{'noise':>8}{'blocks':>9}{'p':>9}",
         "  rejected: pixels and channels that are further off than chance, at most 0.25 % for a pass;",
         "  noise: standard error of a block of 8x8 pixels; blocks: off by more than chance, of all; p: of the least",
         "  likely one, corrected for their number"]
@@ -60,11 +60,11 @@ HEAD = [f"{'':62}{'result':10}{'rejected':>10}  {'mean over the reference’s':2
 
 def _line(row: Mapping[str, Any]) -> str:
     if "tests" not in row:
-        return f"{row['scene']:62}{row['result']}: {', '.join(row['missing'])}"
+        return f"{row['scene']:67}{row['result']}: {', '.join(row['missing'])}"
     means = " ".join(f"{ratio:.5f}" for ratio in row["mean_ratio"])
     blocks = f"{row['blocks_rejected']}/{row['blocks']}"
     missing = f"  {row['judged']:.0%} of the pixels, without {', '.join(row['missing'])}" if row["missing"] else ""
-    return (f"{row['scene']:62}{row['result']:10}{row['rejected'] / row['tests']:10.3%}  {means:26}{row['noise']:8.3%}"
+    return (f"{row['scene']:67}{row['result']:10}{row['rejected'] / row['tests']:10.3%}  {means:26}{row['noise']:8.3%}"
             f"{blocks:>9}{row['block_p']:9.2g}{missing}" + "".join(f"  {each}" for each in row["differences"]))
 
 

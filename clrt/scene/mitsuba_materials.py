@@ -40,10 +40,8 @@ class MaterialReader:
         self._looks: dict[Plugin, Look] = {}
         self.differences: list[str] = []
 
-    def look(self, plugin: Plugin | None) -> Look:
-        """Of a <bsdf>, or where there is none Mitsuba's default."""
-        if plugin is None:
-            return Look(Diffuse(color=(0.5, 0.5, 0.5)))
+    def look(self, plugin: Plugin) -> Look:
+        """Of a <bsdf>."""
         if plugin not in self._looks:
             if plugin.kind not in BSDFS:
                 plugin.refuse_kind(", ".join(sorted(BSDFS)))

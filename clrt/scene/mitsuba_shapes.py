@@ -13,13 +13,14 @@ from .material import Material
 from .mitsuba_materials import Look, MaterialReader, absorbing
 from .mitsuba_primitives import cube, cylinder, disk, rectangle, sphere
 from .mitsuba_textures import Attribute, TextureReader
-from .mitsuba_values import Doubles, look_at
+from .mitsuba_values import Doubles
 from .mitsuba_xml import Plugin, UnsupportedError
+from .materials import Diffuse
 from .meshes import read_model
 from .model import FloatArray, Instance, Mesh, Sphere
 from .normals import smooth_normals
 from .ply import ply_records
-from .transform import transform_mesh
+from .transform import transform_mesh, unit
 from .validate import index_problems
 
 PRIMITIVES: dict[str, Callable[[], Mesh]] = {
@@ -85,7 +86,8 @@ class ShapeReader:
 
     def _own_look(self, plugin: Plugin) -> Look:
         bsdfs = plugin.all("bsdf")
-        look = self._materials.look(bsdfs[-1] if bsdfs else None)
+        grey = 0.0 if plugin.all("emitter") else 0.5  # as Mitsuba takes them where a shape has no BSDF
+        look = self._materials.look(bsdfs[-1]) if bsdfs else Look(Diffuse(color=(grey, grey, grey)))
         for medium in plugin.all("medium"):
             look = look._replace(material=absorbing(look.material, medium))
         return look
@@ -130,14 +132,18 @@ def _ball(plugin: Plugin) -> Doubles:
 
 
 def _between(plugin: Plugin) -> Doubles:
-    """From p0 to p1, of a cylinder along z."""
+    """From p0 to p1, of a cylinder along z, turned about it as Duff et al. 2017 ("Building an Orthonormal Basis,
+    Revisited") turn the other axes."""
     start, end = np.array(plugin.point("p0") or (0, 0, 0)), np.array(plugin.point("p1") or (0, 0, 1))
     radius, along = plugin.value("radius", float, 1.0), end - start
-    up = (1, 0, 0) if abs(along[0]) < 0.9 * np.linalg.norm(along) else (0, 1, 0)
-    try:
-        frame = look_at(start, end, np.array(up, np.float64))
-    except ValueError:
-        raise SceneError(f"{plugin.where}: p0 and p1 are one point; move one") from None
+    x, y, z = unit(along).tolist()
+    if not along.any():
+        raise SceneError(f"{plugin.where}: p0 and p1 are one point; move one")
+    sign = 1.0 if z >= 0 else -1.0
+    a = -1 / (sign + z)
+    frame = np.eye(4)
+    frame[:3] = np.column_stack([(1 + sign * x * x * a, sign * x * y * a, -sign * x), (x * y * a, sign + y * y * a, -y),
+                                 (x, y, z), start])
     return frame @ np.diag([radius, radius, float(np.linalg.norm(along)), 1.0])
 
 

@@ -99,7 +99,7 @@ class TextureReader:
         return self._pictures[file, curve]
 
     def _checkerboard(self, plugin: Plugin, *, encoded: bool) -> Texture:
-        """Two by two texels, with factors by which 8 bits hold both colors to some 1e-5."""
+        """Two by two texels, with factors that make the brighter color exact and the other near to what 8 bits hold."""
         first, second = (rgb(plugin.color(name, value), bounded=True)
                          for name, value in (("color0", 0.4), ("color1", 0.2)))
         if not encoded:  # of numbers Mitsuba 3 exchanges the two

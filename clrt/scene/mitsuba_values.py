@@ -114,8 +114,10 @@ def _rotate(attributes: Attributes) -> Doubles:
     return matrix
 
 
-def look_at(origin: Doubles, target: Doubles, up: Doubles) -> Doubles:
+def _look_at(attributes: Attributes) -> Doubles:
     """From local axes, +z forward, +y up and +x to the left, to the world."""
+    texts = attributes["origin"], attributes["target"], attributes.get("up", "0 1 0")
+    origin, target, up = (np.array(vector({"value": text})) for text in texts)
     forward = unit(target - origin)
     left = unit(np.cross(up, forward))
     if not (forward.any() and left.any()):
@@ -123,11 +125,6 @@ def look_at(origin: Doubles, target: Doubles, up: Doubles) -> Doubles:
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([left, np.cross(forward, left), forward, origin])
     return matrix
-
-
-def _look_at(attributes: Attributes) -> Doubles:
-    up = attributes.get("up", "0 1 0")
-    return look_at(*(np.array(vector({"value": text})) for text in (attributes["origin"], attributes["target"], up)))
 
 
 def _matrix(attributes: Attributes) -> Doubles:

@@ -99,14 +99,24 @@ def _read(path: Path) -> MitsubaScene:
     shows what they reflect. UnsupportedError where these are all that the scene shows."""
     try:
         read = read_mitsuba(path)
-    except UnsupportedError:
-        read = read_mitsuba(path, BLACK)
-        shown = [part.name for part in (*read.scene.meshes, *read.scene.spheres) if not any(part.material.radiance)]
-        direct = read.scene.render.integrator == "direct" or read.scene.render.max_depth <= 2
-        if not direct or read.scene.instances or {*shown} <= {*read.missing}:
+    except UnsupportedError as error:
+        try:
+            read = read_mitsuba(path, BLACK)
+        except UnsupportedError:
+            raise error from None
+        if not _judges_others(read):
             raise
     validate(read.scene)
     return read
+
+
+def _judges_others(read: MitsubaScene) -> bool:
+    """Whether surfaces are shown that nothing stands in for, and do not depend on those that something does."""
+    scene = read.scene
+    parts: list[Mesh | Sphere] = [*scene.meshes, *scene.spheres]
+    shown = {part.name for part in parts if not any(part.material.radiance)}
+    direct = scene.render.integrator == "direct" or scene.render.max_depth <= 2
+    return direct and not scene.instances and not shown <= {*read.missing}
 
 
 def _shown(read: MitsubaScene, device: int) -> NDArray[np.bool_]:
@@ -121,8 +131,8 @@ def _shown(read: MitsubaScene, device: int) -> NDArray[np.bool_]:
     mask = replace(scene, meshes=[*map(masked, scene.meshes)], spheres=[*map(masked, scene.spheres)],
                    render=replace(scene.render, integrator="albedo"))
     seen = np.pad(choices_on(mask, [device], {"mask": {}})["mask"](MASK_SPP, 0).pixels.max(axis=2) > 0, 1)
-    height, width = seen.shape
-    return ~np.any([seen[y:height - 2 + y, x:width - 2 + x] for y in range(3) for x in range(3)], axis=0)
+    around = [seen[y:seen.shape[0] - 2 + y, x:seen.shape[1] - 2 + x] for y in range(3) for x in range(3)]
+    return np.asarray(~np.any(around, axis=0))
 
 
 def _rendered(row: dict[str, Any], case: Case, read: MitsubaScene, budget: int, device: int) -> Judged:
@@ -134,11 +144,12 @@ def _rendered(row: dict[str, Any], case: Case, read: MitsubaScene, budget: int, 
     renderer = choices_on(read.scene, [device], {"clrt": {}})["clrt"]
     pictures = np.array([renderer(spp, seed).pixels for seed in range(SEEDS)], np.float64)
     shown = _shown(read, device) if read.missing else np.ones((height, width), np.bool_)
-    pictures, theirs, variance = (array * shown[..., None] for array in (pictures, theirs, variance))
+    for array in (pictures, theirs, variance):
+        array[..., ~shown, :] = 0
     row |= {"result": "failed", "differences": read.differences, "size": [width, height], "spp": spp * SEEDS,
             "missing": list(dict.fromkeys(each for features in read.missing.values() for each in features)),
             "judged": float(shown.mean())}
-    row |= pixel_test(*(_xyz(array[shown]) for array in (pictures.mean(0), theirs, variance)), spp=spp * SEEDS)
+    row |= pixel_test(spp * SEEDS, *(_xyz(array[shown]) for array in (pictures.mean(0), theirs, variance)))
     row |= block_test(_xyz(pictures), _xyz(theirs), _xyz(variance))
     row |= {"mean_ratio": _ratio(pictures.mean((0, 1, 2)), theirs.astype(np.float64).mean((0, 1)))}
     if row["passes"]:
@@ -146,7 +157,7 @@ def _rendered(row: dict[str, Any], case: Case, read: MitsubaScene, budget: int, 
     return Judged(row, pictures.mean(0).astype(np.float32), theirs)
 
 
-def pixel_test(ours: Doubles, theirs: Doubles, variance: Doubles, spp: int) -> dict[str, Any]:
+def pixel_test(spp: int, ours: Doubles, theirs: Doubles, variance: Doubles) -> dict[str, Any]:
     """Mitsuba's rule for pixels (n, 3) in XYZ. passes; rejected, tests: pixels and channels."""
     p = mean_test(ours, np.maximum(variance, LEAST_VARIANCE), spp, theirs)
     rejected = np.count_nonzero(p <= sidak(LEVEL, p.size // 3))
@@ -179,4 +190,5 @@ def _xyz(pixels: NDArray[Any]) -> Doubles:
 
 
 def _ratio(ours: Doubles, theirs: Doubles) -> list[float]:
-    return np.divide(ours, theirs, out=np.ones(3), where=theirs > 0).tolist()
+    ratios: list[float] = np.divide(ours, theirs, out=np.ones(3), where=theirs > 0).tolist()
+    return ratios

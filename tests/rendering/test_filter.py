@@ -17,16 +17,17 @@ from clrt.study.significance import rejected
 from .pictures import film, pixel_p_values, quad
 
 DENSITIES = {"box": lambda t: float(abs(t) < 0.5), "tent": lambda t: max(0.0, 1 - abs(t)),
-             "blackman_harris": lambda t: float(np.interp(t, np.linspace(-1.5, 1.5, 4097), blackmanharris(4097), 0, 0))}
+             "blackman_harris": lambda t: float(np.interp(t, np.linspace(-1.5, 1.5, 4097), blackmanharris(4097), 0, 0)),
+             "gaussian": lambda t: max(0.0, float(np.exp(-2 * t * t) - np.exp(-8)))}
 
 
 def coverage(name: str, places: np.ndarray) -> np.ndarray:
     """The part of a filter around 0 left of each place, in pixels."""
     def part(end: float) -> float:
         kinks = [p for p in (-1, -0.5, 0, 0.5, 1) if p < end]
-        return float(integral(DENSITIES[name], -1.5, end, points=kinks, limit=200)[0])
+        return float(integral(DENSITIES[name], -2, end, points=kinks, limit=200)[0])
 
-    return np.array([part(place) for place in places]) / part(1.5)
+    return np.array([part(place) for place in places]) / part(2)
 
 
 @pytest.mark.parametrize("name", FILTERS)
