@@ -64,8 +64,9 @@ def _line(row: Mapping[str, Any]) -> str:
     means = " ".join(f"{ratio:.5f}" for ratio in row["mean_ratio"])
     blocks = f"{row['blocks_rejected']}/{row['blocks']}"
     missing = f"  {row['judged']:.0%} of the pixels, without {', '.join(row['missing'])}" if row["missing"] else ""
+    differences = dict.fromkeys(each.partition(": ")[2] for each in row["differences"])
     return (f"{row['scene']:67}{row['result']:10}{row['rejected'] / row['tests']:10.3%}  {means:26}{row['noise']:8.3%}"
-            f"{blocks:>9}{row['block_p']:9.2g}{missing}" + "".join(f"  {each}" for each in row["differences"]))
+            f"{blocks:>9}{row['block_p']:9.2g}{missing}" + "".join(f"  {each}" for each in differences))
 
 
 def _write_pictures(path: Path, ours: Any, theirs: Any) -> None:

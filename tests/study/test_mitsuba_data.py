@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from math import pi
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from numpy.typing import NDArray
 
+from clrt.cli.bench_mitsuba_data import mitsuba_data_command
 from clrt.errors import UsageError
 from clrt.output.image import Image
 from clrt.scene.mitsuba_reader import read_mitsuba
+from clrt.scene.pictures import read_texels
 from clrt.study.agreement import compared, means_of
 from clrt.study.contestants import Picture, choices_on
 from clrt.study.mitsuba_data import block_test, cases, judge, pixel_test
@@ -148,3 +152,15 @@ def test_mitsuba_reads_the_same_scene(tmp_path: Path) -> None:
     ours = choices_on(read.scene, [0], {"clrt": {}})["clrt"]
     told = compared(means_of(ours, 64, range(8)), means_of(other, 64, range(8)))
     assert not told["rejected"] and told["mean_ratio"] == pytest.approx([1, 1, 1], abs=0.005), told
+
+
+@pytest.mark.parametrize(("change", "code"), [(1.0, 0), (1.2, 1)])
+def test_the_command_fails_where_a_scene_does(tmp_path: Path, change: float, code: int) -> None:
+    """And says so in a line, in the figures, and in a picture."""
+    folder = checkout(tmp_path / "data", np.tile(RADIANCE * change, (SIZE, SIZE, 1)))
+    done = CliRunner().invoke(mitsuba_data_command, [
+        str(folder), "--samples", str(samples(16)), "--json", str(tmp_path / "told.json"), "--pictures", str(tmp_path)])
+    (row,) = json.loads((tmp_path / "told.json").read_text())["scenes"]
+    assert (done.exit_code, row["result"]) == (code, "failed" if code else "passed"), done.output
+    assert ["wall/test_wall_path", row["result"]] in [line.split()[:2] for line in done.output.splitlines()]
+    assert read_texels(tmp_path / "wall.test_wall_path.png").shape == (SIZE, 3 * SIZE, 4)
