@@ -15,7 +15,7 @@ from clrt.scene.file import load
 from clrt.scene.materials import Conductor, Dielectric, Diffuse, Mirror
 from clrt.scene.mitsuba_lights import rows_at_middles
 from clrt.scene.mitsuba_primitives import cube, cylinder, disk, rectangle, sphere
-from clrt.scene.mitsuba_reader import read_mitsuba
+from clrt.scene.mitsuba_reader import MitsubaScene, read_mitsuba
 from clrt.scene.mitsuba_textures import _pair
 from clrt.scene.mitsuba_values import transform
 from clrt.scene.mitsuba_xml import UnsupportedError, read_xml
@@ -48,7 +48,8 @@ def test_steps_of_a_transform_are_taken_in_the_order_written() -> None:
     """A point through each step by itself, by scipy's rotations."""
     rng = np.random.default_rng(5)
     for _ in range(20):
-        axis, angle, offset, factors = rng.normal(size=3), rng.uniform(-360, 360), rng.normal(size=3), rng.normal(size=3)
+        axis, offset, factors = rng.normal(size=(3, 3))
+        angle = rng.uniform(-360, 360)
         steps = {"rotate": {"value": " ".join(map(str, axis)), "angle": str(angle)},
                  "translate": dict(zip("xyz", map(str, offset))),
                  "scale": {"value": ", ".join(map(str, factors))}}
@@ -82,7 +83,8 @@ def test_a_camera_looks_where_lookat_says_and_as_wide_as_fov_says(folder: Path) 
 def test_defaults_includes_references_and_paths(folder: Path) -> None:
     (folder / "parts").mkdir()
     (folder / "parts" / "look.xml").write_text(
-        '<scene version="3.0.0"><bsdf type="diffuse" id="red"><rgb name="reflectance" value="$shade, 0, 0"/></bsdf></scene>')
+        '<scene version="3.0.0"><bsdf type="diffuse" id="red">'
+        '<rgb name="reflectance" value="$shade, 0, 0"/></bsdf></scene>')
     read = scene(folder, """<default name="shade" value="0.25"/><default name="shade" value="0.75"/>
         <path value="parts"/><include filename="look.xml"/>
         <shape type="sphere"><ref id="red"/></shape><shape type="sphere"><ref id="red"/></shape>""")
@@ -128,7 +130,7 @@ def test_all_that_is_unsupported_is_listed(folder: Path) -> None:
     assert read.missing == {"shape[0]": ["bsdf hair"]} and len(read.scene.spheres) == 2
 
 
-def read_mitsuba_of(folder: Path, text: str) -> object:
+def read_mitsuba_of(folder: Path, text: str) -> MitsubaScene:
     (folder / "scene.xml").write_text(f"<scene version='3.0.0'>{text}</scene>")
     return read_mitsuba(folder / "scene.xml", Diffuse())
 
@@ -155,7 +157,8 @@ def test_materials(folder: Path) -> None:
 def test_a_blend_of_two_colors(folder: Path) -> None:
     colors = "".join(f'<bsdf type="diffuse"><rgb name="reflectance" value="{value}"/></bsdf>' for value in (0.2, 0.6))
     blend = f'<bsdf type="blendbsdf"><float name="weight" value="0.25"/>{colors}</bsdf>'
-    assert material(folder, blend) == Diffuse(color=pytest.approx((0.3, 0.3, 0.3)))
+    found = material(folder, blend)
+    assert isinstance(found, Diffuse) and found.color == pytest.approx((0.3, 0.3, 0.3))
 
 
 @settings(max_examples=200, deadline=None)
@@ -163,8 +166,8 @@ def test_a_blend_of_two_colors(folder: Path) -> None:
 def test_checkerboards_keep_both_colors(first: float, second: float, encoded: bool) -> None:
     """The brighter one to rounding, the other to half a step of 8 bits; those of the test scenes to 1e-4."""
     one, other, factor = _pair(first, second, encoded)
-    texels = np.array([one, other]) / 255
-    values = linear_from_srgb(texels.astype(np.float32)) if encoded else texels
+    texels = np.array([one, other], np.float32) / np.float32(255)
+    values = linear_from_srgb(texels) if encoded else texels
     assert 0 <= factor <= 1 and 0 <= min(one, other) and max(one, other) <= 255
     np.testing.assert_allclose(max(values) * factor, max(first, second), rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(values * factor, [first, second], atol=4.6e-3 if encoded else 2e-3)
@@ -173,7 +176,7 @@ def test_checkerboards_keep_both_colors(first: float, second: float, encoded: bo
 @pytest.mark.parametrize(("first", "second"), [(0.4, 0.2), (0.8, 0.1), (0.2, 0.4), (0.0, 0.3)])
 def test_common_checkerboards_are_exact(first: float, second: float) -> None:
     one, other, factor = _pair(first, second, True)
-    values = linear_from_srgb(np.array([one, other], np.float32) / 255) * factor
+    values = linear_from_srgb(np.array([one, other], np.float32) / np.float32(255)) * factor
     np.testing.assert_allclose(values, [first, second], atol=1e-4)
 
 
@@ -183,7 +186,8 @@ def test_textures_lie_as_to_uv_says(folder: Path) -> None:
     found = material(folder, bsdf)
     assert isinstance(found, Diffuse) and isinstance(found.color, Texture)
     turn = Rotation.from_euler("z", 30, degrees=True).as_matrix()[:2, :2]
-    np.testing.assert_allclose(found.color.to_picture, np.column_stack([turn @ np.diag([3, -2]), [0.1, 0.7]]), atol=1e-12)
+    expected = np.column_stack([turn @ np.diag([3, -2]), [0.1, 0.7]])
+    np.testing.assert_allclose(found.color.to_picture, expected, atol=1e-12)
 
 
 AREAS = [(rectangle, 4), (cube, 24), (sphere, 4 * np.pi), (disk, np.pi), (cylinder, 2 * np.pi)]
@@ -252,6 +256,7 @@ def test_attributes_of_a_mesh(folder: Path) -> None:
     texture = '<texture type="mesh_attribute" name="{}"><string name="name" value="{}"/></texture>'
     mesh = scene(folder, shape.format(f'<bsdf type="diffuse">{texture.format("reflectance", "vertex_color")}</bsdf>'
                                       )).meshes[0]
+    assert mesh.colors is not None and mesh.uv is not None and mesh.normals is not None
     np.testing.assert_allclose(mesh.colors, [(.1, .2, .3), (.4, .5, .6), (.7, .8, .9), (0, 0, 1)], rtol=1e-6)
     np.testing.assert_array_equal(mesh.uv, [(0, 0), (1, 0), (1, 1), (0, 1)])  # upright, unlike OBJ's
     np.testing.assert_allclose(mesh.normals, np.tile([0, 0, 1], (4, 1)), atol=1e-6)
@@ -259,6 +264,7 @@ def test_attributes_of_a_mesh(folder: Path) -> None:
                      for value in ("0 0 0", "1 .5 .5"))
     blend = f'<bsdf type="blendbsdf">{texture.format("weight", "face_weight")}{colors}</bsdf>'
     mesh = scene(folder, shape.format(blend)).meshes[0]
+    assert mesh.colors is not None
     np.testing.assert_allclose(mesh.colors, np.repeat([(.25, .125, .125), (1, .5, .5)], 3, axis=0))
     assert "face_weight" in problem(folder, shape.format(blend.replace("face_weight", "face_wait")))
 

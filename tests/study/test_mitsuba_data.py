@@ -71,7 +71,8 @@ def test_what_others_stand_in_for_is_left_out(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("more", "missing"), [
     (BALL.format('<bsdf type="hair"/>').replace("sphere", "torus"), ["shape torus"]),
-    ('<emitter type="spot"/>' + BALL.format('<bsdf type="hair"/>'), ["bsdf hair", "emitter spot"])], ids=["shape", "both"])
+    ('<emitter type="spot"/>' + BALL.format('<bsdf type="hair"/>'), ["bsdf hair", "emitter spot"])],
+    ids=["shape", "both"])
 def test_what_cannot_be_expressed_is_listed(tmp_path: Path, more: str, missing: list[str]) -> None:
     (judged,) = judge(cases(checkout(tmp_path, np.ones((SIZE, SIZE, 3)), more)), samples(1))
     assert judged.row["result"] == "not expressible" and sorted(judged.row["missing"]) == sorted(missing)
