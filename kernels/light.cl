@@ -30,10 +30,16 @@ static inline LightSample sample_of_light(const Scene *scene, ireal light, real3
     return sample;
 }
 
+// A light for each lane, and the probability of that choice; u is left for a point on it.
+static inline ireal chosen_light(const Scene *scene, real3 p, real3 n, Sampler *sampler, real2 *u, real *probability) {
+    *u = next_2d(sampler);
+    return pick_light(scene, p, n, sampler, &u->x, probability);
+}
+
 static inline LightSample light_sample(const Scene *scene, real3 p, real3 n, Sampler *sampler) {
     real probability;
-    real2 u = next_2d(sampler);
-    ireal light = pick_light(scene, p, n, sampler, &u.x, &probability);
+    real2 u;
+    ireal light = chosen_light(scene, p, n, sampler, &u, &probability);
     LightSample sample = sample_of_light(scene, light, p, u);
     sample.pdf *= probability;
     return sample;

@@ -59,6 +59,12 @@ def check_pixels(device: Device, pixels: NDArray[Any]) -> None:
         raise _refusal(device, turns, f"{np.count_nonzero(left)} of {left.size} pixels")
 
 
+def check_paths(device: Device, unfinished: int, paths: int) -> None:
+    """DeviceError where loops that followed `unfinished` of so many paths were ended."""
+    if unfinished:
+        raise _refusal(device, loop_turns(device) or 0, f"{unfinished} of {paths} paths")
+
+
 def _refusal(device: Device, turns: int, what: str) -> DeviceError:
     return DeviceError(f"{device.info.name} ({device.info.platform}): the driver ends all loops of a work-item after "
                        f"{turns} turns, and {what} of this scene need more; use another device, or make paths shorter "

@@ -1,0 +1,1 @@
+"""What the paths of one pixel meet: the answer to "why is it black?"."""

@@ -1,0 +1,43 @@
+"""The record of a path vertex, and why a path ends there (kernels/debug.cl)."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from ..device.preamble import defines, typedefs
+from ..device.records import record
+
+#: position … direction: world frame of the compiled scene. throughput: radiance at the eye over radiance here, on
+#: arrival. radiance: emission that arrives here; emission: its contribution. emitter: entry of the light table, or −1.
+#: light …: the light sample, where light is not −1; light_bsdf: f·|cos|; light_weight: its MIS weight; sent: whether it
+#: got a shadow ray; unshadowed, direct: its contribution without occluders and with them; blocker: a primitive, or −1.
+#: direction, weight, pdf, specular: the BSDF sample; weight: f·|cos|/pdf.
+VERTEX = record(position="3f4", distance="f4", geometric_normal="3f4", primitive="i4", shading_normal="3f4",
+                instance="i4", throughput="3f4", end="i4", radiance="3f4", front="i4", emission="3f4", emitter="i4",
+                light_direction="3f4", light="i4", light_radiance="3f4", light_probability="f4", light_bsdf="3f4",
+                light_pdf="f4", unshadowed="3f4", light_weight="f4", direct="3f4", blocker="i4", direction="3f4",
+                blocker_instance="i4", weight="3f4", pdf="f4", specular="i4", sent="i4", pad="2i4")
+
+
+class End(IntEnum):
+    """Why a path ends at a vertex. NONE: it goes on. SIDE: the BSDF sample is on the wrong side of the geometric
+    normal. LOOPS: the driver ended the kernel's loops (device.loops)."""
+
+    NONE = 0
+    ESCAPED = 1
+    DEPTH = 2
+    ABSORBED = 3
+    SIDE = 4
+    ROULETTE = 5
+    LOOPS = 6
+
+
+def vertex_preamble() -> str:
+    """What kernels/debug.cl needs defined: the record, its members by kind, and the numbers of End."""
+    lists = {"ROWS": np.dtype("3f4"), "REALS": np.dtype("f4"), "INTS": np.dtype("i4")}
+    members = {kind: [name for name in VERTEX.names or () if VERTEX[name] == of] for kind, of in lists.items()}
+    return "\n".join([
+        typedefs({"Vertex": VERTEX}), defines({f"END_{end.name}": int(end) for end in End}),
+        *(f"#define VERTEX_{kind}(X) {' '.join(f'X({name})' for name in names)}" for kind, names in members.items())])

@@ -1,0 +1,124 @@
+"""Traces the samples of one pixel on a device, and keeps every vertex of their paths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.arrays import empty_array
+from ..device.launch import wait_for
+from ..device.open import Device
+from ..device.program import make_kernel
+from ..errors import UsageError
+from ..rendering.adaptive import MOST_TIMES_PLANNED
+from ..rendering.choices import Choices, choices_on
+from ..rendering.compile import CompiledScene, compile_scene
+from ..rendering.features import WITH_LIGHT
+from ..rendering.loop_limit import check_paths
+from ..rendering.on_device import SceneOnDevice
+from ..rendering.session import depth_of, first_launch, first_launch_samples
+from ..scene.model import RenderSettings, Scene
+from .record import VERTEX, End, vertex_preamble
+
+#: Records of a launch, at most, but for those of a single sample.
+MOST_RECORDS = 1 << 15
+#: Samples of a brighter component, or one that is not finite, are dropped (kernels/film.cl).
+BRIGHTEST = np.float32(1e31)
+
+
+@dataclass(frozen=True)
+class PixelPaths:
+    """The paths of a pixel's samples, in order.
+
+    rows: (n,) VERTEX records, path by path, in the frame of the compiled scene. starts: (spp,) where each path begins.
+    values: (spp, 3) float32, the samples as the render adds them up.
+    """
+
+    scene: Scene
+    compiled: CompiledScene
+    pixel: tuple[int, int]
+    rows: NDArray[Any]
+    starts: NDArray[np.int64]
+    values: NDArray[np.float32]
+
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """(spp,) the samples that the film keeps: those that are finite."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.all(np.abs(self.values) <= BRIGHTEST, axis=1))
+
+    @property
+    def value(self) -> NDArray[np.float64]:
+        """(3,) the mean of the samples that are kept: the pixel of the render; 0 where none is."""
+        kept = self.values[self.kept].astype(np.float64)
+        return np.asarray(kept.mean(axis=0) if len(kept) else np.zeros(3))
+
+    @property
+    def depth(self) -> NDArray[np.int64]:
+        """(n,) the number of each vertex in its path, from 1."""
+        return np.arange(len(self.rows)) - np.repeat(self.starts, self.lengths) + 1
+
+    @property
+    def lengths(self) -> NDArray[np.int64]:
+        """(spp,) vertices of each path."""
+        return np.diff(np.append(self.starts, len(self.rows)))
+
+
+def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: Choices = Choices(),
+                lanes: int | None = None) -> PixelPaths:
+    """Trace all `scene.render.spp` samples of the pixel (column, row), counted from the upper left corner, as a render
+    with the scene's settings traces them.
+
+    choices, lanes: see `Renderer`. UsageError where the pixel is outside of the picture, or the integrator follows no
+    paths; SceneError, DeviceError and KernelError as of a render.
+    """
+    settings = scene.render
+    _check(settings, pixel)
+    compiled = compile_scene(scene, choices_on(device, choices, lanes), "debug.cl", device)
+    compiled = replace(compiled, preamble=f"{compiled.preamble}\n{vertex_preamble()}")
+    depth = depth_of(settings)
+    planned = settings.spp * (MOST_TIMES_PLANNED if settings.adaptive else 1)
+    launch = first_launch(compiled, settings.size, depth, settings.seed, planned)
+    launch["first_pixel"] = pixel[1] * settings.size[0] + pixel[0]
+    batch = min(settings.spp, max(1, min(first_launch_samples(compiled), MOST_RECORDS // depth)))
+    on_device = SceneOnDevice(device, compiled, launch, batch * depth * VERTEX.itemsize)
+    kernel = make_kernel(device, on_device.program, compiled.kernel)
+    with on_device.allocating():
+        records = empty_array(device, VERTEX, batch * depth)
+    rows, lengths, values = [], [], []
+    for first in range(0, settings.spp, batch):
+        count = min(batch, settings.spp - first)
+        launch["first_sample"], launch["sample_count"] = first, count
+        kernel.set_args(*on_device.scene_arguments, records.buffer, launch[0])
+        wait_for(on_device.enqueue(kernel, count))
+        paths = records.read(device).reshape(batch, depth)[:count]
+        check_paths(device, np.count_nonzero(paths["end"][:, 0] == End.LOOPS), count)
+        length = 1 + np.argmax(paths["end"] != End.NONE, axis=1)
+        used = np.arange(depth) < length[:, None]
+        rows.append(paths[used])
+        lengths.append(length)
+        values.append(_sums(paths, used))
+    starts = np.cumsum(np.concatenate(lengths)) - np.concatenate(lengths)
+    return PixelPaths(scene, compiled, pixel, np.concatenate(rows), starts, np.concatenate(values))
+
+
+def _check(settings: RenderSettings, pixel: tuple[int, int]) -> None:
+    width, height = settings.size
+    if settings.integrator not in WITH_LIGHT:
+        raise UsageError(f'integrator "{settings.integrator}" follows no paths; choose {" or ".join(WITH_LIGHT)}')
+    if not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
+        raise UsageError(f"pixel {pixel[0]},{pixel[1]} is outside of the picture of {width}x{height}; X must be 0 to "
+                         f"{width - 1} and Y 0 to {height - 1}, counted from the upper left corner")
+
+
+def _sums(paths: NDArray[Any], used: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """(count, 3) each path's contributions in float32, in the order in which the render adds them."""
+    total = np.zeros((len(paths), 3), np.float32)
+    with np.errstate(invalid="ignore", over="ignore"):
+        for depth in range(paths.shape[1]):
+            for part in ("emission", "direct"):
+                total += np.where(used[:, depth, None], paths[part][:, depth], np.float32(0))
+    return total

@@ -1,0 +1,180 @@
+// The paths of one pixel's samples, written down vertex by vertex: what path.cl follows, by the same stages of edge.cl, so
+// the contributions that are written add up to the samples of the render.
+//
+// A lane follows a sample, `sample_count` of them from first_sample on, through the pixel first_pixel. Each has room for
+// max_depth records. VERTEX_ROWS, VERTEX_REALS and VERTEX_INTS list the members of a record by their kind, and END_… why a
+// path ended; the host writes both (clrt/debug/record.py). What a stage drew but does not return is drawn again from a copy
+// of its sampler. World frame.
+#include "camera.cl"
+#include "edge.cl"
+#include "film.cl"
+
+#define MOST_VEILS 256   // that are looked through for what stops a shadow ray
+
+typedef struct {
+#define ROW_MEMBER(name) real3 name;
+#define REAL_MEMBER(name) real name;
+#define INT_MEMBER(name) ireal name;
+    VERTEX_ROWS(ROW_MEMBER)
+    VERTEX_REALS(REAL_MEMBER)
+    VERTEX_INTS(INT_MEMBER)
+} VertexLanes;
+
+static inline VertexLanes blank_vertex(void) {
+    VertexLanes v;
+#define BLANK_ROW(name) v.name = splat(ZERO);
+#define BLANK_REAL(name) v.name = ZERO;
+#define BLANK_INT(name) v.name = (ireal)(0);
+    VERTEX_ROWS(BLANK_ROW)
+    VERTEX_REALS(BLANK_REAL)
+    VERTEX_INTS(BLANK_INT)
+    v.primitive = v.emitter = v.light = v.blocker = (ireal)(-1);
+    return v;
+}
+
+static inline void store_vertex(global Vertex *to, const VertexLanes *v, int lane) {
+#define STORE_ROW(name) store_rows(to->name, &v->name, lane);
+#define STORE_REAL(name) to->name = LANE(v->name, lane);
+#define STORE_INT(name) to->name = LANE_INT(v->name, lane);
+    VERTEX_ROWS(STORE_ROW)
+    VERTEX_REALS(STORE_REAL)
+    VERTEX_INTS(STORE_INT)
+}
+
+static inline ireal flag(ireal mask) { return mask ? (ireal)(1) : (ireal)(0); }
+
+// Where the path arrived, and the emission that it finds there.
+static inline void note_arrival(const Scene *scene, const Path *path, const Surface *surface, const Hits *hits, ireal hit,
+                                ireal escaped, VertexLanes *v) {
+    v->throughput = at_eye(path, splat(ONE));
+    v->distance = hits->t;
+    v->primitive = hit ? hits->primitive : (ireal)(-1);
+    v->instance = hit ? hits->instance : (ireal)(0);
+    v->emission = add(emitted_light(scene, path, surface, hits->t, hit), escaped_light(scene, path, escaped));
+#if EMITTERS
+    real pdf;
+    v->emitter = hit ? surface->light : (ireal)(-1);
+    v->radiance = choose(hit, emitter_radiance(scene, path->p, path->n, path->wi, hits->t, surface, hit, &pdf), splat(ZERO));
+#endif
+#if ENVIRONMENT
+    if (ANY(escaped)) {
+        real3 wi = choose(escaped, path->wi, vector(ZERO, ONE, ZERO));
+        v->radiance = choose(escaped, environment_radiance(scene, wi), v->radiance);
+    }
+#endif
+}
+
+#if PRIMITIVES
+#if LIGHTS
+// What stops a shadow ray: the first surface on its way that lets nothing through.
+static inline Hits blocker_of(const Scene *scene, const ShadowRay *ray, ireal stopped) {
+    real3 from = ray->origin;
+    Hits hits;
+    for (int veil = 0; veil < MOST_VEILS; ++veil) {
+        real3 direction = choose(ray->infinite, ray->wi, sub(ray->target, from));
+        hits = closest_hit(scene, from, direction, ray->infinite ? (real)(INFINITY) : ONE, stopped);
+#if OPACITY
+        Surface surface = surface_at(scene, from, direction, &hits);
+        ireal passes = stopped & (hits.primitive >= 0) & (opacity_at(scene, &surface, direction) < 1.0f);
+        if (!ANY(passes)) break;
+        from = choose(passes, behind(&surface, direction), from);
+#else
+        break;
+#endif
+    }
+    return hits;
+}
+
+// The light that is sampled, and what it contributes.
+static inline void note_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
+                              ireal active, Sampler *sampler, VertexLanes *v) {
+    Sampler again = *sampler;
+    real3 n = choosing_normal(&shading->bsdf, shading->frame.n);
+    real2 u;
+    ireal light = chosen_light(scene, surface->p, n, &again, &u, &v->light_probability);
+    LightSample sample = sample_of_light(scene, light, surface->p, u);
+    real3 wi = to_local(shading->frame, sample.wi);
+    v->light = active ? light : (ireal)(-1);
+    v->light_direction = sample.wi;
+    v->light_radiance = sample.radiance;
+    v->light_pdf = sample.pdf * v->light_probability;
+    v->light_bsdf = bsdf_eval(&shading->bsdf, shading->wo, wi);
+    v->light_weight = sample.delta ? ONE : power_heuristic(v->light_pdf, bsdf_pdf(&shading->bsdf, shading->wo, wi));
+
+    ShadowRay shadow;
+    ireal sent = aim_at_light(scene, path, surface, shading, active, sampler, &shadow);
+    v->sent = flag(sent);
+    if (!ANY(sent)) return;
+    v->unshadowed = choose(sent, shadow.light, splat(ZERO));
+    v->direct = light_along(scene, &shadow, sent);
+    ireal stopped = sent & is_positive3(v->unshadowed) & !is_positive3(v->direct);
+    if (!ANY(stopped)) return;
+    Hits blocker = blocker_of(scene, &shadow, stopped);
+    v->blocker = stopped ? blocker.primitive : (ireal)(-1);
+    v->blocker_instance = stopped ? blocker.instance : (ireal)(0);
+}
+#endif
+
+// The direction in which the path goes on, or why it ends here.
+static inline ireal note_direction(Path *path, const Surface *surface, const Shading *shading, ireal active, int depth,
+                                   int max_depth, Sampler *sampler, VertexLanes *v) {
+    Sampler again = *sampler;
+    ireal goes = go_on(path, surface, shading, active, depth, max_depth, sampler);
+    v->end = goes ? (ireal)(END_NONE) : (ireal)(END_DEPTH);
+    if (sampler->dimension == again.dimension) return goes;   // a last edge, for which no direction was drawn
+    real2 u = next_2d(&again), choice = next_2d(&again);
+    BsdfSample sample = bsdf_sample(&shading->bsdf, shading->wo, u, choice.x);
+    v->direction = to_world(shading->frame, sample.wi);
+    v->weight = sample.weight;
+    v->pdf = sample.pdf;
+    v->specular = flag(sample.specular);
+    ireal drawn = (sample.pdf > 0.0f) & is_positive3(sample.weight);
+    ireal sided = keeps_its_side(&sample, dot3(v->direction, surface->ng));
+    ireal why = !drawn ? (ireal)(END_ABSORBED) : !sided ? (ireal)(END_SIDE) : (ireal)(END_ROULETTE);
+    v->end = goes ? (ireal)(END_NONE) : why;
+    return goes;
+}
+#endif
+
+__attribute__((vec_type_hint(real)))
+kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch) {
+    Scene scene = SCENE_ARGUMENTS;
+    uint first = (uint)get_global_id(0) * LANES;
+    if (first >= launch.sample_count) return;
+    ureal number = (ureal)(first) + LANE_INDEX;
+    ireal active = number < launch.sample_count;
+    ureal x = (ureal)(launch.first_pixel % launch.width), y = (ureal)(launch.first_pixel / launch.width);
+    Sampler sampler = sampler_at(pixel_code(x, y), launch.first_sample + number, launch.seed, launch.block_bits);
+    CameraRay ray = camera_ray(&scene, &launch, x, y, next_2d(&sampler), &sampler);
+    Path path = path_along(ray.origin, ray.direction);
+    for (int depth = 1; ANY(active); ++depth) {
+        VertexLanes v = blank_vertex();
+        Surface surface;
+        Hits hits = first_surface(&scene, &path.origin, path.wi, active, &sampler, &surface);
+        ireal arrived = active, hit = active & (hits.primitive >= 0);
+        absorb(&path, hit ? hits.t : (real)(INFINITY));
+        note_arrival(&scene, &path, &surface, &hits, hit, active & !hit, &v);
+        v.end = hit ? (ireal)(END_DEPTH) : (ireal)(END_ESCAPED);
+        active = NO_LANES;
+#if PRIMITIVES
+        Shading shading = shading_at(&scene, path.wi, &surface);
+        v.position = surface.p;
+        v.geometric_normal = surface.ng;
+        v.shading_normal = surface.ns;
+        v.front = flag(surface.front);
+        if (depth < launch.max_depth && ANY(hit)) {
+#if LIGHTS
+            note_light(&scene, &path, &surface, &shading, hit, &sampler, &v);
+#endif
+            active = note_direction(&path, &surface, &shading, hit, depth, launch.max_depth, &sampler, &v);
+            v.end = hit ? v.end : (ireal)(END_ESCAPED);
+        }
+#endif
+        for (int lane = 0; lane < LANES; ++lane)
+            if (LANE_INT(arrived, lane))
+                store_vertex(vertices + (first + lane) * launch.max_depth + depth - 1, &v, lane);
+    }
+    if (!loops_ended(2 + (launch.width == 0))) return;
+    for (uint lane = 0; lane < LANES && first + lane < launch.sample_count; ++lane)
+        vertices[(first + lane) * launch.max_depth].end = END_LOOPS;
+}
