@@ -124,7 +124,7 @@ static inline ireal note_direction(Path *path, const Surface *surface, const Sha
     if (sampler->dimension == again.dimension) return goes;   // a last edge, for which no direction was drawn
     real2 u = next_2d(&again), choice = next_2d(&again);
     BsdfSample sample = bsdf_sample(&shading->bsdf, shading->wo, u, choice.x);
-    v->direction = to_world(shading->frame, sample.wi);
+    v->direction = choose(active, to_world(shading->frame, sample.wi), splat(ZERO));
     v->weight = sample.weight;
     v->pdf = sample.pdf;
     v->specular = flag(sample.specular);

@@ -21,7 +21,7 @@ STARTED = time.perf_counter()
 PROGRAM = "clrt"
 #: After so many new objects garbage is looked for.
 OBJECTS = 100_000
-COMMANDS = ("render", "view", "info", "convert", "compare", "devices", "bench", "cache", "doctor")
+COMMANDS = ("render", "view", "info", "debug", "convert", "compare", "devices", "bench", "cache", "doctor")
 
 
 class _Commands(Group):

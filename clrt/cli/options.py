@@ -36,6 +36,18 @@ class Size(click.ParamType[tuple[int, int]]):
         return int(match[1]), int(match[2])
 
 
+class Pixel(click.ParamType[tuple[int, int]]):
+    """X,Y of a pixel, e.g. 120,64."""
+
+    name = "X,Y"
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> tuple[int, int]:
+        match = re.fullmatch(r"(\d{1,9}),(\d{1,9})", str(value))
+        if not match:
+            self.fail(f"{value!r} is no pixel; write X,Y, its column and row from 0 on, e.g. 120,64", param, context)
+        return int(match[1]), int(match[2])
+
+
 class Finite(click.FloatRange):
     """A range without NaN and infinity, which are within all of click's."""
 
@@ -51,6 +63,23 @@ triangle_option = click.option(
     default="watertight", show_default=True, help="Triangle test.")
 box_option = click.option("--box", type=click.Choice(["robust", "plain"]), default="robust", show_default=True,
                           help="Box test.")
+
+
+def picture_options(command: F) -> F:
+    """Which picture: with the scene's own settings these determine every sample."""
+    for option in reversed([
+        click.option("--camera", metavar="NAME", help="A camera in the model file; see `clrt info`."),
+        click.option("--size", type=Size(), help="Picture size in pixels."),
+        click.option("--depth", type=click.IntRange(1, 1024),
+                     help="Maximum path depth: 1 emission only, 2 direct light, 3 one bounce."),
+        click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers."),
+        click.option("--sampler", type=click.Choice(["sobol", "stratified", "independent"]),
+                     help="Where samples come from."),
+        click.option("--filter", "pixel_filter", type=click.Choice(["box", "tent", "blackman_harris", "gaussian"]),
+                     help="Pixel filter."),
+    ]):
+        command = option(command)
+    return command
 
 
 def tracing_options(command: F) -> F:

@@ -23,7 +23,7 @@ from .goal import Goal
 from .guard import guarded
 from .interrupt import Interruptible
 from .logs import silence, verbose_option
-from .options import Size, tracing_options
+from .options import picture_options, tracing_options
 from .outputs import Outputs
 from .progress import Progress, make_progress
 
@@ -40,23 +40,17 @@ RIGHT = 1.2
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("-o", "--output", "outputs", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
               help="Picture to write: .png, .exr or .hdr; may be repeated. Default: <scene>.png here.")
-@click.option("--camera", metavar="NAME", help="A camera in the model file; see `clrt info`.")
-@click.option("--size", type=Size(), help="Picture size in pixels.")
+@picture_options
 @click.option("--spp", type=click.IntRange(min=1), help="Stop at this many samples a pixel.")
 @click.option("--time", "seconds", type=float, metavar="SECONDS", help="Stop after this time.")
 @click.option("--error", type=float, help="Stop at this estimated error (root of relMSE).")
 @click.option("--error-percentile", type=click.FloatRange(0, 100, min_open=True), metavar="PERCENT",
               help="Stop where so much of the picture, in tiles of 8x8 pixels, has that error, not the whole.")
-@click.option("--depth", type=click.IntRange(1, 1024), help="Path edges: 1 glow only, 2 direct light, 3 one bounce.")
-@click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers.")
 @click.option("--device", "devices", multiple=True, metavar="SEL",
               help="Number, id, part of a name, cpu or gpu; see `clrt devices`. Given twice, both render.")
 @click.option("--integrator", type=click.Choice(["path", "direct", "local", "raster", "normals", "albedo", "depth"]),
               help="What to compute.")
 @click.option("--shadows/--no-shadows", default=None, help="Whether local and raster ask what stands before lights.")
-@click.option("--sampler", type=click.Choice(["sobol", "stratified", "independent"]), help="Where samples come from.")
-@click.option("--filter", "pixel_filter", type=click.Choice(["box", "tent", "blackman_harris", "gaussian"]),
-              help="Pixel filter.")
 @click.option("--adaptive", is_flag=True, default=None, help="More samples where the error is larger.")
 @click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error by.")
 @click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what was done.")

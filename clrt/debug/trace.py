@@ -95,7 +95,7 @@ def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: C
         kernel.set_args(*on_device.scene_arguments, records.buffer, launch[0])
         wait_for(on_device.enqueue(kernel, count))
         paths = records.read(device).reshape(batch, depth)[:count]
-        check_paths(device, np.count_nonzero(paths["end"][:, 0] == End.LOOPS), count)
+        check_paths(device, int(np.sum(paths["end"][:, 0] == End.LOOPS)), count)
         length = 1 + np.argmax(paths["end"] != End.NONE, axis=1)
         used = np.arange(depth) < length[:, None]
         rows.append(paths[used])

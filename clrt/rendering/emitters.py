@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene.lights import DirectionalLight, PointLight, SpotLight
+from ..scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ..scene.model import Scene
 from ..scene.textures import Texture
 from .environment import LUMINANCE, Sky
@@ -75,6 +75,13 @@ def pack_emitters(scene: Scene, sky: Sky, textures: Textures) -> Emitters:
     return Emitters(buffers | choice.buffers, counts, flat.light, of_sphere, choice)
 
 
+def light_type(light: Light) -> str | None:
+    """Return which of TYPES a light without a surface is packed as; None where it is black."""
+    if isinstance(light, DirectionalLight):
+        return ("sun" if light.angle_degrees >= SMALLEST_DEGREES else "directional") if any(light.irradiance) else None
+    return light.kernel if any(light.intensity) else None
+
+
 def _sphere_lights(scene: Scene, textures: Textures) -> NDArray[Any]:
     lamps = [sphere for sphere in scene.spheres if any(sphere.material.radiance)]
     records = np.zeros(len(lamps), SPHERE_LIGHT)
@@ -86,7 +93,7 @@ def _sphere_lights(scene: Scene, textures: Textures) -> NDArray[Any]:
 
 
 def _point_lights(scene: Scene) -> NDArray[Any]:
-    lamps = [light for light in scene.lights if isinstance(light, PointLight) and any(light.intensity)]
+    lamps = [light for light in scene.lights if isinstance(light, PointLight) and light_type(light)]
     records = np.zeros(len(lamps), POINT_LIGHT)
     for record, lamp in zip(records, lamps):
         record["position"], record["intensity"] = lamp.position, lamp.intensity
@@ -95,7 +102,7 @@ def _point_lights(scene: Scene) -> NDArray[Any]:
 
 
 def _spot_lights(scene: Scene) -> NDArray[Any]:
-    lamps = [light for light in scene.lights if isinstance(light, SpotLight) and any(light.intensity)]
+    lamps = [light for light in scene.lights if isinstance(light, SpotLight) and light_type(light)]
     records = np.zeros(len(lamps), SPOT_LIGHT)
     for record, lamp in zip(records, lamps):
         # 1 − cos x = 2 sin² (x/2), which small angles keep their digits in.
@@ -112,7 +119,7 @@ def _per_range2(lamp: PointLight | SpotLight) -> float:
 
 
 def _directional_lights(scene: Scene) -> NDArray[Any]:
-    beams = [light for light in _directional(scene) if light.angle_degrees < SMALLEST_DEGREES]
+    beams = _directional(scene, "directional")
     records = np.zeros(len(beams), DIRECTIONAL_LIGHT)
     for record, beam in zip(records, beams):
         record["towards"], record["irradiance"] = _towards(beam), beam.irradiance
@@ -120,7 +127,7 @@ def _directional_lights(scene: Scene) -> NDArray[Any]:
 
 
 def _suns(scene: Scene) -> NDArray[Any]:
-    suns = [light for light in _directional(scene) if light.angle_degrees >= SMALLEST_DEGREES]
+    suns = _directional(scene, "sun")
     records = np.zeros(len(suns), SUN_LIGHT)
     for record, sun in zip(records, suns):
         record["towards"], record["radiance"] = _towards(sun), sun.radiance
@@ -128,8 +135,8 @@ def _suns(scene: Scene) -> NDArray[Any]:
     return records
 
 
-def _directional(scene: Scene) -> list[DirectionalLight]:
-    return [light for light in scene.lights if isinstance(light, DirectionalLight) and any(light.irradiance)]
+def _directional(scene: Scene, kind: str) -> list[DirectionalLight]:
+    return [light for light in scene.lights if isinstance(light, DirectionalLight) and light_type(light) == kind]
 
 
 def _towards(light: DirectionalLight) -> Doubles:

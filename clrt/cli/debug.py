@@ -1,0 +1,81 @@
+"""`clrt debug`: the paths of one pixel, vertex by vertex."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from . import PROGRAM
+from .guard import guarded
+from .options import Pixel, picture_options, tracing_options
+
+if TYPE_CHECKING:
+    from ..rendering.choices import Choices
+
+
+@click.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.option("--pixel", required=True, type=Pixel(), help="Column and row, from 0,0 in the upper left corner.")
+@click.option("--samples", type=click.IntRange(min=0), default=4, show_default=True, metavar="N",
+              help="How many of the pixel's samples to list, from the first.")
+@click.option("--spp", type=click.IntRange(min=1),
+              help="Samples per pixel that the render takes; all are traced for the summary. Default: the scene's.")
+@click.option("--integrator", type=click.Choice(["path", "direct"]), help="What to compute. Default: the scene's.")
+@click.option("--device", metavar="SEL", help="Number, id, part of a name, cpu or gpu; see `clrt devices`.")
+@click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
+@picture_options
+@tracing_options
+def command(scene: Path, pixel: tuple[int, int], samples: int, device: str | None, as_json: bool, camera: str | None,
+            depth: int | None, pixel_filter: str | None, lanes: int | None, **given: Any) -> None:
+    """Show the paths of one pixel's samples in SCENE, and what they found: why the pixel is black, or where its light
+    comes from. With the options of a render they are the very samples of that render."""
+    if click.get_current_context().obj == PROGRAM:
+        guarded(lambda: "")
+    from ..debug.names import Names
+    from ..debug.summary import summary
+    from ..debug.text import path_lines
+    from ..debug.trace import trace_pixel
+    from ..debug.vertices import vertices
+    from ..device.open import open_device
+    from ..scene.file import load
+
+    content = load(scene, camera)
+    chosen = {"max_depth": depth, "filter": pixel_filter,
+              **{name: given.pop(name) for name in ("size", "spp", "seed", "integrator", "sampler")}}
+    content.render = settings = replace(content.render, **{k: v for k, v in chosen.items() if v is not None})
+    paths = trace_pixel(content, open_device(device), pixel, _choices(**given), lanes)
+    names = Names(content, paths.compiled)
+    found = summary(paths, names)
+    listed = [(i, paths.values[i].tolist(), list(vertices(paths, names, i))) for i in range(min(samples, settings.spp))]
+    if as_json:
+        answer = {"scene": content.name, "pixel": pixel, "size": settings.size, "integrator": settings.integrator,
+                  "max_depth": settings.max_depth, "seed": settings.seed, "spp": settings.spp,
+                  "value": paths.value.tolist(), "dropped": settings.spp - int(paths.kept.sum()), "summary": found,
+                  "samples": [{"sample": i, "value": value, "vertices": [asdict(each) for each in path]}
+                              for i, value, path in listed]}
+        click.echo(json.dumps(_finite(answer)))
+        return
+    for i, value, path in listed:
+        click.echo("\n".join([*path_lines(i, value, path), ""]))
+    click.echo(f"pixel {pixel[0]},{pixel[1]} of {content.name}, {settings.spp} samples: {found}")
+
+
+def _choices(triangle: str, box: str, sphere: str, **others: Any) -> Choices:
+    from ..accel.kernels import HitTests
+    from ..rendering.choices import Choices
+
+    return Choices(tests=HitTests(triangle, box, sphere), **others)
+
+
+def _finite(value: Any) -> Any:
+    """The same with null for numbers that JSON has not."""
+    if isinstance(value, dict):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    return None if isinstance(value, float) and not isfinite(value) else value

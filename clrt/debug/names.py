@@ -1,0 +1,78 @@
+"""What the objects, materials and lights of a scene are called, by the numbers that the kernels have for them."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..rendering.compile import CompiledScene
+from ..rendering.emitters import TYPES, light_type
+from ..scene.model import Instance, Mesh, Scene, Sphere
+from ..scene.source import material_of
+
+IntArray = NDArray[np.int64]
+
+
+class Names:
+    """The names of one scene, as `compiled`. Objects are numbered as in the AOV `object`."""
+
+    def __init__(self, scene: Scene, compiled: CompiledScene) -> None:
+        self._scene, self._compiled = scene, compiled
+        self._objects: list[Mesh | Instance | Sphere] = [*scene.meshes, *scene.instances, *scene.spheres]
+        self._shared = Counter(_plain(each) for each in self._objects)
+        self._materials = {id(material): name for name, material in scene.materials.items()}
+
+    def hits(self, primitive: NDArray[np.int32], instance: NDArray[np.int32]) -> tuple[IntArray, IntArray]:
+        """The objects that were hit, and which of their triangles, both (n,); −1 at misses."""
+        return self._compiled.objects.met(primitive, instance)
+
+    def object(self, number: int) -> str:
+        """An object by its kind and name, and by its number where others share those."""
+        plain = _plain(self._objects[number])
+        return plain if self._shared[plain] == 1 else f"{plain} (object {number})"
+
+    def material(self, number: int) -> str:
+        """The material of an object by its name, if it has one, and its type."""
+        each = self._objects[number]
+        material = each.material if isinstance(each, Sphere) else material_of(each)
+        mesh = each.mesh if isinstance(each, Instance) else each
+        own = mesh.material_name if isinstance(mesh, Mesh) and mesh.material is material else ""
+        name = self._materials.get(id(material)) or own
+        return f'"{name}" ({material.kernel})' if name else material.kernel
+
+    def light(self, number: int) -> str:
+        """An entry of the light table: an object, a light of the scene, or the environment."""
+        first, kind = 0, ""
+        for kind in TYPES:
+            count = int(self._compiled.counts[f"{kind}_lights"][0])
+            if number < first + count:
+                break
+            first += count
+        index, buffers = number - first, self._compiled.buffers
+        if kind == "triangle":
+            return self.object(self._object_of(int(buffers["triangle_lights"][1]["primitive"][index])))
+        if kind == "sphere":
+            sphere = int(np.flatnonzero(buffers["spheres"][1]["light"] == number)[0])
+            return self.object(self._object_of(int(self._compiled.counts["triangles"][0]) + sphere))
+        if kind == "sky":
+            return "the environment"
+        entry = [i for i, light in enumerate(self._scene.lights) if light_type(light) == kind][index]
+        return f"light[{entry}] ({self._scene.lights[entry].kernel})"
+
+    def _object_of(self, primitive: int) -> int:
+        """That of a primitive which no instance shows; those of instances come first."""
+        placed = "placements" in self._compiled.buffers
+        before = int(self._compiled.buffers["placements"][1]["first"][0]) if placed else 0
+        return int(self.hits(np.array([primitive - before], np.int32), np.zeros(1, np.int32))[0][0])
+
+    @property
+    def infinite(self) -> str:
+        """What paths find that escape; empty where there is nothing."""
+        found = {"SKY": "the environment", "LIGHT_SUN": "the discs of directional lights"}
+        return " and ".join(name for feature, name in found.items() if feature in self._compiled.features)
+
+
+def _plain(each: Mesh | Instance | Sphere) -> str:
+    return f'{type(each).__name__.lower()} "{each.name}"'
