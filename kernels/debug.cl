@@ -91,15 +91,18 @@ static inline void note_light(const Scene *scene, const Path *path, const Surfac
     Sampler again = *sampler;
     real3 n = choosing_normal(&shading->bsdf, shading->frame.n);
     real2 u;
-    ireal light = chosen_light(scene, surface->p, n, &again, &u, &v->light_probability);
+    real probability;
+    ireal light = chosen_light(scene, surface->p, n, &again, &u, &probability);
     LightSample sample = sample_of_light(scene, light, surface->p, u);
     real3 wi = to_local(shading->frame, sample.wi);
+    real pdf = sample.pdf * probability, other = bsdf_pdf(&shading->bsdf, shading->wo, wi);
     v->light = active ? light : (ireal)(-1);
-    v->light_direction = sample.wi;
-    v->light_radiance = sample.radiance;
-    v->light_pdf = sample.pdf * v->light_probability;
-    v->light_bsdf = bsdf_eval(&shading->bsdf, shading->wo, wi);
-    v->light_weight = sample.delta ? ONE : power_heuristic(v->light_pdf, bsdf_pdf(&shading->bsdf, shading->wo, wi));
+    v->light_probability = active ? probability : ZERO;
+    v->light_direction = choose(active, sample.wi, splat(ZERO));
+    v->light_radiance = choose(active, sample.radiance, splat(ZERO));
+    v->light_bsdf = choose(active, bsdf_eval(&shading->bsdf, shading->wo, wi), splat(ZERO));
+    v->light_pdf = active ? pdf : ZERO;
+    v->light_weight = active & !sample.delta ? power_heuristic(pdf, other) : ONE;
 
     ShadowRay shadow;
     ireal sent = aim_at_light(scene, path, surface, shading, active, sampler, &shadow);
@@ -125,9 +128,9 @@ static inline ireal note_direction(Path *path, const Surface *surface, const Sha
     real2 u = next_2d(&again), choice = next_2d(&again);
     BsdfSample sample = bsdf_sample(&shading->bsdf, shading->wo, u, choice.x);
     v->direction = choose(active, to_world(shading->frame, sample.wi), splat(ZERO));
-    v->weight = sample.weight;
-    v->pdf = sample.pdf;
-    v->specular = flag(sample.specular);
+    v->weight = choose(active, sample.weight, splat(ZERO));
+    v->pdf = active ? sample.pdf : ZERO;
+    v->specular = flag(active & sample.specular);
     ireal drawn = (sample.pdf > 0.0f) & is_positive3(sample.weight);
     ireal sided = keeps_its_side(&sample, dot3(v->direction, surface->ng));
     ireal why = !drawn ? (ireal)(END_ABSORBED) : !sided ? (ireal)(END_SIDE) : (ireal)(END_ROULETTE);
@@ -158,10 +161,10 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
         active = NO_LANES;
 #if PRIMITIVES
         Shading shading = shading_at(&scene, path.wi, &surface);
-        v.position = surface.p;
-        v.geometric_normal = surface.ng;
-        v.shading_normal = surface.ns;
-        v.front = flag(surface.front);
+        v.position = choose(hit, surface.p, splat(ZERO));
+        v.geometric_normal = choose(hit, surface.ng, splat(ZERO));
+        v.shading_normal = choose(hit, surface.ns, splat(ZERO));
+        v.front = flag(hit & surface.front);
         if (depth < launch.max_depth && ANY(hit)) {
 #if LIGHTS
             note_light(&scene, &path, &surface, &shading, hit, &sampler, &v);

@@ -36,8 +36,9 @@ def _first(paths: PixelPaths, names: Names) -> str:
     rows = paths.rows[paths.starts]
     rows = rows[rows["primitive"] >= 0]
     missed = len(paths.starts) - len(rows)
-    seen = _listed(_hits(rows, names, names.object))
-    return f"the camera sees {seen}{f', and nothing in {missed} of {len(paths.starts)} samples' if missed else ''}"
+    seen = [_listed(_hits(rows, names, names.object))] * (len(rows) > 0)
+    seen += [f"no object in {missed} of {len(paths.starts)} samples"] * (missed > 0)
+    return f"the camera sees {' and '.join(seen)}"
 
 
 def _sources(paths: PixelPaths, names: Names) -> str:

@@ -1,0 +1,142 @@
+"""The paths of a pixel are those of the render: what is written of them adds up, vertex by vertex."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.debug import trace
+from clrt.debug.record import End
+from clrt.debug.trace import PixelPaths, trace_pixel
+from clrt.device import program
+from clrt.device.open import Device
+from clrt.errors import DeviceError, UsageError
+from clrt.rendering import loop_limit
+from clrt.rendering.choices import Choices
+from clrt.rendering.renderer import Renderer
+from clrt.scene import instancing
+from clrt.scene.file import load
+from clrt.scene.materials import Diffuse
+from clrt.scene.model import RenderSettings, Scene, Sphere
+
+from ..check.sabotage import sabotaged
+from ..rendering.lamps import lamps
+from ..rendering.test_variants import everything, painted, planted, shelf
+
+SCENES = Path(__file__).parents[2] / "scenes"
+SIZE, SPP = (32, 24), 8
+Doubles = NDArray[np.float64]
+
+
+def gallery(name: str) -> Callable[[], Scene]:
+    return lambda: load(SCENES / f"{name}.toml")
+
+
+#: All kinds of lights, materials and primitives; textures, partial opacity, coats and instances; every material in all
+#: its variants, media included; many lights, in a light BVH; and scenes of the gallery.
+SUBJECTS: dict[str, Callable[[], Scene]] = {
+    "everything": everything, "painted": lambda: planted(painted(everything())), "shelf": shelf,
+    "lamps": lambda: replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)]),
+    "glass": gallery("glass"), "night": gallery("night")}
+
+
+def pixels(seed: int, count: int) -> list[tuple[int, int]]:
+    rng = np.random.default_rng(seed)
+    return [(int(x), int(y)) for x, y in zip(rng.integers(0, SIZE[0], count), rng.integers(0, SIZE[1], count))]
+
+
+@pytest.fixture(scope="module", params=SUBJECTS)
+def traced(request: pytest.FixtureRequest, device: Device) -> tuple[Doubles, list[PixelPaths]]:
+    """The mean of a render of a subject, and the paths of some of its pixels."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(instancing, "FEW_TRIANGLES", 0)
+        renderer = Renderer(SUBJECTS[request.param](), device=device, size=SIZE, spp=SPP, max_depth=7, seed=5)
+        *_, state = renderer.passes(spp=SPP)
+        paths = [trace_pixel(renderer.scene, device, pixel) for pixel in pixels(3, 12)]
+    return state.film.mean, paths
+
+
+def test_contributions_add_up_to_the_pixel(traced: tuple[Doubles, list[PixelPaths]]) -> None:
+    """To float rounding, but where one turned a decision: of some 100 samples of 100 decisions each that may be one."""
+    mean, paths = traced
+    assert any(each.value.any() for each in paths)
+    differs = [np.abs(each.value - mean[each.pixel[::-1]]).max() > 1e-5 * (each.value.max() + 0.1) for each in paths]
+    assert sum(differs) <= 1
+
+
+def test_vertices_follow_from_each_other(traced: tuple[Doubles, list[PixelPaths]]) -> None:
+    """Where a path goes on, the next surface lies in the direction drawn; weights are weights, and no sum lies."""
+    for paths in traced[1]:
+        rows = {name: paths.rows[name].astype(np.float64) for name in paths.rows.dtype.names or ()}
+        assert all(np.isfinite(rows[name]).all() for name in rows if name != "distance")
+        assert np.all(paths.rows["end"][paths.starts + paths.lengths - 1] != End.NONE)
+        goes = np.flatnonzero((paths.rows["end"][:-1] == End.NONE) & (paths.rows["primitive"][1:] >= 0))
+        way = rows["position"][goes + 1] - rows["position"][goes]
+        there = rows["direction"][goes] * rows["distance"][goes + 1, None]
+        assert np.abs(way - there).max(initial=0) <= 1e-4 * np.abs(rows["position"]).max()
+        for part, whole in (("emission", rows["throughput"] * rows["radiance"]), ("direct", rows["unshadowed"])):
+            assert np.all(rows[part] >= 0) and np.all(rows[part] <= whole * (1 + 1e-5) + 1e-30), part
+        asked = rows["sent"] != 0
+        assert np.all(rows["light_probability"][asked] > 0) and np.all(rows["light_probability"] <= 1 + 1e-6)
+        assert np.all((rows["light_weight"][asked] > 0) & (rows["light_weight"][asked] <= 1))
+        assert not rows["direct"][~asked].any()
+
+
+def test_light_samples_are_their_factors(device: Device) -> None:
+    """Without media: throughput, BSDF, radiance and weight over the density, as Veach has it (1997, eq. 9.15)."""
+    scene = everything()
+    paths = trace_pixel(replace(scene, render=replace(scene.render, spp=64)), device, (20, 22))
+    rows = paths.rows[paths.rows["sent"] != 0]
+    factors = rows["throughput"] * rows["light_bsdf"] * rows["light_radiance"]
+    np.testing.assert_allclose(rows["unshadowed"], factors * (rows["light_weight"] / rows["light_pdf"])[:, None],
+                               rtol=1e-5)
+    assert len(rows) > 50 and len(np.unique(rows["light"])) > 3
+
+
+def test_lanes_and_launches_change_nothing(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = everything()
+    whole = trace_pixel(scene, device, (7, 20))
+    monkeypatch.setattr(trace, "MOST_RECORDS", 3 * scene.render.max_depth)
+    cut = trace_pixel(scene, device, (7, 20), Choices(layout="bvh8"), 16 if device.lanes == 1 else 1)
+    np.testing.assert_allclose(cut.values, whole.values, rtol=1e-4, atol=1e-6)
+    assert np.array_equal(cut.starts, whole.starts)
+
+
+def test_direct_light_ends_at_two_edges(device: Device) -> None:
+    scene = everything()
+    settings = replace(scene.render, integrator="direct")
+    assert trace_pixel(replace(scene, render=settings), device, (20, 20)).lengths.max() == 2
+
+
+@pytest.mark.parametrize("pixel", [(45, 0), (0, 33), (-1, 0)])
+def test_pixels_outside_are_refused(device: Device, pixel: tuple[int, int]) -> None:
+    with pytest.raises(UsageError, match=rf"pixel {pixel[0]},{pixel[1]} is outside of the picture of 45x33; X must be "
+                                         "0 to 44 and Y 0 to 32"):
+        trace_pixel(everything(), device, pixel)
+
+
+def test_integrators_without_paths_are_refused(device: Device) -> None:
+    with pytest.raises(UsageError, match='integrator "local" follows no paths; choose path or direct'):
+        trace_pixel(Scene(render=RenderSettings(integrator="local")), device, (0, 0))
+
+
+def test_samples_that_are_not_finite_are_dropped(device: Device) -> None:
+    """As from the film: 1e38·1e38 is beyond float32."""
+    bright = Sphere(material=Diffuse(emission=(1e38, 0.0, 0.0)))
+    scene = Scene(spheres=[bright], render=RenderSettings(size=(3, 3), spp=4))
+    paths = trace_pixel(scene, device, (1, 1))
+    assert not paths.kept.any() and not paths.value.any()
+
+
+def test_paths_that_were_ended_are_missed(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drivers that end loops early (test_loop_limit.py)."""
+    folder = sabotaged(tmp_path / "kernels", r"!loops_ended\(2 \+ \(launch.width == 0\)\)", "(launch.width == 0)")
+    monkeypatch.setattr(program, "kernel_folder", lambda: folder)
+    monkeypatch.setattr(loop_limit, "loop_turns", lambda device: 50_000)
+    with pytest.raises(DeviceError, match="after 50000 turns, and 4 of 4 paths .* need more"):
+        trace_pixel(everything(), device, (4, 4))
