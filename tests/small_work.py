@@ -13,6 +13,7 @@ import clrt
 from clrt.accel.build import build_tree
 from clrt.accel.device_builder import SHAPES
 from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, UPPER_LEVELS, HitTests
+from clrt.debug.trace import trace_pixel
 from clrt.device.open import Device
 from clrt.output.layers import layered
 from clrt.rendering.aovs import AOVS, film_aovs
@@ -125,6 +126,8 @@ def work(device: Device) -> Iterator[tuple[str, Answers]]:
     every = first_hits(apart, scene(), AOVS) | film_aovs(light, AOVS)
     yield "aovs", {"layers": layered(light.mean.astype(np.float32), every)[0]}
     yield "guides", {**render_guides(started(device, scene()), 2)}
+    for name, subject in (("pixel", scene()), ("planted_pixel", planted(painting))):
+        yield name, {"values": trace_pixel(subject, device, (3, 2)).values}
     build_tree(device, device.layout, "ploc", soup(0), spheres(30))
     build_tree(device, device.layout, "reinsertion", soup(120, 0.3))
     for layout, traversal in [*((layout, "single") for layout in TREES), *(("bvh8", way) for way in TRAVERSALS[1:])]:

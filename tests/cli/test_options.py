@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from clrt.accel.kernels import BOX_TESTS, BUILDER_NAMES, SPHERE_TESTS, TREES, TRIANGLE_TESTS
-from clrt.cli import bench_rays, info, render
+from clrt.cli import bench_rays, debug, info, render
 from clrt.errors import DeviceError
 from clrt.rendering.choices import OFFSETS
 
@@ -21,8 +21,8 @@ KNOWN: dict[str, Iterable[str]] = {"triangle": TRIANGLE_TESTS, "box": BOX_TESTS,
 
 
 @pytest.mark.parametrize("command, names", [
-    (render.command, KNOWN), (info.command, KNOWN),
-    (bench_rays.rays_command, ["triangle", "box", "layout", "builder"])], ids=["render", "info", "bench rays"])
+    (render.command, KNOWN), (info.command, KNOWN), (debug.command, KNOWN),
+    (bench_rays.rays_command, ["triangle", "box", "layout", "builder"])], ids=["render", "info", "debug", "bench rays"])
 def test_options_offer_what_there_is(command: click.Command, names: Iterable[str]) -> None:
     options = {option.name: option.type for option in command.params}
     for name in names:

@@ -65,7 +65,7 @@ REASONS: dict[str, tuple[Scene, str]] = {
                 "the depth limit of 1 shows emission alone; paths: all 16 end at the depth limit"),
     "absorbed": (above_floor(material=BLACK, lights=[POINT]), "paths: all 16 are absorbed (by diffuse)"),
     "mirror": (above_floor(material=Mirror(), lights=[POINT]),
-               "all 16 on a material that scatters nothing there (on mirror); paths: all 16 escape, but the scene has no"),
+               "all 16 on a material that scatters nothing there (on mirror); paths: all 16 escape, but the scene "),
 }
 
 

@@ -18,6 +18,7 @@ from clrt.accel import refit
 from clrt.accel.device_builder import SHAPES, program_source
 from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS, HitTests
 from clrt.check import probe
+from clrt.debug.record import vertex_preamble
 from clrt.device import cache
 from clrt.device.loops import turns_source
 from clrt.device.open import Device
@@ -126,7 +127,7 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     for scene in (painted(everything()), planted(everything()), shelf(), *(sight for _, sight in sights(everything()))):
         used |= set(compile_scene(scene, Choices()).files)
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
-    for entry in ("guides.cl", "raster/outline.cl", "study/probe.cl", "study/raster_hits.cl"):
+    for entry in ("guides.cl", "debug.cl", "raster/outline.cl", "study/probe.cl", "study/raster_hits.cl"):
         used |= set(compile_scene(everything(), Choices(), entry).files)
     assert sorted(used) == FILES
 
@@ -138,7 +139,8 @@ def test_programs_build_without_a_warning(device: Device, capfd: pytest.CaptureF
     scene.spheres = scene.spheres + [type(scene.spheres[0])(material=material)
                                      for kind in MATERIALS for material in variants(kind)]
     compiled = compile_scene(scene, Choices(device.lanes, device.layout, direct_light=True))
-    sources = compiled.source, compiled.source_of("guides.cl"), first_hit_program(compiled, AOVS)[0]
+    sources = (compiled.source, compiled.source_of("guides.cl"), first_hit_program(compiled, AOVS)[0],
+               compiled.source_of("debug.cl", vertex_preamble()))
     for number, source in enumerate(sources):
         monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path / str(number)))
         build(device, f"{source}\n// its own text, so that no cache has it")
