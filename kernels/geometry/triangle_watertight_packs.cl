@@ -33,7 +33,7 @@ static inline bool meet_packs(const TriangleRay *ray, ARRAY(Triangles) packs, ui
                               Hit *hit) {
     // As in intersect_sheared, with reach <= 2 far and depth <= far.
     float far = RECORD(packs, 0)->extent + fabs(ray->ox) + fabs(ray->oy) + fabs(ray->oz);
-    float error = T_ERROR * 6.0f * far * far, rounding = error * far, thin = error / THIN;
+    float error = T_ERROR * 6.0f * far * far, rounding = error * far * fabs(ray->sz), thin = error / THIN;
     // A hit so far is of a primitive behind all these, and gives way to one at the same t.
     wide t = hit->primitive < 0 ? hit->t : as_float(as_int(hit->t) + 1), u = 0.0f, v = 0.0f;
     wide_mask pack = (wide_mask)(-1), open = (wide_mask)(0);

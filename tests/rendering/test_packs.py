@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.accel.kernels import TREES
 from clrt.device.open import Device
 from clrt.scene.model import Scene
 from clrt.study.probe import Probe
@@ -45,3 +46,21 @@ def test_hits_are_those_of_all_triangles(device: Device, order: tuple[int, ...],
     limits = np.minimum(expected[:, 0], 5.0) * np.random.default_rng(1).uniform(0.5, 1.5, len(hits))
     blocked, beyond = (probe("any_hit", 1, places, direction, limits) for probe in (apart, listed))
     assert np.array_equal(blocked, beyond) and 0.2 < blocked.mean() < 0.8
+
+
+@pytest.mark.parametrize("layout", TREES)
+def test_length_of_directions_changes_only_t(device: Device, layout: str) -> None:
+    """Of rays that start on a floor, or a hair beside it, and leave it: by powers of two, so that all digits stay."""
+    scene = Scene(meshes=[mesh(np.concatenate([PARTS[0], PARTS[3]]))])
+    rng = np.random.default_rng(2)
+    origin, direction = rng.uniform(0, 7, (40_000, 3)), rng.normal(size=(40_000, 3))
+    origin[:, 1] = 10.0 ** rng.uniform(-14, -6, len(origin))
+    direction[:, 1] = np.abs(direction[:, 1])
+    probe = Probe(device, scene, layout=layout)
+    expected = probe("closest_hit", 4, origin, direction)
+    for power in (2.0**-40, 2.0**-20, 2.0**-8, 2.0**8, 2.0**20, 2.0**40):
+        found = probe("closest_hit", 4, origin, direction * power)
+        found[:, 0] *= power
+        assert np.array_equal(found, expected), power
+        blocked = probe("any_hit", 1, origin, direction * power, np.full(len(origin), 2.0**-10 / power))
+        assert np.array_equal(blocked[:, 0] > 0, (expected[:, 0] < 2.0**-10)), power
