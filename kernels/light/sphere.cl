@@ -21,7 +21,7 @@ static inline LightSample sphere_light_sample(const Scene *scene, ireal index, r
     real sin2 = around.x * around.x + around.y * around.y;
     real near = distance * around.z - safe_sqrt(radius * radius - distance * distance * sin2);
     real3 n = normalize3(sub(mad3(s.wi, near, p), center));
-    s.target = shadow_target(p, mad3(n, radius, center), n);
+    s.target = shadow_target(p, mad3(n, radius, center), add(absolute3(center), splat(radius)), n);
     real3 radiance = GATHER3(scene->sphere_lights, index, .radiance);
 #if EMISSION_TEXTURES
     Coordinates at = sphere_coordinates(n);

@@ -6,8 +6,10 @@ static inline LightSample triangle_light_sample(const Scene *scene, ireal index,
     real2 b = sample_triangle(u);
     ireal whole = GATHER(ireal, scene->triangle_lights, index, .parallelogram) != 0;
     b = (real2){whole ? u.x : b.x, whole ? u.y : b.y};
-    real3 q = mad3(GATHER3(scene->triangle_lights, index, .e1), b.x,
-              mad3(GATHER3(scene->triangle_lights, index, .e2), b.y, GATHER3(scene->triangle_lights, index, .p0)));
+    real3 p0 = GATHER3(scene->triangle_lights, index, .p0);
+    real3 e1 = scale(GATHER3(scene->triangle_lights, index, .e1), b.x);
+    real3 e2 = scale(GATHER3(scene->triangle_lights, index, .e2), b.y);
+    real3 q = add(p0, add(e1, e2));
     real3 n = GATHER3(scene->triangle_lights, index, .normal);
     real3 d = sub(q, p);
     real d2 = dot3(d, d);
@@ -28,7 +30,7 @@ static inline LightSample triangle_light_sample(const Scene *scene, ireal index,
     s.radiance = scale(s.radiance, opacity_at(scene, &surface, s.wi));
 #endif
     s.pdf = front ? d2 / (cosine * GATHER(real, scene->triangle_lights, index, .area)) : ONE;
-    s.target = shadow_target(p, q, n);
+    s.target = shadow_target(p, q, add(absolute3(p0), add(absolute3(e1), absolute3(e2))), n);
     s.infinite = s.delta = NO_LANES;
     return s;
 }

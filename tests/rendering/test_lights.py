@@ -148,6 +148,30 @@ def test_shadow_rays_end_before_their_lamp(device: Device) -> None:
     assert not probe("any_hit", 1, points, to_target, np.ones(len(points))).any()
 
 
+@pytest.mark.parametrize("kind", ["sphere", "quad", "triangle"])
+def test_shadow_rays_end_before_a_lamp_near_by(device: Device, kind: str) -> None:
+    """Of 1e-4 to 10 times its size away, wherever the lamp and the points are: that q is near 0 says nothing of its
+    rounding."""
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        size, turn = 10.0 ** rng.uniform(-2, 3), np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        normal, gaps = turn[:, 2], size * 10.0 ** rng.uniform(-4, 1, (1 << 14, 1))
+        place = size * 10.0 ** rng.uniform(-8, 0) * rng.uniform(-1, 1, 3)    # of the lamp's foremost point, or middle
+        corners = (np.array([[-1, -1], [-1, 1], [1, 1], [1, -1]]) @ turn[:, :2].T * size + place).astype(np.float32)
+        faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)[:2 if kind == "quad" else 1]
+        if np.cross(corners[1] - corners[0], corners[2] - corners[0]) @ normal < 0:
+            faces = faces[:, ::-1].copy()
+        center = tuple((place - size * normal).tolist())
+        scene = (Scene(spheres=[Sphere(center=center, radius=size, material=LAMP)]) if kind == "sphere" else
+                 Scene(meshes=[Mesh(corners, faces, LAMP)]))
+        points = (place + gaps * normal).astype(np.float32).astype(np.float64)
+        probe = Probe(device, scene, layout="bvh8")
+        sample = probe("light_sample", 12, points, np.tile(-normal, (len(points), 1)), seed=4)
+        assert sample[:, 3:6].all()
+        to_target = sample[:, 7:10] - points
+        assert not probe("any_hit", 1, points, to_target, np.ones(len(points))).any(), (size, place)
+
+
 def points_and_normals(count: int) -> tuple[Doubles, Doubles]:
     """(count, 3) each: in the unit cube, as float32 has them, and every direction."""
     rng = np.random.default_rng(0)

@@ -1,0 +1,75 @@
+"""Sphere lights from near to far: what a receiver reflects is the irradiance by a float64 quadrature."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.device.open import Device
+from clrt.scene import instancing
+from clrt.scene.materials import Diffuse
+from clrt.scene.model import Camera, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
+
+from .lamps import directions
+from .pictures import film
+
+Doubles = NDArray[np.float64]
+ALBEDO, COUNT, KINDS = 0.5, 24, ("flat", "curved", "instance")
+QUAD = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
+FACES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+
+
+def irradiance(distance: float, radius: float, cosine: float, n: int = 512) -> float:
+    """E/L of a sphere whose middle is `distance` away in a direction at that cosine to the normal: the mean of the
+    cosines, where above 0, over the cone of directions that it fills (midpoints; 1 − cos of the cone's angle)."""
+    sine2 = (radius / distance) ** 2
+    height = sine2 / (1 + np.sqrt(1 - sine2))
+    h, phi = np.meshgrid((np.arange(n) + 0.5) / n * height, (np.arange(n) + 0.5) / n * np.pi)
+    cosines = (1 - h) * cosine + np.sqrt(h * (2 - h) * (1 - cosine**2)) * np.cos(phi)
+    return float(np.maximum(cosines, 0).mean() * 2 * np.pi * height)
+
+
+def frame_around(n: Doubles) -> Doubles:
+    """(3, 3), a turn whose last column is n."""
+    s = np.cross(n, [1.0, 0, 0] if abs(n[0]) < 0.5 else [0, 1.0, 0])
+    s /= np.linalg.norm(s)
+    return np.column_stack([s, np.cross(n, s), n])
+
+
+def lit(kind: str, integrator: Integrator, radius: float, gap: float, cosine: float, rng: np.random.Generator) -> Scene:
+    """A receiver seen from half as near as the light, of some radius, comes to it, at `gap` radii; its middle at that
+    cosine to the normal."""
+    n, p = directions(rng, 1)[0], rng.uniform(-3, 3, 3) * radius * 10.0 ** rng.uniform(-8, 0)
+    turn, distance = frame_around(n), radius * (1 + gap)
+    toward = turn @ [np.sqrt(1 - cosine**2), 0, cosine]
+    grey, scene = Diffuse(color=(ALBEDO,) * 3), Scene()
+    if kind == "curved":
+        size = radius * 10.0 ** rng.uniform(-1, 1)
+        scene.spheres.append(Sphere(center=tuple((p - size * n).tolist()), radius=size, material=grey))
+    elif kind == "instance":
+        mesh = Mesh(QUAD, FACES, grey)
+        scene.instances.extend(Instance(mesh, np.column_stack([10 * radius * turn, p - depth * radius * n]))
+                               for depth in (0, 5))
+    else:
+        scene.meshes.append(Mesh((10 * radius * QUAD @ turn.T + p).astype(np.float32), FACES, grey))
+    scene.spheres.append(Sphere(center=tuple((p + distance * toward).tolist()), radius=radius,
+                                material=Diffuse(color=(0.0, 0.0, 0.0), emission=(1.0, 1.0, 1.0))))
+    scene.camera = Camera(position=tuple((p + gap * radius / 2 * n).tolist()), look_at=tuple(p.tolist()),
+                          up=tuple(turn[:, 0].tolist()), fov_degrees=0.2)
+    scene.render = RenderSettings(size=(8, 8), spp=512, max_depth=2, integrator=integrator)
+    return scene
+
+
+@pytest.mark.parametrize("integrator", ["path", "local"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_near_and_far(device: Device, kind: str, integrator: Integrator, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of any radius between .01 and 1000, gaps between 1e-4 and 10 radii, some partly below the horizon: to 1 %."""
+    monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
+    rng = np.random.default_rng(KINDS.index(kind))
+    for _ in range(COUNT):
+        radius, gap, cosine = 10.0 ** rng.uniform(-2, 3), 10.0 ** rng.uniform(-4, 1), rng.uniform(0.1, 1)
+        scene = lit(kind, integrator, radius, gap, cosine, rng)
+        expected = ALBEDO / np.pi * irradiance(radius * (1 + gap), radius, cosine)
+        found = film(device, scene, sampler="sobol").mean.mean()
+        assert found == pytest.approx(expected, rel=0.01), (radius, gap, cosine)
