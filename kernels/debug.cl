@@ -9,8 +9,6 @@
 #include "edge.cl"
 #include "film.cl"
 
-#define MOST_VEILS 256   // that are looked through for what stops a shadow ray
-
 typedef struct {
 #define ROW_MEMBER(name) real3 name;
 #define REAL_MEMBER(name) real name;
@@ -68,20 +66,18 @@ static inline void note_arrival(const Scene *scene, const Path *path, const Surf
 #if LIGHTS
 // What stops a shadow ray: the first surface on its way that lets nothing through.
 static inline Hits blocker_of(const Scene *scene, const ShadowRay *ray, ireal stopped) {
-    real3 from = ray->origin;
-    Hits hits;
-    for (int veil = 0; veil < MOST_VEILS; ++veil) {
-        real3 direction = choose(ray->infinite, ray->wi, sub(ray->target, from));
-        hits = closest_hit(scene, from, direction, ray->infinite ? (real)(INFINITY) : ONE, stopped);
+    real3 direction = choose(ray->infinite, ray->wi, sub(ray->target, ray->origin));
+    real t_max = ray->infinite ? (real)(INFINITY) : ONE;
+    Hits hits = closest_hit(scene, ray->origin, direction, t_max, stopped);
 #if OPACITY
-        Surface surface = surface_at(scene, from, direction, &hits);
+    for (;;) {
+        Surface surface = surface_at(scene, ray->origin, direction, &hits);
         ireal passes = stopped & (hits.primitive >= 0) & (opacity_at(scene, &surface, direction) < 1.0f);
         if (!ANY(passes)) break;
-        from = choose(passes, behind(&surface, direction), from);
-#else
-        break;
-#endif
+        Hits next = next_hit(scene, ray->origin, direction, t_max, passes, &hits);
+        hits = choose_hits(passes, &next, &hits);
     }
+#endif
     return hits;
 }
 
@@ -153,7 +149,7 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
     for (int depth = 1; ANY(active); ++depth) {
         VertexLanes v = blank_vertex();
         Surface surface;
-        Hits hits = first_surface(&scene, &path.origin, path.wi, active, &sampler, &surface);
+        Hits hits = first_surface(&scene, path.origin, path.wi, active, &sampler, &surface);
         ireal arrived = active, hit = active & (hits.primitive >= 0);
         absorb(&path, hit ? hits.t : (real)(INFINITY));
         note_arrival(&scene, &path, &surface, &hits, hit, active & !hit, &v);

@@ -13,9 +13,8 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
                                ureal *rays, real3 *direct) {
     *rays += active ? (ureal)(1) : (ureal)(0);
 #if PRIMITIVES
-    real3 origin = ray->origin;
     Surface surface;
-    Hits hits = first_surface(scene, &origin, ray->direction, active, sampler, &surface);
+    Hits hits = first_surface(scene, ray->origin, ray->direction, active, sampler, &surface);
     ireal hit = active & (hits.primitive >= 0);
     if (!ANY(hit)) return splat(ZERO);
     return choose(hit, picture_value(scene, launch, ray->direction, hits.t, &surface), splat(ZERO));

@@ -17,9 +17,6 @@
 typedef struct {
     Path path;
     ureal slot;
-#if OPACITY
-    real gone;               // to where path.origin now is, behind the layers that let it through
-#endif
 } Travel;
 
 typedef struct { Travel travel; Hits hits; } Arrival;
@@ -97,9 +94,7 @@ __attribute__((noinline)) static void trace(const Scene *scene, Wave *w, int cou
 #if OPACITY
         Sampler sampler = slot_sampler(w, travel.slot);
         Surface surface;
-        Hits hits = first_stop(scene, &travel.path.origin, travel.path.wi, lanes_of(i, count), &sampler, &surface,
-                               &travel.gone);
-        STORE(travel, w->arrivals, i)
+        Hits hits = first_surface(scene, travel.path.origin, travel.path.wi, lanes_of(i, count), &sampler, &surface);
         dimension = sampler.dimension;
 #else
         Hits hits = closest_hit(scene, travel.path.origin, travel.path.wi, (real)(INFINITY), lanes_of(i, count));
@@ -145,9 +140,6 @@ __attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int coun
         ireal active = lanes_of(i, count);
         a.hits.primitive = active ? a.hits.primitive : (ireal)(-1);
         Surface surface = surface_at(scene, path->origin, path->wi, &a.hits);
-#if OPACITY
-        a.hits.t += a.travel.gone;
-#endif
         absorb(path, a.hits.t);
         add_light(w, a.travel.slot, emitted_light(scene, path, &surface, a.hits.t, active));
         if (depth >= w->launch->max_depth) continue;

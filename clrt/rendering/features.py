@@ -49,7 +49,7 @@ def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
            "VERTEX_COLORS": any(mesh.colors is not None for mesh in scene.meshes),
            "TEXTURES": packed.uv_sets > 0, "NORMAL_MAPS": materials.normal_maps,
            "EMISSION_TEXTURES": any(isinstance(user.emission, Texture) for user in packed.shapes.users),
-           "OPACITY": bool(materials.with_value("opacity")),
+           "OPACITY": bool(materials.with_value("opacity")), "NEXT_HIT": bool(materials.with_value("opacity")),
            "SKY": packed.sky.kernel is not None, "LIGHTS": emitters.count > 0, "LIGHT_TREE": emitters.choice.tree,
            "EMITTERS": any(t in SURFACES for t in emitters.types),
            "LIGHT_RANGES": any(getattr(light, "range", None) for light in scene.lights),

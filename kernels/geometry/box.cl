@@ -7,9 +7,19 @@
 #include "vector.cl"
 #include BOX_TEST
 
+// Boxes that end before this t are not entered: the last hit's, where the next one is searched for.
+#if NEXT_HIT
+#define FIRST_T(ray) ((ray)->after_t)
+#else
+#define FIRST_T(ray) 0.0f
+#endif
+
 typedef struct {
     float origin[3], near[3], far[3];   // near, far: padded 1/direction
     int backward[3];                    // where the ray runs towards the box's low side
+#if NEXT_HIT
+    float after_t;
+#endif
 } SlabRay;
 
 typedef struct { real near[3], far[3]; ireal backward[3]; } SlabRays;   // the same for all lanes, made at once
@@ -32,5 +42,9 @@ static inline SlabRay slab_ray(const SlabRays *rays, const Ray *ray, int lane) {
     return (SlabRay){{ray->origin[0], ray->origin[1], ray->origin[2]},
                      {LANE(rays->near[0], lane), LANE(rays->near[1], lane), LANE(rays->near[2], lane)},
                      {LANE(rays->far[0], lane), LANE(rays->far[1], lane), LANE(rays->far[2], lane)},
-                     {LANE_INT(rays->backward[0], lane), LANE_INT(rays->backward[1], lane), LANE_INT(rays->backward[2], lane)}};
+                     {LANE_INT(rays->backward[0], lane), LANE_INT(rays->backward[1], lane), LANE_INT(rays->backward[2], lane)},
+#if NEXT_HIT
+                     ray->after_t,
+#endif
+    };
 }

@@ -28,9 +28,18 @@ static inline float wide_least(wide x) {
     return two.x < two.y ? two.x : two.y;
 }
 
+// Whether hits at t come after the last one, where the next one is searched for.
+static inline wide_mask comes_next(const Ray *ray, global const Triangles *leaf, wide t) {
+#if NEXT_HIT
+    return (t > ray->after_t) | ((t == ray->after_t) & (LOAD_WIDE(leaf->primitive) > ray->after_primitive));
+#else
+    return (wide_mask)(-1);
+#endif
+}
+
 // The closest hit in chosen packs, or whether there is any. False where that is left open.
-static inline bool meet_packs(const TriangleRay *ray, ARRAY(Triangles) packs, uint chosen, const bool stop_at_first,
-                              Hit *hit) {
+static inline bool meet_packs(const TriangleRay *ray, const Ray *whole, ARRAY(Triangles) packs, uint chosen,
+                              const bool stop_at_first, Hit *hit) {
     // As in intersect_sheared, with reach <= 2 far and depth <= far.
     float far = RECORD(packs, 0)->extent + fabs(ray->ox) + fabs(ray->oy) + fabs(ray->oz);
     float error = T_ERROR * 6.0f * far * far, rounding = error * far * fabs(ray->sz), thin = error / THIN;
@@ -49,12 +58,12 @@ static inline bool meet_packs(const TriangleRay *ray, ARRAY(Triangles) packs, ui
         wide inverse = 1.0f / det;
         wide volume = weighted(at_a, at_b, at_c, a.z * ray->sz, b.z * ray->sz, c.z * ray->sz);
         wide pack_t = volume * inverse;
-        wide_mask ahead = pack_t > 0.0f;
+        wide_mask ahead = pack_t > 0.0f, next = comes_next(whole, leaf, pack_t);
         wide_mask beside = ((WIDE_BITS(a.z) ^ WIDE_BITS(b.z)) | (WIDE_BITS(a.z) ^ WIDE_BITS(c.z))) < 0;
         open |= inside & ((at_a * at_b * at_c == 0.0f)
-                          | (ahead & (pack_t == t))
+                          | (ahead & next & (pack_t == t))
                           | (beside & (WIDE_ABS(volume) <= rounding) & (ahead | (WIDE_ABS(det) < thin))));
-        wide_mask closer = inside & ahead & (pack_t < t);
+        wide_mask closer = inside & ahead & next & (pack_t < t);
         t = closer ? pack_t : t;
         u = closer ? at_b * inverse : u;
         v = closer ? at_c * inverse : v;

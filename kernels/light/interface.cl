@@ -29,8 +29,8 @@ static inline real within_range(real d2, real per_range2) {
 }
 #endif
 
-// A point q of a light's surface, moved towards p beyond its error and the rounding of a ray between the two. size: of q's
-// terms, |a| + |b| where q = a + b: they may cancel, and their rounding stays.
+// A point q on a light's surface, moved towards p beyond its rounding error and that of a ray between the two. size:
+// |a| + |b| where q = a + b, since the rounding error of terms that cancel remains.
 static inline real3 shadow_target(real3 p, real3 q, real3 size, real3 n) {
     real distance = dot3(absolute3(n), scale(add(absolute3(p), size), (real)(GAMMA(16))));
     return mad3(n, dot3(sub(p, q), n) < 0.0f ? -distance : distance, q);

@@ -9,7 +9,7 @@
 #include UPPER_LEVEL
 
 static inline float enter_box(const SlabRay *ray, global const Node *node, float t_max) {
-    float t_near = 0.0f, t_far = t_max;
+    float t_near = FIRST_T(ray), t_far = t_max;
     for (int axis = 0; axis < 3; ++axis) {
         float low = node->aabb_min[axis], high = node->aabb_max[axis];
         float near = ((ray->backward[axis] ? high : low) - ray->origin[axis]) * ray->near[axis];

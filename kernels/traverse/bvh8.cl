@@ -27,7 +27,7 @@ static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int referenc
 
 // Tests the eight boxes of a node; returns the bits of those entered and where.
 static inline uint enter_boxes(const SlabRay *ray, global const Node *node, float t_max, float *entry) {
-    float8 t_near = 0.0f, t_far = t_max;
+    float8 t_near = FIRST_T(ray), t_far = t_max;
     global const float *low = node->lo[0], *high = node->hi[0];
 #define SLAB(axis) { \
         float8 near = (vload8(axis, ray->backward[axis] ? high : low) - ray->origin[axis]) * ray->near[axis]; \

@@ -35,7 +35,7 @@ static inline Grid node_grid(const SlabRay *ray, uint4 frame) {
 // Of four children of a node, a byte each in meta and in each axis of low and high, the bits of those that are entered.
 static inline uint enter_four(const SlabRay *ray, const Grid *grid, uint order, float t_max, uint meta,
                               const uint low[3], const uint high[3]) {
-    float4 t_near = 0.0f, t_far = t_max;
+    float4 t_near = FIRST_T(ray), t_far = t_max;
     for (int axis = 0; axis < 3; ++axis) {
         uint near_bytes = ray->backward[axis] ? high[axis] : low[axis];
         uint far_bytes = ray->backward[axis] ? low[axis] : high[axis];

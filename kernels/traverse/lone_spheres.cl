@@ -5,8 +5,19 @@
 
 SPHERE_OF(real, ireal, TwiceReal, lone)
 
-// The closest hits of enabled lanes nearer than t_max among the spheres, or their t_max and no primitive.
-static inline Hits meet_spheres(const Scene *scene, real3 origin, real3 direction, real t_max, ireal enabled) {
+// Whether a hit at t > 0 comes after the last one, where the next one is searched for.
+static inline ireal is_ahead(real t, int primitive, const Hits *after) {
+#if NEXT_HIT
+    ireal later = (after->instance < 0) | ((after->instance == 0) & (after->primitive < primitive));
+    return (t > 0.0f) & ((t > after->t) | ((t == after->t) & later));
+#else
+    return t > 0.0f;
+#endif
+}
+
+// The closest hits of enabled lanes nearer than t_max among the spheres (see next_hit), or their t_max and no primitive.
+static inline Hits meet_spheres(const Scene *scene, real3 origin, real3 direction, real t_max, ireal enabled,
+                                const Hits *after) {
     Hits hits = {t_max, ZERO, ZERO, (ireal)(-1), (ireal)(0)};
     const real o[3] = {origin.x, origin.y, origin.z}, d[3] = {direction.x, direction.y, direction.z};
     for (int i = 0; i < scene->counts.spheres; ++i) {
@@ -16,8 +27,8 @@ static inline Hits meet_spheres(const Scene *scene, real3 origin, real3 directio
         if (!ANY(meets)) continue;
         real near, far;
         lone_roots(o, d, sphere->center, sphere->radius, &near, &far);
-        real t = near > 0.0f ? near : far;
-        meets = meets ? (t > 0.0f) & (t < hits.t) : NO_LANES;   // of equal ones the first stays
+        real t = is_ahead(near, sphere->primitive, after) ? near : far;
+        meets = meets ? is_ahead(t, sphere->primitive, after) & (t < hits.t) : NO_LANES;   // of equals the first stays
         hits.t = meets ? t : hits.t;
         hits.primitive = meets ? (ireal)(sphere->primitive) : hits.primitive;
     }

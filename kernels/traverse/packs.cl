@@ -35,7 +35,7 @@ static inline ireal choose_packs(const Scene *scene, real3 origin, real3 directi
     return chosen;
 }
 
-// Seldom called, unless hits behind others are asked for.
+// Seldom called.
 __attribute__((noinline)) static Hit meet_packs_exactly(const LeafRay *leaf, ARRAY(Triangles) packs,
                                                         const bool stop_at_first, Hit hit) {
     for (int i = 0; i < RECORD(packs, 0)->count * HALVES && !(stop_at_first && hit.primitive >= 0); ++i)
@@ -59,14 +59,10 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
     Hit hit = *nearest;
     LeafRay leaf = leaf_ray(&rays->leaves, ray, lane);
 #if TRIANGLES
-#if NEXT_HIT
-    hit = meet_packs_exactly(&leaf, scene->packs, stop_at_first, hit);
-#else
     uint chosen = (uint)LANE_INT(rays->chosen, lane);
     for (int i = 0; i < RECORD(scene->packs, 0)->count; ++i) if (is_chosen(chosen, i)) VISIT(tests);
-    if (!meet_packs(&leaf.triangle_ray, scene->packs, chosen, stop_at_first, &hit))
+    if (!meet_packs(&leaf.triangle_ray, ray, scene->packs, chosen, stop_at_first, &hit))
         hit = meet_packs_exactly(&leaf, scene->packs, stop_at_first, *nearest);
-#endif
 #endif
 #if LEAF_SPHERES
     for (int i = 0; i < scene->counts.spheres && !(stop_at_first && hit.primitive >= 0); ++i)

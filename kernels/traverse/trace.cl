@@ -5,6 +5,11 @@
 
 typedef struct { real t, u, v; ireal primitive, instance; } Hits;   // primitive < 0: nothing was hit
 
+static inline Hits choose_hits(ireal mask, const Hits *a, const Hits *b) {
+    return (Hits){mask ? a->t : b->t, mask ? a->u : b->u, mask ? a->v : b->v, mask ? a->primitive : b->primitive,
+                  mask ? a->instance : b->instance};
+}
+
 #include TREE
 #include LONE_SPHERES_FILE
 
@@ -39,17 +44,15 @@ static inline ireal is_ray(real3 origin, real3 direction) {
     return (absolute(sum) <= 3.4e38f) & (largest(absolute3(direction)) > 0.0f);
 }
 
-// The nearest hit of each active lane's ray with 0 < t < t_max; in a program with NEXT_HIT the first behind `after`.
-static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active
-#if NEXT_HIT
-                               , const Hits *after
-#endif
-) {
+// The closest hit of each active lane's ray with 0 < t < t_max; in a program with NEXT_HIT the first one after `after`, in
+// the order of (t, instance, primitive).
+static inline Hits next_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active,
+                            const Hits *after) {
     Hits hits = {(real)(INFINITY), ZERO, ZERO, (ireal)(-1), (ireal)(0)};
 #if PRIMITIVES
     ireal enabled = active & is_ray(origin, direction);
 #if LONE_SPHERES
-    hits = meet_spheres(scene, origin, direction, t_max, enabled);
+    hits = meet_spheres(scene, origin, direction, t_max, enabled, after);
 #else
     hits.t = t_max;
 #endif
@@ -85,13 +88,21 @@ static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction
     return hits;
 }
 
+#define NO_HIT {ZERO, ZERO, ZERO, (ireal)(-1), (ireal)(-1)}   // precedes every hit
+
+static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active) {
+    const Hits none = NO_HIT;
+    return next_hit(scene, origin, direction, t_max, active, &none);
+}
+
 // Which active lanes meet anything with 0 < t < t_max.
 static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active) {
     ireal blocked = NO_LANES;
 #if PRIMITIVES
     ireal enabled = active & is_ray(origin, direction);
 #if LONE_SPHERES
-    blocked = meet_spheres(scene, origin, direction, t_max, enabled).primitive >= 0;
+    const Hits none = NO_HIT;
+    blocked = meet_spheres(scene, origin, direction, t_max, enabled, &none).primitive >= 0;
     enabled = enabled & !blocked;
 #endif
 #if IN_TREE

@@ -2,19 +2,18 @@
 #include "surface.cl"
 #include "sampler.cl"
 
-// The surfaces that rays meet, whose closest hits are known; lanes that meet nothing get that of primitive 0. The origin
-// stays.
-static inline Hits first_surface_from(const Scene *scene, const Hits *closest, real3 *origin, real3 direction, ireal active,
+// The surfaces that rays meet, whose closest hits are known; lanes that meet nothing get that of primitive 0.
+static inline Hits first_surface_from(const Scene *scene, const Hits *closest, real3 origin, real3 direction, ireal active,
                                       Sampler *sampler, Surface *surface) {
 #if PRIMITIVES
-    *surface = surface_at(scene, *origin, direction, closest);
+    *surface = surface_at(scene, origin, direction, closest);
 #endif
     return *closest;
 }
 
-static inline Hits first_surface(const Scene *scene, real3 *origin, real3 direction, ireal active, Sampler *sampler,
+static inline Hits first_surface(const Scene *scene, real3 origin, real3 direction, ireal active, Sampler *sampler,
                                  Surface *surface) {
-    Hits closest = closest_hit(scene, *origin, direction, (real)(INFINITY), active);
+    Hits closest = closest_hit(scene, origin, direction, (real)(INFINITY), active);
     return first_surface_from(scene, &closest, origin, direction, active, sampler, surface);
 }
 
