@@ -172,10 +172,10 @@ class TreeQuery:
             kernel.set_args(*self._scene, self._counts[0], *buffers, output, np.float32(self.frame.unit), np.uint32(n))
             launched = cl.enqueue_nd_range_kernel(queue, kernel, (groups * local,), (local,))
         wait_for(launched)
-        seconds = time.perf_counter() - start
+        seconds = run_seconds(launched) or time.perf_counter() - start
         self.kernel_seconds += seconds
-        self.longest_launch = max(self.longest_launch, run_seconds(launched) or seconds)
-        self._sizes[name].learn(n, run_seconds(launched) or seconds)
+        self.longest_launch = max(self.longest_launch, seconds)
+        self._sizes[name].learn(n, seconds)
         wait_for(cl.enqueue_copy(queue, answers, output, is_blocking=False))
 
     def _way(self, name: str, directions: NDArray[np.float32]) -> str:
