@@ -66,9 +66,10 @@ def pack_materials(users: Iterable[Material], textures: Textures) -> Materials:
             if name.endswith("_texture"):
                 records[name] = -1
         for i, (material, named) in enumerate(zip(distinct[kind], values)):
+            plain = material.without_textures()     # what it does not read itself is a number
             for name in records.dtype.names or ():
                 if name in named or hasattr(material, name):
-                    records[name][i] = named.get(name, getattr(material, name, 0))
+                    records[name][i] = named.get(name, getattr(plain, name, 0))
         buffers[kind.kernel] = (kind.__name__, records)
         names = {name for named in values for name in named}
         reads |= {f"{kind.kernel}_{name}": f"{name}_texture" in names for name in sorted(names)

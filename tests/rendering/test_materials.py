@@ -1,0 +1,53 @@
+"""Materials of a type are packed into one array of records, whatever each of them reads from textures."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any, get_args, get_type_hints
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.rendering.materials import pack_materials
+from clrt.rendering.textures import Textures
+from clrt.scene.materials import MATERIALS, Material
+from clrt.scene.textures import Picture, Texture
+from clrt.study.bsdfs import variants
+
+#: Random materials of a type.
+COUNT = 40
+
+
+def textured(kind: type[Material], rng: np.random.Generator) -> Material:
+    """A random variant of the type with random textures on some of the fields that may be one."""
+    chosen, hints = variants(kind), get_type_hints(kind)
+    while True:
+        names = [field.name for field in fields(kind) if Texture in get_args(hints[field.name]) and rng.random() < 0.5]
+        texels = rng.integers(0, 256, (len(names), 2, 2, 4), np.uint8)
+        found: dict[str, Any] = {name: Texture(picture=Picture(each), factor=float(rng.uniform(0.1, 0.9)))
+                                 for name, each in zip(names, texels)}
+        material = replace(chosen[int(rng.integers(len(chosen)))], **found)
+        if not material.conflicts():
+            return material
+
+
+def names_of(records: NDArray[Any]) -> set[str]:
+    """The record's fields without its padding."""
+    return {name for name in records.dtype.names or () if not name.startswith(("pad", "rest"))}
+
+
+@pytest.mark.parametrize("kind", MATERIALS)
+@pytest.mark.parametrize("seed", range(5))
+def test_materials_are_packed_together_as_alone(kind: type[Material], seed: int) -> None:
+    """A record holds what it holds when packed alone, and no texture that its material does not read."""
+    rng = np.random.default_rng(seed)
+    users = [textured(kind, rng) for _ in range(COUNT)]
+    textures = Textures()
+    together = pack_materials(users, textures)
+    _, records = together.buffers[kind.kernel]
+    for code, user in zip(together.codes, users):
+        record, (_, (alone,)) = records[code >> 4], pack_materials([user], textures).buffers[kind.kernel]
+        assert all(np.array_equal(record[name], alone[name]) for name in names_of(alone))
+        others = names_of(records) - names_of(alone)
+        assert all(record[name] == -1 for name in others if name.endswith("_texture"))
