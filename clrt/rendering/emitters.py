@@ -83,9 +83,9 @@ def light_type(light: Light) -> str | None:
 
 
 def _sphere_lights(scene: Scene, textures: Textures) -> NDArray[Any]:
-    lamps = [sphere for sphere in scene.spheres if any(sphere.material.radiance)]
+    lamps = [(i, sphere) for i, sphere in enumerate(scene.spheres) if any(sphere.material.radiance)]
     records = np.zeros(len(lamps), SPHERE_LIGHT)
-    for record, lamp in zip(records, lamps):
+    for record, (record["sphere"], lamp) in zip(records, lamps):
         record["center"], record["radius"], record["radiance"] = lamp.center, lamp.radius, lamp.material.radiance
         emission = lamp.material.emission
         record["texture"] = textures.number(emission) if isinstance(emission, Texture) else -1

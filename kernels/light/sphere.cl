@@ -1,10 +1,14 @@
 // A sphere that shines outwards: a direction uniform over the cone it fills (Shirley et al. 1996). World frame.
 #include "light/interface.cl"
+#include OPACITY_FILE
 
-// 1 − cos of the cone's half angle, without cancellation for a far sphere; 0 from inside, where nothing shines.
-static inline real sphere_light_cone(real3 to_center, real radius) {
+// 1 − cos of the cone's half angle, without cancellation for a far sphere; 0 from inside, where nothing shines, and for
+// points on the sphere itself, which see its inside alone: within their rounding error (surface.cl) of it.
+static inline real sphere_light_cone(real3 center, real radius, real3 to_center) {
     real sin2 = radius * radius / dot3(to_center, to_center);
-    return sin2 < 1.0f ? sin2 / (1.0f + safe_sqrt(1.0f - sin2)) : ZERO;
+    real reach = radius + (real)(GAMMA(32)) * (largest(absolute3(center)) + radius);
+    ireal outside = dot3(to_center, to_center) > reach * reach;
+    return outside ? sin2 / (1.0f + safe_sqrt(1.0f - sin2)) : ZERO;
 }
 
 static inline LightSample sphere_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
@@ -12,7 +16,7 @@ static inline LightSample sphere_light_sample(const Scene *scene, ireal index, r
     real radius = GATHER(real, scene->sphere_lights, index, .radius);
     real3 to_center = sub(center, p);
     real distance = length3(to_center);
-    real height = sphere_light_cone(to_center, radius);
+    real height = sphere_light_cone(center, radius, to_center);
     ireal outside = height > 0.0f;
     LightSample s;
     real3 around = sample_cone(u, height);
@@ -28,13 +32,20 @@ static inline LightSample sphere_light_sample(const Scene *scene, ireal index, r
     radiance = textured3(scene, GATHER(ireal, scene->sphere_lights, index, .texture), radiance, &at);
 #endif
     s.radiance = choose(outside, radiance, splat(ZERO));
+#if OPACITY
+    Hits sampled = {near, ZERO, ZERO, GATHER(ireal, scene->sphere_lights, index, .sphere)};
+    Surface surface;
+    sphere_surface(scene, p, s.wi, &sampled, sampled.primitive, &surface);
+    s.radiance = scale(s.radiance, opacity_at(scene, &surface, s.wi));
+#endif
     s.infinite = s.delta = NO_LANES;
     return s;
 }
 
 static inline real sphere_light_pdf(const Scene *scene, ireal index, real3 p, real3 wi, real t, const Surface *surface) {
-    real3 to_center = sub(GATHER3(scene->sphere_lights, index, .center), p);
-    return cone_pdf(sphere_light_cone(to_center, GATHER(real, scene->sphere_lights, index, .radius)));
+    real3 center = GATHER3(scene->sphere_lights, index, .center);
+    real height = sphere_light_cone(center, GATHER(real, scene->sphere_lights, index, .radius), sub(center, p));
+    return height > 0.0f ? cone_pdf(height) : ZERO;
 }
 
 static inline real3 sphere_light_radiance(const Scene *scene, ireal index, real3 wi, const Surface *surface) {

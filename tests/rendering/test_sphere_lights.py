@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from clrt.device.open import Device
 from clrt.scene import instancing
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials import MATERIALS, Diffuse, Material
 from clrt.scene.model import Camera, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
+from clrt.study.bsdfs import variants
 
 from .lamps import directions
 from .pictures import film
@@ -73,3 +76,40 @@ def test_near_and_far(device: Device, kind: str, integrator: Integrator, monkeyp
         expected = ALBEDO / np.pi * irradiance(radius * (1 + gap), radius, cosine)
         found = film(device, scene, sampler="sobol").mean.mean()
         assert found == pytest.approx(expected, rel=0.01), (radius, gap, cosine)
+
+
+#: Of each material type that light passes in many directions, one.
+PASSED = {kind.__name__: next(each for each in variants(kind) if "TRANSMISSION_LOBES" in each.features())
+          for kind in MATERIALS if any("TRANSMISSION_LOBES" in each.features() for each in variants(kind))}
+
+
+@pytest.mark.parametrize("kind", PASSED)
+def test_a_sphere_does_not_light_itself(device: Device, kind: str) -> None:
+    """It shines outwards and is convex: whatever it is made of, it looks as it shines, anywhere and of any size."""
+    material, rng = replace(PASSED[kind], emission=(1.0, 2.0, 3.0)), np.random.default_rng(3)
+    for _ in range(COUNT // 2):
+        radius = 10.0 ** rng.uniform(-2, 3)
+        center = directions(rng, 1)[0] * radius * 10.0 ** rng.uniform(-2, 3)
+        scene = Scene(spheres=[Sphere(center=tuple(center.tolist()), radius=radius, material=material)],
+                      camera=Camera(position=tuple((center + [0, 0, 3 * radius]).tolist()),
+                                    look_at=tuple(center.tolist())),
+                      render=RenderSettings(size=(16, 16), spp=64, max_depth=3))
+        shine = film(device, replace(scene, render=replace(scene.render, max_depth=1)))
+        np.testing.assert_array_equal(film(device, scene).mean, shine.mean)
+
+
+@pytest.mark.parametrize("integrator", ["path", "local"])
+def test_light_in_part_opaque(device: Device, integrator: Integrator) -> None:
+    """Where it lets light through it sends out none: its light is as much less as it is opaque."""
+    rng = np.random.default_rng(9)
+    for _ in range(4):
+        opacity, lamp = rng.uniform(0.1, 0.9), Diffuse(color=(0.0, 0.0, 0.0), emission=(1.0, 1.0, 1.0))
+        scene = lit("flat", integrator, 1.0, 10.0 ** rng.uniform(-1, 1), rng.uniform(0.3, 1), rng)
+        opaque, clear = (film(device, with_lamp(scene, each), sampler="sobol").mean.mean()
+                         for each in (lamp, replace(lamp, opacity=opacity)))
+        assert clear == pytest.approx(opacity * opaque, rel=0.01)
+
+
+def with_lamp(scene: Scene, material: Material) -> Scene:
+    """The scene with its last sphere of that material."""
+    return replace(scene, spheres=[*scene.spheres[:-1], replace(scene.spheres[-1], material=material)])
