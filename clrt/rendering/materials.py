@@ -68,7 +68,7 @@ def pack_materials(users: Iterable[Material], textures: Textures) -> Materials:
         for i, (material, named) in enumerate(zip(distinct[kind], values)):
             plain = material.without_textures()     # what it does not read itself is a number
             for name in records.dtype.names or ():
-                if name in named or hasattr(material, name):
+                if name in named or getattr(plain, name, None) is not None:
                     records[name][i] = named.get(name, getattr(plain, name, 0))
         buffers[kind.kernel] = (kind.__name__, records)
         names = {name for named in values for name in named}

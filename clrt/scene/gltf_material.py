@@ -23,6 +23,8 @@ WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 NEAREST = 9728
 #: Of what is no metal; glTF's 0 stands for infinity.
 MOST_IOR = 4.0
+#: Opacity 1 would ignore the alpha of vertex colours.
+BELOW_ONE = 1 - 2.0**-24
 #: A base colour texture that cannot be read counts by this.
 GREY = 0.8
 
@@ -59,11 +61,13 @@ class Materials:
         if source.alphaMode == "OPAQUE":
             return made
         opacity = _numbered(_unit(pbr.baseColorFactor[3]), base, "alpha")
+        most = BELOW_ONE if opacity == 1 and "COLOR_0" in primitive.attributes else 1.0
+        opacity = most if opacity == 1 else opacity
         if source.alphaMode == "BLEND":
             return replace(made, opacity=opacity)
         if source.alphaCutoff > 1:    # nothing reaches it (specification 3.9.4)
             return replace(made, opacity=0.0)
-        return replace(made, opacity=opacity, alpha_cutoff=_unit(source.alphaCutoff))
+        return replace(made, opacity=opacity, alpha_cutoff=most * _unit(source.alphaCutoff))
 
     def _layers(self, extensions: looks.MaterialExtensions, primitive: gltf.Primitive, user: str) -> dict[str, Any]:
         """The fields for the extensions in use."""

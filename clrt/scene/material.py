@@ -63,7 +63,9 @@ class Material:
             parameters["normal_map"] = self.normal_map
         if self.opacity != 1 or self.one_sided:
             cutoff = -1.0 if self.alpha_cutoff is None else self.alpha_cutoff
-            parameters |= {"opacity": self.opacity, "alpha_cutoff": cutoff, "one_sided": float(self.one_sided)}
+            # No field's name: materials without one have 0, and stop all light whatever the alpha of vertex colours is.
+            parameters["cutoff"] = 0.0 if self.opacity == 1 else cutoff
+            parameters |= {"opacity": self.opacity, "one_sided": float(self.one_sided)}
         return parameters
 
     @property

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from clrt.device.open import Device
 from clrt.rendering.renderer import Renderer
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.materials import Diffuse, Material
+from clrt.scene.materials import Diffuse, Material, Mirror
 from clrt.scene.model import Camera, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.textures import Picture, Texture
 from clrt.study.significance import chi2_test
@@ -84,6 +84,23 @@ def test_a_picture_cuts_holes(device: Device) -> None:
     fading[:, 3] = UV[:, 0]
     found = seen(device, quad(replace(lamp(1, 0, 0), opacity=0.999999), 1, colors=fading), quad(lamp(0, 1, 0)))
     assert np.abs(found[..., 0].mean(axis=0) - (np.arange(16) + 0.5) / 16).max() < 0.02
+    cut = replace(lamp(1, 0, 0), opacity=0.999999, alpha_cutoff=0.5)
+    found = seen(device, quad(cut, 1, colors=fading), quad(lamp(0, 1, 0)))
+    assert found[:, :8, 0].max() == 0 and found[:, 8:, 0].min() == 1
+
+
+@pytest.mark.parametrize("other", [Diffuse(), Diffuse(opacity=0.5), Mirror(opacity=0.5), Mirror(one_sided=True)],
+                         ids=["diffuse", "clear diffuse", "clear mirror", "one-sided mirror"])
+@pytest.mark.parametrize("one_sided", [False, True])
+@pytest.mark.parametrize("cutoff", [None, 0.5])
+def test_opaque_materials_stop_all_light(device: Device, other: Material, one_sided: bool,
+                                         cutoff: float | None) -> None:
+    """Whatever the alpha of vertex colours is, and whatever materials the scene has elsewhere."""
+    fading = np.ones((4, 4), np.float32)
+    fading[:, 3] = UV[:, 0]
+    top = quad(replace(lamp(1, 0, 0), one_sided=one_sided, alpha_cutoff=cutoff), 1, colors=fading)
+    found = seen(device, top, quad(lamp(0, 1, 0)), spheres=[Sphere(center=(0, 0, -9), radius=0.01, material=other)])
+    assert (found == [1, 0, 0]).all()
 
 
 @pytest.mark.parametrize("lanes", [1, 8])

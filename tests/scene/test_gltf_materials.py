@@ -103,6 +103,19 @@ def test_layers_and_glass(tmp_path: Path) -> None:
         color=(1, 0.5, 1), ior=1.4, roughness=0.5, attenuation_color=(0.5, 1, 1), attenuation_distance=2)
 
 
+@pytest.mark.parametrize("mode, fades, cutoff", [("OPAQUE", False, None), ("BLEND", True, None), ("MASK", True, 1.0)])
+def test_alpha_of_vertex_colors(tmp_path: Path, mode: str, fades: bool, cutoff: float | None) -> None:
+    """It multiplies an opacity of 1 as any other, which opaque materials do not have."""
+    gltf = ball()
+    gltf.document["materials"] = [{"alphaMode": mode, "alphaCutoff": 1.0}]
+    primitive = gltf.document["meshes"][0]["primitives"][0]
+    primitive["material"] = 0
+    primitive["attributes"]["COLOR_0"] = gltf.accessor(np.full((len(icosphere(0)[0]), 4), 0.5))
+    material = read(gltf, tmp_path).meshes[0].material
+    assert (material.opacity != 1) == fades and material.opacity == pytest.approx(1)
+    assert material.alpha_cutoff == (None if cutoff is None else material.opacity)
+
+
 def test_missing_texture_is_grey_with_a_warning(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     gltf = ball()
     gltf.document |= {"images": [{"uri": "lost.png"}], "textures": [{"source": 0}],
