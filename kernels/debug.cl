@@ -98,7 +98,7 @@ static inline void note_light(const Scene *scene, const Path *path, const Surfac
     v->light_radiance = choose(active, sample.radiance, splat(ZERO));
     v->light_bsdf = choose(active, bsdf_eval(&shading->bsdf, shading->wo, wi), splat(ZERO));
     v->light_pdf = active ? pdf : ZERO;
-    v->light_weight = (active & !sample.delta) ? power_heuristic(pdf, other) : ONE;
+    v->light_weight = (active & !sample.delta) ? light_sample_weight(pdf, other) : ONE;
 
     ShadowRay shadow;
     ireal sent = aim_at_light(scene, path, surface, shading, active, sampler, &shadow);

@@ -59,7 +59,7 @@ static inline real3 emitted_light(const Scene *scene, const Path *path, const Su
 #if EMITTERS
     real pdf;
     real3 emitted = emitter_radiance(scene, path->p, path->n, path->wi, t, surface, hit, &pdf);
-    real weight = path->specular ? ONE : power_heuristic(path->pdf, pdf);
+    real weight = path->specular ? ONE : bsdf_sample_weight(path->pdf, pdf);
     return choose(hit, at_eye(path, scale(emitted, weight)), splat(ZERO));
 #else
     return splat(ZERO);
@@ -106,7 +106,7 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
     contribution = mul(contribution, attenuated(absorption, distance));
 #endif
     real pdf = bsdf_pdf(&shading->bsdf, shading->wo, wi);
-    real weight = (light.delta ? ONE : power_heuristic(light.pdf, pdf)) / light.pdf;
+    real weight = (light.delta ? ONE : light_sample_weight(light.pdf, pdf)) / light.pdf;
     ray->light = at_eye(path, scale(contribution, weight));
     return useful;
 }

@@ -4,6 +4,7 @@
 // numbered type by type in that order. Where there are several, light/choice.cl chooses one; the probability of that is
 // part of every pdf here. p, n: the point that is lit, and its unit normal on the side that is.
 #include "light/interface.cl"
+#include MIS_WEIGHTS
 #include LIGHT_FILES
 #include LIGHT_CHOICE
 
@@ -107,7 +108,7 @@ static inline real3 environment_light(const Scene *scene, real3 p, real3 n, real
     real other;
 #if SKY
     real3 radiance = escaped_radiance(scene, p, n, wi, &other);
-    light = scale(radiance, specular ? ONE : power_heuristic(pdf, other));
+    light = scale(radiance, specular ? ONE : bsdf_sample_weight(pdf, other));
 #endif
 #if LIGHT_SUN
     int first = scene->counts.lights - scene->counts.sky_lights - scene->counts.sun_lights;
@@ -115,7 +116,7 @@ static inline real3 environment_light(const Scene *scene, real3 p, real3 n, real
         real3 disc = sun_radiance(scene, sun, wi, &other);
         if (!ANY(other > 0.0f)) continue;
         other *= light_probability(scene, p, n, (ireal)(first + sun));
-        light = add(light, scale(disc, specular ? ONE : power_heuristic(pdf, other)));
+        light = add(light, scale(disc, specular ? ONE : bsdf_sample_weight(pdf, other)));
     }
 #endif
     return light;

@@ -6,6 +6,7 @@ import click
 
 from .bench_agree import agree_command
 from .bench_build import build_command
+from .bench_combinations import combinations_command
 from .bench_converge import converge_command
 from .bench_farm import farm_command
 from .bench_hits import hits_command
@@ -19,9 +20,10 @@ from .options import Group
 
 @click.group(cls=Group)
 def command() -> None:
-    """Measure this machine: rays, build, hits, peers, converge, agree, mitsuba-data, numerics, theses, farm."""
+    """Measure this machine: rays, build, hits, peers, converge, agree, combinations,
+    mitsuba-data, numerics, theses, farm."""
 
 
 for each in (rays_command, build_command, hits_command, peers_command, converge_command, agree_command,
-             mitsuba_data_command, numerics_command, theses_command, farm_command):
+             combinations_command, mitsuba_data_command, numerics_command, theses_command, farm_command):
     command.add_command(each)

@@ -6,13 +6,17 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from clrt.cli import bench_combinations
 from clrt.errors import SceneError
+from clrt.study import combinations, identities
 from clrt.study.rays import load_rays
 
 CORNER = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
@@ -78,6 +82,33 @@ def test_hits_that_must_be_the_same(tmp_path: Path) -> None:
         assert f"float64: {mesh['exact']['wrong']} of {mesh['exact']['rays']} answers impossible" in printed
     assert [mesh["escaped"] for mesh in figures["meshes"]] == [0, 0, None]
     assert {"index", "platform", "driver"} <= set(figures["devices"][0])
+
+
+def test_random_scenes_obey_a_property(tmp_path: Path) -> None:
+    figures, printed = bench("combinations", "--property", "brightness", "--scenes", "1", "--seed", "5", cwd=tmp_path)
+    assert (figures["seed"], figures["first"], figures["scenes"]) == (5, 0, 1)
+    (found,) = figures["verdicts"]
+    assert {"property", "scene", "number", "side", "rounds", "p", "difference", "mean", "noise", "dropped",
+            "off"} == set(found)
+    assert (found["property"], found["scene"], found["off"]) == ("brightness", "combination-5-0", False)
+    assert re.search(r"^brightness +1 +0", printed, re.M)
+
+
+def test_all_properties_can_be_chosen() -> None:
+    assert bench_combinations.PROPERTIES == tuple(identities.PROPERTIES)
+
+
+def test_a_violated_property_is_reported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """With its scenes, and by the exit code; the other scene is right."""
+    wrong = combinations.Verdict("brightness", "combination-5-0", 0, "2 times the light", len(combinations.ROUNDS),
+                                 1e-12, 0.03, 1.02, 0.001, 0)
+    monkeypatch.setattr(combinations, "verdicts", lambda *_: iter([wrong, replace(wrong, number=1, p=0.5)]))
+    options = ["--property", "brightness", "--scenes", "2", "--seed", "5", "--keep", str(tmp_path)]
+    done = CliRunner().invoke(bench_combinations.combinations_command, options)
+    assert done.exit_code == 1
+    assert "off: brightness, scene 0: 2 times the light: picture +2.00% ± 0.10%, a block +3.00%" in done.output
+    assert re.search(r"^brightness +2 +1 ", done.output, re.M) and "scene 1" not in done.output
+    assert [path.name for path in tmp_path.glob("*.toml")] == ["combination-5-0-brightness-as-it-is-0.toml"]
 
 
 def stored(path: Path, **arrays: Any) -> Path:

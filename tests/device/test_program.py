@@ -129,6 +129,10 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     used |= set(files_of(first_hit_program(compile_scene(everything(), Choices()), AOVS)[0]))
     for entry in ("guides.cl", "debug.cl", "raster/outline.cl", "study/probe.cl", "study/raster_hits.cl"):
         used |= set(compile_scene(everything(), Choices(), entry).files)
+    for name, file in (("MIS_WEIGHTS", "bsdf_sampling"), ("MIS_WEIGHTS", "light_sampling"),
+                       ("LIGHT_CHOICE", "uniform_choice")):
+        compiled = compile_scene(everything(), Choices())
+        used |= set(replace(compiled, chosen_files=compiled.chosen_files | {name: [f"study/{file}.cl"]}).files)
     assert sorted(used) == FILES
 
 

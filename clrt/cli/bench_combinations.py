@@ -1,0 +1,88 @@
+"""`clrt bench combinations`: test identities that hold for all pictures over random scenes."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from ..study.combinations import Verdict
+
+PROPERTIES = ("additivity", "strategies", "choice", "integrators", "brightness", "similarity", "partition",
+              "bystanders")
+HEADER = (f"{'':16}{'scenes':>8}{'off':>6}{'2 rounds':>10}{'3 rounds':>10}{'4 rounds':>10}{'least p':>10}{'noise':>9}"
+          f"{'dropped':>9}")
+LEGEND = """  rounds: suspicious scenes, rendered again with fresh seeds and more samples
+  least p: of a scene's last round, corrected; dropped: samples that were not finite
+  noise: standard error of the relative difference of whole pictures, median"""
+
+
+@click.command("combinations")
+@click.option("--property", "names", multiple=True, type=click.Choice(PROPERTIES),
+              help="Test this property only; may be repeated. Default: all.")
+@click.option("--scenes", type=click.IntRange(min=1), help="Number of random scenes; default: 500, with --quick 4.")
+@click.option("--first", default=0, show_default=True, type=click.IntRange(min=0), help="Number of the first scene.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(0, 2**32 - 1), help="Seed of the scenes.")
+@click.option("--keep", type=click.Path(path_type=Path), metavar="DIR",
+              help="Save the scenes that violate a property there, as scene files.")
+@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--quick", is_flag=True, help="Test few scenes.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+def combinations_command(names: tuple[str, ...], scenes: int | None, first: int, seed: int, keep: Path | None,
+                         device: str | None, quick: bool, json_file: Path | None) -> None:
+    """Test identities that hold for all pictures over random scenes.
+
+    The scenes combine all materials, lights, cameras and textures at random. Properties: the picture in all lights is
+    the sum of the pictures in each light (additivity); BSDF sampling, light sampling and both together have the same
+    mean (strategies), and so has the uniform choice of lights (choice); path at depth 2 agrees with direct, local and
+    raster (integrators); brighter light makes a proportionally brighter picture (brightness); moving, rotating,
+    mirroring and scaling a scene with its camera keeps the picture (similarity), and so do meshes in pieces and as
+    instances (partition), and further objects that are not seen (bystanders). The exit code is 1 if a scene violates a
+    property significantly.
+    """
+    from ..device.open import open_device
+    from ..output.files import check_target
+    from ..output.report import write_report
+    from ..study.combinations import keep_scenes, verdicts
+
+    if json_file is not None:
+        check_target(json_file)
+    count = scenes or (4 if quick else 500)
+    opened, chosen = open_device(device), names or PROPERTIES
+    click.echo(f"device {opened.info.index}: {opened.info.name}; seed {seed}, scenes {first} to {first + count - 1}")
+    click.echo(HEADER)
+    results: list[Verdict] = []
+    for name in chosen:
+        found = []
+        for each in verdicts(opened, [name], seed, range(first, first + count)):
+            found.append(each)
+            if each.is_off(count * len(chosen)):
+                click.echo(_line(each))
+                if keep is not None:
+                    click.echo("\n".join(map(str, keep_scenes(each, seed, keep))))
+        click.echo(_row(name, found, count * len(chosen)))
+        results += found
+    click.echo(LEGEND)
+    off = [each.is_off(count * len(chosen)) for each in results]
+    if json_file is not None:
+        write_report(json_file, {"seed": seed, "first": first, "scenes": count, "verdicts": [
+            asdict(each) | {"off": wrong} for each, wrong in zip(results, off)]})
+        click.echo(str(json_file))
+    if any(off):
+        raise SystemExit(1)
+
+
+def _line(each: Verdict) -> str:
+    return (f"  off: {each.property}, scene {each.number}: {each.side}: picture {each.mean - 1:+.2%} ± {each.noise:.2%}"
+            f", a block {each.difference:+.2%}, p {each.p:.1e}")
+
+
+def _row(name: str, found: list[Verdict], tests: int) -> str:
+    longer = "".join(f"{sum(each.rounds >= rounds for each in found):10}" for rounds in (2, 3, 4))
+    return (f"{name:16}{len(found):8}{sum(each.is_off(tests) for each in found):6}{longer}"
+            f"{min(each.p for each in found):10.1e}{median(each.noise for each in found):9.2%}"
+            f"{sum(each.dropped for each in found):9}")

@@ -1,0 +1,153 @@
+"""Random scenes of everything there is, and the identities that their pictures obey."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields, replace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import clrt
+from clrt.device.open import Device
+from clrt.rendering.compile import compile_scene
+from clrt.rendering.session import Session
+from clrt.scene.lights import LIGHTS, PointLight
+from clrt.scene.materials import MATERIALS, Diffuse, Material
+from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.validate import scene_problems
+from clrt.study.combinations import ROUNDS, keep_scenes, verdict, verdicts
+from clrt.study.identities import PROPERTIES, Side, single_lights, strategies
+from clrt.study.probe import choices
+from clrt.study.random_draws import Draws
+from clrt.study.random_scenes import BATCH, random_scene
+
+#: Other scenes every day, or those of the seed in this environment variable.
+VARIABLE = "CLRT_COMBINATIONS_SEED"
+TODAY = int(os.environ.get(VARIABLE, date.today().toordinal()))
+#: In the suite, of one batch, which shares programs.
+SCENES = range(2)
+
+
+def materials(scene: Scene) -> list[Material]:
+    users: list[Mesh | Sphere] = [*scene.meshes, *scene.spheres, *(each.mesh for each in scene.instances)]
+    return [user.material for user in users]
+
+
+@pytest.mark.parametrize("name", PROPERTIES)
+def test_pictures_of_random_scenes_obey(device: Device, name: str) -> None:
+    """`clrt bench combinations` tests hundreds of scenes."""
+    print(f"seed {TODAY}")
+    again = f"`clrt bench combinations --seed {TODAY} --scenes {len(SCENES)} --property {name}` or {VARIABLE}={TODAY}"
+    for each in verdicts(device, [name], TODAY, SCENES):
+        assert not each.is_off(len(SCENES) * len(PROPERTIES)), f"{again} tests this again: {each}"
+        assert each.dropped == 0, f"{again} drops samples again: {each}"
+
+
+def three_lights() -> Scene:
+    """A ball on a floor below a lamp, a point light and a sky."""
+    lamp = Diffuse(emission=(9.0, 9.0, 9.0))
+    return Scene(spheres=[Sphere(), Sphere(center=(0.0, -100.0, 0.0), radius=99.0),
+                          Sphere(center=(2.0, 3.0, 0.0), radius=0.5, material=lamp)],
+                 lights=[PointLight(position=(-2.0, 3.0, 0.0), intensity=(9.0, 9.0, 9.0))],
+                 environment=Environment(color=(0.5, 0.5, 0.5)), camera=Camera(position=(0.0, 1.0, 5.0)),
+                 render=RenderSettings(size=(24, 16), max_depth=3))
+
+
+def pixels(device: Device, side: Side) -> NDArray[np.float64]:
+    """The picture of a side's first scene by few samples, with the same random numbers for all sides."""
+    scene = side.scenes[0]
+    compiled = compile_scene(scene, choices(device))
+    compiled = replace(compiled, chosen_files={**compiled.chosen_files, **side.files})
+    session = Session(device, compiled, scene.render.size, scene.render.max_depth, 1, 4)
+    for _ in session.render(4):
+        pass
+    return session.film().mean
+
+
+@pytest.mark.parametrize("share, off", [(1.0, False), (0.99, True)])
+def test_a_difference_of_one_percent_is_found(device: Device, share: float, off: bool) -> None:
+    scene = three_lights()
+    other = Side("other", [replace(scene, render=replace(scene.render, sampler="independent"))], scale=share)
+    found = verdict(device, "additivity", 0, [Side("scene", [scene]), other])
+    assert found.is_off() == off and abs(found.mean - share) < 5 * found.noise
+    assert found.noise < 0.005 and (found.rounds == len(ROUNDS)) == off
+
+
+def test_a_lost_light_is_found(device: Device) -> None:
+    scene = three_lights()
+    parts = list(single_lights(scene))
+    assert len(parts) == 3
+    assert verdict(device, "additivity", 0, [Side("all", [scene]), Side("two", parts[1:])]).is_off()
+
+
+def test_a_light_too_small_for_bsdf_sampling_is_not_off(device: Device) -> None:
+    """That finds it in no sample, of which deviations over the seeds tell nothing."""
+    scene = three_lights()
+    small = replace(scene.spheres[-1], center=(200.0, 300.0, 0.0), radius=0.1)
+    dark = replace(scene, spheres=[*scene.spheres[:-1], small], lights=[], environment=Environment())
+    both, bsdf, _ = strategies(dark, Draws(0, 0, 0))
+    assert not verdict(device, "strategies", 0, [both, bsdf]).is_off()
+    found, missed = (pixels(device, each) for each in (both, bsdf))
+    assert found.mean() > 0 and not missed.any()
+
+
+@pytest.mark.parametrize("name", ["strategies", "choice"])
+def test_other_strategies_draw_other_noise(device: Device, name: str) -> None:
+    """So the kernels' files were replaced."""
+    first, *others = PROPERTIES[name](three_lights(), Draws(0, 0, 0))
+    assert all(np.any(pixels(device, first) != pixels(device, other)) for other in others)
+
+
+def test_scenes_have_everything() -> None:
+    """Every material and light with each of its fields off its default, in valid scenes."""
+    varied: set[tuple[str, str]] = set()
+    for batch in range(60):
+        scene = random_scene(3, batch * BATCH)
+        assert not scene_problems(scene)
+        users: list[Any] = [*materials(scene), *scene.lights]
+        varied |= {(type(each).__name__, field.name) for each in users for field in fields(each)
+                   if getattr(each, field.name) != field.default}
+    assert {(kind.__name__, field.name) for kind in (*MATERIALS, *LIGHTS) for field in fields(kind)} <= varied
+
+
+def test_scenes_have_instances(device: Device) -> None:
+    """Which do not become meshes."""
+    scene = next(scene for batch in range(99) if (scene := random_scene(3, batch * BATCH)).instances)
+    assert "INSTANCES" in compile_scene(scene, choices(device), device=device).features
+
+
+def test_scenes_of_a_batch_share_programs(device: Device) -> None:
+    for batch in range(4):
+        scenes = [random_scene(5, batch * BATCH + number) for number in range(3)]
+        assert len({compile_scene(scene, choices(device), device=device).source for scene in scenes}) == 1
+        assert len({scene.camera.position for scene in scenes}) == len(scenes)
+
+
+def test_single_lights_share_out_all_lights() -> None:
+    """Each light, sky and emissive material is in one of them, and in no other."""
+    for number in range(0, 20 * BATCH, BATCH):
+        scene = random_scene(4, number)
+        parts = list(single_lights(scene))
+        count = len(scene.lights) + len({id(each) for each in materials(scene) if any(each.radiance)})
+        sky = scene.environment.image is not None or any(scene.environment.color)
+        assert len(parts) == count + sky
+        for part in parts:
+            lit = [each for each in materials(part) if any(each.radiance)]
+            own_sky = part.environment.image is not None or any(part.environment.color)
+            assert len(part.lights) + len({id(each) for each in lit}) + own_sky == 1
+
+
+def test_scenes_that_are_off_are_kept(device: Device, tmp_path: Path) -> None:
+    """As files that draw the same picture."""
+    seed = next(seed for seed in range(99) if not random_scene(seed, 0).instances)
+    found = next(verdicts(device, ["brightness"], seed, [0]))
+    kept = keep_scenes(found, seed, tmp_path)
+    assert len(kept) == 2
+    loaded, scene = clrt.load(kept[0]), random_scene(seed, 0)
+    same = [pixels(device, Side("", [each])) for each in (loaded, scene)]
+    np.testing.assert_allclose(same[0], same[1], rtol=1e-4, atol=1e-5)
