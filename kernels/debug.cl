@@ -72,7 +72,7 @@ static inline Hits blocker_of(const Scene *scene, const ShadowRay *ray, ireal st
 #if OPACITY
     for (;;) {
         Surface surface = surface_at(scene, ray->origin, direction, &hits);
-        ireal passes = stopped & (hits.primitive >= 0) & (opacity_at(scene, &surface, direction) < 1.0f);
+        ireal passes = stopped & (hits.primitive >= 0) & (opacity_at(scene, &surface, direction, false) < 1.0f);
         if (!ANY(passes)) break;
         Hits next = next_hit(scene, ray->origin, direction, t_max, passes, &hits);
         hits = choose_hits(passes, &next, &hits);
@@ -149,7 +149,7 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
     for (int depth = 1; ANY(active); ++depth) {
         VertexLanes v = blank_vertex();
         Surface surface;
-        Hits hits = first_surface(&scene, path.origin, path.wi, active, &sampler, &surface);
+        Hits hits = first_surface(&scene, path.origin, path.wi, depth == 1, active, &sampler, &surface);
         ireal arrived = active, hit = active & (hits.primitive >= 0);
         absorb(&path, hit ? hits.t : (real)(INFINITY));
         note_arrival(&scene, &path, &surface, &hits, hit, active & !hit, &v);

@@ -30,7 +30,7 @@ static inline real3 seen_position(const Scene *scene, const Surface *surface) { 
 // The surface that stops a ray, turned towards the camera; which lanes meet one, and its primitive and instance.
 static inline ireal meet(const Scene *scene, const CameraRay *ray, ireal active, Sampler *sampler, Surface *surface,
                          ireal *primitive, ireal *instance) {
-    Hits hits = first_surface(scene, ray->origin, ray->direction, active, sampler, surface);
+    Hits hits = first_surface(scene, ray->origin, ray->direction, true, active, sampler, surface);
     ireal hit = active & (hits.primitive >= 0);
     *primitive = hit ? hits.primitive : (ireal)(-1);
     *instance = hit ? hits.instance : (ireal)(0);

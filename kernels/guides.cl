@@ -20,7 +20,7 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
     real3 origin = eye, direction = view, tint = splat(ONE);
     for (int depth = 1;; ++depth) {
         Surface surface;
-        Hits hits = first_surface(scene, origin, direction, active, sampler, &surface);
+        Hits hits = first_surface(scene, origin, direction, depth == 1, active, sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
 #if ENVIRONMENT
         ireal escaped = active & !hit;

@@ -9,7 +9,7 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
         Surface surface;
-        Hits hits = first_surface(scene, path.origin, path.wi, active, sampler, &surface);
+        Hits hits = first_surface(scene, path.origin, path.wi, depth == 1, active, sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
         absorb(&path, hit ? hits.t : (real)(INFINITY));
         L = add(L, emitted_light(scene, &path, &surface, hits.t, hit));

@@ -14,7 +14,7 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
     *rays += active ? (ureal)(1) : (ureal)(0);
 #if PRIMITIVES
     Surface surface;
-    Hits hits = first_surface(scene, ray->origin, ray->direction, active, sampler, &surface);
+    Hits hits = first_surface(scene, ray->origin, ray->direction, true, active, sampler, &surface);
     ireal hit = active & (hits.primitive >= 0);
     if (!ANY(hit)) return splat(ZERO);
     return choose(hit, picture_value(scene, launch, ray->direction, hits.t, &surface), splat(ZERO));

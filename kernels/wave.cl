@@ -86,7 +86,7 @@ __attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int sl
     return count;
 }
 
-__attribute__((noinline)) static void trace(const Scene *scene, Wave *w, int count) {
+__attribute__((noinline)) static void trace(const Scene *scene, Wave *w, int count, int depth) {
     uint dimension = w->dimension;
     for (int i = 0; i < count; i += LANES) {
         Travel travel;
@@ -94,7 +94,8 @@ __attribute__((noinline)) static void trace(const Scene *scene, Wave *w, int cou
 #if OPACITY
         Sampler sampler = slot_sampler(w, travel.slot);
         Surface surface;
-        Hits hits = first_surface(scene, travel.path.origin, travel.path.wi, lanes_of(i, count), &sampler, &surface);
+        Hits hits = first_surface(scene, travel.path.origin, travel.path.wi, depth == 1, lanes_of(i, count), &sampler,
+                                  &surface);
         dimension = sampler.dimension;
 #else
         Hits hits = closest_hit(scene, travel.path.origin, travel.path.wi, (real)(INFINITY), lanes_of(i, count));
@@ -224,7 +225,7 @@ kernel void wave(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles,
         w.rays = 0;
         int count = set_out(&scene, &w, slots);
         for (int depth = 1; count > 0; ++depth) {
-            trace(&scene, &w, count);
+            trace(&scene, &w, count, depth);
             count = sort_out(&scene, &w, count);
 #if PRIMITIVES
             count = shade(&scene, &w, count, depth, &sent);

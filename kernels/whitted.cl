@@ -72,9 +72,9 @@ static inline real3 local_light(const Scene *scene, const Launch *launch, const 
         Surface surface;
 #if RASTER
         Hits next = depth == 1 ? *closest : closest_hit(scene, origin, direction, (real)(INFINITY), active);
-        Hits hits = first_surface_from(scene, &next, origin, direction, active, sampler, &surface);
+        Hits hits = first_surface_from(scene, &next, origin, direction, depth == 1, active, sampler, &surface);
 #else
-        Hits hits = first_surface(scene, origin, direction, active, sampler, &surface);
+        Hits hits = first_surface(scene, origin, direction, depth == 1, active, sampler, &surface);
 #endif
         ireal hit = active & (hits.primitive >= 0);
 #if ATTENUATION

@@ -52,6 +52,8 @@ RIGHT = 1.2
               help="What to compute.")
 @click.option("--shadows/--no-shadows", default=None, help="Whether local and raster ask what stands before lights.")
 @click.option("--adaptive", is_flag=True, default=None, help="More samples where the error is larger.")
+@click.option("--back-face-culling", type=click.Choice(["none", "camera", "all"]),
+              help="Which rays do not see back faces of materials that are not double-sided.")
 @click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error by.")
 @click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what was done.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
@@ -78,7 +80,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             seconds: float | None, error: float | None, error_percentile: float | None, depth: int | None,
             seed: int | None, devices: tuple[str, ...],
             integrator: str | None, shadows: bool | None, sampler: str | None, pixel_filter: str | None,
-            adaptive: bool | None, reference: Path | None, report: Path | None, plot: Path | None,
+            adaptive: bool | None, back_face_culling: str | None, reference: Path | None,
+            report: Path | None, plot: Path | None,
             aovs: tuple[str, ...], denoise: bool, checkpoint: Path | None, checkpoint_every: float, resume: bool,
             view: str, exposure: float, progress_kind: str | None, print_kernel: bool, quiet: bool,
             frames: str | None, turntable: int | None, fps: float | None, scheduler: str | None,
@@ -120,6 +123,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     options: dict[str, Any] = {
         "size": size, "max_depth": depth, "seed": seed, "device": devices or None,
         "integrator": integrator, "shadows": shadows, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
+        "back_face_culling": back_face_culling,
         "checkpoint": None if print_kernel else checkpoint, "resume": resume and not (print_kernel or sequence),
         "checkpoint_seconds": checkpoint_every, "error_percentile": error_percentile, "aovs": beside,
         "first_hits": denoise, **tracing}

@@ -89,6 +89,7 @@ def _sphere_lights(scene: Scene, textures: Textures) -> NDArray[Any]:
         record["center"], record["radius"], record["radiance"] = lamp.center, lamp.radius, lamp.material.radiance
         emission = lamp.material.emission
         record["texture"] = textures.number(emission) if isinstance(emission, Texture) else -1
+        record["double_sided"] = lamp.material.double_sided
     return records
 
 

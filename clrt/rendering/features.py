@@ -52,9 +52,12 @@ def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
            "OPACITY": bool(materials.with_value("opacity")), "NEXT_HIT": bool(materials.with_value("opacity")),
            "SKY": packed.sky.kernel is not None, "LIGHTS": emitters.count > 0, "LIGHT_TREE": emitters.choice.tree,
            "EMITTERS": any(t in SURFACES for t in emitters.types),
+           "DOUBLE_SIDED_LIGHTS": any(user.double_sided and any(user.radiance) for user in packed.shapes.users),
            "LIGHT_RANGES": any(getattr(light, "range", None) for light in scene.lights),
            "LOCAL": local, "NO_SHADOWS": local and not scene.render.shadows,
            "RASTER": scene.render.integrator == "raster", "PIXEL_MIDDLE": scene.render.integrator == "depth",
+           "CAMERA_CULLING": (scene.render.back_face_culling == "camera"
+                              and any(user.is_culled for user in packed.shapes.users)),
            "DIRECT_LIGHT": choices.direct_light, "LOOP_LIMIT": loop_limit}
     return features | {name for name, present in has.items() if present}
 

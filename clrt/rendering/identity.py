@@ -21,7 +21,7 @@ from .choices import Choices
 
 PARTS = ("camera", "meshes", "instances", "spheres", "lights", "environment")
 #: Of those in RenderSettings, beside the size.
-SETTINGS = ("max_depth", "seed", "integrator", "shadows", "sampler", "filter", "adaptive")
+SETTINGS = ("max_depth", "seed", "integrator", "shadows", "sampler", "filter", "adaptive", "back_face_culling")
 
 
 def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:

@@ -41,11 +41,12 @@ class LightGroups:
         return len(self.intensity)
 
 
-def flat_lights(corners: Doubles, normal: Doubles, intensity: Doubles) -> LightGroups:
-    """Flat lights with corners (n, k, 3) that shine on the side of their unit normals (n, 3)."""
+def flat_lights(corners: Doubles, normal: Doubles, intensity: Doubles, both: NDArray[np.bool_]) -> LightGroups:
+    """Flat lights with corners (n, k, 3) that shine on the side of their unit normals (n, 3), or on both (n,): these
+    are bounded as if they shone everywhere."""
     low, high = corners.min(axis=1), corners.max(axis=1)
-    ones = np.ones(len(normal))
-    return LightGroups(low, high, _half_diagonal(low, high), normal, ones, intensity, 0 * ones)
+    axis, cos_cone = np.where(both[:, None], 0.0, normal), np.where(both, -1.0, 1.0)
+    return LightGroups(low, high, _half_diagonal(low, high), axis, cos_cone, intensity, 0 * cos_cone)
 
 
 def round_lights(center: Doubles, radius: Doubles, intensity: Doubles) -> LightGroups:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene.material import as_color
+from ..scene.material import Culling, as_color
 from ..scene.materials import MATERIALS, Material
 from ..scene.textures import Texture
 from .records import material_record
@@ -49,8 +49,9 @@ class Materials:
         return bool(self.mapped("normal_map") or self.mapped("clearcoat_normal_map"))
 
 
-def pack_materials(users: Iterable[Material], textures: Textures) -> Materials:
-    """The materials of these users, equal ones packed once, with their textures added to `textures`."""
+def pack_materials(users: Iterable[Material], textures: Textures, culling: Culling) -> Materials:
+    """The materials of these users, equal ones packed once, with their textures added to `textures`; culling: of back
+    faces."""
     distinct: dict[type[Material], dict[Material, int]] = {}
     codes = []
     for material in users:
@@ -60,7 +61,7 @@ def pack_materials(users: Iterable[Material], textures: Textures) -> Materials:
     buffers: dict[str, tuple[str, NDArray[Any]]] = {}
     reads: dict[str, bool] = {}
     for kind in used:
-        values = [_values(material, textures) for material in distinct[kind]]
+        values = [_values(material, textures, culling) for material in distinct[kind]]
         records = np.zeros(len(values), material_record(values))
         for name in records.dtype.names or ():
             if name.endswith("_texture"):
@@ -78,10 +79,10 @@ def pack_materials(users: Iterable[Material], textures: Textures) -> Materials:
     return Materials(np.array(codes, np.int32), buffers, reads, used, features)
 
 
-def _values(material: Material, textures: Textures) -> dict[str, Number]:
+def _values(material: Material, textures: Textures, culling: Culling) -> dict[str, Number]:
     """What its record holds: of a texture its factor, and its number as NAME_texture."""
     parameters = material.parameters()
-    parameters |= material.surface_parameters()
+    parameters |= material.surface_parameters(culling)
     colors = {field.name for field in fields(material) if isinstance(field.default, tuple)}
     values: dict[str, Number] = {}
     for name, value in parameters.items():

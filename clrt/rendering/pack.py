@@ -60,8 +60,8 @@ class Shapes:
         """Whether rays are: the integrator `raster` has no others than those of shadows, mirrors, glass and holes."""
         render = self.scene.render
         return (render.integrator != "raster" or render.shadows or choices.first_hits
-                or any(user.is_specular or "TRANSMISSION" in user.features() or "opacity" in user.surface_parameters()
-                       for user in self.users))
+                or any(user.is_specular or "TRANSMISSION" in user.features()
+                       or "opacity" in user.surface_parameters(render.back_face_culling) for user in self.users))
 
     def tree(self, choices: Choices, device: Device | None, carried: Carried) -> Layout:
         """The tree over all but lone spheres; NO_RAYS where none is needed."""
@@ -128,7 +128,7 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: C
         sky = packing.result()
     textures = Textures()
     emitters = pack_emitters(shapes.scene, sky, textures)
-    materials = pack_materials(shapes.users, textures)
+    materials = pack_materials(shapes.users, textures, scene.render.back_face_culling)
     buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, normals, tree is not NO_RAYS)
     buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, materials.normal_maps)
     buffers |= materials.buffers | textures.buffers() | emitters.buffers | sky.buffers

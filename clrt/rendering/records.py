@@ -25,11 +25,13 @@ PLACEMENT = record(to_world="(3,4)f4", rounding0="3f4", first="i4", rounding1="3
 LIGHT_GROUP = record(center="3f4", radius="f4", axis="3f4", cos_cone="f4", intensity="f4", below="i4", above="i4",
                      cos_reach="f4")
 LIGHT_PLACE = np.dtype([("group", "i4")])
-#: texture: of its radiance, or −1; primitive: the triangle whose texture coordinates that has.
+#: texture: of its radiance, or −1; primitive: the triangle whose texture coordinates that has; double_sided: 1 where it
+#: emits from both sides.
 TRIANGLE_LIGHT = record(p0="3f4", area="f4", e1="3f4", parallelogram="i4", e2="3f4", texture="i4", normal="3f4",
-                        primitive="i4", radiance="3f4", pad="i4")
+                        primitive="i4", radiance="3f4", double_sided="i4")
 #: sphere: its number among the spheres.
-SPHERE_LIGHT = record(center="3f4", radius="f4", radiance="3f4", texture="i4", sphere="i4", pad="3i4")
+SPHERE_LIGHT = record(center="3f4", radius="f4", radiance="3f4", texture="i4", sphere="i4", double_sided="i4",
+                      pad="2i4")
 #: per_range2: 1 over the square of its range, 0 without one.
 POINT_LIGHT = record(position="3f4", pad="i4", intensity="3f4", per_range2="f4")
 #: outer: 1 − the cosine of the outer cone's angle; slope: 1 over what the inner one's is less.

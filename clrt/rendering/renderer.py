@@ -66,6 +66,7 @@ class Renderer:
                  size: tuple[int, int] | None = None, spp: int | None = None, max_depth: int | None = None,
                  seed: int | None = None, integrator: str | None = None, shadows: bool | None = None,
                  sampler: str | None = None, filter: str | None = None, adaptive: bool | None = None,
+                 back_face_culling: str | None = None,
                  triangle: str = "watertight", box: str = "robust", sphere: str = "robust", offset: str = "bound",
                  builder: str | None = None, layout: str | None = None, lanes: int | None = None,
                  paths: str | None = None, tree: bool | None = None, error_percentile: float | None = None,
@@ -76,7 +77,8 @@ class Renderer:
         check_stops(spp)
         self._aovs, self._percentile = chosen_aovs(aovs), checked_percentile(error_percentile)
         given: dict[str, Any] = {"size": size, "spp": spp, "max_depth": max_depth, "seed": seed, "filter": filter,
-                                 "integrator": integrator, "shadows": shadows, "sampler": sampler, "adaptive": adaptive}
+                                 "integrator": integrator, "shadows": shadows, "sampler": sampler, "adaptive": adaptive,
+                                 "back_face_culling": back_face_culling}
         settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
         self.scene = replace(scene, render=settings)
         check_light(self._aovs, settings.integrator)

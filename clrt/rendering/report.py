@@ -20,7 +20,7 @@ def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
         "width": width, "height": height, "spp": state.spp,
         "max_depth": settings.max_depth, "seed": settings.seed, "integrator": settings.integrator,
         "shadows": settings.shadows, "sampler": settings.sampler, "filter": settings.filter,
-        "adaptive": settings.adaptive,
+        "adaptive": settings.adaptive, "back_face_culling": settings.back_face_culling,
         "seconds": renderer.seconds,
         "samples": samples, "samples_per_second": samples / seconds,
         "rays": state.film.rays, "rays_per_second": state.film.rays / seconds,

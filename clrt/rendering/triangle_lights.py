@@ -54,16 +54,17 @@ def pack_triangle_lights(meshes: list[Mesh], textures: Textures) -> TriangleLigh
     light = np.full(len(mesh), -1, np.int32)
     light[lamps] = np.cumsum(begins) - 1
     own = lamps[begins]
-    records, groups = _packed(corners[begins], whole[begins], emission[mesh[own]], around[begins])
+    both = np.array([each.material.double_sided for each in meshes], bool)[mesh[own]]
+    records, groups = _packed(corners[begins], whole[begins], emission[mesh[own]], around[begins], both)
     records["texture"], records["primitive"] = texture[mesh[own]], own
     return TriangleLights(records, groups, light)
 
 
 def _packed(corners: Doubles, whole: NDArray[np.bool_], radiance: Doubles,
-            share: Doubles) -> tuple[NDArray[Any], LightGroups]:
+            share: Doubles, both: NDArray[np.bool_]) -> tuple[NDArray[Any], LightGroups]:
     """Of triangles with corners (n, 3, 3) or, where `whole` (n,), the parallelograms that have these three.
 
-    share: (n, 3), what part of the radiance leaves them on average.
+    share: (n, 3), what part of the radiance leaves them on average. both: (n,), which emit from both sides.
     """
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal, area = _normals(corners)
@@ -71,10 +72,10 @@ def _packed(corners: Doubles, whole: NDArray[np.bool_], radiance: Doubles,
     records = np.zeros(len(corners), TRIANGLE_LIGHT)
     records["p0"], records["e1"], records["e2"] = corners[:, 0], e1, e2
     records["area"], records["normal"], records["radiance"] = area, normal, radiance
-    records["parallelogram"] = whole
+    records["parallelogram"], records["double_sided"] = whole, both
     fourth = corners[:, 1] + np.where(whole[:, None], e2, 0)
     outline = np.concatenate([corners, fourth[:, None]], axis=1)
-    return records, flat_lights(outline, normal, area * (radiance * share @ LUMINANCE))
+    return records, flat_lights(outline, normal, area * (radiance * share @ LUMINANCE), both)
 
 
 def _normals(corners: Doubles) -> tuple[Doubles, Doubles]:

@@ -132,4 +132,5 @@ class Material(Part):
     normalTexture: NormalTextureInfo | None = None
     alphaMode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
     alphaCutoff: float = 0.5
+    doubleSided: bool = False
     extensions: MaterialExtensions = MaterialExtensions()

@@ -53,7 +53,8 @@ class Materials:
             color=_colored(_cut(pbr.baseColorFactor[:3]), base, pbr.baseColorTexture, GREY),
             metallic=_numbered(_unit(pbr.metallicFactor), gloss, "blue"),
             roughness=_numbered(_unit(pbr.roughnessFactor), gloss, "green"),
-            emission=self._emission(source, primitive, user), **self._layers(source.extensions, primitive, user))
+            emission=self._emission(source, primitive, user), double_sided=source.doubleSided,
+            **self._layers(source.extensions, primitive, user))
         glass = _glass(source.extensions, made)
         if glass is not None:
             return glass
@@ -160,6 +161,7 @@ def _glass(extensions: looks.MaterialExtensions, made: MetallicRoughness) -> Die
         return None
     distance = volume.attenuationDistance
     return Dielectric(color=made.color, ior=made.ior, roughness=made.roughness, emission=made.emission,
+                      double_sided=made.double_sided,
                       attenuation_color=_cut(volume.attenuationColor),
                       attenuation_distance=distance if distance is not None and distance > 0 else None)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from .limits import Ge, Le
 from .textures import NonNegative, Texture
@@ -12,6 +12,8 @@ Unit = Annotated[float, Ge(0), Le(1)]
 Albedo = tuple[Unit, Unit, Unit]
 Radiance = tuple[NonNegative, NonNegative, NonNegative]
 Parameter = float | tuple[float, ...] | Texture
+#: Which rays back faces are invisible to (`RenderSettings.back_face_culling`).
+Culling = Literal["none", "camera", "all"]
 
 #: GGX below this alpha is beyond float32 (D ~ 1/(pi alpha²)), in the kernel too; use `Mirror` for a perfect one.
 ALPHA_MIN = 1e-4
@@ -31,10 +33,11 @@ def tuples_for_lists(record: Any) -> None:
 class Material:
     """What every material has.
 
-    emission: radiance in W·sr⁻¹·m⁻² that its front side sends out. normal_map: bends the shading normal (glTF's
-    convention: linear, x to the right and y up in the picture); its factor scales how far. opacity: what part of light
-    it stops; the rest goes straight through. With an alpha_cutoff it stops all where the opacity reaches that, and
-    nothing elsewhere. one_sided: from behind it is not there.
+    emission: radiance in W·sr⁻¹·m⁻² that its front side sends out. double_sided: its back side does so, too, and
+    back-face culling leaves it alone (glTF's doubleSided). normal_map: bends the shading normal (glTF's convention:
+    linear, x to the right and y up in the picture); its factor scales how far. opacity: what part of light it stops;
+    the rest goes straight through. With an alpha_cutoff it stops all where the opacity reaches that, and nothing
+    elsewhere. one_sided: from behind it is not there.
     """
 
     kernel: ClassVar[str]
@@ -45,6 +48,7 @@ class Material:
     opacity: Unit | Texture = 1.0
     alpha_cutoff: Unit | None = None
     one_sided: bool = False
+    double_sided: bool = False
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)
@@ -56,17 +60,28 @@ class Material:
         """
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in SHARED}
 
-    def surface_parameters(self) -> dict[str, Parameter]:
-        """Those of the fields above that the surface reads, as far as they say anything."""
+    def surface_parameters(self, culling: Culling) -> dict[str, Parameter]:
+        """Those of the fields above that the surface reads, as far as they say anything.
+
+        one_sided, of the kernels: 1 where no ray meets it from behind, 0.5 where no camera ray does.
+        """
         parameters: dict[str, Parameter] = {}
         if self.normal_map is not None:
             parameters["normal_map"] = self.normal_map
-        if self.opacity != 1 or self.one_sided:
+        one_sided = 1.0 if self.one_sided or culling == "all" and self.is_culled else 0.0
+        if culling == "camera" and self.is_culled:
+            one_sided = max(one_sided, 0.5)
+        if self.opacity != 1 or one_sided:
             cutoff = -1.0 if self.alpha_cutoff is None else self.alpha_cutoff
             # No field's name: materials without one have 0, and stop all light whatever the alpha of vertex colours is.
             parameters["cutoff"] = 0.0 if self.opacity == 1 else cutoff
-            parameters |= {"opacity": self.opacity, "one_sided": float(self.one_sided)}
+            parameters |= {"opacity": self.opacity, "one_sided": one_sided}
         return parameters
+
+    @property
+    def is_culled(self) -> bool:
+        """Whether back-face culling is of its back faces: not of those that light inside it has to meet."""
+        return not (self.double_sided or "TRANSMISSION" in self.features())
 
     @property
     def radiance(self) -> Radiance:

@@ -13,7 +13,7 @@ from ..errors import ClrtError
 from .animation import Animation
 from .lights import Light
 from .limits import Ge, Gt, Le, Lt
-from .material import tuples_for_lists
+from .material import Culling, tuples_for_lists
 from .materials import Diffuse, Material
 from .numbers import real_array, whole_array
 from .textures import NonNegative
@@ -154,7 +154,8 @@ class Environment:
 class RenderSettings:
     """How to render unless told otherwise. `size`: (width, height). `max_depth` counts path edges:
     1 = only what glows, 2 = + direct light, 3 = + one bounce. shadows: whether they are cast, where the integrator is
-    local or raster."""
+    local or raster. back_face_culling: which rays pass through the back faces of materials that are not double_sided:
+    "none", those of the "camera", or "all"."""
 
     size: tuple[Pixels, Pixels] = (512, 512)
     spp: Annotated[int, Ge(1)] = 64
@@ -165,6 +166,7 @@ class RenderSettings:
     sampler: Sampler = "sobol"
     filter: Filter = "box"
     adaptive: bool = False
+    back_face_culling: Culling = "none"
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)

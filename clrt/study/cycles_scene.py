@@ -47,6 +47,8 @@ def check_scene(scene: Scene) -> None:
         raise UsageError(f"{scene.name}: Cycles is told of pinholes only")
     if scene.render.integrator == "local":
         raise UsageError(f'{scene.name}: Cycles has no integrator "local"')
+    if scene.render.back_face_culling != "none":
+        raise UsageError(f"{scene.name}: Cycles is not told of back_face_culling; leave it out")
     if scene.render.filter != "box" or scene.render.max_depth < 2:
         raise UsageError(f'{scene.name}: Cycles is compared with filter = "box", and two path edges or more')
 
@@ -134,16 +136,17 @@ def _is_metal(material: MetallicRoughness) -> bool:
 
 
 def _material(data: Any, material: Material) -> Any:
-    """Its BSDF, and its emission from the front."""
+    """Its BSDF, and its emission, from the front or from both sides."""
     made = data.materials.new(material.kernel)
     nodes = Nodes(made)
     shader = BSDFS[type(material)](nodes, material).outputs[0]
     if any(material.radiance):
         back = nodes("NewGeometry").outputs["Backfacing"]
         front = nodes("Math", {0: 1.0, 1: back}, operation="SUBTRACT").outputs[0]
-        emission = nodes("Emission", {"Color": (*untextured(material.emission), 1), "Strength": front}).outputs[0]
+        strength = 1.0 if material.double_sided else front
+        emission = nodes("Emission", {"Color": (*untextured(material.emission), 1), "Strength": strength}).outputs[0]
         shader = nodes("AddShader", {0: shader, 1: emission}).outputs[0]
-        made.cycles.emission_sampling = "FRONT"
+        made.cycles.emission_sampling = "FRONT_BACK" if material.double_sided else "FRONT"
     nodes("OutputMaterial", {"Surface": shader})
     return made
 

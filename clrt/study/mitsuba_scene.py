@@ -37,6 +37,8 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
         raise UsageError(f'{scene.name}: Mitsuba is compared with filter = "box"')
     if scene.render.integrator not in ("path", "direct"):
         raise UsageError(f'{scene.name}: Mitsuba has no integrator "{scene.render.integrator}"')
+    if scene.render.back_face_culling != "none":
+        raise UsageError(f"{scene.name}: Mitsuba culls no back faces; leave out back_face_culling")
     depth = scene.render.max_depth if scene.render.integrator == "path" else min(scene.render.max_depth, 2)
     owners: list[Mesh | Sphere] = [*unfolded(scene).meshes, *scene.spheres]
     absorbs = any(isinstance(owner.material, Dielectric) and medium(owner.material) for owner in owners)
@@ -87,6 +89,8 @@ def _surface(owner: Mesh | Sphere) -> Plugin:
     if isinstance(owner.material, Dielectric) and (inside := medium(owner.material)):
         shape["interior"] = inside
     if any(owner.material.radiance):
+        if owner.material.double_sided:
+            raise UsageError(f"{owner.name}: Mitsuba's area lights emit from one side; leave out double_sided")
         if isinstance(owner, Sphere) and isinstance(owner.material.emission, Texture):
             raise UsageError(f"{owner.name}: Mitsuba samples the light of painted balls as if they were turned")
         shape["emitter"] = {"type": "area", "radiance": color(owner.material.emission)}

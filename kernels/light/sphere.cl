@@ -1,4 +1,6 @@
 // A sphere that shines outwards: a direction uniform over the cone it fills (Shirley et al. 1996). World frame.
+//
+// One that shines inwards, too, is found there by the BSDF's directions alone: it lies in all of them.
 #include "light/interface.cl"
 #include OPACITY_FILE
 
@@ -36,7 +38,7 @@ static inline LightSample sphere_light_sample(const Scene *scene, ireal index, r
     Hits sampled = {near, ZERO, ZERO, GATHER(ireal, scene->sphere_lights, index, .sphere)};
     Surface surface;
     sphere_surface(scene, p, s.wi, &sampled, sampled.primitive, &surface);
-    s.radiance = scale(s.radiance, opacity_at(scene, &surface, s.wi));
+    s.radiance = scale(s.radiance, opacity_at(scene, &surface, s.wi, false));
 #endif
     s.infinite = s.delta = NO_LANES;
     return s;
@@ -53,5 +55,9 @@ static inline real3 sphere_light_radiance(const Scene *scene, ireal index, real3
 #if EMISSION_TEXTURES
     radiance = textured3(scene, GATHER(ireal, scene->sphere_lights, index, .texture), radiance, &surface->at);
 #endif
-    return choose(dot3(wi, surface->ng) < 0.0f, radiance, splat(ZERO));
+    ireal emits = dot3(wi, surface->ng) < 0.0f;
+#if DOUBLE_SIDED_LIGHTS
+    emits = emits | (GATHER(ireal, scene->sphere_lights, index, .double_sided) != 0);
+#endif
+    return choose(emits, radiance, splat(ZERO));
 }

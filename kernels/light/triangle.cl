@@ -1,6 +1,15 @@
-// A triangle, or the parallelogram of two, that shines from its front side: a point uniform over its area. World frame.
+// A triangle, or the parallelogram of two, that shines from its front side, or from both: a point uniform over its area. World
+// frame.
 #include "light/interface.cl"
 #include OPACITY_FILE
+
+// The cosine on the side that emits, from that on the front side: positive on the back as well if both sides emit.
+static inline real triangle_light_cosine(const Scene *scene, ireal index, real front) {
+#if DOUBLE_SIDED_LIGHTS
+    front = GATHER(ireal, scene->triangle_lights, index, .double_sided) != 0 ? absolute(front) : front;
+#endif
+    return front;
+}
 
 static inline LightSample triangle_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
     real2 b = sample_triangle(u);
@@ -15,7 +24,7 @@ static inline LightSample triangle_light_sample(const Scene *scene, ireal index,
     real d2 = dot3(d, d);
     LightSample s;
     s.wi = scale(d, rsqrt(d2));
-    real cosine = -dot3(s.wi, n);
+    real cosine = triangle_light_cosine(scene, index, -dot3(s.wi, n));
     ireal front = (cosine > 0.0f) & (d2 > 0.0f);
     real3 radiance = GATHER3(scene->triangle_lights, index, .radiance);
 #if EMISSION_TEXTURES
@@ -27,7 +36,7 @@ static inline LightSample triangle_light_sample(const Scene *scene, ireal index,
     Hits sampled = {ZERO, b.x, b.y, GATHER(ireal, scene->triangle_lights, index, .primitive)};
     Surface surface;
     triangle_surface(scene, &sampled, sampled.primitive, &surface);
-    s.radiance = scale(s.radiance, opacity_at(scene, &surface, s.wi));
+    s.radiance = scale(s.radiance, opacity_at(scene, &surface, s.wi, false));
 #endif
     s.pdf = front ? d2 / (cosine * GATHER(real, scene->triangle_lights, index, .area)) : ONE;
     s.target = shadow_target(p, q, add(absolute3(p0), add(absolute3(e1), absolute3(e2))), n);
@@ -44,5 +53,5 @@ static inline real3 triangle_light_radiance(const Scene *scene, ireal index, rea
 #if EMISSION_TEXTURES
     radiance = textured3(scene, GATHER(ireal, scene->triangle_lights, index, .texture), radiance, &surface->at);
 #endif
-    return choose(dot3(wi, surface->ng) < 0.0f, radiance, splat(ZERO));
+    return choose(triangle_light_cosine(scene, index, -dot3(wi, surface->ng)) > 0.0f, radiance, splat(ZERO));
 }

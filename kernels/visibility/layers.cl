@@ -7,15 +7,15 @@
 #include "bsdf.cl"
 #include "sampler.cl"
 
-// The first surfaces that stop rays whose closest hits are known; lanes without one get any.
-static inline Hits first_surface_from(const Scene *scene, const Hits *closest, real3 origin, real3 direction, ireal active,
-                                      Sampler *sampler, Surface *surface) {
+// The first surfaces that stop rays whose closest hits are known; lanes without one get any. from_camera: see opacity_at.
+static inline Hits first_surface_from(const Scene *scene, const Hits *closest, real3 origin, real3 direction,
+                                      int from_camera, ireal active, Sampler *sampler, Surface *surface) {
     real u = next_1d(sampler), left = ONE;
     Hits hits = *closest;
 #if RASTER
     // A rasterised t differs from the traced one by rounding, and the order of hits is that of traced ones.
     *surface = surface_at(scene, origin, direction, &hits);
-    ireal clear = active & (hits.primitive >= 0) & (opacity_at(scene, surface, direction) < 1.0f);
+    ireal clear = active & (hits.primitive >= 0) & (opacity_at(scene, surface, direction, from_camera) < 1.0f);
     if (ANY(clear)) {
         Hits traced = closest_hit(scene, origin, direction, (real)(INFINITY), clear);
         hits = choose_hits(clear, &traced, &hits);
@@ -23,7 +23,7 @@ static inline Hits first_surface_from(const Scene *scene, const Hits *closest, r
 #endif
     for (;;) {
         *surface = surface_at(scene, origin, direction, &hits);
-        left *= 1.0f - opacity_at(scene, surface, direction);
+        left *= 1.0f - opacity_at(scene, surface, direction, from_camera);
         ireal passes = active & (hits.primitive >= 0) & (u < left);
         if (!ANY(passes)) return hits;
         Hits next = next_hit(scene, origin, direction, (real)(INFINITY), passes, &hits);
@@ -31,10 +31,10 @@ static inline Hits first_surface_from(const Scene *scene, const Hits *closest, r
     }
 }
 
-static inline Hits first_surface(const Scene *scene, real3 origin, real3 direction, ireal active, Sampler *sampler,
-                                 Surface *surface) {
+static inline Hits first_surface(const Scene *scene, real3 origin, real3 direction, int from_camera, ireal active,
+                                 Sampler *sampler, Surface *surface) {
     Hits closest = closest_hit(scene, origin, direction, (real)(INFINITY), active);
-    return first_surface_from(scene, &closest, origin, direction, active, sampler, surface);
+    return first_surface_from(scene, &closest, origin, direction, from_camera, active, sampler, surface);
 }
 
 // What part of the light comes through to `origin` from a target, or from infinitely far along wi.
@@ -46,7 +46,7 @@ static inline real transmittance(const Scene *scene, real3 origin, real3 target,
         ireal hit = (left > 0.0f) & (hits.primitive >= 0);
         if (!ANY(hit)) return left;
         Surface surface = surface_at(scene, origin, direction, &hits);
-        left = hit ? left * (1.0f - opacity_at(scene, &surface, direction)) : left;
+        left = hit ? left * (1.0f - opacity_at(scene, &surface, direction, false)) : left;
         hits = next_hit(scene, origin, direction, t_max, hit & (left > 0.0f), &hits);
     }
 }

@@ -72,6 +72,20 @@ def test_a_cutoff_that_nothing_reaches(tmp_path: Path) -> None:
     assert textured((255, 255, 255), tmp_path, alphaMode="MASK", alphaCutoff=1.5).opacity == 0
 
 
+@pytest.mark.parametrize("extensions", [{}, {"KHR_materials_transmission": {"transmissionFactor": 1},
+                                             "KHR_materials_volume": {"thicknessFactor": 1}}], ids=["opaque", "glass"])
+def test_sides(tmp_path: Path, extensions: dict[str, Any]) -> None:
+    """What is double-sided emits from both; a material that says nothing, and the default material, have one side."""
+    found = []
+    for sides in ({"doubleSided": True}, {"doubleSided": False}, {}, None):
+        gltf = ball()
+        if sides is not None:
+            gltf.document["materials"] = [{"emissiveFactor": [1, 1, 1], "extensions": extensions, **sides}]
+            gltf.document["meshes"][0]["primitives"][0]["material"] = 0
+        found.append(read(gltf, tmp_path).meshes[0].material.double_sided)
+    assert found == [True, False, False, False]
+
+
 def test_layers_and_glass(tmp_path: Path) -> None:
     """Extensions by their names; a volume behind a surface that passes all light is glass."""
     texture = {"index": 0}
