@@ -27,6 +27,7 @@ static inline VertexLanes blank_vertex(void) {
     VERTEX_REALS(BLANK_REAL)
     VERTEX_INTS(BLANK_INT)
     v.primitive = v.emitter = v.light = v.blocker = (ireal)(-1);
+    v.emission_clamp = v.direct_clamp = ONE;
     return v;
 }
 
@@ -153,6 +154,7 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
         ireal arrived = active, hit = active & (hits.primitive >= 0);
         absorb(&path, hit ? hits.t : (real)(INFINITY));
         note_arrival(&scene, &path, &surface, &hits, hit, active & !hit, &v);
+        v.emission_clamp = clamp_factor(&launch, v.emission, depth);
         v.end = hit ? (ireal)(END_DEPTH) : (ireal)(END_ESCAPED);
         active = NO_LANES;
 #if PRIMITIVES
@@ -164,6 +166,7 @@ kernel void debug(SCENE_PARAMETERS, global Vertex *vertices, const Launch launch
         if (depth < launch.max_depth && ANY(hit)) {
 #if LIGHTS
             note_light(&scene, &path, &surface, &shading, hit, &sampler, &v);
+            v.direct_clamp = clamp_factor(&launch, v.direct, depth + 1);
 #endif
             active = note_direction(&path, &surface, &shading, hit, depth, launch.max_depth, &sampler, &v);
             v.end = hit ? v.end : (ireal)(END_ESCAPED);

@@ -47,6 +47,25 @@ static inline real3 at_eye(const Path *path, real3 L) {
 #endif
 }
 
+#if CLAMP
+// The factor that clamps a contribution to a sample, whose path has so many edges: it makes the largest channel at most
+// clamp_direct (up to two edges, as in Cycles) or clamp_indirect.
+static inline real clamp_factor(const Launch *launch, real3 light, int edges) {
+    real limit = (real)(edges <= 2 ? launch->clamp_direct : launch->clamp_indirect), most = largest(light);
+    return most > limit ? limit / most : ONE;
+}
+
+// The clamped contribution. *removed gains the mean of the channels of what that removes.
+static inline real3 clamped(const Launch *launch, real3 light, int edges, real *removed) {
+    real part = clamp_factor(launch, light, edges);
+    *removed += (1.0f - part) * (light.x * (1.0f / 3.0f) + light.y * (1.0f / 3.0f) + light.z * (1.0f / 3.0f));
+    return scale(light, part);
+}
+#else
+#define clamp_factor(launch, light, edges) ONE
+#define clamped(launch, light, edges, removed) (light)
+#endif
+
 // What is absorbed on the way to where the ray ended.
 static inline void absorb(Path *path, real distance) {
 #if ATTENUATION

@@ -15,6 +15,9 @@ typedef struct {
 #if DIRECT_LIGHT
     real3 direct, direct_error;   // of the same samples: what came with two edges at most
 #endif
+#if CLAMP
+    real clamped;                 // what clamps took from them, the mean of the channels
+#endif
 } Accumulator;
 
 static inline void two_sum(real *sum, real *error, real x) {
@@ -60,6 +63,9 @@ static inline Accumulator load_pixels(global const Pixel *pixels, ireal pixel) {
 #if DIRECT_LIGHT
                          GATHER3(film, pixel, .direct), GATHER3(film, pixel, .direct_error),
 #endif
+#if CLAMP
+                         GATHER(real, film, pixel, .clamped),
+#endif
     };
 }
 
@@ -86,5 +92,8 @@ static inline void store_pixels(global Pixel *film, ureal index, ireal stored, c
         pixel->count = LANE_UINT(a->count, lane);
         pixel->dropped = LANE_UINT(a->dropped, lane);
         pixel->rays = LANE_UINT(a->rays, lane);
+#if CLAMP
+        pixel->clamped = LANE(a->clamped, lane);
+#endif
     }
 }

@@ -2,9 +2,10 @@
 //
 // INTEGRATOR provides
 //
-//   seen_along(scene, launch, &ray, active, &sampler, &rays, &direct)   what arrives at the eye along camera rays, 0 in
-//                                                                       idle lanes; adds how many rays that took;
-//                                                                       direct: set where DIRECT_LIGHT is compiled in
+//   seen_along(scene, launch, &ray, active, &sampler, &rays, &direct, &removed)
+//                                         what arrives at the eye along camera rays, 0 in idle lanes; adds how many rays
+//                                         that took; direct: set where DIRECT_LIGHT is compiled in; removed: what clamps
+//                                         took is added where CLAMP is
 //
 // PIXEL_MIDDLE: all samples are of the ray through the pixel's middle.
 #include "camera.cl"
@@ -26,8 +27,12 @@ kernel void integrate(SCENE_PARAMETERS, global Pixel *film, global const uint *t
 #endif
         CameraRay ray = camera_ray(&scene, &launch, own.x, own.y, place, &sampler);
         real3 direct;
-        real3 seen = seen_along(&scene, &launch, &ray, own.inside, &sampler, &pixels.rays, &direct);
+        real removed = ZERO;
+        real3 seen = seen_along(&scene, &launch, &ray, own.inside, &sampler, &pixels.rays, &direct, &removed);
         ireal kept = accumulate(&pixels, seen, own.inside);
+#if CLAMP
+        pixels.clamped += kept ? removed : ZERO;
+#endif
 #if DIRECT_LIGHT
         accumulate_direct(&pixels, direct, kept);
 #endif

@@ -1,9 +1,9 @@
-// A path a lane, followed to its end (see integrate.cl). direct: what came with two edges at most.
+// A path a lane, followed to its end (see integrate.cl). direct: what came with two edges at most; removed: what clamps took.
 #include "camera.cl"
 #include "edge.cl"
 
 static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active, Sampler *sampler,
-                               ureal *rays, real3 *direct) {
+                               ureal *rays, real3 *direct, real *removed) {
     real3 L = splat(ZERO);
     Path path = path_along(ray->origin, ray->direction);
     for (int depth = 1;; ++depth) {
@@ -12,8 +12,8 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
         Hits hits = first_surface(scene, path.origin, path.wi, depth == 1, active, sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
         absorb(&path, hit ? hits.t : (real)(INFINITY));
-        L = add(L, emitted_light(scene, &path, &surface, hits.t, hit));
-        L = add(L, escaped_light(scene, &path, active & !hit));
+        L = add(L, clamped(launch, emitted_light(scene, &path, &surface, hits.t, hit), depth, removed));
+        L = add(L, clamped(launch, escaped_light(scene, &path, active & !hit), depth, removed));
 #if DIRECT_LIGHT
         if (depth <= 2) *direct = L;
 #endif
@@ -25,7 +25,7 @@ static inline real3 seen_along(const Scene *scene, const Launch *launch, const C
         ShadowRay shadow;
         ireal sent = aim_at_light(scene, &path, &surface, &shading, active, sampler, &shadow);
         *rays += sent ? (ureal)(1) : (ureal)(0);
-        if (ANY(sent)) L = add(L, light_along(scene, &shadow, sent));
+        if (ANY(sent)) L = add(L, clamped(launch, light_along(scene, &shadow, sent), depth + 1, removed));
 #endif
         active = go_on(&path, &surface, &shading, active, depth, launch->max_depth, sampler);
 #endif

@@ -10,7 +10,7 @@
 #include VISIBILITY
 
 static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active, Sampler *sampler,
-                               ureal *rays, real3 *direct) {
+                               ureal *rays, real3 *direct, real *removed) {
     *rays += active ? (ureal)(1) : (ureal)(0);
 #if PRIMITIVES
     Surface surface;

@@ -36,6 +36,9 @@ typedef struct {
 #if DIRECT_LIGHT
     float direct[3][WAVE];               // what of it came with two edges at most
 #endif
+#if CLAMP
+    float removed[WAVE];                 // what clamps took from it
+#endif
     const Launch *launch;
     uint x, y, sample;                   // of the first slot
     uint dimension, rays;
@@ -54,7 +57,10 @@ static inline Sampler slot_sampler(const Wave *w, ureal slot) {
     return sampler;
 }
 
-static inline void add_light(Wave *w, ureal slot, real3 light) {
+// Light that took so many edges.
+static inline void add_light(Wave *w, ureal slot, real3 found, int edges) {
+    real removed = ZERO;
+    real3 light = clamped(w->launch, found, edges, &removed);
     ireal some = (light.x != 0.0f) | (light.y != 0.0f) | (light.z != 0.0f);   // a NaN, too, for the film to drop
     for (uint bits = mask_bits(some); bits; bits &= bits - 1) {
         int lane = first_bit(bits);
@@ -62,6 +68,9 @@ static inline void add_light(Wave *w, ureal slot, real3 light) {
         w->light[0][to] += LANE(light.x, lane);
         w->light[1][to] += LANE(light.y, lane);
         w->light[2][to] += LANE(light.z, lane);
+#if CLAMP
+        w->removed[to] += LANE(removed, lane);
+#endif
     }
 }
 
@@ -79,6 +88,9 @@ __attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int sl
         travel.path = path_along(ray.origin, ray.direction);
         PACK(travel, in_picture(w, travel.slot), w->arrivals, count)
         for (int c = 0; c < 3; ++c) vstore8(ZERO, 0, w->light[c] + i);
+#if CLAMP
+        vstore8(ZERO, 0, w->removed + i);
+#endif
         dimension = sampler.dimension;
     }
     FILL_UP(Travel, w->arrivals, count)
@@ -107,7 +119,7 @@ __attribute__((noinline)) static void trace(const Scene *scene, Wave *w, int cou
 }
 
 // Packs the paths that hit something, and adds the light of the environment to those that escape.
-__attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int count) {
+__attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int count, int depth) {
     int arrived = 0, escaped = 0;
     for (int i = 0; i < count; i += LANES) {
         Arrival a;
@@ -124,7 +136,7 @@ __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int c
         Travel travel;
         LOAD(travel, w->escapes, i)
         absorb(&travel.path, (real)(INFINITY));
-        add_light(w, travel.slot, escaped_light(scene, &travel.path, lanes_of(i, escaped)));
+        add_light(w, travel.slot, escaped_light(scene, &travel.path, lanes_of(i, escaped)), depth);
     }
     return arrived;
 }
@@ -142,7 +154,7 @@ __attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int coun
         a.hits.primitive = active ? a.hits.primitive : (ireal)(-1);
         Surface surface = surface_at(scene, path->origin, path->wi, &a.hits);
         absorb(path, a.hits.t);
-        add_light(w, a.travel.slot, emitted_light(scene, path, &surface, a.hits.t, active));
+        add_light(w, a.travel.slot, emitted_light(scene, path, &surface, a.hits.t, active), depth);
         if (depth >= w->launch->max_depth) continue;
         Shading shading = shading_at(scene, path->wi, &surface);
         Sampler sampler = slot_sampler(w, a.travel.slot);
@@ -165,11 +177,11 @@ __attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int coun
 #endif
 
 #if SHADOWS
-__attribute__((noinline)) static void trace_shadows(const Scene *scene, Wave *w, int count) {
+__attribute__((noinline)) static void trace_shadows(const Scene *scene, Wave *w, int count, int depth) {
     for (int i = 0; i < count; i += LANES) {
         Shadow shadow;
         LOAD(shadow, w->shadows, i)
-        add_light(w, shadow.slot, light_along(scene, &shadow.ray, lanes_of(i, count)));
+        add_light(w, shadow.slot, light_along(scene, &shadow.ray, lanes_of(i, count)), depth + 1);
     }
     w->rays += count;
 }
@@ -203,6 +215,9 @@ static inline void add_samples(const Wave *w, global Pixel *film, uint first_pix
 #if DIRECT_LIGHT
             accumulate_direct(&pixels, slots_light(w->direct, first), kept);
 #endif
+#if CLAMP
+            pixels.clamped += kept ? vload8(0, w->removed + first) : ZERO;
+#endif
         }
         store_pixels(film, index, inside, &pixels);
     }
@@ -226,7 +241,7 @@ kernel void wave(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles,
         int count = set_out(&scene, &w, slots);
         for (int depth = 1; count > 0; ++depth) {
             trace(&scene, &w, count, depth);
-            count = sort_out(&scene, &w, count);
+            count = sort_out(&scene, &w, count, depth);
 #if PRIMITIVES
             count = shade(&scene, &w, count, depth, &sent);
 #endif
@@ -234,7 +249,7 @@ kernel void wave(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles,
             if (depth == 2) keep_direct(&w);
 #endif
 #if SHADOWS
-            trace_shadows(&scene, &w, sent);
+            trace_shadows(&scene, &w, sent, depth);
 #endif
 #if DIRECT_LIGHT
             if (depth == 1) keep_direct(&w);   // of paths that end here, all

@@ -106,6 +106,6 @@ static inline real3 local_light(const Scene *scene, const Launch *launch, const 
 }
 
 static inline real3 seen_along(const Scene *scene, const Launch *launch, const CameraRay *ray, ireal active, Sampler *sampler,
-                               ureal *rays, real3 *direct) {
+                               ureal *rays, real3 *direct, real *removed) {
     return local_light(scene, launch, ray, 0, active, sampler, rays);
 }

@@ -17,6 +17,9 @@ from .options import Pixel, picture_options, tracing_options
 if TYPE_CHECKING:
     from ..rendering.choices import Choices
 
+#: Options that are settings of the scene by the same name.
+SETTINGS = ("size", "spp", "seed", "integrator", "sampler", "back_face_culling", "clamp_direct", "clamp_indirect")
+
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
@@ -45,8 +48,7 @@ def command(scene: Path, pixel: tuple[int, int], samples: int, device: str | Non
     from ..scene.file import load
 
     content = load(scene, camera)
-    chosen = {"max_depth": depth, "filter": pixel_filter,
-              **{name: given.pop(name) for name in ("size", "spp", "seed", "integrator", "sampler")}}
+    chosen = {"max_depth": depth, "filter": pixel_filter, **{name: given.pop(name) for name in SETTINGS}}
     content.render = settings = replace(content.render, **{k: v for k, v in chosen.items() if v is not None})
     paths = trace_pixel(content, open_device(device), pixel, _choices(**given), lanes)
     names = Names(content, paths.compiled)

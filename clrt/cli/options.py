@@ -77,6 +77,12 @@ def picture_options(command: F) -> F:
                      help="Where samples come from."),
         click.option("--filter", "pixel_filter", type=click.Choice(["box", "tent", "blackman_harris", "gaussian"]),
                      help="Pixel filter."),
+        click.option("--back-face-culling", type=click.Choice(["none", "camera", "all"]),
+                     help="Which rays pass through the back faces of materials that are not double-sided."),
+        click.option("--clamp-direct", type=Finite(min=0), metavar="X",
+                     help="Largest value that one contribution of direct light adds to a sample; 0 does not clamp."),
+        click.option("--clamp-indirect", type=Finite(min=0), metavar="X",
+                     help="The same for indirect light: fewer fireflies, but a picture that is too dark."),
     ]):
         command = option(command)
     return command

@@ -52,8 +52,6 @@ RIGHT = 1.2
               help="What to compute.")
 @click.option("--shadows/--no-shadows", default=None, help="Whether local and raster ask what stands before lights.")
 @click.option("--adaptive", is_flag=True, default=None, help="More samples where the error is larger.")
-@click.option("--back-face-culling", type=click.Choice(["none", "camera", "all"]),
-              help="Which rays do not see back faces of materials that are not double-sided.")
 @click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error by.")
 @click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what was done.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
@@ -80,12 +78,11 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             seconds: float | None, error: float | None, error_percentile: float | None, depth: int | None,
             seed: int | None, devices: tuple[str, ...],
             integrator: str | None, shadows: bool | None, sampler: str | None, pixel_filter: str | None,
-            adaptive: bool | None, back_face_culling: str | None, reference: Path | None,
-            report: Path | None, plot: Path | None,
+            adaptive: bool | None, reference: Path | None, report: Path | None, plot: Path | None,
             aovs: tuple[str, ...], denoise: bool, checkpoint: Path | None, checkpoint_every: float, resume: bool,
             view: str, exposure: float, progress_kind: str | None, print_kernel: bool, quiet: bool,
             frames: str | None, turntable: int | None, fps: float | None, scheduler: str | None,
-            local_cluster: int | None, **tracing: Any) -> None:
+            local_cluster: int | None, **others: Any) -> None:
     """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
     def advice() -> str:
         kept = checkpoint is not None and checkpoint.exists()
@@ -123,10 +120,9 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     options: dict[str, Any] = {
         "size": size, "max_depth": depth, "seed": seed, "device": devices or None,
         "integrator": integrator, "shadows": shadows, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
-        "back_face_culling": back_face_culling,
         "checkpoint": None if print_kernel else checkpoint, "resume": resume and not (print_kernel or sequence),
         "checkpoint_seconds": checkpoint_every, "error_percentile": error_percentile, "aovs": beside,
-        "first_hits": denoise, **tracing}
+        "first_hits": denoise, **others}
     if print_kernel:
         scheduler = local_cluster = None
     with (make_progress(progress_kind, quiet) as progress,

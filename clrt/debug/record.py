@@ -13,12 +13,14 @@ from ..device.records import record
 #: arrival. radiance: emission that arrives here; emission: its contribution. emitter: entry of the light table, or −1.
 #: light …: the light sample, where light is not −1; light_bsdf: f·|cos|; light_weight: its MIS weight; sent: whether it
 #: got a shadow ray; unshadowed, direct: its contribution without occluders and with them; blocker: a primitive, or −1.
-#: direction, weight, pdf, specular: the BSDF sample; weight: f·|cos|/pdf.
+#: direction, weight, pdf, specular: the BSDF sample; weight: f·|cos|/pdf. emission_clamp, direct_clamp: the factors by
+#: which clamps scale both contributions, 1 without.
 VERTEX = record(position="3f4", distance="f4", geometric_normal="3f4", primitive="i4", shading_normal="3f4",
                 instance="i4", throughput="3f4", end="i4", radiance="3f4", front="i4", emission="3f4", emitter="i4",
                 light_direction="3f4", light="i4", light_radiance="3f4", light_probability="f4", light_bsdf="3f4",
                 light_pdf="f4", unshadowed="3f4", light_weight="f4", direct="3f4", blocker="i4", direction="3f4",
-                blocker_instance="i4", weight="3f4", pdf="f4", specular="i4", sent="i4", pad="2i4")
+                blocker_instance="i4", weight="3f4", pdf="f4", specular="i4", sent="i4",
+                emission_clamp="f4", direct_clamp="f4")
 
 
 class End(IntEnum):

@@ -13,7 +13,7 @@ from ..rendering.environment import LUMINANCE
 from .names import Names
 from .outcomes import Outcome, outcomes
 from .record import End
-from .trace import PixelPaths
+from .trace import PixelPaths, contributions
 
 #: Of several causes so many are named.
 MOST_NAMED = 3
@@ -47,7 +47,7 @@ def _sources(paths: PixelPaths, names: Names) -> str:
     shares: Counter[str] = Counter()
     indirect = 0.0
     for part, first in (("emission", 3), ("direct", 2)):
-        light = np.where(kept, np.nan_to_num(rows[part].astype(np.float64)) @ LUMINANCE, 0)
+        light = np.where(kept, np.nan_to_num(contributions(rows, part).astype(np.float64)) @ LUMINANCE, 0)
         indirect += float(light[paths.depth >= first].sum())
         shares.update({name: float(light[own].sum()) for name, own in _by_source(rows, part, light, names).items()})
     total = shares.total()

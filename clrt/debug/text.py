@@ -39,7 +39,7 @@ def _emission(emission: Emission) -> str:
     if emission.mis_weight is None:
         return f"none from {emission.source} in this direction"
     return (f"{emission.source}, radiance {_numbers(emission.radiance)}, MIS weight {emission.mis_weight:.4g}; "
-            f"contributes {_numbers(emission.contribution)}")
+            f"{_contribution(emission)}")
 
 
 def _light_sample(light: LightSample) -> Iterator[str]:
@@ -47,7 +47,11 @@ def _light_sample(light: LightSample) -> Iterator[str]:
            f"({_direction(light.direction)}), pdf {light.pdf:.4g}")
     yield (f"  radiance {_numbers(light.radiance)}, BSDF {_numbers(light.bsdf)}, MIS weight {light.mis_weight:.4g}; "
            f"{light.outcome}{f' by {light.blocker}' if light.blocker else ''}; "
-           f"contributes {_numbers(light.contribution)}")
+           f"{_contribution(light)}")
+
+
+def _contribution(part: Emission | LightSample) -> str:
+    return f"contributes {_numbers(part.contribution)}{f', clamped by {part.clamp:.4g}' if part.clamp < 1 else ''}"
 
 
 def _bsdf_sample(sample: BsdfSample) -> str:

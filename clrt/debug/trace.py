@@ -105,6 +105,11 @@ def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: C
     return PixelPaths(scene, compiled, pixel, np.concatenate(rows), starts, np.concatenate(values))
 
 
+def contributions(rows: NDArray[Any], part: str) -> NDArray[np.float32]:
+    """(n, 3) float32: what these VERTEX records add to their samples by their `part`, "emission" or "direct"."""
+    return np.asarray(rows[part] * rows[f"{part}_clamp"][:, None])
+
+
 def _check(settings: RenderSettings, pixel: tuple[int, int]) -> None:
     width, height = settings.size
     if settings.integrator not in WITH_LIGHT:
@@ -120,5 +125,5 @@ def _sums(paths: NDArray[Any], used: NDArray[np.bool_]) -> NDArray[np.float32]:
     with np.errstate(invalid="ignore", over="ignore"):
         for depth in range(paths.shape[1]):
             for part in ("emission", "direct"):
-                total += np.where(used[:, depth, None], paths[part][:, depth], np.float32(0))
+                total += np.where(used[:, depth, None], contributions(paths[:, depth], part), np.float32(0))
     return total

@@ -23,11 +23,13 @@ ENDS = {End.ESCAPED: "escaped", End.DEPTH: "depth limit", End.ABSORBED: "absorbe
 @dataclass(frozen=True)
 class Emission:
     """Emission that the path found by itself. source: an object, or what lies infinitely far away; mis_weight: None
-    where nothing is emitted towards the path; contribution: to the sample's value."""
+    where nothing is emitted towards the path; clamp: the factor by which a clamp scales the contribution, 1 without;
+    contribution: to the sample's value."""
 
     source: str
     radiance: Triple
     mis_weight: float | None
+    clamp: float
     contribution: Triple
 
 
@@ -38,7 +40,7 @@ class LightSample:
     probability: of choosing this light; pdf: of the direction per solid angle, that included (a point, spot or
     directional light without a size has that alone); radiance: that arrives if nothing is in between, or the irradiance
     of such a light; bsdf: f·|cos|; outcome: see `Outcome`; blocker: the object that casts the shadow; unshadowed: the
-    contribution if there were no shadows; contribution: to the sample's value.
+    contribution if there were neither shadows nor clamps; clamp, contribution: as of `Emission`.
     """
 
     light: str
@@ -51,6 +53,7 @@ class LightSample:
     outcome: str
     blocker: str | None
     unshadowed: Triple
+    clamp: float
     contribution: Triple
 
 
@@ -118,14 +121,16 @@ def mis_weight(row: NDArray[Any]) -> float | None:
 
 def _emission(row: NDArray[Any], names: Names, number: int | None) -> Emission | None:
     source = names.infinite if number is None else names.object(number) if row["emitter"] >= 0 else ""
-    return Emission(source, _triple(row["radiance"]), mis_weight(row), _triple(row["emission"])) if source else None
+    return Emission(source, _triple(row["radiance"]), mis_weight(row), float(row["emission_clamp"]),
+                    _triple(row["emission"] * row["emission_clamp"])) if source else None
 
 
 def _light_sample(row: NDArray[Any], names: Names, outcome: str, blocker: int) -> LightSample:
     return LightSample(names.light(int(row["light"])), float(row["light_probability"]), _triple(row["light_direction"]),
                        float(row["light_pdf"]), _triple(row["light_radiance"]), _triple(row["light_bsdf"]),
                        float(row["light_weight"]), str(outcome), names.object(blocker) if blocker >= 0 else None,
-                       _triple(row["unshadowed"]), _triple(row["direct"]))
+                       _triple(row["unshadowed"]), float(row["direct_clamp"]),
+                       _triple(row["direct"] * row["direct_clamp"]))
 
 
 def _bsdf_sample(row: NDArray[Any]) -> BsdfSample | None:

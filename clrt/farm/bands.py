@@ -34,7 +34,7 @@ HUGE = 1 << 23
 BAND_PIXELS = 1 << 20
 BYTES = 12
 #: Of a band's report, what says nothing of the picture.
-OF_ONE = {"seconds", "samples_per_second", "rays_per_second", "stop_reason", "tile_noise"}
+OF_ONE = {"seconds", "samples_per_second", "rays_per_second", "stop_reason", "tile_noise", "clamped_part"}
 
 
 @dataclass

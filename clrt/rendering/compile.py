@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf
 from typing import Any
 
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ class CompiledScene:
 
     All points, the camera's too, are those of the scene in `frame` (see scene.scaling). instances: how many are in the
     tree; others became meshes (see scene.instancing). part_bytes: the arrays are in parts of at most so many bytes, as
-    the device has no larger buffers (kernels/arrays.cl).
+    the device has no larger buffers (kernels/arrays.cl). clamps: of direct and of indirect light, infinite for none.
     """
 
     buffers: Buffers
@@ -48,6 +49,7 @@ class CompiledScene:
     instances: int
     objects: Objects
     part_bytes: int | None = None
+    clamps: tuple[float, float] = (inf, inf)
 
     @cached_property
     def source(self) -> str:
@@ -113,4 +115,5 @@ def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
     return CompiledScene(packed.buffers, packed.counts, sorted(features),
                          preamble_of(packed, choices, features, part_bytes), files_for(packed, choices, features),
                          entry, packed.tree, choices, packed.scene.camera, packed.frame,
-                         len(packed.scene.instances), packed.shapes.objects, part_bytes)
+                         len(packed.scene.instances), packed.shapes.objects, part_bytes,
+                         (scene.render.clamp_direct or inf, scene.render.clamp_indirect or inf))

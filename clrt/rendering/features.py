@@ -9,7 +9,7 @@ from ..accel.kernels import tree_defines, tree_features, tree_files
 from ..accel.layouts import NO_RAYS
 from ..device.preamble import defines, scene_struct, type_list, typedefs
 from ..scene.materials import MATERIALS, Material
-from ..scene.model import Scene
+from ..scene.model import RenderSettings, Scene
 from ..scene.textures import Texture
 from .camera import camera_file
 from .choices import OFFSETS, Choices
@@ -31,6 +31,12 @@ def warn_of_darkness(scene: Scene, features: Iterable[str]) -> None:
     """Warns where nothing shines among what is compiled in."""
     if scene.render.integrator in INTEGRATORS and not {"LIGHTS", "SKY"} & set(features):
         logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
+
+
+def biased_by(settings: RenderSettings) -> list[str]:
+    """Names of the settings that make the mean of the samples darker than the picture, whatever their number."""
+    clamps = ("clamp_direct", "clamp_indirect") if settings.integrator in WITH_LIGHT else ()
+    return [name for name in clamps if getattr(settings, name)]
 
 
 def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
@@ -58,6 +64,7 @@ def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
            "RASTER": scene.render.integrator == "raster", "PIXEL_MIDDLE": scene.render.integrator == "depth",
            "CAMERA_CULLING": (scene.render.back_face_culling == "camera"
                               and any(user.is_culled for user in packed.shapes.users)),
+           "CLAMP": bool(biased_by(scene.render)),
            "DIRECT_LIGHT": choices.direct_light, "LOOP_LIMIT": loop_limit}
     return features | {name for name, present in has.items() if present}
 

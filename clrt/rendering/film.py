@@ -131,6 +131,12 @@ class Film:
         return relative, np.concatenate(in_bands(mean.shape, judge, self.unwanted))
 
     @property
+    def clamped_part(self) -> float:
+        """The part of all light that clamping took away, the mean over the picture; 0 where it is black."""
+        clamped = float(np.mean(self.pixels["clamped"] / np.maximum(self.pixels["count"], 1), dtype=np.float64))
+        return clamped / whole if (whole := clamped + float(self.mean.mean())) else 0.0
+
+    @property
     def samples(self) -> int:
         """Samples in the film, dropped ones included."""
         return self._totals["count"] + self.nonfinite_samples

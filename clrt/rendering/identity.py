@@ -21,7 +21,8 @@ from .choices import Choices
 
 PARTS = ("camera", "meshes", "instances", "spheres", "lights", "environment")
 #: Of those in RenderSettings, beside the size.
-SETTINGS = ("max_depth", "seed", "integrator", "shadows", "sampler", "filter", "adaptive", "back_face_culling")
+SETTINGS = ("max_depth", "seed", "integrator", "shadows", "sampler", "filter", "adaptive", "back_face_culling",
+            "clamp_direct", "clamp_indirect")
 
 
 def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:

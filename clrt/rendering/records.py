@@ -47,11 +47,12 @@ SKY_STEP = np.dtype([("top", "f4"), ("start", "i4")])
 
 COUNTS = record(triangles="i4", spheres="i4", lights="i4", triangle_lights="i4", sphere_lights="i4", point_lights="i4",
                 spot_lights="i4", directional_lights="i4", sun_lights="i4", sky_lights="i4", pad="2i4")
+#: clamped: where CLAMP is compiled in, what clamping took from the samples, the mean of their channels.
 PIXEL = record(sum="3f4", count="u4", sum_error="3f4", dropped="u4", square="3f4", rays="u4", square_error="3f4",
-               pad="u4")
+               clamped="f4")
 LAUNCH = record(position="3f4", width="u4", right="3f4", height="u4", up="3f4", max_depth="i4", forward="3f4",
                 seed="u4", first_pixel="u4", pixel_count="u4", first_sample="u4", sample_count="u4",
-                block_bits="u4", lens_radius="f4", pad="2u4")
+                block_bits="u4", lens_radius="f4", clamp_direct="f4", clamp_indirect="f4")
 #: u_row, v_row: what of (u, v, 1) makes the picture's coordinates. first: of its texels.
 TEXTURE = record(u_row="3f4", width="i4", v_row="3f4", height="i4", first="i4", wrap_u="i4", wrap_v="i4", nearest="i4",
                  uv_set="i4", shift="u4", pad="2i4")

@@ -66,20 +66,18 @@ class Renderer:
                  size: tuple[int, int] | None = None, spp: int | None = None, max_depth: int | None = None,
                  seed: int | None = None, integrator: str | None = None, shadows: bool | None = None,
                  sampler: str | None = None, filter: str | None = None, adaptive: bool | None = None,
-                 back_face_culling: str | None = None,
-                 triangle: str = "watertight", box: str = "robust", sphere: str = "robust", offset: str = "bound",
-                 builder: str | None = None, layout: str | None = None, lanes: int | None = None,
-                 paths: str | None = None, tree: bool | None = None, error_percentile: float | None = None,
-                 on_phase: Callable[[str], None] = lambda phase: None, aovs: str | Iterable[str] = (),
-                 checkpoint: str | Path | None = None, resume: bool = False, checkpoint_seconds: float = 30.0,
-                 before: Renderer | None = None, first_hits: bool = False) -> None:
+                 back_face_culling: str | None = None, clamp_direct: float | None = None,
+                 clamp_indirect: float | None = None, triangle: str = "watertight", box: str = "robust",
+                 sphere: str = "robust", offset: str = "bound", builder: str | None = None, layout: str | None = None,
+                 lanes: int | None = None, paths: str | None = None, tree: bool | None = None,
+                 error_percentile: float | None = None, on_phase: Callable[[str], None] = lambda phase: None,
+                 aovs: str | Iterable[str] = (), checkpoint: str | Path | None = None, resume: bool = False,
+                 checkpoint_seconds: float = 30.0, before: Renderer | None = None, first_hits: bool = False) -> None:
         check_is_scene(scene)
         check_stops(spp)
+        given = {name: value for name, value in locals().items() if value is not None and hasattr(scene.render, name)}
         self._aovs, self._percentile = chosen_aovs(aovs), checked_percentile(error_percentile)
-        given: dict[str, Any] = {"size": size, "spp": spp, "max_depth": max_depth, "seed": seed, "filter": filter,
-                                 "integrator": integrator, "shadows": shadows, "sampler": sampler, "adaptive": adaptive,
-                                 "back_face_culling": back_face_culling}
-        settings = replace(scene.render, **{name: value for name, value in given.items() if value is not None})
+        settings = replace(scene.render, **given)
         self.scene = replace(scene, render=settings)
         check_light(self._aovs, settings.integrator)
         self.choices = Choices(lanes or WAVE_LANES, layout, builder, HitTests(triangle, box, sphere), offset,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from .features import biased_by
 from .identity import scene_hash
 from .renderer import Renderer, State
 
@@ -21,10 +22,13 @@ def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
         "max_depth": settings.max_depth, "seed": settings.seed, "integrator": settings.integrator,
         "shadows": settings.shadows, "sampler": settings.sampler, "filter": settings.filter,
         "adaptive": settings.adaptive, "back_face_culling": settings.back_face_culling,
+        "clamp_direct": settings.clamp_direct, "clamp_indirect": settings.clamp_indirect,
         "seconds": renderer.seconds,
         "samples": samples, "samples_per_second": samples / seconds,
         "rays": state.film.rays, "rays_per_second": state.film.rays / seconds,
         "stop_reason": renderer.stop_reason, "noise": state.noise, "nonfinite_samples": state.film.nonfinite_samples,
+        "biased_by": (biases := biased_by(settings)),
+        **({"clamped_part": state.film.clamped_part} if biases else {}),
         **renderer.session.machine(renderer.devices), "history": renderer.history,
         **({} if state.tile_noise is None else {"tile_noise": state.tile_noise}),
         **({} if state.relmse is None else {"relmse": state.relmse, "noise_ratio": state.noise_ratio}),

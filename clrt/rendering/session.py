@@ -130,6 +130,7 @@ def first_launch(compiled: CompiledScene, size: tuple[int, int], max_depth: int,
     """The LAUNCH record of a picture, without any range of pixels and samples."""
     launch = launch_record(compiled.camera, size)
     launch["max_depth"], launch["seed"], launch["block_bits"] = max_depth, seed, block_bits(planned_spp)
+    launch["clamp_direct"], launch["clamp_indirect"] = compiled.clamps
     return launch
 
 

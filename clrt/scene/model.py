@@ -155,7 +155,9 @@ class RenderSettings:
     """How to render unless told otherwise. `size`: (width, height). `max_depth` counts path edges:
     1 = only what glows, 2 = + direct light, 3 = + one bounce. shadows: whether they are cast, where the integrator is
     local or raster. back_face_culling: which rays pass through the back faces of materials that are not double_sided:
-    "none", those of the "camera", or "all"."""
+    "none", those of the "camera", or "all". clamp_direct, clamp_indirect: the largest value that any channel of one
+    contribution to a sample may have, for paths of at most two edges and for longer ones, where the integrator is path
+    or direct; 0 does not clamp."""
 
     size: tuple[Pixels, Pixels] = (512, 512)
     spp: Annotated[int, Ge(1)] = 64
@@ -167,6 +169,8 @@ class RenderSettings:
     filter: Filter = "box"
     adaptive: bool = False
     back_face_culling: Culling = "none"
+    clamp_direct: NonNegative = 0.0
+    clamp_indirect: NonNegative = 0.0
 
     def __post_init__(self) -> None:
         tuples_for_lists(self)

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import UsageError
 from ..output.images import write_image
+from ..rendering.features import biased_by
 from ..scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ..scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ..scene.instancing import unfolded
@@ -48,7 +49,9 @@ def check_scene(scene: Scene) -> None:
     if scene.render.integrator == "local":
         raise UsageError(f'{scene.name}: Cycles has no integrator "local"')
     if scene.render.back_face_culling != "none":
-        raise UsageError(f"{scene.name}: Cycles is not told of back_face_culling; leave it out")
+        raise UsageError(f"{scene.name}: back_face_culling is not exported to Cycles; leave it out")
+    if biases := biased_by(scene.render):
+        raise UsageError(f"{scene.name}: clamps are not exported to Cycles; leave out {' and '.join(biases)}")
     if scene.render.filter != "box" or scene.render.max_depth < 2:
         raise UsageError(f'{scene.name}: Cycles is compared with filter = "box", and two path edges or more')
 

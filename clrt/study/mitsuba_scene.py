@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
+from ..rendering.features import biased_by
 from ..scene.instancing import unfolded
 from ..scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ..scene.materials import Dielectric
@@ -39,6 +40,8 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
         raise UsageError(f'{scene.name}: Mitsuba has no integrator "{scene.render.integrator}"')
     if scene.render.back_face_culling != "none":
         raise UsageError(f"{scene.name}: Mitsuba culls no back faces; leave out back_face_culling")
+    if biases := biased_by(scene.render):
+        raise UsageError(f"{scene.name}: Mitsuba clamps nothing; leave out {' and '.join(biases)}")
     depth = scene.render.max_depth if scene.render.integrator == "path" else min(scene.render.max_depth, 2)
     owners: list[Mesh | Sphere] = [*unfolded(scene).meshes, *scene.spheres]
     absorbs = any(isinstance(owner.material, Dielectric) and medium(owner.material) for owner in owners)

@@ -52,7 +52,8 @@ def run(*arguments: object) -> Result:
 def test_it_is_the_pixel_of_the_render(scene: Path) -> None:
     """With the same options, as `clrt render` writes it."""
     options = ("--size", "12x10", "--seed", "7", "--depth", "3", "--spp", "16", "--filter", "tent",
-               "--sampler", "stratified")
+               "--sampler", "stratified", "--clamp-direct", "0.5", "--clamp-indirect", "0.1",
+               "--back-face-culling", "camera")
     assert clrt("render", scene, *options, "-o", "r.exr", "-q", cwd=scene.parent).returncode == 0
     pixels = read_image(scene.parent / "r.exr")
     for x, y in ((5, 3), (1, 8)):
@@ -73,6 +74,8 @@ def test_text_lists_the_vertices_and_ends_with_a_summary(scene: Path) -> None:
     assert [line[:9] for line in text.splitlines() if line.startswith("sample")] == ["sample 0:", "sample 1:"]
     assert 'mesh "floor", triangle ' in text and 'material "white" (diffuse)' in text and "light[0] (point)" in text
     assert text.splitlines()[-1].startswith("pixel 2,15 of ball, 8 samples: mean ")
+    assert ", clamped by 0." not in text
+    assert ", clamped by 0." in run(scene, "--pixel", "2,15", "--samples", "2", "--clamp-direct", "0.01").stdout
     summary = run(scene, "--pixel", "2,15", "--samples", "0").stdout
     assert summary.splitlines() == text.splitlines()[-1:]
 

@@ -37,12 +37,19 @@ def gallery(name: str) -> Callable[[], Scene]:
     return lambda: load(SCENES / f"{name}.toml")
 
 
+def biased() -> Scene:
+    """With clamps that take much away, and back faces that camera rays pass through."""
+    scene = everything()
+    settings = replace(scene.render, clamp_direct=0.5, clamp_indirect=0.05, back_face_culling="camera")
+    return replace(scene, render=settings)
+
+
 #: All kinds of lights, materials and primitives; textures, partial opacity, coats and instances; every material in all
-#: its variants, media included; many lights, in a light BVH; and scenes of the gallery.
+#: its variants, media included; many lights, in a light BVH; clamps; and scenes of the gallery.
 SUBJECTS: dict[str, Callable[[], Scene]] = {
     "everything": everything, "painted": lambda: planted(painted(everything())), "shelf": shelf,
     "lamps": lambda: replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)]),
-    "glass": gallery("glass"), "night": gallery("night")}
+    "biased": biased, "glass": gallery("glass"), "night": gallery("night")}
 
 
 def pixels(seed: int, count: int) -> list[tuple[int, int]]:

@@ -32,6 +32,7 @@ from clrt.rendering.renderer import Renderer
 from clrt.scene.model import Scene
 
 from ..rendering.checkpoints import run, same
+from ..rendering.test_clamps import clamped
 from ..rendering.test_noise import room
 
 FAULTS = Path(__file__).with_name("faulty.py")
@@ -83,8 +84,8 @@ def at_pass(running: Renderer, number: int, event: Callable[[], Any], **stops: f
     assert passes > number
 
 
-@pytest.mark.parametrize("scene", [room(), clrt.load(SCENES / "cornell.toml"), clrt.load(SCENES / "spheres.toml")],
-                         ids=lambda scene: scene.name)
+@pytest.mark.parametrize("scene", [clamped(room(), 0.5, 0.05), clrt.load(SCENES / "cornell.toml"),
+                                   clrt.load(SCENES / "spheres.toml")], ids=lambda scene: scene.name)
 def test_same_picture(cluster: Cluster, small_tasks: None, scene: Scene) -> None:
     """Film, estimate and history; all four took part."""
     expected = alone(scene)

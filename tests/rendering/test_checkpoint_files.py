@@ -149,6 +149,8 @@ def _rewrite(path: Path, header: dict[str, Any], arrays: dict[str, Any]) -> None
 
 
 @pytest.mark.parametrize("other, named", [
+    ({"clamp_direct": 2.0}, "clamp_direct 0.0 instead of 2.0"), ({"clamp_indirect": 0.5}, "clamp_indirect 0.0 instead"),
+    ({"back_face_culling": "all"}, "back_face_culling none instead of all"),
     ({"seed": 2}, "seed 1 instead of 2"), ({"size": (44, 61)}, "size 61x44 instead of 44x61"),
     ({"max_depth": 2}, "max_depth"), ({"integrator": "direct"}, "integrator"), ({"filter": "tent"}, "filter"),
     ({"sampler": "independent"}, "sampler"), ({"adaptive": True}, "adaptive False instead of True"),

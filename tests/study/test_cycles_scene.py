@@ -50,6 +50,8 @@ def test_spheres_are_triangles_seen_from_outside() -> None:
     (ball(MetallicRoughness(metallic=1.0, smith="separable")), "the ball: .*height_correlated"),
     (replace(ball(MATERIALS[0]()), camera=Camera(aperture_radius=0.1)), "room: .*pinholes only"),
     (replace(ball(MATERIALS[0]()), render=RenderSettings(max_depth=1)), "room: .*two path edges"),
+    (replace(ball(MATERIALS[0]()), render=RenderSettings(back_face_culling="all")), "room: back_face_culling is not"),
+    (replace(ball(MATERIALS[0]()), render=RenderSettings(clamp_indirect=1.0)), "room: clamps .*out clamp_indirect"),
     (replace(ball(MATERIALS[0]()), render=RenderSettings(filter="tent")), 'room: .*filter = "box"')])
 def test_what_has_no_counterpart_is_refused_by_name(scene: Scene, words: str) -> None:
     with pytest.raises(UsageError, match=words):

@@ -89,6 +89,15 @@ def test_what_has_no_counterpart_is_refused_by_name(material: Material, words: s
         mitsuba_scene(ball(material))
 
 
+@pytest.mark.parametrize(("scene", "words"), [
+    (replace(ball(Diffuse()), render=RenderSettings(back_face_culling="camera")), "leave out back_face_culling"),
+    (replace(ball(Diffuse()), render=RenderSettings(clamp_direct=1.0)), "leave out clamp_direct"),
+    (ball(Diffuse(emission=(1, 1, 1), double_sided=True)), "leave out double_sided")])
+def test_settings_without_a_counterpart_are_refused(scene: Scene, words: str) -> None:
+    with pytest.raises(UsageError, match=words):
+        mitsuba_scene(scene)
+
+
 def test_other_gloss_is_a_plugin_of_our_own() -> None:
     """Of all values by which the formula of docs/scene-format.md goes."""
     plastic = bsdf(MetallicRoughness(preset="plastic_high", color=(0.1, 0.2, 0.3), roughness=0.4))
