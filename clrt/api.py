@@ -64,5 +64,6 @@ def _rendered(renderer: Renderer, denoiser: Denoiser | None, reference: NDArray[
     for state in renderer.passes(reference=reference, **stops):
         pass
     assert state is not None  # passes() yields at least once
+    renderer.warnings.log(state.film)
     image = Image(state.pixels, render_report(renderer, state), aovs=renderer.aovs(state))
     return denoised(image, denoiser, guides, reference) if denoiser else image

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import logging
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -94,6 +95,7 @@ def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: G
                 break
     if not interrupted:
         progress.phase("write")
+        _warn(scene, banded.summary()["warnings"])
         results.save_rows(banded)
     if not interrupted or checkpoint is None:
         banded.forget()
@@ -115,7 +117,7 @@ def render_frames(cluster: Cluster, scene: Scene, options: dict[str, Any], goal:
              for results, camera in sequence.left(order.settled, order.choices, goal)}
     pictures = WholePictures(cluster, list(shots), lambda name: replace(order, camera=shots[name][1]),
                              tuple(options["device"] or ()))
-    interrupted, done = list[bool](), 0
+    interrupted, done, warned = list[bool](), 0, set[str]()
     progress.phase("render")
     with Interruptible(lambda: interrupted.append(True)):
         for found in pictures.results():
@@ -123,8 +125,16 @@ def render_frames(cluster: Cluster, scene: Scene, options: dict[str, Any], goal:
                 results, image = shots[found[0]][0], Image(**found[1])
                 progress.frame(results.header["frame"], done, len(shots))
                 done += 1
+                _warn(scene, sorted({*image.report["warnings"]} - warned))
+                warned.update(image.report["warnings"])
                 results.save_frame(replace(image, report=image.report | results.header))
             if interrupted:
                 return False
     sequence.join()
     return True
+
+
+def _warn(scene: Scene, texts: Iterable[str]) -> None:
+    """Log what workers found: their own logs stay with them."""
+    for text in texts:
+        logging.getLogger(__name__).warning("%s: %s", scene.name, text)

@@ -224,6 +224,7 @@ def _write(renderer: Renderer, state: State, results: Outputs, denoiser: Denoise
 
     progress.phase("write")
     image = Image(state.pixels, render_report(renderer, state) | results.header, aovs=renderer.aovs(state))
+    renderer.warnings.log(state.film)
     ratio = state.noise_ratio
     if ratio is not None and not 1 / RIGHT <= ratio <= RIGHT:
         logging.getLogger(__name__).warning("the noise that is told is %.2f times the error against the "

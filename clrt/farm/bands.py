@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..errors import OutputError
 from ..output.rows import BLOCK_ROWS, write_rows
 from ..rendering.identity import facts_of
+from ..rendering.picture_warnings import DARK, bias_warnings, black_warnings, nonfinite_warnings
 from ..rendering.tiles import TILE, tiles_of
 from ..scene.validate import validate
 from .cluster import Cluster
@@ -34,7 +35,7 @@ HUGE = 1 << 23
 BAND_PIXELS = 1 << 20
 BYTES = 12
 #: Of a band's report, what says nothing of the picture.
-OF_ONE = {"seconds", "samples_per_second", "rays_per_second", "stop_reason", "tile_noise", "clamped_part"}
+OF_ONE = {"seconds", "samples_per_second", "rays_per_second", "stop_reason", "tile_noise", "clamped_part", "brightest"}
 
 
 @dataclass
@@ -102,10 +103,20 @@ class Banded:
         reasons = {report["stop_reason"] for report in reports}
         if len(reasons) == 1:
             first["stop_reason"] = reasons.pop()
+        if len(reports) > 1:
+            first["warnings"] = [*first["warnings"], *self._warnings(reports)]
         return {**first, "width": self.size[0], "height": self.size[1], "bands": len(reports),
                 "samples": added["samples"], "rays": added["rays"], "nonfinite_samples": added["nonfinite_samples"],
                 "worker_seconds": added["seconds"], "spp": round(added["samples"] / pixels),
                 "noise": float(np.sqrt(sum(squares) / pixels)) if len(squares) == len(reports) else None}
+
+    def _warnings(self, reports: list[dict[str, Any]]) -> list[str]:
+        """Those about the whole picture; of the scene each band has its own."""
+        settings = self.order.settled.render
+        dropped, samples = (sum(report[name] for report in reports) for name in ("nonfinite_samples", "samples"))
+        return [*nonfinite_warnings(dropped, samples), *bias_warnings(settings, None),
+                *black_warnings(settings, reports[0]["kernel"]["features"],
+                                max(report["brightest"] for report in reports), DARK)]
 
     def _bands(self) -> dict[str, tuple[int, int]]:
         """Rows of tiles of each band, by its name; all begin where a block of an .exr does."""
@@ -137,6 +148,7 @@ class Banded:
         except OSError as error:
             raise OutputError(f"{self.rows_path}: cannot be written ({error.strerror})") from error
         report = {key: value for key, value in result["report"].items() if key != "history"}
+        report["brightest"] = float(np.max(result["pixels"]))
         manifest.add(name, {"sha256": hashlib.sha256(content).hexdigest(), "report": report})
         self.reports[name] = report
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..device.open import Device
 from ..errors import DeviceError, UsageError
 from ..rendering.checkpoint import check_of_none
-from ..rendering.features import warn_of_darkness
 from ..rendering.on_device import SceneOnDevice
+from ..rendering.picture_warnings import PictureWarnings
 from ..rendering.renderer import Renderer, State
 from ..scene.model import Camera, Scene
 from ..scene.validate import validate
@@ -64,7 +64,7 @@ class FarmRenderer(Renderer):
                       self._simulated)
         picture = FarmPicture(self._cluster, order, self.choices.pixel)
         facts = picture.dispatch.wait_for()[0].facts or {}
-        warn_of_darkness(self.scene, facts["report"]["kernel"]["features"])
+        self.warnings = PictureWarnings(self.scene, facts["report"]["kernel"]["features"])
         return picture
 
     def look(self, camera: Camera) -> None:

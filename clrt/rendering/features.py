@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterable
 
 from ..accel.kernels import tree_defines, tree_features, tree_files
 from ..accel.layouts import NO_RAYS
 from ..device.preamble import defines, scene_struct, type_list, typedefs
 from ..scene.materials import MATERIALS, Material
-from ..scene.model import RenderSettings, Scene
+from ..scene.model import RenderSettings
 from ..scene.textures import Texture
 from .camera import camera_file
 from .choices import OFFSETS, Choices
@@ -25,12 +24,6 @@ LARGEST_UNIT = 2.0**127
 #: (kernels/picture.cl).
 WITH_LIGHT = ("path", "direct")
 INTEGRATORS = {"path": "path.cl", "direct": "path.cl", "local": "whitted.cl", "raster": "whitted.cl"}
-
-
-def warn_of_darkness(scene: Scene, features: Iterable[str]) -> None:
-    """Warns where nothing shines among what is compiled in."""
-    if scene.render.integrator in INTEGRATORS and not {"LIGHTS", "SKY"} & set(features):
-        logging.getLogger(__name__).warning("%s: nothing shines in this scene, so the picture is black", scene.name)
 
 
 def biased_by(settings: RenderSettings) -> list[str]:

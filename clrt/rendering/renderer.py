@@ -30,10 +30,10 @@ from .compile import CompiledScene
 from .compiler import Compiler
 from .convergence import Convergence
 from .crew import make_picture
-from .features import warn_of_darkness
 from .film import Film
 from .kept import Kept
 from .on_device import SceneOnDevice
+from .picture_warnings import PictureWarnings
 from .session import depth_of
 from .state import State as State, check_reference
 from .stops import check_step, check_stops, checked_percentile, low_enough, pass_room, planned_spp
@@ -105,7 +105,7 @@ class Renderer:
         self._compiler: Compiler = Compiler.after(before._compiler if before else None, self.devices)
         choices = [choices_on(each, self.choices, lanes) for each in self.devices]
         self._compiled = self._compiler.compile(self.scene, choices, ahead=len(choices) == 1)
-        warn_of_darkness(self.scene, self.compiled.features)
+        self.warnings = PictureWarnings(self.scene, self.compiled.features)
 
     def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
         return make_picture(self.devices, self._compiled, self.settings.size, depth_of(self.settings),

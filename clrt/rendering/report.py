@@ -27,7 +27,7 @@ def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
         "samples": samples, "samples_per_second": samples / seconds,
         "rays": state.film.rays, "rays_per_second": state.film.rays / seconds,
         "stop_reason": renderer.stop_reason, "noise": state.noise, "nonfinite_samples": state.film.nonfinite_samples,
-        "biased_by": (biases := biased_by(settings)),
+        "biased_by": (biases := biased_by(settings)), "warnings": renderer.warnings.of(state.film),
         **({"clamped_part": state.film.clamped_part} if biases else {}),
         **renderer.session.machine(renderer.devices), "history": renderer.history,
         **({} if state.tile_noise is None else {"tile_noise": state.tile_noise}),

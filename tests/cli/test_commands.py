@@ -86,7 +86,7 @@ def test_warnings_are_json_where_progress_is(scene: Path) -> None:
     lines = [json.loads(line) for line in result.stderr.splitlines()]
     assert all("phase" in line for line in lines)
     assert [line["warning"] for line in lines if "warning" in line] == [
-        "ball: nothing shines in this scene, so the picture is black"]
+        "ball: the picture is black: nothing in this scene emits light"]
 
 
 def test_time_and_error_end_a_render(scene: Path) -> None:
@@ -252,7 +252,7 @@ def test_error_is_reached_and_not_far_passed(scene: Path) -> None:
 
 def test_a_scene_without_light_says_so(tmp_path: Path) -> None:
     (tmp_path / "dark.toml").write_text("[render]\nsize = [4, 4]\nspp = 1\n[[sphere]]\n")
-    assert "nothing shines" in clrt("render", "dark.toml", cwd=tmp_path).stderr
+    assert "nothing in this scene emits light" in clrt("render", "dark.toml", cwd=tmp_path).stderr
     assert clrt("render", "dark.toml", "-q", cwd=tmp_path).stderr == ""
 
 

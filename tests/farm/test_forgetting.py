@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -97,14 +98,33 @@ def test_a_checkpoint_is_of_one_camera(cluster: Cluster, tmp_path: Path) -> None
         renderer.look(Camera(position=(0, 0, 2)))
 
 
+def band(**differs: Any) -> dict[str, Any]:
+    """The report of one band of half a picture, as far as it counts for the whole."""
+    return {"samples": 6144, "spp": 4, "rays": 10, "nonfinite_samples": 0, "noise": 0.1, "seconds": 1.0,
+            "stop_reason": "spp", "kernel": {"features": ["LIGHTS"]}, "brightest": 1.0, "warnings": ["of the scene"],
+            **differs}
+
+
 def test_what_bands_say_together(tmp_path: Path) -> None:
     """Nothing of one band is told of all."""
     banded = Banded(PictureOrder(room(), {"size": SIZE}, spp=4), tmp_path / "a.bands")
-    of_one = {"samples": 6144, "spp": 4, "rays": 10, "nonfinite_samples": 0, "noise": 0.1, "device": "one"}
-    banded.reports = {name: {**of_one, "seconds": seconds, "samples_per_second": 6144 / seconds, "rays_per_second": 1.0,
-                             "stop_reason": "error", "tile_noise": 0.02} for name, seconds in (("a", 1.0), ("b", 9.0))}
+    banded.reports = {name: band(device="one", seconds=seconds, samples_per_second=6144 / seconds, rays_per_second=1.0,
+                                 stop_reason="error", tile_noise=0.02) for name, seconds in (("a", 1.0), ("b", 9.0))}
     told = banded.summary()
     assert told["worker_seconds"] == 10 and told["samples"] == 2 * 6144 and told["stop_reason"] == "error"
-    assert not {"seconds", "samples_per_second", "rays_per_second", "tile_noise"} & set(told)
+    assert not {"seconds", "samples_per_second", "rays_per_second", "tile_noise", "brightest"} & set(told)
     banded.reports["b"]["stop_reason"] = "time"
-    assert "stop_reason" not in banded.summary()
+    assert "stop_reason" not in banded.summary() and banded.summary()["warnings"] == ["of the scene"]
+
+
+def test_bands_warn_of_the_whole_picture(tmp_path: Path) -> None:
+    """Samples that any of them dropped, all together, what biases them all, and a picture that is black everywhere."""
+    banded = Banded(PictureOrder(room(), {"size": SIZE, "clamp_direct": 1.0}, spp=4), tmp_path / "a.bands")
+    banded.reports = {"a": band(samples=100, nonfinite_samples=3, brightest=0.0),
+                      "b": band(samples=100, nonfinite_samples=4)}
+    first, dropped, biased = banded.summary()["warnings"]
+    assert first == "of the scene" and dropped.startswith("7 of 200 samples were not finite")
+    assert biased.startswith("the picture is biased by clamp_direct; the estimated error does not include")
+    banded.reports["b"]["brightest"] = 0.0
+    assert banded.summary()["warnings"][3:] == ["the picture is black: no light reaches what the camera sees; "
+                                                "`clrt debug SCENE --pixel 32,24` shows why"]

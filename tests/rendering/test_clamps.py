@@ -67,15 +67,17 @@ def test_what_is_left_and_what_was_taken_are_the_picture(device: Device, lanes: 
 
 
 def test_the_report_names_the_bias(device: Device) -> None:
-    """What is in force, and how much it took."""
+    """What is in force, how much it took, and one line that says so."""
     scene = Scene(spheres=[Sphere(material=Mirror())], environment=Environment(color=(1, 2, 4)))
     chosen: dict[str, Any] = {"size": (8, 8), "spp": 2, "device": device.info.index}
     report = clrt.render(scene, clamp_direct=1.0, **chosen).report
     assert (report["biased_by"], report["clamp_direct"], report["clamp_indirect"]) == (["clamp_direct"], 1.0, 0.0)
     assert report["clamped_part"] == pytest.approx(0.75)
+    assert report["warnings"] == ["the picture is biased by clamp_direct: 75.00% of the light was removed; the "
+                                  "estimated error does not include this bias"]
     for clamp, integrator in ((0.0, "path"), (1.0, "local")):
         report = clrt.render(scene, clamp_direct=clamp, integrator=integrator, **chosen).report
-        assert report["biased_by"] == [] and "clamped_part" not in report
+        assert report["biased_by"] == report["warnings"] == [] and "clamped_part" not in report
 
 
 def test_a_checkpoint_keeps_what_was_removed(device: Device, tmp_path: Path) -> None:
