@@ -1,0 +1,68 @@
+"""Light from no surface: the environment and suns with a size, which rays that escape find, and delta lights."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clrt.scene.lights import DirectionalLight, Light, PointLight, SpotLight
+from clrt.scene.model import Environment, Scene
+
+from .textures import bilinear
+from .vectors import Doubles, dot, unit
+
+#: Below this angular diameter in degrees a directional light is a delta light.
+POINT = 1e-4
+
+
+def escaped(scene: Scene, direction: Doubles) -> Doubles:
+    """(n, 3) radiance that arrives against unit directions from infinitely far away."""
+    radiance = _environment(scene.environment, direction)
+    for light in scene.lights:
+        if isinstance(light, DirectionalLight) and light.angle_degrees >= POINT:
+            half = np.radians(light.angle_degrees) / 2
+            within = direction @ -unit(np.array(light.direction, float)) > np.cos(half)
+            radiance += within[:, None] * np.array(light.irradiance) / (np.pi * np.sin(half)**2)
+    return radiance
+
+
+def delta_lights(scene: Scene) -> list[Light]:
+    """Those that a direct sum alone finds."""
+    return [light for light in scene.lights if not isinstance(light, DirectionalLight) or light.angle_degrees < POINT]
+
+
+def arriving(light: Light, p: Doubles) -> tuple[Doubles, Doubles, Doubles]:
+    """At points (n, 3): unit directions to a delta light, distances (n,), and irradiance (n, 3) facing it."""
+    if isinstance(light, DirectionalLight):
+        towards = np.tile(-unit(np.array(light.direction, float)), (len(p), 1))
+        return towards, np.full(len(p), np.inf), np.tile(np.array(light.irradiance, float), (len(p), 1))
+    away = np.array(light.position, float) - p
+    distance = np.linalg.norm(away, axis=1)
+    towards = away / distance[:, None]
+    strength = _falloff(light, towards) / distance**2
+    if light.range is not None:
+        strength = strength * np.maximum(1 - (distance / light.range)**4, 0)
+    intensity: Doubles = np.array(light.intensity, float)
+    return towards, distance, strength[:, None] * intensity
+
+
+def _falloff(light: PointLight | SpotLight, towards: Doubles) -> Doubles:
+    """KHR_lights_punctual: the square of what falls evenly in the cosine from the inner to the outer cone."""
+    if isinstance(light, PointLight):
+        return np.ones(len(towards))
+    inner, outer = np.cos(np.radians([light.inner_degrees, light.outer_degrees]))
+    cosine = -dot(towards, unit(np.array(light.direction, float)))
+    return np.asarray(np.clip((cosine - outer) / (inner - outer), 0, 1)**2)
+
+
+def _environment(environment: Environment, direction: Doubles) -> Doubles:
+    if environment.image is None:
+        return np.tile(environment.strength * np.array(environment.color, float), (len(direction), 1))
+    # Turned counter-clockwise about +Y: a direction is looked up where it was before.
+    angle = np.radians(environment.rotation_degrees)
+    x = np.cos(angle) * direction[:, 0] - np.sin(angle) * direction[:, 2]
+    z = np.sin(angle) * direction[:, 0] + np.cos(angle) * direction[:, 2]
+    image = environment.image.astype(float)
+    height, width = image.shape[:2]
+    u = np.arctan2(x, -z) / (2 * np.pi) % 1
+    v = np.arccos(np.clip(direction[:, 1], -1, 1)) / np.pi
+    return environment.strength * bilinear(image, u * width - 0.5, v * height - 0.5, "repeat", "clamp")

@@ -1,0 +1,27 @@
+"""The materials that the oracle knows, a file each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from clrt.scene.material import Material
+from clrt.scene.materials import BlinnPhong, Conductor, Dielectric, Diffuse, MetallicRoughness, Mirror, Phong
+
+from ..surface import Surface
+from .conductor import Metal
+from .dielectric import Glass
+from .diffuse import Lambertian
+from .metallic_roughness import CookTorrance
+from .mirror import Specular
+from .phong import BlinnGloss, PhongGloss
+from .scattering import Scattering
+
+SCATTERINGS: dict[type[Material], Callable[[Any, Surface], Scattering]] = {
+    Diffuse: Lambertian, MetallicRoughness: CookTorrance, Mirror: Specular, Dielectric: Glass, Conductor: Metal,
+    Phong: PhongGloss, BlinnPhong: BlinnGloss}
+
+
+def scattering_of(material: Material, at: Surface) -> Scattering:
+    """Of a material where rays hit it."""
+    return SCATTERINGS[type(material)](material, at)

@@ -1,0 +1,93 @@
+"""Glass: Fresnel's equations and Snell's law at a smooth surface, at GGX's microfacets (Walter et al. 2007, with the
+height-correlated G2 of Heitz 2014), and at both faces of a thin sheet.
+
+Radiance is bundled where it enters a denser medium, by the square of the relative index (Walter 2007, sec. 4.1).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clrt.scene.materials import Dielectric
+
+from ..surface import Surface
+from ..vectors import Doubles, dot, unit
+from . import fresnel
+from .ggx import LEAST, distribution, reflection, shadowing, smith_lambda, visible_normals
+from .scattering import Sample, Scattering, halfway, mirrored_below, reflected
+
+
+class Glass(Scattering):
+    """eta: (n,) index beyond the surface over that on wo's side; rough: (n,) where there are microfacets."""
+
+    def __init__(self, material: Dielectric, at: Surface) -> None:
+        roughness = at.number(material.roughness)
+        self.color, self.thin = at.tinted(material.color), material.thin
+        self.eta = np.where(at.front | material.thin, material.ior, 1 / material.ior)
+        self.alpha = np.maximum(roughness**2, LEAST)
+        self.rough = (roughness > 0) & (material.thin or material.ior != 1)
+        if not material.thin:
+            self.absorption_beyond = np.where(at.front[:, None], _absorption(material), 0.0)
+
+    def parts(self, cos_o: Doubles) -> tuple[Doubles, Doubles, Doubles]:
+        """(n, 3) what microfacets reflect and what they pass, and the cosine of what is refracted."""
+        f, cos_t = fresnel.dielectric(cos_o, self.eta)
+        f, c = f[:, None], self.color
+        if not self.thin:
+            return np.tile(f, (1, 3)), (1 - f) * c, cos_t
+        # All bounces between the faces: a geometric series.
+        between = 1 - (c * f)**2
+        safe = np.where(between > 0, between, 1)
+        return f + (1 - f)**2 * c**2 * f / safe, (1 - f)**2 * c / safe, cos_o
+
+    def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
+        same_side = wi[:, 2] > 0
+        up = np.where(same_side[:, None], wi, mirrored_below(wi))
+        back, on, _ = self.parts(np.abs(dot(wo, halfway(wo, up))))
+        mirrored = reflection(wo, up, self.alpha)[:, None]
+        passed = on * mirrored if self.thin else self._refracted(wo, wi)
+        return np.where(self.rough[:, None], np.where(same_side[:, None], back * mirrored, passed), 0.0)
+
+    def _refracted(self, wo: Doubles, wi: Doubles) -> Doubles:
+        """f·|cos wi| (Walter 2007, eq. 16 and 21)."""
+        h = -(wo + self.eta[:, None] * wi)
+        length = np.linalg.norm(h, axis=1, keepdims=True)
+        h = h / np.where(length > 0, length, 1)
+        h = np.where(h[:, 2:] < 0, -h, h)
+        cos_o, cos_i = dot(wo, h), dot(wi, h)
+        crosses = (cos_o > 0) & (cos_i < 0) & (wi[:, 2] < 0)
+        _, on, _ = self.parts(np.abs(cos_o))
+        g = shadowing(wo[:, 2], np.maximum(-wi[:, 2], 1e-300), self.alpha)
+        stretch = np.where(crosses, (cos_o + self.eta * cos_i)**2, 1)
+        f = np.abs(cos_i * cos_o) / wo[:, 2] * distribution(h, self.alpha) * g / stretch
+        return on * np.where(crosses, f, 0)[:, None]
+
+    def sample(self, wo: Doubles, rng: np.random.Generator) -> Sample:
+        h = np.where(self.rough[:, None], visible_normals(wo, self.alpha, rng), [0.0, 0.0, 1.0])
+        cos_o = dot(wo, h)
+        back, on, cos_t = self.parts(cos_o)
+        chance = back.mean(axis=1) / (back + on).mean(axis=1)
+        returns = (rng.random(len(wo)) < chance)[:, None]
+        eta = self.eta[:, None]
+        if self.thin:
+            through, bundled = mirrored_below(reflected(wo, h)), np.ones_like(eta)
+        else:
+            through = unit(-wo / eta + (cos_o / self.eta - cos_t)[:, None] * h)
+            bundled = 1 / eta**2
+        wi = np.where(returns, reflected(wo, h), through)
+        weight = np.where(returns, back / chance[:, None], on * bundled / np.maximum(1 - chance, 1e-300)[:, None])
+        return Sample(wi, weight * self._seen(wo, wi, returns[:, 0])[:, None])
+
+    def _seen(self, wo: Doubles, wi: Doubles, returns: Doubles) -> Doubles:
+        """G2/G1 of microfacets; 0 where light ends up on the wrong side."""
+        height = np.where(returns, wi[:, 2], -wi[:, 2])
+        own, other = smith_lambda(wo[:, 2], self.alpha), smith_lambda(height, self.alpha)
+        return np.where(height > 0, np.where(self.rough, (1 + own) / (1 + own + other), 1), 0)
+
+
+def _absorption(material: Dielectric) -> Doubles:
+    """(3,) per length: Beer and Lambert's law (KHR_materials_volume)."""
+    if material.attenuation_distance is None:
+        return np.zeros(3)
+    color = np.maximum(np.array(material.attenuation_color, float), 1e-300)
+    return np.asarray(-np.log(color) / material.attenuation_distance)

@@ -1,0 +1,89 @@
+"""What every material provides, and how directions are drawn.
+
+Local frame: wo and wi are unit and point away from the surface, +z is its normal on the side of wo.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from ..vectors import Doubles, dot, unit
+
+
+class Sample(NamedTuple):
+    """wi (n, 3), and f·|cos wi| over its density, (n, 3), in radiance: what is refracted is spread or bundled."""
+
+    wi: Doubles
+    weight: Doubles
+
+
+class Scattering(Protocol):
+    """A material where rays hit it."""
+
+    #: Where light passes into another medium: its absorption per length, (n, 3).
+    absorption_beyond: Doubles | None = None
+
+    def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
+        """(n, 3) of f·|cos wi|, but for single directions."""
+
+    def sample(self, wo: Doubles, rng: np.random.Generator) -> Sample:
+        """A direction for each row."""
+
+
+class Strategy(Protocol):
+    """A way to draw directions, with its density per solid angle."""
+
+    def draw(self, wo: Doubles, rng: np.random.Generator) -> Doubles: ...
+    def density(self, wo: Doubles, wi: Doubles) -> Doubles: ...
+
+
+class Mixed(Scattering):
+    """A material whose directions are drawn by one of its strategies, each as often as the others."""
+
+    strategies: list[Strategy]
+
+    @abstractmethod
+    def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles: ...
+
+    def sample(self, wo: Doubles, rng: np.random.Generator) -> Sample:
+        choice = rng.integers(len(self.strategies), size=len(wo))
+        drawn = np.array([each.draw(wo, rng) for each in self.strategies])
+        wi = drawn[choice, np.arange(len(wo))]
+        density = np.mean([each.density(wo, wi) for each in self.strategies], axis=0)
+        value = self.evaluate(wo, wi)
+        return Sample(wi, np.divide(value, density[:, None], out=np.zeros_like(value), where=density[:, None] > 0))
+
+
+class Cosine:
+    """Around the normal, by the cosine."""
+
+    def draw(self, wo: Doubles, rng: np.random.Generator) -> Doubles:
+        return power_directions(1.0, rng.random((len(wo), 2)))
+
+    def density(self, wo: Doubles, wi: Doubles) -> Doubles:
+        return np.maximum(wi[:, 2], 0) / np.pi
+
+
+def mirrored_below(w: Doubles) -> Doubles:
+    """To the other side of the surface."""
+    return w * [1.0, 1.0, -1.0]
+
+
+def reflected(wo: Doubles, h: Doubles) -> Doubles:
+    """The mirror image of wo about h."""
+    return 2 * dot(wo, h)[:, None] * h - wo
+
+
+def halfway(wo: Doubles, wi: Doubles) -> Doubles:
+    """The unit half vector."""
+    return unit(wo + wi)
+
+
+def power_directions(n: float | Doubles, u: Doubles) -> Doubles:
+    """Around +z, with a density of (n + 1)/2π·cosⁿ; u (k, 2) in [0, 1)."""
+    z = u[:, 0]**(1 / (n + 1))
+    r, phi = np.sqrt(1 - z * z), 2 * np.pi * u[:, 1]
+    return np.column_stack([r * np.cos(phi), r * np.sin(phi), z])
