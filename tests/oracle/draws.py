@@ -1,0 +1,123 @@
+"""Random choices behind small scenes of what the oracle knows, and materials by them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import fields, replace
+from typing import Any, TypeVar, get_args
+
+import numpy as np
+
+from clrt.scene.material import Material
+from clrt.scene.materials import BlinnPhong, Conductor, Dielectric, Diffuse, MetallicRoughness, Mirror, Phong
+from clrt.scene.metallic_roughness import Smith
+from clrt.scene.presets import CONDUCTORS, F0_PRESETS
+from clrt.scene.textures import Channel, Picture, Texture, Wrap
+
+Drawn = TypeVar("Drawn")
+Color = tuple[float, float, float]
+
+#: Texels along a side.
+TEXELS = 4
+#: Smoother lobes than this roughness make single paths so bright that means of thousands say little.
+SMOOTHEST = 0.3
+#: The forms that the oracle knows, where a material has a field to choose them.
+FORMS = {"multiple_scattering": False, "coupling": "fresnel"}
+
+
+class Draws:
+    """Choices that programs depend on are alike for all scenes of a batch, which thus share programs; numbers are each
+    scene's own."""
+
+    def __init__(self, seed: int, batch: int, number: int) -> None:
+        self._choices = np.random.default_rng([seed, batch])
+        self._numbers = np.random.default_rng([seed, batch, number])
+
+    def one_of(self, options: Iterable[Drawn], weights: Sequence[float] | None = None) -> Drawn:
+        """A batch's choice, with these probabilities."""
+        listed = list(options)
+        return listed[int(self._choices.choice(len(listed), p=weights))]
+
+    def chance(self, probability: float) -> bool:
+        """A batch's choice."""
+        return bool(self._choices.random() < probability)
+
+    def between(self, low: float, high: float) -> float:
+        """A scene's own number."""
+        return float(self._numbers.uniform(low, high))
+
+    def vector(self, low: float = -1.0, high: float = 1.0) -> Color:
+        """Three of a scene's own numbers."""
+        return self.between(low, high), self.between(low, high), self.between(low, high)
+
+    def texture(self, factor: float | Color, lowest: int = 40) -> Texture:
+        """Random texels, laid out at random."""
+        texels = self._numbers.integers(lowest, 256, (TEXELS, TEXELS, 4), np.uint8)
+        wrap: tuple[Wrap, Wrap] = self.one_of(get_args(Wrap)), self.one_of(get_args(Wrap))
+        return Texture(picture=Picture(texels), factor=factor, channel=self.one_of(get_args(Channel)), wrap=wrap,
+                       uv_set=self.one_of((0, 1)), offset=(self.between(-1, 1), self.between(-1, 1)),
+                       scale=(self.between(-2, 2), self.between(0.5, 2)), rotation_degrees=self.between(-180, 180),
+                       filter=self.one_of(("linear", "nearest")))
+
+    def color(self, low: float = 0.1, high: float = 0.95) -> Color | Texture:
+        """Any, a fifth of them textures."""
+        return self.texture(self.vector(0.5, 1.0)) if self.chance(0.2) else self.vector(low, high)
+
+    def number(self, low: float, high: float = 1.0) -> float | Texture:
+        """Any, a fifth of them textures."""
+        return self.texture(high, int(255 * low / high) + 1) if self.chance(0.2) else self.between(low, high)
+
+
+def random_material(draws: Draws, kind: type[Material], opaque: bool = False) -> Material:
+    """One of a kind. opaque: whether it stops all light from both sides."""
+    own = {field.name for field in fields(kind)}
+    given = DRAWERS[kind](draws) | {name: form for name, form in FORMS.items() if name in own}
+    material = kind(**given)
+    if draws.chance(0.1):
+        material = replace(material, emission=draws.vector(0.0, 0.6))
+    if opaque or draws.chance(0.7):
+        return material
+    if draws.chance(0.3):
+        return replace(material, one_sided=True)
+    return replace(material, opacity=draws.number(0.2, 0.9), alpha_cutoff=draws.one_of((None, None, 0.5)))
+
+
+def _diffuse(draws: Draws) -> dict[str, Any]:
+    return {"color": draws.color()}
+
+
+def _mirror(draws: Draws) -> dict[str, Any]:
+    return {"color": draws.color(0.5, 1.0)}
+
+
+def _dielectric(draws: Draws) -> dict[str, Any]:
+    least, most = draws.one_of(((1.1, 2.0), (0.5, 0.9)))
+    given: dict[str, Any] = {"color": draws.color(0.5, 1.0), "ior": draws.between(least, most)}
+    given["roughness"] = draws.number(SMOOTHEST) if draws.chance(0.5) else 0.0
+    inside = draws.one_of(("clear", "thin", "absorbing"))
+    if inside == "absorbing":
+        given |= {"attenuation_color": draws.vector(0.1, 0.9), "attenuation_distance": draws.between(0.2, 2.0)}
+    return given | {"thin": inside == "thin"}
+
+
+def _conductor(draws: Draws) -> dict[str, Any]:
+    given: dict[str, Any] = {"roughness": draws.number(SMOOTHEST), "preset": draws.one_of(CONDUCTORS)}
+    return given | ({"eta": draws.vector(0.2, 3.0), "k": draws.vector(0.0, 5.0)} if draws.chance(0.3) else {})
+
+
+def _metallic_roughness(draws: Draws) -> dict[str, Any]:
+    given: dict[str, Any] = {
+        "color": draws.color(), "roughness": draws.number(SMOOTHEST), "ior": draws.between(1.0, 2.5),
+        "metallic": draws.one_of((0.0, 1.0, draws.number(0.0))), "smith": draws.one_of(get_args(Smith))}
+    if draws.chance(0.3):
+        given |= {"specular": draws.number(0.0), "specular_color": draws.color(0.2, 2.0)}
+    return given | {"preset": draws.one_of(F0_PRESETS) if draws.chance(0.2) else None}
+
+
+def _phong(draws: Draws) -> dict[str, Any]:
+    return {"color": draws.color(), "specular": draws.color(0.0, 0.8), "shininess": 10 ** draws.between(0.0, 1.7)}
+
+
+DRAWERS: dict[type[Material], Callable[[Draws], dict[str, Any]]] = {
+    Diffuse: _diffuse, Mirror: _mirror, Dielectric: _dielectric, Conductor: _conductor,
+    MetallicRoughness: _metallic_roughness, Phong: _phong, BlinnPhong: _phong}
