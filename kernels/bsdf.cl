@@ -83,23 +83,28 @@ static inline ireal same_side(real cos_ns, real cos_ng) {
 #endif
 }
 
-// Whether a sample leaves to the side of the geometric normal that its direction names; cos_ng: that direction's with it.
-static inline ireal keeps_its_side(const BsdfSample *sample, real cos_ng) { return same_side(sample->wi.z, cos_ng); }
-
 #if TRANSMISSION_LOBES
-// The normal by which lights are chosen: 0 where this material, not only its type, scatters light from behind the surface.
-static inline real3 choosing_normal(const Bsdf *bsdf, real3 n) {
-    real3 chosen = n;
+// Whether this material, not only its type, scatters light from behind the surface.
+static inline ireal is_lit_from_behind(const Bsdf *bsdf) {
+    ireal lit = NO_LANES;
 #define SPREADING(name, number) { \
         ireal is_type = bsdf->type == number; \
-        if (ANY(is_type)) chosen = choose(is_type & name##_transmits(&bsdf->name), splat(ZERO), chosen); \
+        if (ANY(is_type)) lit = lit | (is_type & name##_transmits(&bsdf->name)); \
     }
     SPREADING_TYPES(SPREADING)
-    return chosen;
+    return lit;
 }
-#else
-#define choosing_normal(bsdf, n) (n)
 #endif
+
+#if HORIZON
+static inline real3 bsdf_matte(const Bsdf *bsdf, real3 wo, real3 wi) {
+    real3 value = splat(ZERO);
+#define MATTE(name, number) value = choose(bsdf->type == number, name##_matte(&bsdf->name, wo, wi), value);
+    MATERIAL_TYPES(MATTE)
+    return value;
+}
+#endif
+#include HORIZON_FILE
 
 #if ATTENUATION
 // What is absorbed of light beyond the surface, per unit of length.

@@ -86,18 +86,17 @@ static inline Hits blocker_of(const Scene *scene, const ShadowRay *ray, ireal st
 static inline void note_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
                               ireal active, Sampler *sampler, VertexLanes *v) {
     Sampler again = *sampler;
-    real3 n = choosing_normal(&shading->bsdf, shading->frame.n);
+    real3 n = choosing_normal(shading);
     real2 u;
     real probability;
     ireal light = chosen_light(scene, surface->p, n, &again, &u, &probability);
     LightSample sample = sample_of_light(scene, light, surface->p, u);
-    real3 wi = to_local(shading->frame, sample.wi);
-    real pdf = sample.pdf * probability, other = bsdf_pdf(&shading->bsdf, shading->wo, wi);
+    real pdf = sample.pdf * probability, other = shading_pdf(shading, surface, sample.wi);
     v->light = active ? light : (ireal)(-1);
     v->light_probability = active ? probability : ZERO;
     v->light_direction = choose(active, sample.wi, splat(ZERO));
     v->light_radiance = choose(active, sample.radiance, splat(ZERO));
-    v->light_bsdf = choose(active, bsdf_eval(&shading->bsdf, shading->wo, wi), splat(ZERO));
+    v->light_bsdf = choose(active, shading_eval(shading, surface, sample.wi), splat(ZERO));
     v->light_pdf = active ? pdf : ZERO;
     v->light_weight = (active & !sample.delta) ? light_sample_weight(pdf, other) : ONE;
 
@@ -123,14 +122,13 @@ static inline ireal note_direction(Path *path, const Surface *surface, const Sha
     v->end = goes ? (ireal)(END_NONE) : (ireal)(END_DEPTH);
     if (sampler->dimension == again.dimension) return goes;   // a last edge, for which no direction was drawn
     real2 u = next_2d(&again), choice = next_2d(&again);
-    BsdfSample sample = bsdf_sample(&shading->bsdf, shading->wo, u, choice.x);
-    v->direction = choose(active, to_world(shading->frame, sample.wi), splat(ZERO));
+    BsdfSample sample = shading_sample(shading, surface, u, choice.x);
+    v->direction = choose(active, sample.wi, splat(ZERO));
     v->weight = choose(active, sample.weight, splat(ZERO));
     v->pdf = active ? sample.pdf : ZERO;
     v->specular = flag(active & sample.specular);
-    ireal drawn = (sample.pdf > 0.0f) & is_positive3(sample.weight);
-    ireal sided = keeps_its_side(&sample, dot3(v->direction, surface->ng));
-    ireal why = !drawn ? (ireal)(END_ABSORBED) : !sided ? (ireal)(END_SIDE) : (ireal)(END_ROULETTE);
+    ireal why = !(sample.pdf > 0.0f) ? (ireal)(END_SIDE) : (ireal)(END_ROULETTE);
+    why = !is_positive3(sample.weight) ? (ireal)(END_ABSORBED) : why;
     v->end = goes ? (ireal)(END_NONE) : why;
     return goes;
 }

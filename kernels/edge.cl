@@ -109,22 +109,20 @@ typedef struct {
 // 2. Light by shadow rays: which lanes send one.
 static inline ireal aim_at_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
                                  ireal active, Sampler *sampler, ShadowRay *ray) {
-    LightSample light = light_sample(scene, surface->p, choosing_normal(&shading->bsdf, shading->frame.n), sampler);
-    real3 wi = to_local(shading->frame, light.wi);
-    ireal reachable = same_side(wi.z, dot3(light.wi, surface->ng));
-    real3 contribution = mul(bsdf_eval(&shading->bsdf, shading->wo, wi), light.radiance);
-    ireal useful = active & reachable & (light.pdf > 0.0f) & is_positive3(contribution);
+    LightSample light = light_sample(scene, surface->p, choosing_normal(shading), sampler);
+    real3 contribution = mul(shading_eval(shading, surface, light.wi), light.radiance);
+    ireal useful = active & (light.pdf > 0.0f) & is_positive3(contribution);
     if (!ANY(useful)) return useful;
     ray->origin = offset_origin(surface->p, surface->p_error, surface->ng, light.wi);
     ray->target = light.target;
     ray->wi = light.wi;
     ray->infinite = light.infinite;
 #if ATTENUATION
-    real3 absorption = choose(wi.z > 0.0f, path->absorption, absorption_beyond(&shading->bsdf));
+    real3 absorption = choose(dot3(light.wi, surface->ng) > 0.0f, path->absorption, absorption_beyond(&shading->bsdf));
     real distance = light.infinite ? (real)(INFINITY) : length3(sub(light.target, ray->origin));
     contribution = mul(contribution, attenuated(absorption, distance));
 #endif
-    real pdf = bsdf_pdf(&shading->bsdf, shading->wo, wi);
+    real pdf = shading_pdf(shading, surface, light.wi);
     real weight = (light.delta ? ONE : light_sample_weight(light.pdf, pdf)) / light.pdf;
     ray->light = at_eye(path, scale(contribution, weight));
     return useful;
@@ -144,20 +142,19 @@ static inline ireal go_on(Path *path, const Surface *surface, const Shading *sha
     if (depth + 1 >= max_depth) return NO_LANES;
 #endif
     real2 u = next_2d(sampler), choice = next_2d(sampler);
-    BsdfSample sample = bsdf_sample(&shading->bsdf, shading->wo, u, choice.x);
-    path->wi = to_world(shading->frame, sample.wi);
+    BsdfSample sample = shading_sample(shading, surface, u, choice.x);
+    path->wi = sample.wi;
     path->p = surface->p;
-    path->n = choosing_normal(&shading->bsdf, shading->frame.n);
+    path->n = choosing_normal(shading);
     path->pdf = sample.pdf;
     path->specular = sample.specular;
-    active = active & (sample.pdf > 0.0f) & is_positive3(sample.weight)
-           & keeps_its_side(&sample, dot3(path->wi, surface->ng));
+    active = active & (sample.pdf > 0.0f) & is_positive3(sample.weight);
     path->beta = choose(active, mul(path->beta, sample.weight), path->beta);
 #if TRANSMISSION
     path->spread *= sample.spread;
 #endif
 #if ATTENUATION
-    path->absorption = choose(sample.wi.z < 0.0f, absorption_beyond(&shading->bsdf), path->absorption);
+    path->absorption = choose(dot3(path->wi, surface->ng) < 0.0f, absorption_beyond(&shading->bsdf), path->absorption);
 #endif
     path->origin = offset_origin(surface->p, surface->p_error, surface->ng, path->wi);
 

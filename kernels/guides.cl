@@ -34,16 +34,15 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
 #if PRIMITIVES
         Shading shading = shading_at(scene, direction, &surface);
         real middle = (real)(0.5f);
-        BsdfSample sample = bsdf_sample(&shading.bsdf, shading.wo, (real2){middle, middle}, middle);
-        real3 wi = to_world(shading.frame, sample.wi);
-        ireal followed = hit & sample.specular & keeps_its_side(&sample, dot3(wi, surface.ng));
+        BsdfSample sample = shading_sample(&shading, &surface, (real2){middle, middle}, middle);
+        ireal followed = hit & sample.specular & (sample.pdf > 0.0f);
         ireal ends = hit & !followed;
         seen.albedo = choose(ends, mul(tint, bsdf_albedo(&shading.bsdf)), seen.albedo);
         seen.normal = choose(ends, surface.ns, seen.normal);
         if (depth >= max_depth || !ANY(followed)) return seen;
         tint = choose(followed, mul(tint, sample.weight), tint);
-        origin = offset_origin(surface.p, surface.p_error, surface.ng, wi);
-        direction = wi;
+        origin = offset_origin(surface.p, surface.p_error, surface.ng, sample.wi);
+        direction = sample.wi;
         active = followed;
 #endif
     }

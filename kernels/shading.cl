@@ -1,4 +1,12 @@
-// What the material of a surface is where a ray met it, in the frame of its shading normal. World frame but for wo.
+// What the material of a surface is where a ray met it, in the frame of its shading normal, and how light is scattered there:
+//
+//   shading_eval(shading, surface, wi)           bsdf_eval, 0 where wi is not on the side of the geometric surface that it
+//                                                belongs to: reflected light above, transmitted light below
+//   shading_pdf(shading, surface, wi)            density with which shading_sample chooses such a wi
+//   shading_sample(shading, surface, u, lobe)    bsdf_sample, its wi in the world frame, with a density of 0 where it failed
+//
+// wi: unit, world frame. HORIZON: what lobes around a bent or interpolated normal send to the wrong side is not lost
+// (horizon.cl).
 #include "bsdf.cl"
 
 #if COAT_NORMALS
@@ -12,6 +20,9 @@ typedef struct {
     Frame frame;
     real3 wo;        // local
     Bsdf bsdf;
+#if HORIZON
+    real3 ng;        // local
+#endif
 } Shading;
 
 // Turns the surface to the side that a ray along `direction` comes from, with what its normal map says.
@@ -25,6 +36,79 @@ static inline Shading shading_at(const Scene *scene, real3 direction, Surface *s
     shading.frame = frame_around(FRAME_NORMAL(surface));
     shading.wo = to_local(shading.frame, towards);
     bsdf_at(scene, surface, &shading.bsdf);
+#if HORIZON
+    shading.ng = to_local(shading.frame, surface->ng);
+#endif
     return shading;
+}
+
+static inline real3 shading_eval(const Shading *shading, const Surface *surface, real3 wi) {
+    real3 w = to_local(shading->frame, wi);
+    real side = dot3(wi, surface->ng);
+    real3 value = choose(same_side(w.z, side), bsdf_eval(&shading->bsdf, shading->wo, w), splat(ZERO));
+#if HORIZON
+    real pdf = ZERO;
+    add_folded(&shading->bsdf, shading->ng, shading->wo, w, side, &value, &pdf);
+#endif
+    return value;
+}
+
+static inline real shading_pdf(const Shading *shading, const Surface *surface, real3 wi) {
+    real3 w = to_local(shading->frame, wi);
+    real pdf = bsdf_pdf(&shading->bsdf, shading->wo, w);
+#if HORIZON
+    real side = dot3(wi, surface->ng);
+    real3 value = splat(ZERO);
+    pdf = same_side(w.z, side) ? pdf : ZERO;
+    add_folded(&shading->bsdf, shading->ng, shading->wo, w, side, &value, &pdf);
+#endif
+    return pdf;
+}
+
+#if HORIZON
+#if TRANSMISSION
+#define SPREAD(sample) (sample)->spread
+#else
+#define SPREAD(sample) ONE
+#endif
+
+// Folds a sample that was drawn on the wrong side. Its weight becomes that of both ways to draw its direction.
+static inline void fold_sample(const Shading *shading, const Surface *surface, BsdfSample *sample) {
+    const Bsdf *bsdf = &shading->bsdf;
+    real side = dot3(to_world(shading->frame, sample->wi), surface->ng);
+    real3 value = scale(sample->weight, sample->pdf * SPREAD(sample));
+    real pdf = sample->pdf;
+    ireal moved = !same_side(sample->wi.z, side);
+    if (ANY(moved)) {
+        sample->wi = choose(moved, mirrored_at(shading->ng, sample->wi, side), sample->wi);
+        value = choose(moved, bsdf_eval(bsdf, shading->wo, sample->wi), value);
+        pdf = moved ? bsdf_pdf(bsdf, shading->wo, sample->wi) : pdf;
+        side = moved ? -side : side;
+    }
+    ireal folded = add_folded(bsdf, shading->ng, shading->wo, sample->wi, side, &value, &pdf);
+    folded = folded & (sample->pdf > 0.0f) & !sample->specular;
+    sample->weight = choose(folded, scale(value, 1.0f / (pdf * SPREAD(sample))), sample->weight);
+    sample->pdf = folded ? pdf : sample->pdf;
+}
+#endif
+
+static inline BsdfSample shading_sample(const Shading *shading, const Surface *surface, real2 u, real lobe) {
+    BsdfSample sample = bsdf_sample(&shading->bsdf, shading->wo, u, lobe);
+#if HORIZON
+    fold_sample(shading, surface, &sample);
+#endif
+    real belongs = sample.wi.z;
+    sample.wi = to_world(shading->frame, sample.wi);
+    sample.pdf = same_side(belongs, dot3(sample.wi, surface->ng)) ? sample.pdf : ZERO;
+    return sample;
+}
+
+// The normal by which lights are chosen: no light behind it contributes anything.
+static inline real3 choosing_normal(const Shading *shading) {
+#if TRANSMISSION_LOBES
+    return choose(is_lit_from_behind(&shading->bsdf), splat(ZERO), shading->frame.n);
+#else
+    return shading->frame.n;
+#endif
 }
 #endif

@@ -30,9 +30,8 @@ static inline real3 seen_light(const Scene *scene, real3 origin, real3 direction
 static inline real3 light_of_one(const Scene *scene, int light, const Surface *surface, const Shading *shading,
                                  ireal active, real2 u, ureal *rays) {
     LightSample sample = sample_of_light(scene, (ireal)(light), surface->p, u);
-    real3 wi = to_local(shading->frame, sample.wi);
-    real3 contribution = scale(mul(bsdf_eval(&shading->bsdf, shading->wo, wi), sample.radiance), 1.0f / sample.pdf);
-    ireal useful = active & same_side(wi.z, dot3(sample.wi, surface->ng)) & (sample.pdf > 0.0f) & is_positive3(contribution);
+    real3 contribution = scale(mul(shading_eval(shading, surface, sample.wi), sample.radiance), 1.0f / sample.pdf);
+    ireal useful = active & (sample.pdf > 0.0f) & is_positive3(contribution);
     if (!ANY(useful)) return splat(ZERO);
 #if NO_SHADOWS
     return choose(useful, contribution, splat(ZERO));
@@ -87,18 +86,18 @@ static inline real3 local_light(const Scene *scene, const Launch *launch, const 
 #if PRIMITIVES
         Shading shading = shading_at(scene, direction, &surface);
         real2 u = next_2d(sampler), choice = next_2d(sampler);
-        BsdfSample sample = bsdf_sample(&shading.bsdf, shading.wo, u, choice.x);
+        BsdfSample sample = shading_sample(&shading, &surface, u, choice.x);
         L = add(L, mul(beta, shade(scene, &surface, &shading, active & !sample.specular, sampler, rays)));
 
         // 3. Go on from mirrors and glass.
-        direction = to_world(shading.frame, sample.wi);
-        active = active & sample.specular & keeps_its_side(&sample, dot3(direction, surface.ng));
+        direction = sample.wi;
+        active = active & sample.specular & (sample.pdf > 0.0f);
         beta = choose(active, mul(beta, sample.weight), beta);
 #if TRANSMISSION
         beta = choose(active, scale(beta, sample.spread), beta);
 #endif
 #if ATTENUATION
-        absorption = choose(sample.wi.z < 0.0f, absorption_beyond(&shading.bsdf), absorption);
+        absorption = choose(dot3(direction, surface.ng) < 0.0f, absorption_beyond(&shading.bsdf), absorption);
 #endif
         origin = offset_origin(surface.p, surface.p_error, surface.ng, direction);
 #endif

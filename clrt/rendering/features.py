@@ -59,6 +59,7 @@ def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
                               and any(user.is_culled for user in packed.shapes.users)),
            "CLAMP": bool(biased_by(scene.render)),
            "DIRECT_LIGHT": choices.direct_light, "LOOP_LIMIT": loop_limit}
+    has["HORIZON"] = has["SMOOTH_NORMALS"] or has["NORMAL_MAPS"]
     return features | {name for name, present in has.items() if present}
 
 
@@ -108,6 +109,7 @@ def files_for(packed: Packed, choices: Choices, features: set[str]) -> dict[str,
             "OPACITY_FILE": ["opacity.cl"] if "OPACITY" in features else [],
             "TEXTURE_FILES": ["texture.cl"] if packed.uv_sets else [],
             "NORMAL_MAPS_FILE": ["normal_maps.cl"] if packed.materials.normal_maps else [],
+            "HORIZON_FILE": ["horizon.cl"] if "HORIZON" in features else [],
             "SAMPLER": [f"sampler/{scene.render.sampler}.cl"], "CAMERA": [camera_file(scene.camera, integrator)],
             "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"],
             "INTEGRATOR": [INTEGRATORS.get(integrator, "picture.cl")], "PICTURE": [f"picture/{integrator}.cl"]}

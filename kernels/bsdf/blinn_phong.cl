@@ -22,6 +22,8 @@ static inline real3 blinn_phong_eval(const struct blinn_phong *m, real3 wo, real
     return choose((wo.z > 0.0f) & (wi.z > 0.0f), scale(value, (real)(1.0f / PI)), splat(ZERO));
 }
 
+static inline real3 blinn_phong_matte(const struct blinn_phong *m, real3 wo, real3 wi) { return scale(m->lobes.color, wo.z > 0.0f ? cosine_pdf(wi.z) : ZERO); }
+
 static inline real blinn_phong_pdf(const struct blinn_phong *m, real3 wo, real3 wi) {
     real3 sum = add(wo, wi);
     real length = length3(sum), share = gloss_share(&m->lobes);

@@ -44,6 +44,8 @@ static inline real3 conductor_eval(const struct conductor *m, real3 wo, real3 wi
     return choose((wo.z > 0.0f) & (wi.z > 0.0f), scale(f, value), splat(ZERO));
 }
 
+static inline real3 conductor_matte(const struct conductor *m, real3 wo, real3 wi) { return splat(ZERO); }
+
 static inline real conductor_pdf(const struct conductor *m, real3 wo, real3 wi) {
     real visible = ggx_d(normalize3(add(wo, wi)), m->alpha) / (4.0f * wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
     return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? visible : ZERO;

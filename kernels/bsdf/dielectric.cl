@@ -44,6 +44,8 @@ struct dielectric {
 
 static inline real3 dielectric_albedo(const struct dielectric *m) { return m->color; }
 
+static inline real3 dielectric_matte(const struct dielectric *m, real3 wo, real3 wi) { return splat(ZERO); }
+
 // How light divides where Fresnel's equations give F: the probability of following what is reflected, and what each then
 // weighs.
 typedef struct { real reflected; real3 reflection, transmission; } Division;

@@ -12,6 +12,8 @@ static inline real3 diffuse_eval(const struct diffuse *m, real3 wo, real3 wi) {
     return scale(m->color, wo.z > 0.0f ? cosine_pdf(wi.z) : ZERO);
 }
 
+static inline real3 diffuse_matte(const struct diffuse *m, real3 wo, real3 wi) { return diffuse_eval(m, wo, wi); }
+
 static inline real diffuse_pdf(const struct diffuse *m, real3 wo, real3 wi) { return cosine_pdf(wi.z); }
 
 static inline real3 diffuse_albedo(const struct diffuse *m) { return m->color; }

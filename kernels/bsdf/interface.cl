@@ -8,6 +8,7 @@
 //   NAME_sample(m, wo, u, lobe)              a direction with its weight f·|cos|/pdf; u in [0,1)², lobe in [0,1)
 //   NAME_albedo(m)                           what part of white light from straight above it reflects or lets through,
 //                                            in [0, 1]
+//   NAME_matte(m, wo, wi)                    the part of NAME_eval that spreads light about as Lambert's law does (horizon.cl)
 //
 // m: const struct NAME *. wo, wi: unit, local frame, both pointing away from the surface, +z the shading normal on the
 // side of wo; surface->front: whether that is the outside. wi.z < 0 goes through it: then the material has the feature

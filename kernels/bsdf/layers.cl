@@ -5,7 +5,8 @@
 //              color·(1 − F(wo·h))·G·D/(4·cos wo·cos wi), wi mirrored to wo's side
 //
 // COAT_NORMALS: wo and wi are in the frame of the unbent normal. The coat, and what lies below it, each reflect in a frame around
-// a normal of their own: nothing to below its horizon, nor to below that of the unbent one.
+// a normal of their own: nothing to below its horizon. Gloss that is sent below that of the unbent one is mirrored there, as at
+// the geometric surface (horizon.cl).
 //
 // What a coat reflects by F(cos) it takes from what lies below twice, at wo and at wi, and fibres leave 1 − max(sheen_color)·E
 // of the larger E of both: so all is reciprocal and no light is made. glTF takes a coat's share at wo alone. E, the fibres'
@@ -92,7 +93,8 @@ static inline LayerShares layer_shares(const struct metallic_roughness *m, real3
 static inline ireal metallic_roughness_transmits(const struct metallic_roughness *m) { return largest(m->through) > 0.0f; }
 #endif
 
-static inline real3 metallic_roughness_eval(const struct metallic_roughness *m, real3 wo, real3 wi) {
+// What each lobe reflects, and what passes on.
+static inline real3 layers_reflected(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), coat_o = IN_COAT(m, wo), coat_i = IN_COAT(m, wi);
     real3 value = scale(base_eval(m, base_o, base_i), under_sheen(m, base_o, base_i));
 #if SHEEN
@@ -104,21 +106,50 @@ static inline real3 metallic_roughness_eval(const struct metallic_roughness *m, 
     real coat = reflected_density(coat_o, coat_i, m->coat_alpha, &hidden) * hidden;
     value = add(value, splat(IF_ABOVE(coat_o, coat_i, coat_fresnel(m, 0.5f * length3(add(wo, wi))) * coat)));
 #endif
-    value = choose((wo.z > 0.0f) & (wi.z > 0.0f), value, splat(ZERO));
+    return value;
+}
+
+static inline real3 layers_matte(const struct metallic_roughness *m, real3 wo, real3 wi) {
+    real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi);
+    real left = under_sheen(m, base_o, base_i) * under_coat(m, IN_COAT(m, wo), IN_COAT(m, wi));
+    return scale(base_matte(m, base_o, base_i), left);
+}
+
 #if THROUGH
-    real3 mirrored = vector(base_i.x, base_i.y, -base_i.z);
+static inline real3 layers_transmitted(const struct metallic_roughness *m, real3 wo, real3 wi) {
+    real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), mirrored = vector(base_i.x, base_i.y, -base_i.z);
     real seen;
     real density = reflected_density(base_o, mirrored, m->alpha, &seen) * seen;
     real3 on = mul(sub(splat(ONE), base_fresnel(m, 0.5f * length3(add(base_o, mirrored)))), m->through);
-    on = scale(on, IF_ABOVE(base_o, mirrored, density * under_coat(m, coat_o, coat_i) * under_sheen(m, base_o, base_i)));
+    density *= under_coat(m, IN_COAT(m, wo), IN_COAT(m, wi)) * under_sheen(m, base_o, base_i);
+    return scale(on, IF_ABOVE(base_o, mirrored, density));
+}
+#endif
+
+static inline real3 metallic_roughness_eval(const struct metallic_roughness *m, real3 wo, real3 wi) {
+    real3 value = layers_reflected(m, wo, wi);
+#if COAT_NORMALS
+    real3 across = vector(wi.x, wi.y, -wi.z);
+    value = add(value, sub(layers_reflected(m, wo, across), layers_matte(m, wo, across)));
+#endif
+    value = choose((wo.z > 0.0f) & (wi.z > 0.0f), value, splat(ZERO));
+#if THROUGH
+    real3 on = layers_transmitted(m, wo, wi);
+#if COAT_NORMALS
+    on = add(on, layers_transmitted(m, wo, across));
+#endif
     value = choose((wo.z > 0.0f) & (wi.z < 0.0f), on, value);
 #endif
     return value;
 }
 
-static inline real metallic_roughness_pdf(const struct metallic_roughness *m, real3 wo, real3 wi) {
+static inline real3 metallic_roughness_matte(const struct metallic_roughness *m, real3 wo, real3 wi) {
+    return choose((wo.z > 0.0f) & (wi.z > 0.0f), layers_matte(m, wo, wi), splat(ZERO));
+}
+
+// The densities with which each is drawn.
+static inline real reflected_pdf(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), coat_o = IN_COAT(m, wo), coat_i = IN_COAT(m, wi);
-    LayerShares share = layer_shares(m, base_o, coat_o);
     real hidden, pdf = share.base * base_pdf(m, base_o, base_i);
 #if CLEARCOAT
     pdf += IF_ABOVE(coat_o, coat_i, share.coat * reflected_density(coat_o, coat_i, m->coat_alpha, &hidden));
@@ -126,10 +157,30 @@ static inline real metallic_roughness_pdf(const struct metallic_roughness *m, re
 #if SHEEN
     pdf += IF_ABOVE(base_o, base_i, share.sheen * (0.5f / PI));
 #endif
+    return pdf;
+}
+
+#if THROUGH
+static inline real transmitted_pdf(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
+    real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), mirrored = vector(base_i.x, base_i.y, -base_i.z);
+    real hidden;
+    return IF_ABOVE(base_o, mirrored, share.through * reflected_density(base_o, mirrored, m->alpha, &hidden));
+}
+#endif
+
+static inline real metallic_roughness_pdf(const struct metallic_roughness *m, real3 wo, real3 wi) {
+    LayerShares share = layer_shares(m, IN_BASE(m, wo), IN_COAT(m, wo));
+    real pdf = reflected_pdf(m, share, wo, wi);
+#if COAT_NORMALS
+    real3 across = vector(wi.x, wi.y, -wi.z);
+    pdf += reflected_pdf(m, share, wo, across);
+#endif
     pdf = ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
 #if THROUGH
-    real3 mirrored = vector(base_i.x, base_i.y, -base_i.z);
-    real on = IF_ABOVE(base_o, mirrored, share.through * reflected_density(base_o, mirrored, m->alpha, &hidden));
+    real on = transmitted_pdf(m, share, wo, wi);
+#if COAT_NORMALS
+    on += transmitted_pdf(m, share, wo, across);
+#endif
     pdf = ((wo.z > 0.0f) & (wi.z < 0.0f)) ? on : pdf;
 #endif
     return pdf;
@@ -177,6 +228,9 @@ static inline BsdfSample metallic_roughness_sample(const struct metallic_roughne
     real3 film = sample_visible_normal(coat_o, m->coat_alpha, u);
     real3 reflected = sub(scale(film, 2.0f * dot3(coat_o, film)), coat_o);
     sample.wi = choose(lobe < share.coat, OF_COAT(m, reflected), sample.wi);
+#endif
+#if COAT_NORMALS
+    sample.wi.z = (through ? sample.wi.z > 0.0f : sample.wi.z < 0.0f) ? -sample.wi.z : sample.wi.z;
 #endif
     real pdf = metallic_roughness_pdf(m, wo, sample.wi);
     sample.pdf = (through ? sample.wi.z < 0.0f : sample.wi.z > 0.0f) ? pdf : ZERO;

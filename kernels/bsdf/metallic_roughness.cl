@@ -168,6 +168,12 @@ static inline LobeShares lobe_shares(const struct metallic_roughness *m, real3 w
                         some ? share.diffuse / sum : ZERO};
 }
 
+// What the body reflects.
+static inline real3 BASE(matte)(const struct metallic_roughness *m, real3 wo, real3 wi) {
+    real3 body = scale(mul(mul(transmitted(m, wi.z), transmitted(m, wo.z)), m->albedo), wi.z * (1.0f / PI));
+    return choose((wo.z > 0.0f) & (wi.z > 0.0f), body, splat(ZERO));
+}
+
 static inline real3 BASE(eval)(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 sum = add(wo, wi);
     real length = length3(sum);

@@ -23,6 +23,8 @@ static inline real3 phong_eval(const struct phong *m, real3 wo, real3 wi) {
     return choose((wo.z > 0.0f) & (wi.z > 0.0f), scale(value, (real)(1.0f / PI)), splat(ZERO));
 }
 
+static inline real3 phong_matte(const struct phong *m, real3 wo, real3 wi) { return scale(m->lobes.color, wo.z > 0.0f ? cosine_pdf(wi.z) : ZERO); }
+
 static inline real phong_pdf(const struct phong *m, real3 wo, real3 wi) {
     real share = gloss_share(&m->lobes);
     real pdf = share * power_pdf(mirrored_cosine(wo, wi), m->lobes.shininess) + (1.0f - share) * cosine_pdf(wi.z);

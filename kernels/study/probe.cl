@@ -2,7 +2,7 @@
 //
 // A scene's program with this file in place of path.cl: what is probed is what renders that scene. Arrays are rows of n
 // floats: row r of element i is array[r·n + i]. Whole numbers up to 2^24 and masks (0, 1) are written as floats.
-#include "bsdf.cl"
+#include "shading.cl"
 #include "camera.cl"
 #include "film.cl"
 #include "light.cl"
@@ -115,6 +115,55 @@ kernel void probe_bsdf_value(SCENE_PARAMETERS, uint n, global const float *in, g
     put3(out, n, 0, bsdf_eval(&bsdf, ROW3(in, 1), ROW3(in, 4)));
     put(out, n, 3, bsdf_pdf(&bsdf, ROW3(in, 1), ROW3(in, 4)));
 }
+
+#if PRIMITIVES
+// A material, by its code, on a surface with these normals, seen along −wo. No map bends it.
+static Shading shading_between(const Scene *scene, real code, real3 ng, real3 ns, real3 wo, Surface *surface) {
+    surface->material = TO_INT(code);
+    surface->ng = ng;
+    surface->ns = ns;
+#if TEXTURES
+    for (int i = 0; i < UV_SETS; ++i) surface->at.set[i] = (real2){ZERO, ZERO};
+#endif
+#if VERTEX_COLORS
+    surface->tint = splat(ONE);
+#endif
+#if NORMAL_MAPS
+    surface->tangent = ns;
+    surface->handedness = ZERO;
+#endif
+#if COAT_NORMALS
+    surface->unbent = surface->coat_normal = ns;
+#endif
+    return shading_at(scene, negate(wo), surface);
+}
+
+// in: material, ng (3), ns (3), wo (3), u (2), lobe -> out: wi (3), weight (3), pdf, specular, spread
+kernel void probe_shading_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    Surface surface;
+    Shading shading = shading_between(&scene, ROW(in, 0), ROW3(in, 1), ROW3(in, 4), ROW3(in, 7), &surface);
+    BsdfSample sample = shading_sample(&shading, &surface, (real2){ROW(in, 10), ROW(in, 11)}, ROW(in, 12));
+    put3(out, n, 0, sample.wi);
+    put3(out, n, 3, sample.weight);
+    put(out, n, 6, sample.pdf);
+    put(out, n, 7, FLAG(sample.specular));
+#if TRANSMISSION
+    put(out, n, 8, sample.spread);
+#else
+    put(out, n, 8, ONE);
+#endif
+}
+
+// in: material, ng (3), ns (3), wo (3), wi (3) -> out: f·|cos| (3), pdf
+kernel void probe_shading_value(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
+    ELEMENTS
+    Surface surface;
+    Shading shading = shading_between(&scene, ROW(in, 0), ROW3(in, 1), ROW3(in, 4), ROW3(in, 7), &surface);
+    put3(out, n, 0, shading_eval(&shading, &surface, ROW3(in, 10)));
+    put(out, n, 3, shading_pdf(&shading, &surface, ROW3(in, 10)));
+}
+#endif
 
 #if MATERIAL_METALLIC_ROUGHNESS
 // in: wo (3), alpha, u (2) -> out: the normal that is drawn of those visible from wo

@@ -1,0 +1,31 @@
+// The horizon of the geometric surface. Lobes lie around a shading normal, bent by a map or interpolated, and send a part of
+// their light to the wrong side of the surface, where a ray would enter what is solid. The gloss in that part is mirrored at
+// the geometric surface, as by a flat surface below, so that value and density remain those of one function and no energy
+// is lost:
+//
+//   value(wi) = f(wi) + gloss(mirrored wi)     above the surface; of what is transmitted, below it
+//
+// The mirrored view is continuous where it crosses this horizon, and where the view crosses the shading horizon, beyond which
+// the geometric normal replaces the shading normal (surface.cl).
+//
+// Matte light is not folded, as in other renderers: Lambert's law around the shading normal loses (1 − cos θ)/2 to below the
+// surface, θ the angle between both normals. Mirrored, it would be twice as bright at the horizon, a hard edge where a light
+// sets (docs/accuracy.md).
+//
+// Local frame of the shading normal, as in bsdf/interface.cl. `side`: the cosine of a direction with the geometric normal.
+
+static inline real3 mirrored_at(real3 ng, real3 w, real side) { return mad3(ng, -2.0f * side, w); }
+
+// Adds the gloss that is folded to w, and the density of all that is. Returns where there is any.
+static inline ireal add_folded(const Bsdf *bsdf, real3 ng, real3 wo, real3 w, real side, real3 *value, real *pdf) {
+    real3 mirrored = mirrored_at(ng, w, side);
+    ireal folded = same_side(mirrored.z, side);
+#if !TRANSMISSION
+    folded = folded & (mirrored.z > 0.0f);
+#endif
+    if (!ANY(folded)) return folded;
+    real3 gloss = sub(bsdf_eval(bsdf, wo, mirrored), bsdf_matte(bsdf, wo, mirrored));
+    *value = choose(folded, add(*value, gloss), *value);
+    *pdf += folded ? bsdf_pdf(bsdf, wo, mirrored) : ZERO;
+    return folded;
+}
