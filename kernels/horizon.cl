@@ -10,7 +10,7 @@
 //
 // Matte light is not folded, as in other renderers: Lambert's law around the shading normal loses (1 − cos θ)/2 to below the
 // surface, θ the angle between both normals. Mirrored, it would be twice as bright at the horizon, a hard edge where a light
-// sets (docs/accuracy.md).
+// sets (docs/accuracy.md). Below bumps of normal maps it fades out towards the horizon (bump_shadowing in normal_maps.cl).
 //
 // Local frame of the shading normal, as in bsdf/interface.cl. `side`: the cosine of a direction with the geometric normal.
 

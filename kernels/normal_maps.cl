@@ -51,6 +51,15 @@ static inline void bend_normal(const Scene *scene, Surface *surface) {
     surface->ns = bent(scene, surface, normal_map(scene, surface));
 }
 
+// What bumps leave of matte light to or from w, unit, world frame: by the normal alone it would end at a hard edge, where w
+// sinks below the surface. GGX's shadowing, with a roughness for the slope of the bump (Estevez, Lecocq and Stein 2019, A
+// Microfacet-Based Shadowing Function to Solve the Bump Terminator Problem): 1 where no map bends, 0 at the horizon.
+static inline real bump_shadowing(const Surface *surface, real3 w) {
+    real up = dot3(w, surface->unbent), bend = dot3(surface->ns, surface->unbent), up2 = up * up, bend2 = bend * bend;
+    real alpha2 = minimum(0.125f * maximum(1.0f - bend2, ZERO) / bend2, ONE);
+    return up > 0.0f ? 2.0f * up / (up + sqrt(up2 + alpha2 * maximum(1.0f - up2, ZERO))) : ZERO;
+}
+
 #if COAT_NORMALS
 // The normal of the frame in which a material is evaluated.
 static inline real3 frame_normal(const Surface *surface) {

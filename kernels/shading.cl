@@ -42,10 +42,28 @@ static inline Shading shading_at(const Scene *scene, real3 direction, Surface *s
     return shading;
 }
 
+#if HORIZON
+// Takes from *value, eval in the direction w (local), what bumps take of its matte part. Returns where that is anything.
+static inline ireal shadow_by_bumps(const Shading *shading, const Surface *surface, real3 w, real3 *value) {
+#if NORMAL_MAPS
+    real taken = 1.0f - bump_shadowing(surface, to_world(shading->frame, w));
+    ireal some = taken > 0.0f;
+    if (ANY(some)) *value = choose(some, sub(*value, scale(bsdf_matte(&shading->bsdf, shading->wo, w), taken)), *value);
+    return some;
+#else
+    return NO_LANES;
+#endif
+}
+#endif
+
 static inline real3 shading_eval(const Shading *shading, const Surface *surface, real3 wi) {
     real3 w = to_local(shading->frame, wi);
     real side = dot3(wi, surface->ng);
-    real3 value = choose(same_side(w.z, side), bsdf_eval(&shading->bsdf, shading->wo, w), splat(ZERO));
+    real3 value = bsdf_eval(&shading->bsdf, shading->wo, w);
+#if HORIZON
+    shadow_by_bumps(shading, surface, w, &value);
+#endif
+    value = choose(same_side(w.z, side), value, splat(ZERO));
 #if HORIZON
     real pdf = ZERO;
     add_folded(&shading->bsdf, shading->ng, shading->wo, w, side, &value, &pdf);
@@ -85,10 +103,11 @@ static inline void fold_sample(const Shading *shading, const Surface *surface, B
         pdf = moved ? bsdf_pdf(bsdf, shading->wo, sample->wi) : pdf;
         side = moved ? -side : side;
     }
-    ireal folded = add_folded(bsdf, shading->ng, shading->wo, sample->wi, side, &value, &pdf);
-    folded = folded & (sample->pdf > 0.0f) & !sample->specular;
-    sample->weight = choose(folded, scale(value, 1.0f / (pdf * SPREAD(sample))), sample->weight);
-    sample->pdf = folded ? pdf : sample->pdf;
+    ireal changed = shadow_by_bumps(shading, surface, sample->wi, &value);
+    changed = changed | add_folded(bsdf, shading->ng, shading->wo, sample->wi, side, &value, &pdf);
+    changed = changed & (sample->pdf > 0.0f) & !sample->specular;
+    sample->weight = choose(changed, scale(value, 1.0f / (pdf * SPREAD(sample))), sample->weight);
+    sample->pdf = changed ? pdf : sample->pdf;
 }
 #endif
 

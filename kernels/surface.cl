@@ -22,9 +22,10 @@ typedef struct {
 #if NORMAL_MAPS
     real3 tangent;        // not of unit length
     real handedness;      // of the bitangent; 0 where there are no tangents
+    real3 unbent;         // the shading normal as no map bends it
 #endif
 #if COAT_NORMALS
-    real3 unbent, coat_normal;   // shading normals as no map bends them, and as a coat's own does (normal_maps.cl)
+    real3 coat_normal;    // the shading normal as a coat's own map bends it (normal_maps.cl)
 #endif
 } Surface;
 
@@ -176,8 +177,11 @@ static inline Surface surface_at(const Scene *scene, real3 origin, real3 directi
 #elif SPHERES
     sphere_surface(scene, origin, direction, hits, primitive, &surface);
 #endif
+#if NORMAL_MAPS
+    surface.unbent = surface.ns;
+#endif
 #if COAT_NORMALS
-    surface.unbent = surface.coat_normal = surface.ns;
+    surface.coat_normal = surface.ns;
 #endif
     return surface;
 }
@@ -193,8 +197,10 @@ static inline void turn_towards(Surface *surface, real3 towards) {
     surface->front = !(dot3(surface->ng, towards) < 0.0f);
     surface->ng = choose(surface->front, surface->ng, negate(surface->ng));
     surface->ns = turned(surface->ns, surface, towards);
-#if COAT_NORMALS
+#if NORMAL_MAPS
     surface->unbent = turned(surface->unbent, surface, towards);
+#endif
+#if COAT_NORMALS
     surface->coat_normal = turned(surface->coat_normal, surface, towards);
 #endif
 }

@@ -131,9 +131,10 @@ static Shading shading_between(const Scene *scene, real code, real3 ng, real3 ns
 #if NORMAL_MAPS
     surface->tangent = ns;
     surface->handedness = ZERO;
+    surface->unbent = ns;
 #endif
 #if COAT_NORMALS
-    surface->unbent = surface->coat_normal = ns;
+    surface->coat_normal = ns;
 #endif
     return shading_at(scene, negate(wo), surface);
 }

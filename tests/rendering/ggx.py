@@ -45,6 +45,12 @@ def masking(smith: str, alpha: float, cos_o: Doubles, cos_i: Doubles) -> Doubles
     return np.asarray(2 / (root_o + root_i))
 
 
+def bump_shadowing(unbent: Doubles, bent: Doubles, w: Doubles) -> float:
+    """What bumps leave of matte light from w: listing 12-1 of Estevez, Lecocq and Stein 2019."""
+    slope, angle = (1 / float(v @ unbent / np.linalg.norm(v))**2 - 1 for v in (bent, w))
+    return 2 / (1 + np.sqrt(1 + min(slope / 8, 1) * angle)) if w @ unbent > 0 else 0.0
+
+
 def albedo(alpha: float, cosine: float, smith: str, steps: int = 500) -> float:
     """What microfacets with F = 1 reflect of a white furnace in one bounce.
 

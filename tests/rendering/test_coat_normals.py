@@ -20,7 +20,7 @@ from clrt.study.probe import Doubles
 from clrt.study.scattering import FLIP, above
 from clrt.study.significance import chi2_test, mean_test, rejected
 
-from .ggx import masking
+from .ggx import bump_shadowing, masking
 from .test_textures import plain, quad, seen
 
 COLOR = (0.8, 0.5, 0.2)
@@ -179,7 +179,7 @@ def test_highlights_lie_where_the_coat_is_bent_to(device: Device, base: str | No
         picture = seen(device, scene, size=8, spp=4, max_depth=2).mean(axis=(0, 1))
         gloss = film(towards_eye, light[None], n, alpha) + film(towards_eye, light[None] * FLIP, n, alpha)
         left = (1 - schlick(n[2])) * (1 - schlick(light @ n))
-        lambert = left * np.array(COLOR) / np.pi * max(light @ normal(base), 0)
+        lambert = left * np.array(COLOR) / np.pi * max(light @ normal(base), 0) * bump_shadowing(UP, normal(base), light)
         np.testing.assert_allclose(picture, gloss + lambert, rtol=1e-3)
         found.append(picture[2])
     assert np.argmax(found) == 2 and found[2] > 3 * max(found[0], found[4])

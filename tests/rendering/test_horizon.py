@@ -1,4 +1,4 @@
-"""Shading normals that are not the surface's: gloss is folded at the horizon, in values, samples and pictures."""
+"""Shading normals that are not the surface's: gloss is folded at the horizon, and what is matte ends softly there."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from clrt.device.open import Device
 from clrt.rendering.choices import Choices
 from clrt.rendering.compile import compile_scene
+from clrt.scene.lights import DirectionalLight
 from clrt.scene.material import Material
 from clrt.scene.materials import Conductor, Dielectric, Diffuse, MetallicRoughness, Mirror, Phong
 from clrt.scene.model import Camera, Environment, Integrator, Mesh, RenderSettings, Scene, Sphere
@@ -20,6 +21,7 @@ from clrt.study.scattering import FITTED
 from clrt.study.shapes import icosphere
 from clrt.study.significance import chi2_test, mean_test, rejected
 
+from .ggx import bump_shadowing
 from .pictures import film, quad
 
 WHITE, COLOR = (1.0, 1.0, 1.0), (0.9, 0.5, 0.2)
@@ -247,6 +249,27 @@ def test_light_samples_and_bsdf_samples_agree(device: Device, material: Material
     assert min(means["path"]) > 0.005
     for mean in means.values():
         np.testing.assert_allclose(mean, means["path"], rtol=0.01)
+
+
+@pytest.mark.parametrize("material", [Diffuse(color=COLOR), MetallicRoughness(color=COLOR, specular=0.0),
+                                      MetallicRoughness(color=COLOR, specular=0.0, clearcoat=1e-6)],
+                         ids=["diffuse", "matte", "coated"])
+def test_matte_bumps_shadow_themselves(device: Device, material: Material) -> None:
+    """Lambert's law around a bent normal, times a shadowing that ends it softly at the horizon."""
+    rng, up = np.random.default_rng(7), np.array([0.0, 0.0, 1.0])
+    for bend in rng.random(8) * 60:
+        turn, wi = rng.random() * 2 * np.pi, unit(rng.normal(size=3) * [1, 1, 0.3])
+        bent = np.array([np.cos(turn), np.sin(turn), 0]) * np.sin(np.radians(bend)) + up * np.cos(np.radians(bend))
+        texel = np.round((bent + 1) / 2 * 255)
+        bump = Texture(picture=Picture(np.array([[[*texel, 255]]], np.uint8)))
+        ns, wi[2] = unit(texel / 255 * 2 - 1), abs(wi[2])
+        sun = DirectionalLight(direction=tuple(-wi), irradiance=(np.pi,) * 3)
+        scene = replace(furnace(replace(material, normal_map=bump), 0), lights=[sun],
+                        environment=Environment(color=(0.0,) * 3),
+                        camera=Camera(position=(0, 0, 5), up=(0, 1, 0), fov_degrees=20),
+                        render=RenderSettings(size=(4, 4), spp=4, integrator="direct"))
+        expected = max(float(ns @ wi), 0) * bump_shadowing(up, ns, wi) * np.array(COLOR)
+        np.testing.assert_allclose(film(device, scene).mean, np.broadcast_to(expected, (4, 4, 3)), rtol=1e-4, atol=1e-6)
 
 
 def test_only_shading_normals_compile_the_horizon(device: Device) -> None:
