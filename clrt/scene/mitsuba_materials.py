@@ -68,10 +68,11 @@ class MaterialReader:
         return look._replace(material=replace(look.material, opacity=opacity))
 
     def _normalmap(self, plugin: Plugin) -> Look:
-        if plugin.value("use_shadowing_function", bool, True):
-            self.differences.append(f"{plugin.where}: normal map without Mitsuba's shadowing function")
+        shadowed = plugin.value("use_shadowing_function", bool, True)
         plugin.value("flip_invalid_normals", bool, True)
         look = self.look(_only(plugin))
+        if not (shadowed and type(look.material) is Diffuse):
+            self.differences.append(f"{plugin.where}: normal map that shadows diffuse reflection, and nothing else")
         normals = self._textures.normals(plugin, "normalmap")
         return look._replace(material=replace(look.material, normal_map=normals))
 

@@ -40,9 +40,11 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
         if isinstance(owner, Mesh) and owner.colors is not None:
             plugin = _painted(plugin, material)
         if material.normal_map is not None:
-            # Neither its shadows of bumps (Estevez et al. 2019) nor its flipped normals are ours.
+            # Its shadows of bumps (Estevez et al. 2019) lie on gloss, too, ours do not; nor are flipped normals ours.
+            if plugin["type"] == "gltf":
+                plugin |= {"bumps": True}
             plugin = {"type": "normalmap", "normalmap": _bend(material.normal_map), "bsdf": plugin,
-                      "use_shadowing_function": False, "flip_invalid_normals": False}
+                      "use_shadowing_function": isinstance(material, Diffuse), "flip_invalid_normals": False}
         plugin = plugin if isinstance(material, Dielectric) else {"type": "twosided", "front": plugin}
         if material.one_sided:
             raise ValueError("surfaces with one side")

@@ -17,7 +17,8 @@ def register(mi: Any) -> None:
     """Makes the plugin "gltf" known to `mi`, the module of Mitsuba with its variant chosen.
 
     color, metallic, roughness: colours or textures; f0: of what is no metal; separable: Smith's G1·G1, else the
-    height-correlated G2.
+    height-correlated G2; bumps: within a normal map, whose bumps shadow what is matte. There the unbent normal is taken
+    for the geometric one, which it is on flat meshes.
     """
     dr = import_module("drjit")
 
@@ -28,6 +29,7 @@ def register(mi: Any) -> None:
                 props.get_texture(name) for name in ("color", "metallic", "roughness"))
             self.f0 = mi.Color3f(props["f0"])
             self.separable = props.get("separable", False)
+            self.bumps = props.get("bumps", False)
             reflects = mi.BSDFFlags.FrontSide
             self.m_components = [mi.BSDFFlags.GlossyReflection | reflects, mi.BSDFFlags.DiffuseReflection | reflects]
             self.m_flags = self.m_components[0] | self.m_components[1]
@@ -62,9 +64,15 @@ def register(mi: Any) -> None:
             shadowing = g_i * g_o if self.separable else 1 / (1 / g_i + 1 / g_o - 1)
             gloss = _schlick(f0, dr.dot(wo, h)) * facets.eval(h) * shadowing / (4 * cos_i * cos_o)
             body = (1 - _schlick(f0, cos_i)) * (1 - _schlick(f0, cos_o)) * (1 - metallic) * color / dr.pi
+            if self.bumps:
+                body *= self._shadowing(si, wo)
             pdf = 0.5 * facets.pdf(si.wi, h) / (4 * dr.dot(wo, h)) + 0.5 * cos_o / dr.pi
             active &= (cos_i > 0) & (cos_o > 0)
             return dr.select(active, (gloss + body) * cos_o, 0), dr.select(active, pdf, 0)
+
+        def _shadowing(self, si: Any, wo: Any) -> Any:
+            up, bend = (dr.square(dr.dot(si.n, w)) for w in (si.sh_frame.to_world(wo), si.sh_frame.n))
+            return 2 / (1 + dr.sqrt(1 + dr.minimum((1 / bend - 1) / 8, 1) * (1 / up - 1)))
 
         def traverse(self, callback: Any) -> None:
             """Nothing of it changes."""

@@ -217,8 +217,8 @@ def furnace(material: Material, seed: int) -> Scene:
 @pytest.mark.parametrize("mapped", [False, True])
 @pytest.mark.parametrize("seed", range(3))
 def test_white_gloss_in_a_white_furnace_is_white(device: Device, mapped: bool, seed: int) -> None:
-    """A mirror exactly, rough metals with multiple scattering by their mean, within five standard errors and the error of
-    what they are fitted to: over random normals."""
+    """A mirror exactly, rough metals with multiple scattering by their mean, within five standard errors and the error
+    of what they are fitted to: over random normals."""
     normal_map = bumps(seed) if mapped else None
     assert np.abs(film(device, furnace(Mirror(color=WHITE, normal_map=normal_map), seed)).mean - 1).max() < 1e-5
     for roughness in (0.2, 0.6, 1.0):
