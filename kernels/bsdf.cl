@@ -99,7 +99,10 @@ static inline ireal is_lit_from_behind(const Bsdf *bsdf) {
 #if HORIZON
 static inline real3 bsdf_matte(const Bsdf *bsdf, real3 wo, real3 wi) {
     real3 value = splat(ZERO);
-#define MATTE(name, number) value = choose(bsdf->type == number, name##_matte(&bsdf->name, wo, wi), value);
+#define MATTE(name, number) { \
+        ireal is_type = bsdf->type == number; \
+        if (ANY(is_type)) value = choose(is_type, name##_matte(&bsdf->name, wo, wi), value); \
+    }
     MATERIAL_TYPES(MATTE)
     return value;
 }

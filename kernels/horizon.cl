@@ -16,16 +16,21 @@
 
 static inline real3 mirrored_at(real3 ng, real3 w, real side) { return mad3(ng, -2.0f * side, w); }
 
-// Adds the gloss that is folded to w, and the density of all that is. Returns where there is any.
-static inline ireal add_folded(const Bsdf *bsdf, real3 ng, real3 wo, real3 w, real side, real3 *value, real *pdf) {
-    real3 mirrored = mirrored_at(ng, w, side);
-    ireal folded = same_side(mirrored.z, side);
-#if !TRANSMISSION
-    folded = folded & (mirrored.z > 0.0f);
+// Whether light scattered to w, whatever side of the geometric surface that is on, belongs to the side of the cosine `side`.
+static inline ireal ends_on_side(real3 w, real side) {
+#if TRANSMISSION
+    return same_side(w.z, side);
+#else
+    return (w.z > 0.0f) & (side > 0.0f);
 #endif
-    if (!ANY(folded)) return folded;
+}
+
+// Adds the gloss that is folded to w, and the density of all that is.
+static inline void add_folded(const Bsdf *bsdf, real3 ng, real3 wo, real3 w, real side, real3 *value, real *pdf) {
+    real3 mirrored = mirrored_at(ng, w, side);
+    ireal folded = ends_on_side(mirrored, side);
+    if (!ANY(folded)) return;
     real3 gloss = sub(bsdf_eval(bsdf, wo, mirrored), bsdf_matte(bsdf, wo, mirrored));
     *value = choose(folded, add(*value, gloss), *value);
     *pdf += folded ? bsdf_pdf(bsdf, wo, mirrored) : ZERO;
-    return folded;
 }

@@ -90,22 +90,21 @@ static inline real shading_pdf(const Shading *shading, const Surface *surface, r
 #define SPREAD(sample) ONE
 #endif
 
-// Folds a sample that was drawn on the wrong side. Its weight becomes that of both ways to draw its direction.
+// Mirrors a sample that was drawn on the wrong side. Its weight becomes that of both directions that end where it does.
 static inline void fold_sample(const Shading *shading, const Surface *surface, BsdfSample *sample) {
     const Bsdf *bsdf = &shading->bsdf;
-    real side = dot3(to_world(shading->frame, sample->wi), surface->ng);
-    real3 value = scale(sample->weight, sample->pdf * SPREAD(sample));
-    real pdf = sample->pdf;
-    ireal moved = !same_side(sample->wi.z, side);
-    if (ANY(moved)) {
-        sample->wi = choose(moved, mirrored_at(shading->ng, sample->wi, side), sample->wi);
-        value = choose(moved, bsdf_eval(bsdf, shading->wo, sample->wi), value);
-        pdf = moved ? bsdf_pdf(bsdf, shading->wo, sample->wi) : pdf;
-        side = moved ? -side : side;
+    real3 drawn = sample->wi, value = scale(sample->weight, sample->pdf * SPREAD(sample));
+    real side = dot3(drawn, shading->ng), pdf = sample->pdf;
+    real3 other = mirrored_at(shading->ng, drawn, side);
+    ireal moved = !same_side(drawn.z, side);
+    sample->wi = choose(moved, other, drawn);
+    ireal both = ends_on_side(other, moved ? -side : side), changed = shadow_by_bumps(shading, surface, sample->wi, &value);
+    if (ANY(both)) {
+        real3 lost = bsdf_matte(bsdf, shading->wo, choose(moved, drawn, other));
+        value = choose(both, add(value, sub(bsdf_eval(bsdf, shading->wo, other), lost)), value);
+        pdf += both ? bsdf_pdf(bsdf, shading->wo, other) : ZERO;
     }
-    ireal changed = shadow_by_bumps(shading, surface, sample->wi, &value);
-    changed = changed | add_folded(bsdf, shading->ng, shading->wo, sample->wi, side, &value, &pdf);
-    changed = changed & (sample->pdf > 0.0f) & !sample->specular;
+    changed = (changed | both) & (sample->pdf > 0.0f) & !sample->specular;
     sample->weight = choose(changed, scale(value, 1.0f / (pdf * SPREAD(sample))), sample->weight);
     sample->pdf = changed ? pdf : sample->pdf;
 }
