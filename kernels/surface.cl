@@ -12,6 +12,7 @@ typedef struct {
     ireal material;       // type | index << 4
     ireal light;          // entry of the light table, or -1
     ireal front;          // whether it is seen from its front side, once it is turned (turn_towards)
+    real cos_o;           // between ns and where it is seen from, once it is turned
 #if TEXTURES
     Coordinates at;
 #endif
@@ -197,6 +198,7 @@ static inline void turn_towards(Surface *surface, real3 towards) {
     surface->front = !(dot3(surface->ng, towards) < 0.0f);
     surface->ng = choose(surface->front, surface->ng, negate(surface->ng));
     surface->ns = turned(surface->ns, surface, towards);
+    surface->cos_o = dot3(surface->ns, towards);
 #if NORMAL_MAPS
     surface->unbent = turned(surface->unbent, surface, towards);
 #endif

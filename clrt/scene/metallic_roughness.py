@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import log1p
+from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
 from .limits import Ge, Le
 from .material import ALPHA_MIN, Albedo, Material, Parameter, Radiance, Unit
-from .microfacets import fitted_loss, multiple_scattering
 from .presets import F0_PRESETS, Preset
 from .textures import Texture
 
 Smith = Literal["height_correlated", "separable", "schlick", "schlick_ibl"]
+Coupling = Literal["albedo", "fresnel", "half_vector"]
 
 
 class Lobes(NamedTuple):
@@ -25,12 +24,18 @@ class Lobes(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class MetallicRoughness(Material):
-    """Cook–Torrance with GGX over Lambert (glTF's base material; Suchiński 6.5–6.15, Nadolny 3.5–3.13).
+    """Cook–Torrance with GGX over a diffuse body (glTF's base material; Suchiński 6.5–6.15, Nadolny 3.5–3.13).
 
     alpha = roughness². `preset` takes F0 (and for metals the color) from the table. `smith` chooses the
-    shadowing–masking term: height-correlated (glTF), separable G1·G1, or Schlick-GGX with k = (r+1)²/8 ("schlick")
-    or k = r²/2 ("schlick_ibl"). `multiple_scattering` gives back what one bounce between microfacets leaves out
-    (scene.microfacets): white metal then reflects all light, and coloured metal grows deeper in color.
+    masking–shadowing term: height-correlated (glTF), separable G1·G1, or Schlick-GGX with k = (r+1)²/8 ("schlick")
+    or k = r²/2 ("schlick_ibl").
+
+    `coupling` chooses what the gloss leaves to the body: "albedo", (1 − E(wi))(1 − E(wo))/(1 − mean E) with the
+    directional albedo E of the gloss, which keeps all energy (Kelemen and Szirmay-Kalos 2001; Kulla and Conty 2017);
+    "fresnel", (1 − F(cos wi))(1 − F(cos wo)), which loses some; or "half_vector", 1 − F(wi·h) of the theses and glTF,
+    which makes some. `multiple_scattering` gives back what one bounce between microfacets loses: white metal then
+    reflects all light, and coloured metal grows deeper in color. Left out, both are what keeps energy with the
+    height-correlated term, and with the other forms what the theses have: "fresnel", without multiple scattering.
 
     The rest are glTF's extensions by their names. `ior`, `specular` and `specular_color`: F0 of what is no metal,
     ((ior − 1)/(ior + 1))²·specular·specular_color, and F at grazing angles, `specular`. `clearcoat`: a clear film,
@@ -39,13 +44,15 @@ class MetallicRoughness(Material):
     """
 
     kernel: ClassVar[str] = "metallic_roughness"
-    parts: ClassVar[tuple[str, ...]] = ("LAYERS", "SHEEN")
+    parts: ClassVar[tuple[str, ...]] = ("LAYERS", "SHEEN", "GGX_ALBEDO",
+                                        *(f"ALBEDO_{smith.upper()}" for smith in get_args(Smith)))
     color: Albedo | Texture = (0.8, 0.8, 0.8)
     metallic: Unit | Texture = 0.0
     roughness: Unit | Texture = 0.5
     preset: Preset | None = None
     smith: Smith = "height_correlated"
-    multiple_scattering: bool = False
+    coupling: Coupling | None = None
+    multiple_scattering: bool | None = None
     ior: Annotated[float, Ge(1), Le(4)] = 1.5
     specular: Unit | Texture = 1.0
     specular_color: Radiance | Texture = (1.0, 1.0, 1.0)
@@ -61,15 +68,15 @@ class MetallicRoughness(Material):
         if self.preset is not None:
             f0, metallic = F0_PRESETS[self.preset]
             color = f0 if metallic else color
-        single: dict[str, Parameter] = {"color": color, "metallic": metallic, "roughness": self.roughness,
-                                        "f0": f0, "smith": float(get_args(Smith).index(self.smith))}
-        single |= self._layers()
-        if not self.multiple_scattering:
-            return single
-        lobes = self.lobes
-        loss = fitted_loss(lobes.alpha, self.smith)
-        return {**single, "multiple": multiple_scattering(lobes.f0, loss.mean), "mean_loss": loss.mean,
-                "width": loss.width, "spread": log1p(lobes.alpha**-2), "loss": loss.coefficients}
+        return {"color": color, "metallic": metallic, "roughness": self.roughness, "f0": f0,
+                "smith": float(get_args(Smith).index(self.smith)),
+                "coupling": float(get_args(Coupling).index(self.coupled_by)),
+                "multiple": float("MULTIPLE_SCATTERING" in self.features())} | self._layers()
+
+    @property
+    def coupled_by(self) -> Coupling:
+        """`coupling`, or what it is where it is left out."""
+        return self.coupling or ("albedo" if self.smith == "height_correlated" else "fresnel")
 
     def _layers(self) -> dict[str, Parameter]:
         """What its kernel reads of the extensions in use."""
@@ -87,17 +94,10 @@ class MetallicRoughness(Material):
     def bent_by(self) -> Texture | None:
         return self.normal_map or (self.clearcoat_normal_map if self.clearcoat != 0 else None)
 
-    def conflicts(self) -> list[str]:
-        painted = any(isinstance(value, Texture) for value in (self.color, self.metallic, self.roughness))
-        if not self.multiple_scattering or not (painted or "SPECULAR" in self.features()):
-            return []
-        remedy = "leave it out, or specular" if not painted else "leave it out, or write numbers for color and the like"
-        return [f"multiple_scattering: is not known for {'textures' if painted else 'specular'}; {remedy}"]
-
     @property
     def lobes(self) -> Lobes:
         """What its parameters come to; TypeError if one of them is a texture."""
-        single = replace(self, multiple_scattering=False).parameters()
+        single = self.parameters()
         color, f0, metallic, roughness = (single[name] for name in ("color", "f0", "metallic", "roughness"))
         if not (isinstance(color, tuple) and isinstance(f0, tuple) and isinstance(metallic, float | int)
                 and isinstance(roughness, float | int)):
@@ -106,9 +106,15 @@ class MetallicRoughness(Material):
         return Lobes(f0, tuple((1 - metallic) * c for c in color), max(roughness**2, ALPHA_MIN))
 
     def features(self) -> frozenset[str]:
+        metallic = self.metallic if self.preset is None else F0_PRESETS[self.preset][1]
         layers = {"CLEARCOAT": self.clearcoat != 0, "SHEEN": self.sheen_color != (0, 0, 0),
                   "THROUGH": self.transmission != 0}
-        has = {f"SMITH_{self.smith.upper()}": True, "MULTIPLE_SCATTERING": self.multiple_scattering, **layers,
+        further = self.coupled_by == "albedo" if self.multiple_scattering is None else self.multiple_scattering
+        # A body under the albedo coupling has all that the gloss does not reflect, so a metal alone loses light.
+        further &= metallic != 0 or self.coupled_by != "albedo" or layers["THROUGH"]
+        fitted = further or (metallic != 1 and self.coupled_by == "albedo")
+        has = {f"SMITH_{self.smith.upper()}": True, f"COUPLING_{self.coupled_by.upper()}": metallic != 1,
+               "MULTIPLE_SCATTERING": further, "GGX_ALBEDO": fitted, f"ALBEDO_{self.smith.upper()}": fitted, **layers,
                "COAT_NORMALS": layers["CLEARCOAT"] and self.bent_by is not None,
                "LAYERS": any(layers.values()), "SPECULAR": self.specular != 1 or self.specular_color != (1, 1, 1),
                "TRANSMISSION": layers["THROUGH"], "TRANSMISSION_LOBES": layers["THROUGH"]}

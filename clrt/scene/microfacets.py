@@ -1,69 +1,27 @@
-"""What GGX loses by following light for one bounce only, as a polynomial that a kernel can evaluate.
+"""What GGX reflects of light by following it for one bounce between its microfacets only: its directional albedo.
 
 With F = 1 microfacets reflect all light, but part of it only after they met it twice or more, and the usual
 single-bounce f leaves that out: of light from an angle of cosine c to the normal the part loss(c), which for
-alpha = 1 is up to 0.69. Kulla and Conty (2017, "Revisiting Physically Based Shading at Imageworks") give it back by a
-reciprocal lobe whose albedo is just that: loss(cos wo)·loss(cos wi)/(pi·mean), mean = ∫ loss(c)·2c dc.
+alpha = 1 is up to 0.69. The kernels know these albedos by fits (kernels/bsdf/ggx_albedo.cl); here they are exact.
 """
 
 from __future__ import annotations
-
-from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 Doubles = NDArray[np.float64]
 
-#: Coefficients of the polynomial. The loss is then off by less than 1e-4, by 5e-4 for "schlick_ibl".
-COEFFICIENTS = 12
-
-
-class Loss(NamedTuple):
-    """loss(c) = max(0, (1 − q)·Σ coefficients[k]·x^k), q = c/(c + width), x = 2·sqrt(q·(1 + width)) − 1.
-
-    q brings the peak, at c ≈ alpha, to the same place for every alpha, and 1 − q falls as the loss behind it does; the
-    root takes in the slope of c·log c at c = 0. x runs from −1 to 1.
-    """
-
-    width: float
-    coefficients: tuple[float, ...]
-    mean: float
-
-    def at(self, cosines: Doubles) -> Doubles:
-        """The loss at cosines in (0, 1], as the kernel computes it."""
-        q = cosines / (cosines + self.width)
-        x = 2 * np.sqrt(q * (1 + self.width)) - 1
-        return np.asarray(np.maximum((1 - q) * np.polynomial.polynomial.polyval(x, self.coefficients), 0))
-
-
-@lru_cache
-def fitted_loss(alpha: float, smith: str) -> Loss:
-    """The loss of GGX with this alpha and form of shadowing (see `shadowing`), interpolated at Chebyshev points."""
-    x = np.polynomial.chebyshev.chebpts1(COEFFICIENTS)
-    width = 16 * schlick_k(alpha, smith) if smith.startswith("schlick") else 4 * alpha
-    q = (x + 1)**2 / (4 * (1 + width))
-    values = (1 - albedo(width * q / (1 - q), alpha, smith)) / (1 - q)
-    coefficients = np.linalg.solve(np.polynomial.polynomial.polyvander(x, COEFFICIENTS - 1), values)
-    loss = Loss(width, tuple(coefficients.astype(np.float32).tolist()), 0.0)
-    steps = 1000    # of log c, in which the integrand is smooth for every alpha
-    cosines = np.exp(-16 * (np.arange(steps) + 0.5) / steps)
-    return loss._replace(mean=float(np.mean(2 * cosines**2 * loss.at(cosines))) * 16)
-
-
-def multiple_scattering(f0: tuple[float, ...], mean: float) -> tuple[float, ...]:
-    """The lobe's factor in each channel: what is reflected after two or more bounces, over the mean loss.
-
-    Every bounce takes Schlick's F in the cosine-weighted mean over the hemisphere, f0 + (1 − f0)/21, and after each the
-    part 1 − mean of the light leaves: a geometric series from the second bounce on, 1 for F = 1.
-    """
-    averages = [f + (1 - f) / 21 for f in f0]
-    return tuple(f * f * (1 - mean) / (1 - f * mean) / mean for f in averages)
-
 
 def albedo(cosines: Doubles, alpha: float, smith: str) -> Doubles:
-    """(n,) of cosines (n,) in (0, 1]: what a single bounce with F = 1 reflects of light from there; error below 1e-6.
+    """(n,) of cosines (n,) in (0, 1]: what a bounce with F = 1 reflects of light from there; error below 1e-6."""
+    return albedos(cosines, alpha, smith)[0]
+
+
+def albedos(cosines: Doubles, alpha: float, smith: str) -> tuple[Doubles, Doubles]:
+    """(n,) of cosines (n,) in (0, 1]: what a single bounce reflects with F = 1, and with F = (1 − wo·h)^5.
+
+    With Schlick's F of f0 and f90 a bounce reflects f0·(first − second) + f90·second.
 
     ∫ D·G·(wo·h)/cos wo dωh over the half vectors for which wi is above the horizon. Of h, tan θ = alpha·tan psi, which
     makes D·cos θ dωh = 2·sin psi·cos psi dpsi dphi/(2·pi), and phi is its azimuth from wo. Gauss–Legendre points,
@@ -81,7 +39,9 @@ def albedo(cosines: Doubles, alpha: float, smith: str) -> Doubles:
     cos_i = np.maximum(2 * (cosine + along * slope) / (1 + slope**2) - cosine, 1e-300)
     visible = 2 * np.sin(psi) * (np.cos(psi) + alpha * along / cosine * np.sin(psi))
     reflected = visible * shadowing(cosine, cos_i, alpha, smith) * np.arctan(horizon / alpha)
-    return np.asarray(np.sum(reflected * psi_weight, axis=2) @ phi_weight)
+    grazing = np.maximum(1 - (cosine + along * slope) / np.sqrt(1 + slope**2), 0)**5
+    whole, part = (np.sum(value * psi_weight, axis=2) @ phi_weight for value in (reflected, reflected * grazing))
+    return np.asarray(whole), np.asarray(part)
 
 
 def shadowing(cos_o: Doubles, cos_i: Doubles, alpha: float, smith: str) -> Doubles:

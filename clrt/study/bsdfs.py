@@ -124,7 +124,7 @@ def _values(kind: type[Material]) -> tuple[dict[str, tuple[Any, ...]], ...]:
     apart = {name for layer in LAYERS.get(kind.kernel, ()) for name in layer}
     names = [field.name for field in fields(kind) if field.name not in SHARED | apart]
     words = {name: tuple(found) for name in names if (found := _words(hints[name]))}
-    flags = {name: (False, True) for name in names if hints[name] is bool}
+    flags = {name: (False, True) for name in names if bool in (hints[name], *get_args(hints[name]))}
     numbers = {name: NUMBERS.get(name) or _numbers(kind, name) for name in names if name not in words | flags}
     return numbers, flags, words
 

@@ -17,13 +17,14 @@ from .probe import Doubles
 ROUGHNESSES = (0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
 COSINES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 1e-2, 1e-3, 1e-4)
 SMITHS: tuple[Smith, ...] = get_args(Smith)
+IORS = (1.0, 1.2, 1.5, 2.5, 4.0)
 COLOR = (0.8, 0.5, 0.2)
 
 
 class Reflected(NamedTuple):
-    """What a white metal sends back, and what it should: 1 with multiple scattering, else the albedo of one bounce."""
+    """What white sends back, and what it should: 1, or without multiple scattering the albedo of one bounce."""
 
-    metal: MetallicRoughness
+    material: MetallicRoughness
     cosine: float
     found: float
     exact: float
@@ -40,6 +41,16 @@ def measure_metals(device: Device, samples: int, smiths: Iterable[Smith] = SMITH
         for cosine, once in zip(COSINES, single):
             found = float(_weights(subject, which, cosine, numbers)[:, 0].mean())
             yield Reflected(metal, cosine, found, 1.0 if metal.multiple_scattering else float(once))
+
+
+def measure_plastics(device: Device, samples: int) -> Iterator[Reflected]:
+    """White bodies under gloss of every roughness and some indices, without metal and with, from every angle."""
+    plastics = [MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=metallic, roughness=roughness, ior=ior)
+                for metallic in (0.0, 0.5) for ior in IORS for roughness in ROUGHNESSES]
+    subject, numbers = bsdfs(device, [*plastics]), evenly(samples)
+    for which, plastic in enumerate(plastics):
+        for cosine in COSINES:
+            yield Reflected(plastic, cosine, float(_weights(subject, which, cosine, numbers)[:, 0].mean()), 1.0)
 
 
 def inexact(device: Device, samples: int) -> tuple[int, int]:

@@ -143,15 +143,15 @@ def _metallic_roughness(material: MetallicRoughness) -> Plugin:
     """`principled` is GGX under Schlick's Fresnel term with the separable Smith term, if metallic is 1, exactly."""
     if material.features() & {"LAYERS", "SPECULAR"}:
         raise ValueError("metallic_roughness with layers")
-    if material.smith not in ("separable", "height_correlated") or material.multiple_scattering:
-        raise ValueError('metals but with smith = "separable" or "height_correlated", and single scattering')
-    values = material.parameters()
-    if material.smith == "separable" and values["metallic"] == 1 and not material.textures():
+    if material.smith not in ("separable", "height_correlated"):
+        raise ValueError('metallic_roughness but with smith = "separable" or "height_correlated"')
+    values, multiple = material.parameters(), "MULTIPLE_SCATTERING" in material.features()
+    if material.smith == "separable" and values["metallic"] == 1 and not material.textures() and not multiple:
         lobes = material.lobes
         return {"type": "principled", "metallic": 1.0, "roughness": sqrt(lobes.alpha), "base_color": rgb(lobes.f0)}
     return {"type": "gltf", "color": color(values["color"]), "f0": rgb(values["f0"]),
             "metallic": number(values["metallic"]), "roughness": number(values["roughness"]),
-            "separable": material.smith == "separable"}
+            "smith": material.smith, "coupling": material.coupled_by, "multiple": multiple}
 
 
 def _dielectric(material: Dielectric) -> Plugin:

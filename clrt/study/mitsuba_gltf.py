@@ -1,24 +1,42 @@
 """glTF's metallic-roughness as a plugin of Mitsuba 3, which has none: after docs/scene-format.md, for all of its ways.
 
-    f = F(wi·h)·G·D/(4·cos wi·cos wo) + (1 − F(cos wi))(1 − F(cos wo))·albedo/pi
+    f = F(wi·h)·G·D/(4·cos wi·cos wo) + coupling·albedo/pi, and what further bounces between microfacets reflect
 
-It draws half of its directions by their cosine, and half from Mitsuba's own visible normals.
+Albedos of the gloss are interpolated between integrals, not the kernels' fits. It draws half of its directions by their
+cosine, and half from Mitsuba's own visible normals.
 """
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
 from typing import Any
 
+import numpy as np
+
 from ..scene.material import ALPHA_MIN
+from ..scene.metallic_roughness import Smith
+from ..scene.microfacets import Doubles, albedos
+
+#: Albedos are known at so many roughnesses, and roots of cosines.
+SIDE = 128
+#: What keeps quotients of zeros zero.
+TINY = 1e-20
+
+
+@cache
+def albedo_grid(smith: Smith) -> Doubles:
+    """(SIDE, SIDE, 2) of `albedos` by roughness and √cos, in the middles of SIDE intervals each."""
+    middles = (np.arange(SIDE) + 0.5) / SIDE
+    return np.array([np.transpose(albedos(middles**2, max(roughness**2, ALPHA_MIN), smith)) for roughness in middles])
 
 
 def register(mi: Any) -> None:
     """Makes the plugin "gltf" known to `mi`, the module of Mitsuba with its variant chosen.
 
-    color, metallic, roughness: colours or textures; f0: of what is no metal; separable: Smith's G1·G1, else the
-    height-correlated G2; bumps: within a normal map, whose bumps shadow what is matte. There the unbent normal is taken
-    for the geometric one, which it is on flat meshes.
+    color, metallic, roughness: colours or textures; f0: of what is no metal; smith, coupling: see
+    `MetallicRoughness`; multiple: whether light bounces on between microfacets; bumps: within a normal map, whose bumps
+    shadow what is matte. There the unbent normal is taken for the geometric one, which it is on flat meshes.
     """
     dr = import_module("drjit")
 
@@ -28,7 +46,11 @@ def register(mi: Any) -> None:
             self.color, self.metallic, self.roughness = (
                 props.get_texture(name) for name in ("color", "metallic", "roughness"))
             self.f0 = mi.Color3f(props["f0"])
-            self.separable = props.get("separable", False)
+            self.smith, self.coupling, self.multiple = (props[name] for name in ("smith", "coupling", "multiple"))
+            grid, roots = albedo_grid(self.smith), (np.arange(SIDE) + 0.5) / SIDE
+            self.albedos = mi.Texture2f(mi.TensorXf(grid.astype(np.float32)))
+            means = np.mean(4 * roots[:, None]**3 * grid, axis=1)    # ∫ 2·cos·E dcos
+            self.means = mi.Texture1f(mi.TensorXf(means.astype(np.float32)))
             self.bumps = props.get("bumps", False)
             reflects = mi.BSDFFlags.FrontSide
             self.m_components = [mi.BSDFFlags.GlossyReflection | reflects, mi.BSDFFlags.DiffuseReflection | reflects]
@@ -46,7 +68,7 @@ def register(mi: Any) -> None:
             bs.eta, bs.sampled_component = 1.0, mi.UInt32(0)
             bs.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
             active &= bs.pdf > 0
-            return bs, dr.select(active, value / bs.pdf, 0)
+            return bs, dr.select(active, value / dr.maximum(bs.pdf, TINY), 0)
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return self.eval_pdf(ctx, si, wo, active)[0]
@@ -61,9 +83,9 @@ def register(mi: Any) -> None:
             cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
             h = dr.normalize(si.wi + wo)
             g_i, g_o = facets.smith_g1(si.wi, h), facets.smith_g1(wo, h)
-            shadowing = g_i * g_o if self.separable else 1 / (1 / g_i + 1 / g_o - 1)
-            gloss = _schlick(f0, dr.dot(wo, h)) * facets.eval(h) * shadowing / (4 * cos_i * cos_o)
-            body = (1 - _schlick(f0, cos_i)) * (1 - _schlick(f0, cos_o)) * (1 - metallic) * color / dr.pi
+            shadowing = g_i * g_o if self.smith == "separable" else g_i * g_o / dr.maximum(g_i + g_o - g_i * g_o, TINY)
+            gloss = _schlick(f0, dr.dot(wo, h)) * facets.eval(h) * shadowing / dr.maximum(4 * cos_i * cos_o, TINY)
+            body = self._body(si, cos_o, dr.dot(wo, h), f0, color, metallic, active) / dr.pi
             if self.bumps:
                 body *= self._shadowing(si, wo)
             pdf = 0.5 * facets.pdf(si.wi, h) / (4 * dr.dot(wo, h)) + 0.5 * cos_o / dr.pi
@@ -73,6 +95,27 @@ def register(mi: Any) -> None:
         def _shadowing(self, si: Any, wo: Any) -> Any:
             up, bend = (dr.square(dr.dot(si.n, w)) for w in (si.sh_frame.to_world(wo), si.sh_frame.n))
             return 2 / (1 + dr.sqrt(1 + dr.minimum((1 / bend - 1) / 8, 1) * (1 / up - 1)))
+
+        def _body(self, si: Any, cos_o: Any, cos_h: Any, f0: Any, color: Any, metallic: Any, active: Any) -> Any:
+            """Of what is below the gloss, and of further bounces: f·pi."""
+            cos_i, roughness = mi.Frame3f.cos_theta(si.wi), self.roughness.eval_1(si, active)
+            albedo = (1 - metallic) * color
+            angles = [self.albedos.eval([dr.sqrt(dr.maximum(cosine, 0)), roughness]) for cosine in (cos_i, cos_o)]
+            angles.append(self.means.eval([roughness]))
+            lost = [1 - whole for whole, _ in angles]
+            bounced = mi.Color3f(0)
+            if self.multiple:
+                mean = (20 * (color if self.coupling == "albedo" else f0) + 1) / 21
+                bounced = mean * mean * (1 - lost[2]) / (1 - mean * lost[2])
+                bounced *= metallic if self.coupling == "albedo" else 1
+            if self.coupling == "albedo":
+                left = [albedo * (1 - self.f0 * (whole - grazing) - grazing) + bounced * (1 - whole)
+                        for whole, grazing in angles]
+                return left[0] * left[1] / dr.maximum(left[2], TINY)
+            crossing = (1 - _schlick(f0, cos_i)) * (1 - _schlick(f0, cos_o))
+            if self.coupling == "half_vector":
+                crossing = 1 - _schlick(f0, cos_h)
+            return crossing * albedo + bounced * lost[0] * lost[1] / dr.maximum(lost[2], TINY)
 
         def traverse(self, callback: Any) -> None:
             """Nothing of it changes."""

@@ -14,7 +14,7 @@ from ..scene.materials import Diffuse, Material
 from ..scene.model import Camera, RenderSettings, Scene, Sphere
 from .accumulation import accumulate, stream_errors
 from .bsdfs import Bsdfs, bsdfs
-from .furnace import SMITHS, inexact, measure_metals
+from .furnace import SMITHS, inexact, measure_metals, measure_plastics
 from .jacobians import check_density
 from .light_sampling import light_tests
 from .probe import Probe
@@ -68,9 +68,11 @@ def _furnaces(device: Device, effort: Effort) -> Iterator[Row]:
     wrong, count = inexact(device, effort.furnace)
     yield Row("L1", "diffuse and mirror weigh their color exactly", count, wrong)
     metals = list(measure_metals(device, effort.furnace, SMITHS[:effort.smiths]))
-    for what, multiple in (("white metal reflects the albedo of one bounce", False),
-                           ("white metal with multiple scattering reflects all", True)):
-        errors = [abs(m.found - m.exact) for m in metals if m.metal.multiple_scattering == multiple]
+    single, full = ([m for m in metals if m.material.multiple_scattering == multiple] for multiple in (False, True))
+    for what, found in (("white metal reflects the albedo of one bounce", single),
+                        ("white metal with multiple scattering reflects all", full),
+                        ("white under gloss reflects all", list(measure_plastics(device, effort.furnace)))):
+        errors = [abs(each.found - each.exact) for each in found]
         yield Row("L1", what, len(errors), sum(not error <= FURNACE for error in errors), max(errors), "largest error")
 
 

@@ -19,8 +19,8 @@ from .significance import chi2_test, mean_test
 ROUNDING = 2e-6
 #: The quadrature of densities, at directions that are rounded to float32; seen at the narrowest lobes.
 QUADRATURE = 5e-4
-#: What white metal with multiple scattering reflects too much at most (see scene.microfacets).
-FITTED = 5e-4
+#: By what the fits of albedos are off at most (kernels/bsdf/ggx_albedo.cl): what white may reflect too much.
+FITTED = 1e-3
 #: Views of what differs in words only.
 FEW = (0.6, 0.1)
 #: Makes a direction above the surface one below it.

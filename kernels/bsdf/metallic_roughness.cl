@@ -1,22 +1,26 @@
-// Cook–Torrance over Lambert (Suchiński 6.5–6.15, Nadolny 3.5–3.13):
-//   f = F(wi·h)·G·D/(4·cos wi·cos wo) + (1 − F(cos wi))(1 − F(cos wo))·albedo/pi
-// with F(c) = f0 + (1 − f0)(1 − c)^5 and h the half vector.
+// Cook–Torrance over a diffuse body (Suchiński 6.5–6.15, Nadolny 3.5–3.13):
+//   f = F(wi·h)·G·D/(4·cos wi·cos wo) + coupling·albedo/pi,  F(c) = f0 + (f90 − f0)(1 − c)^5, h the half vector
+// The coupling is what the gloss leaves to the body:
+//   COUPLING_ALBEDO       (1 − E(wi))(1 − E(wo))/(1 − mean E), E the directional albedo of the dielectric's gloss
+//                         (ggx_albedo.cl): reciprocal, and white stays white (Kelemen and Szirmay-Kalos 2001)
+//   COUPLING_FRESNEL      (1 − F(cos wi))(1 − F(cos wo)): reciprocal, never more than 1 with the gloss
+//   COUPLING_HALF_VECTOR  1 − F(wi·h) of the sources and glTF, which makes light: at roughness 0.1 a white plastic reflects
+//                         1.7 times what it gets at grazing angles
 //
-// The sources, and glTF, weigh Lambert by 1 − F(wi·h). That makes light: a white plastic of roughness 0.1 reflects
-// 1.7 times what it gets at grazing angles. Light that reaches the body crosses the surface twice, which the two
-// factors stand for; they are reciprocal and never sum to more than 1 with the specular part, further bounces included.
+// D is GGX, and the microfacet lobe draws normals visible from wo (ggx.cl); lobes are chosen by their albedos at wo.
 //
-// D is GGX, and the microfacet lobe draws normals visible from wo (ggx.cl); it and the cosine lobe are chosen by the Fresnel
-// term at wo.
-//
-// MULTIPLE_SCATTERING adds what further bounces between microfacets reflect, as clrt/scene/microfacets.py says:
-//   multiple·loss(cos wi)·loss(cos wo)/pi
-// The loss is near 0.1 at cos ≈ alpha and falls with 1/cos² behind; a lobe of its own is drawn with about that density.
+// MULTIPLE_SCATTERING adds what further bounces between microfacets reflect (Kulla and Conty 2017):
+//   multiple·lost(cos wi)·lost(cos wo)/(pi·mean lost), multiple = mean F²·(1 − mean lost)/(1 − mean F·mean lost)
+// of the metal; of the couplings without albedos, of all of f0. lost is near 0.1 at cos ≈ alpha and falls with 1/cos² behind;
+// a lobe of its own is drawn with about that density. With COUPLING_ALBEDO this and the body are one lobe,
+//   r(wi)·r(wo)/(pi·mean r), r(c) = albedo·(1 − E(c)) + multiple·lost(c)
 //
 // SPECULAR: f0 of what is no metal times specular·specular_color, and F ends at `specular` (glTF's KHR_materials_specular).
 // LAYERS: what lies on it and passes through it (layers.cl).
 #include "bsdf/ggx.cl"
+#include "bsdf/smith.cl"
 #include "bsdf/interface.cl"
+#include GGX_ALBEDO_FILE
 #include SHEEN_FILE
 
 #if LAYERS
@@ -24,16 +28,34 @@
 #else
 #define BASE(name) metallic_roughness_##name
 #endif
-#define LOSS_COEFFICIENTS ((int)(sizeof(((MetallicRoughness *)0)->loss) / sizeof(float)))
+#define OTHER_COUPLINGS (COUPLING_FRESNEL || COUPLING_HALF_VECTOR)
+// Which lanes have the albedo coupling. Where no material has another, metals may count as having it.
+#if COUPLING_ALBEDO && OTHER_COUPLINGS
+#define BY_ALBEDO(m) ((m)->coupling == 0)
+#elif COUPLING_ALBEDO
+#define BY_ALBEDO(m) ALL_LANES
+#else
+#define BY_ALBEDO(m) NO_LANES
+#endif
+
+// The lobes' probabilities: their shares of the reflected light, by their albedos at wo, or by the Fresnel term there.
+typedef struct { real specular, multiple, diffuse; } LobeShares;
 
 struct metallic_roughness {
     real3 albedo, f0;
     real alpha;
-    ireal smith;
+    ireal smith, coupling;
+    LobeShares shares;
+#if COUPLING_ALBEDO
+    real3 body_f0, left_o;      // of what is no metal; r(wo)/mean r
+    real body_f90;
+#endif
 #if MULTIPLE_SCATTERING
     real3 multiple;
-    real mean_loss, width, spread;
-    real loss[LOSS_COEFFICIENTS];
+    real spread, lost_o;        // the latter over its mean
+#endif
+#if GGX_ALBEDO
+    GgxAlbedo bounces;
 #endif
 #if SPECULAR
     real f90;
@@ -53,58 +75,23 @@ struct metallic_roughness {
 #endif
 };
 
-static inline struct metallic_roughness metallic_roughness_at(const Scene *scene, ireal index, const Surface *surface) {
-    struct metallic_roughness m;
-    real3 color = COLOR(metallic_roughness), specular = PARAMETER3(metallic_roughness, f0);
-    real metallic = PARAMETER(metallic_roughness, metallic), roughness = PARAMETER(metallic_roughness, roughness);
-#if SPECULAR
-    real factor = PARAMETER(metallic_roughness, specular);
-    specular = mul(specular, PARAMETER3(metallic_roughness, specular_color));
-    specular = scale(vector(minimum(specular.x, ONE), minimum(specular.y, ONE), minimum(specular.z, ONE)), factor);
-    m.f90 = factor + (1.0f - factor) * metallic;
-#endif
-    m.f0 = mad3(sub(color, specular), metallic, specular);
-    m.albedo = scale(color, 1.0f - metallic);
-    m.alpha = maximum(roughness * roughness, (real)(ALPHA_MIN));
-    m.smith = TO_INT(PARAMETER(metallic_roughness, smith));
-#if MULTIPLE_SCATTERING
-    m.multiple = PARAMETER3(metallic_roughness, multiple);
-    m.mean_loss = PARAMETER(metallic_roughness, mean_loss);
-    m.width = PARAMETER(metallic_roughness, width);
-    m.spread = PARAMETER(metallic_roughness, spread);
-    for (int k = 0; k < LOSS_COEFFICIENTS; ++k) m.loss[k] = GATHER(real, scene->metallic_roughness, index, .loss[k]);
-#endif
-#if CLEARCOAT
-    m.coat = PARAMETER(metallic_roughness, clearcoat);
-    m.coat_alpha = maximum(square(PARAMETER(metallic_roughness, clearcoat_roughness)), (real)(ALPHA_MIN));
-#endif
-#if COAT_NORMALS
-    Frame frame = frame_around(surface->unbent);
-    m.base_frame = frame_around(to_local(frame, surface->ns));
-    m.coat_frame = frame_around(to_local(frame, surface->coat_normal));
-#endif
-#if SHEEN
-    m.sheen = PARAMETER3(metallic_roughness, sheen_color);
-    m.fibres = fibres_of(PARAMETER(metallic_roughness, sheen_roughness));
-#endif
-#if THROUGH
-    real transmission = PARAMETER(metallic_roughness, transmission);
-    m.through = scale(m.albedo, transmission);
-    m.albedo = scale(m.albedo, 1.0f - transmission);
-#endif
-    return m;
+#if COUPLING_ALBEDO
+// What leaves the body of light from an angle: albedo·(1 − E).
+static inline real3 body_left(const struct metallic_roughness *m, Bounce bounce) {
+    return mul(m->albedo, sub(splat(ONE), bounce_albedo(m->body_f0, m->body_f90, bounce)));
 }
 
+// r.
+static inline real3 left_albedo(const struct metallic_roughness *m, Bounce bounce) {
+    real3 left = body_left(m, bounce);
 #if MULTIPLE_SCATTERING
-// What a single bounce with F = 1 loses of light from an angle: a polynomial in a stretched cosine.
-static inline real microfacet_loss(const struct metallic_roughness *m, real cos_theta) {
-    real q = cos_theta / (cos_theta + m->width);
-    real x = 2.0f * sqrt(q * (1.0f + m->width)) - 1.0f;
-    real sum = ZERO;
-    for (int k = LOSS_COEFFICIENTS - 1; k >= 0; --k) sum = sum * x + m->loss[k];
-    return maximum((1.0f - q) * sum, ZERO);
+    left = mad3(m->multiple, bounce.lost, left);
+#endif
+    return left;
 }
+#endif
 
+#if MULTIPLE_SCATTERING
 // Around +z with a density of cos² + alpha² in cos²: pdf = cos/(pi·spread·(cos² + alpha²)), spread = log(1 + 1/alpha²).
 static inline real3 sample_multiple(const struct metallic_roughness *m, real2 u) {
     real s, c, z2 = minimum(m->alpha * m->alpha * (exp(u.x * m->spread) - 1.0f), ONE), r = sqrt(1.0f - z2);
@@ -134,84 +121,166 @@ static inline real3 transmitted(const struct metallic_roughness *m, real c) {
     return mad3(sub(splat(F90(m)), m->f0), rest, splat(1.0f - F90(m)));
 }
 
-// G2 by the forms that the scene's materials use.
-static inline real shadowing(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    real g = ZERO;
-    real lambda_o = ggx_lambda(wo, m->alpha), lambda_i = ggx_lambda(wi, m->alpha);
-#if SMITH_HEIGHT_CORRELATED
-    g = m->smith == 0 ? 1.0f / (1.0f + lambda_o + lambda_i) : g;
-#endif
-#if SMITH_SEPARABLE
-    g = m->smith == 1 ? 1.0f / ((1.0f + lambda_o) * (1.0f + lambda_i)) : g;
-#endif
-#if SMITH_SCHLICK || SMITH_SCHLICK_IBL
-    real r = sqrt(m->alpha);
-    real k = m->smith == 2 ? square(r + 1.0f) * 0.125f : m->alpha * 0.5f;
-    real schlick = wo.z * wi.z / ((wo.z * (1.0f - k) + k) * (wi.z * (1.0f - k) + k));
-    g = m->smith >= 2 ? schlick : g;
-#endif
-    return g;
-}
+static inline real inverse_or_zero(real x) { return x > 0.0f ? 1.0f / x : ZERO; }
 
-// The lobes' probabilities: their shares of the reflected light, judged by the Fresnel term at wo.
-typedef struct { real specular, multiple, diffuse; } LobeShares;
-
-static inline LobeShares lobe_shares(const struct metallic_roughness *m, real3 wo) {
-    real3 f = base_fresnel(m, wo.z);
+static inline LobeShares lobe_shares(const struct metallic_roughness *m, real cos_o) {
+    real3 f = base_fresnel(m, cos_o);
     LobeShares share = {luminance(f), ZERO, luminance(mul(sub(splat(ONE), f), m->albedo))};
-#if MULTIPLE_SCATTERING
-    share.multiple = luminance(m->multiple) * m->mean_loss * microfacet_loss(m, wo.z);
+#if GGX_ALBEDO
+    Bounce bounce = ggx_bounce(&m->bounces, cos_o);
 #endif
-    real sum = share.specular + share.multiple + share.diffuse;
-    ireal some = sum > 0.0f;
-    return (LobeShares){some ? share.specular / sum : ONE, some ? share.multiple / sum : ZERO,
-                        some ? share.diffuse / sum : ZERO};
+#if COUPLING_ALBEDO
+    real3 left = sub(splat(ONE), bounce_albedo(m->body_f0, m->body_f90, bounce));
+    share.specular = BY_ALBEDO(m) ? luminance(bounce_albedo(m->f0, F90(m), bounce)) : share.specular;
+    share.diffuse = BY_ALBEDO(m) ? luminance(mul(left, m->albedo)) : share.diffuse;
+#endif
+#if MULTIPLE_SCATTERING
+    share.multiple = luminance(m->multiple) * bounce.lost;
+#endif
+    real sum = share.specular + share.multiple + share.diffuse, inverse = inverse_or_zero(sum);
+    return (LobeShares){sum > 0.0f ? share.specular * inverse : ONE, share.multiple * inverse, share.diffuse * inverse};
 }
 
-// What the body reflects.
+static inline struct metallic_roughness metallic_roughness_at(const Scene *scene, ireal index, const Surface *surface) {
+    struct metallic_roughness m;
+    real3 color = COLOR(metallic_roughness), specular = PARAMETER3(metallic_roughness, f0);
+    real metallic = PARAMETER(metallic_roughness, metallic), roughness = PARAMETER(metallic_roughness, roughness);
+    real f90 = ONE;
+#if SPECULAR
+    f90 = PARAMETER(metallic_roughness, specular);
+    specular = mul(specular, PARAMETER3(metallic_roughness, specular_color));
+    specular = scale(vector(minimum(specular.x, ONE), minimum(specular.y, ONE), minimum(specular.z, ONE)), f90);
+    m.f90 = f90 + (1.0f - f90) * metallic;
+#endif
+    m.f0 = mad3(sub(color, specular), metallic, specular);
+    m.albedo = scale(color, 1.0f - metallic);
+    m.alpha = maximum(roughness * roughness, (real)(ALPHA_MIN));
+    m.smith = TO_INT(PARAMETER(metallic_roughness, smith));
+    m.coupling = TO_INT(PARAMETER(metallic_roughness, coupling));
+#if CLEARCOAT
+    m.coat = PARAMETER(metallic_roughness, clearcoat);
+    m.coat_alpha = maximum(square(PARAMETER(metallic_roughness, clearcoat_roughness)), (real)(ALPHA_MIN));
+#endif
+#if COAT_NORMALS
+    Frame frame = frame_around(surface->unbent);
+    m.base_frame = frame_around(to_local(frame, surface->ns));
+    m.coat_frame = frame_around(to_local(frame, surface->coat_normal));
+#endif
+#if SHEEN
+    m.sheen = PARAMETER3(metallic_roughness, sheen_color);
+    m.fibres = fibres_of(PARAMETER(metallic_roughness, sheen_roughness));
+#endif
+#if THROUGH
+    real transmission = PARAMETER(metallic_roughness, transmission);
+    m.through = scale(m.albedo, transmission);
+    m.albedo = scale(m.albedo, 1.0f - transmission);
+#endif
+#if GGX_ALBEDO
+    m.bounces = bounces_of(m.alpha, m.smith);
+#endif
+#if MULTIPLE_SCATTERING
+    real lost = m.bounces.mean.lost;
+    real3 f = choose(BY_ALBEDO(&m), color, m.f0);
+    f = mad3(f, (real)(20.0f / 21.0f), splat((real)(1.0f / 21.0f)));     // the mean of F, weighted by cosines
+    real3 kept = sub(splat(ONE), scale(f, lost));
+    real part = PARAMETER(metallic_roughness, multiple) * (BY_ALBEDO(&m) ? metallic : ONE) * (1.0f - lost);
+    m.multiple = scale(vector(f.x * f.x / kept.x, f.y * f.y / kept.y, f.z * f.z / kept.z), part);
+    m.spread = log(1.0f + 1.0f / square(m.alpha));
+#endif
+    real cos_o = maximum(surface->cos_o, ZERO);
+#if GGX_ALBEDO
+    Bounce bounce_o = ggx_bounce(&m.bounces, cos_o);
+#endif
+#if MULTIPLE_SCATTERING
+    m.lost_o = bounce_o.lost / lost;
+#endif
+#if COUPLING_ALBEDO
+    m.body_f0 = specular;
+    m.body_f90 = f90;
+    real3 mean = left_albedo(&m, m.bounces.mean), left = left_albedo(&m, bounce_o);
+    m.left_o = vector(left.x * inverse_or_zero(mean.x), left.y * inverse_or_zero(mean.y), left.z * inverse_or_zero(mean.z));
+#endif
+    m.shares = lobe_shares(&m, cos_o);
+    return m;
+}
+
+// By the couplings without albedos, of the body: f·pi. cos_h: wi·h.
+static inline real3 crossing_value(const struct metallic_roughness *m, real3 wo, real3 wi, real cos_h) {
+    real3 crossing = mul(transmitted(m, wi.z), transmitted(m, wo.z));
+#if COUPLING_HALF_VECTOR
+    crossing = choose(m->coupling == 2, transmitted(m, cos_h), crossing);
+#endif
+    return mul(crossing, m->albedo);
+}
+
+// Of the lobes of the body and of multiple scattering: f·pi.
+static inline real3 diffuse_value(const struct metallic_roughness *m, real3 wo, real3 wi, real cos_h) {
+    real3 value = splat(ZERO);
+#if GGX_ALBEDO
+    Bounce bounce_i = ggx_bounce(&m->bounces, wi.z);
+#endif
+#if OTHER_COUPLINGS
+    value = crossing_value(m, wo, wi, cos_h);
+#endif
+#if MULTIPLE_SCATTERING
+    value = mad3(m->multiple, m->lost_o * bounce_i.lost, value);
+#endif
+#if COUPLING_ALBEDO
+    value = choose(BY_ALBEDO(m), mul(m->left_o, left_albedo(m, bounce_i)), value);
+#endif
+    return value;
+}
+
+// Of the body alone. Where it shares its lobe with multiple scattering, that part which is its own by wi.
 static inline real3 BASE(matte)(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    real3 body = scale(mul(mul(transmitted(m, wi.z), transmitted(m, wo.z)), m->albedo), wi.z * (1.0f / PI));
-    return choose((wo.z > 0.0f) & (wi.z > 0.0f), body, splat(ZERO));
+    real3 value = splat(ZERO);
+#if OTHER_COUPLINGS
+    value = crossing_value(m, wo, wi, 0.5f * length3(add(wo, wi)));
+#endif
+#if COUPLING_ALBEDO
+    value = choose(BY_ALBEDO(m), mul(m->left_o, body_left(m, ggx_bounce(&m->bounces, wi.z))), value);
+#endif
+    return choose((wo.z > 0.0f) & (wi.z > 0.0f), scale(value, wi.z * (1.0f / PI)), splat(ZERO));
 }
 
 static inline real3 BASE(eval)(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 sum = add(wo, wi);
-    real length = length3(sum);
+    real length = length3(sum), cos_h = 0.5f * length;     // wi·h = wo·h, which as products differ near wi = −wo
     real3 h = scale(sum, 1.0f / length);
-    real3 f = base_fresnel(m, 0.5f * length);     // wi·h = wo·h, which as products differ near wi = −wo
-    real specular = ggx_d(h, m->alpha) * shadowing(m, wo, wi) / (4.0f * wo.z);
-    real3 crossing = mul(transmitted(m, wi.z), transmitted(m, wo.z));
-    real3 body = mul(crossing, m->albedo);
-#if MULTIPLE_SCATTERING
-    body = mad3(m->multiple, microfacet_loss(m, wo.z) * microfacet_loss(m, wi.z), body);
-#endif
-    real3 diffuse = scale(body, wi.z * (1.0f / PI));
-    return choose((wo.z > 0.0f) & (wi.z > 0.0f), mad3(f, specular, diffuse), splat(ZERO));
+    real specular = ggx_d(h, m->alpha) * smith_shadowing(wo, wi, m->alpha, m->smith) / (4.0f * wo.z);
+    real3 diffuse = scale(diffuse_value(m, wo, wi, cos_h), wi.z * (1.0f / PI));
+    return choose((wo.z > 0.0f) & (wi.z > 0.0f), mad3(base_fresnel(m, cos_h), specular, diffuse), splat(ZERO));
 }
 
 static inline real BASE(pdf)(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 h = normalize3(add(wo, wi));
     real visible = ggx_d(h, m->alpha) / (4.0f * wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
-    LobeShares share = lobe_shares(m, wo);
+    LobeShares share = m->shares;
     real pdf = share.specular * visible + share.diffuse * cosine_pdf(wi.z);
 #if MULTIPLE_SCATTERING
-    pdf += share.multiple > 0.0f ? share.multiple * multiple_pdf(m, wi.z) : ZERO;   // spread is 0 where there is none
+    pdf += share.multiple * multiple_pdf(m, wi.z);
 #endif
     return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
 }
 
-// As if no light were lost between microfacets: f0, and what goes through the surface twice: (1 − f0) of it straight in,
-// and (1 − f0)·20/21, the cosine-weighted mean of 1 − F, out again.
+// As if no light were lost between microfacets, without fits of their albedos: f0, and what goes through the surface
+// twice: (1 − f0) of it straight in, and (1 − f0)·20/21, the cosine-weighted mean of 1 − F, out again.
 static inline real3 BASE(albedo)(const struct metallic_roughness *m) {
     real3 in = sub(splat(ONE), m->f0);
-    return mad3(mul(mul(in, in), m->albedo), (real)(20.0f / 21.0f), m->f0);
+    real3 albedo = mad3(mul(mul(in, in), m->albedo), (real)(20.0f / 21.0f), m->f0);
+#if COUPLING_ALBEDO
+    Bounce straight = ggx_bounce(&m->bounces, ONE);
+    real3 coupled = add(bounce_albedo(m->f0, F90(m), straight), left_albedo(m, straight));
+    albedo = choose(BY_ALBEDO(m), coupled, albedo);
+#endif
+    return albedo;
 }
 
 static inline BsdfSample BASE(sample)(const struct metallic_roughness *m, real3 wo, real2 u, real lobe) {
     real3 h = sample_visible_normal(wo, m->alpha, u);
     real3 reflected = sub(scale(h, 2.0f * dot3(wo, h)), wo);
     BsdfSample sample = no_sample();
-    LobeShares share = lobe_shares(m, wo);
+    LobeShares share = m->shares;
     sample.wi = choose(lobe < share.specular, reflected, sample_cosine(u));
 #if MULTIPLE_SCATTERING
     sample.wi = choose(lobe >= 1.0f - share.multiple, sample_multiple(m, u), sample.wi);

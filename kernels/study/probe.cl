@@ -74,17 +74,19 @@ kernel void probe_accumulate(SCENE_PARAMETERS, uint n, global const float *in, g
     put(out, n, 13, TO_REAL(a.dropped));
 }
 
-// A material, by its code, somewhere on a surface; where its picture begins, if normal maps bend it under a coat.
-static Bsdf material_at(const Scene *scene, real code, ireal front) {
+// A material, by its code, somewhere on a surface that is seen from wo; where its picture begins, if normal maps bend it under a coat.
+static Bsdf material_at(const Scene *scene, real code, real3 wo, ireal front) {
     Surface surface;
     surface.material = TO_INT(code);
     surface.front = front;
+    surface.cos_o = wo.z;
 #if COAT_NORMALS
     for (int i = 0; i < UV_SETS; ++i) surface.at.set[i] = (real2){ZERO, ZERO};
     surface.unbent = surface.ns = vector(ZERO, ZERO, ONE);
     surface.tangent = vector(ONE, ZERO, ZERO);
     surface.handedness = ONE;
     bend_normal(scene, &surface);
+    surface.cos_o = dot3(surface.ns, wo);
 #endif
     Bsdf bsdf;
     bsdf_at(scene, &surface, &bsdf);
@@ -95,7 +97,7 @@ static Bsdf material_at(const Scene *scene, real code, ireal front) {
 kernel void probe_bsdf_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint front) {
     ELEMENTS
     real2 u = {ROW(in, 4), ROW(in, 5)};
-    Bsdf bsdf = material_at(&scene, ROW(in, 0), front ? ALL_LANES : NO_LANES);
+    Bsdf bsdf = material_at(&scene, ROW(in, 0), ROW3(in, 1), front ? ALL_LANES : NO_LANES);
     BsdfSample sample = bsdf_sample(&bsdf, ROW3(in, 1), u, ROW(in, 6));
     put3(out, n, 0, sample.wi);
     put3(out, n, 3, sample.weight);
@@ -111,7 +113,7 @@ kernel void probe_bsdf_sample(SCENE_PARAMETERS, uint n, global const float *in, 
 // in: material, wo (3), wi (3) -> out: f·|cos| (3), pdf; seen from the front if `front`
 kernel void probe_bsdf_value(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint front) {
     ELEMENTS
-    Bsdf bsdf = material_at(&scene, ROW(in, 0), front ? ALL_LANES : NO_LANES);
+    Bsdf bsdf = material_at(&scene, ROW(in, 0), ROW3(in, 1), front ? ALL_LANES : NO_LANES);
     put3(out, n, 0, bsdf_eval(&bsdf, ROW3(in, 1), ROW3(in, 4)));
     put(out, n, 3, bsdf_pdf(&bsdf, ROW3(in, 1), ROW3(in, 4)));
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from clrt.scene.materials import MetallicRoughness
 from clrt.scene.presets import F0_PRESETS
@@ -13,15 +14,16 @@ Doubles = NDArray[np.float64]
 
 
 def cook_torrance(material: MetallicRoughness, wo: Doubles, wi: Doubles) -> Doubles:
-    """(n, 3) f = F·G·D/(4 cos cos) + (1 − F(cos wi))(1 − F(cos wo))(1 − metallic)·color/pi.
+    """(n, 3) f = F·G·D/(4 cos cos) + coupling·(1 − metallic)·color/pi.
 
-    F of Schlick, D of Walter 2007 (eq. 33).
+    F of Schlick, D of Walter 2007 (eq. 33); the coupling by its name.
     """
     color, f0 = np.array(untextured(material.color)), np.full(3, ((material.ior - 1) / (material.ior + 1))**2)
     metallic, roughness = untextured(material.metallic), untextured(material.roughness)
     if material.preset is not None:
         f0, metallic = np.array(F0_PRESETS[material.preset][0]), F0_PRESETS[material.preset][1]
         color = f0 if metallic else color
+    body_f0 = f0
     f0 = (1 - metallic) * f0 + metallic * color
     h = (wo + wi) / np.linalg.norm(wo + wi, axis=1, keepdims=True)
     alpha, cos_h = roughness**2, h[:, 2]
@@ -31,7 +33,21 @@ def cook_torrance(material: MetallicRoughness, wo: Doubles, wi: Doubles) -> Doub
     fresnel, enter, leave = (f0 + (1 - f0) * (1 - cosine)**5
                              for cosine in (np.sum(wi * h, axis=1, keepdims=True), wi[:, 2:], wo[:, 2:]))
     specular = (d * g / (4 * wo[:, 2] * wi[:, 2]))[:, None]
-    return np.asarray(fresnel * specular + (1 - enter) * (1 - leave) * (1 - metallic) * color / np.pi)
+    coupling = {"fresnel": (1 - enter) * (1 - leave), "half_vector": 1 - fresnel}.get(material.coupled_by)
+    if coupling is None:
+        coupling = coupling_by_albedo(float(body_f0[0]), alpha, material.smith, wo[:, 2:], wi[:, 2:])
+    return np.asarray(fresnel * specular + coupling * (1 - metallic) * color / np.pi)
+
+
+def coupling_by_albedo(f0: float, alpha: float, smith: str, cos_o: Doubles, cos_i: Doubles) -> Doubles:
+    """(1 − E(wi))(1 − E(wo))/(1 − mean E), E = f0·(first − second) + second of `albedos`: interpolated in √cos."""
+    nodes = np.linspace(0.01, 1, 60)
+    left = [1 - f0 * (whole - part) - part for whole, part in (albedos(alpha, c * c, smith, 300) for c in nodes)]
+    spline = CubicSpline(nodes, left)
+    t, weight = np.polynomial.legendre.leggauss(50)
+    roots = (t + 1) / 2
+    mean = weight @ (spline(roots) * 2 * roots**3)      # ∫ 2·cos·(1 − E) dcos, cos = root²
+    return np.asarray(spline(np.sqrt(cos_o)) * spline(np.sqrt(cos_i)) / mean)
 
 
 def masking(smith: str, alpha: float, cos_o: Doubles, cos_i: Doubles) -> Doubles:
@@ -52,7 +68,12 @@ def bump_shadowing(unbent: Doubles, bent: Doubles, w: Doubles) -> float:
 
 
 def albedo(alpha: float, cosine: float, smith: str, steps: int = 500) -> float:
-    """What microfacets with F = 1 reflect of a white furnace in one bounce.
+    """What microfacets with F = 1 reflect of a white furnace in one bounce."""
+    return albedos(alpha, cosine, smith, steps)[0]
+
+
+def albedos(alpha: float, cosine: float, smith: str, steps: int = 500) -> tuple[float, float]:
+    """What microfacets reflect of a white furnace in one bounce, with F = 1 and with F = (1 − wo·h)^5.
 
     ∫ f·cos wi dωi over half vectors, dωi = 4 (wo·h) dωh, with s from D·cos θh dωh = ds dphi/(2·pi),
     tan²θh = alpha²·s/(1 − s): the midpoint rule in phi and x, where 1 − s = (1 − x)³ to reach steep half vectors.
@@ -66,4 +87,5 @@ def albedo(alpha: float, cosine: float, smith: str, steps: int = 500) -> float:
     cos_i = 2 * cos_oh * cos_h - cosine
     lit = (cos_oh > 0) & (cos_i > 0)
     g = masking(smith, alpha, np.full(lit.shape, cosine)[lit], cos_i[lit])
-    return float(np.sum(g * (3 * (1 - x)**2 * cos_oh / (cosine * cos_h))[lit]) / steps**2)
+    reflected = g * (3 * (1 - x)**2 * cos_oh / (cosine * cos_h))[lit] / steps**2
+    return float(np.sum(reflected)), float(np.sum(reflected * (1 - cos_oh[lit])**5))

@@ -44,10 +44,10 @@ def test_materials_are_packed_together_as_alone(kind: type[Material], seed: int)
     rng = np.random.default_rng(seed)
     users = [textured(kind, rng) for _ in range(COUNT)]
     textures = Textures()
-    together = pack_materials(users, textures)
+    together = pack_materials(users, textures, "none")
     _, records = together.buffers[kind.kernel]
     for code, user in zip(together.codes, users):
-        record, (_, (alone,)) = records[code >> 4], pack_materials([user], textures).buffers[kind.kernel]
+        record, (_, (alone,)) = records[code >> 4], pack_materials([user], textures, "none").buffers[kind.kernel]
         assert all(np.array_equal(record[name], alone[name]) for name in names_of(alone))
         others = names_of(records) - names_of(alone)
         assert all(record[name] == -1 for name in others if name.endswith("_texture"))

@@ -64,4 +64,4 @@ def test_every_material_is_converted_or_refused() -> None:
             check_scene(ball(kind()))
     for kind in set(BSDFS) - {MetallicRoughness}:
         check_scene(ball(kind()))
-    check_scene(ball(MetallicRoughness(preset="gold")))
+    check_scene(ball(MetallicRoughness(preset="gold", multiple_scattering=False)))

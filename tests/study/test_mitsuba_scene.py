@@ -82,7 +82,6 @@ def test_materials_are_told_by_what_they_reflect() -> None:
 
 @pytest.mark.parametrize(("material", "words"), [
     (MetallicRoughness(clearcoat=0.5), "with layers"), (MetallicRoughness(smith="schlick"), 'smith = "separable"'),
-    (MetallicRoughness(preset="gold", multiple_scattering=True), "single scattering"),
     (Dielectric(roughness=0.5), "rougher than 0.3"), (Diffuse(one_sided=True), "one side")])
 def test_what_has_no_counterpart_is_refused_by_name(material: Material, words: str) -> None:
     with pytest.raises(UsageError, match=f"the ball: Mitsuba cannot draw .*{words}"):
@@ -102,7 +101,8 @@ def test_other_gloss_is_a_plugin_of_our_own() -> None:
     """Of all values by which the formula of docs/scene-format.md goes."""
     plastic = bsdf(MetallicRoughness(preset="plastic_high", color=(0.1, 0.2, 0.3), roughness=0.4))
     assert plastic == {"type": "gltf", "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}, "metallic": 0,
-                       "roughness": 0.4, "f0": {"type": "rgb", "value": [0.05, 0.05, 0.05]}, "separable": False}
+                       "roughness": 0.4, "f0": {"type": "rgb", "value": [0.05, 0.05, 0.05]},
+                       "smith": "height_correlated", "coupling": "albedo", "multiple": False}
 
 
 PICTURE = Picture(np.array([[[0, 51, 102, 255], [255, 153, 204, 0]]], np.uint8))
