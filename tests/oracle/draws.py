@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, TypeVar, get_args
 
 import numpy as np
 
 from clrt.scene.material import Material
 from clrt.scene.materials import BlinnPhong, Conductor, Dielectric, Diffuse, MetallicRoughness, Mirror, Phong
-from clrt.scene.metallic_roughness import Smith
+from clrt.scene.metallic_roughness import Coupling, Smith
 from clrt.scene.presets import CONDUCTORS, F0_PRESETS
 from clrt.scene.textures import Channel, Picture, Texture, Wrap
 
@@ -21,8 +21,6 @@ Color = tuple[float, float, float]
 TEXELS = 4
 #: Smoother lobes than this roughness make single paths so bright that means of thousands say little.
 SMOOTHEST = 0.3
-#: The forms that the oracle knows, where a material has a field to choose them.
-FORMS = {"multiple_scattering": False, "coupling": "fresnel"}
 
 
 class Draws:
@@ -70,9 +68,7 @@ class Draws:
 
 def random_material(draws: Draws, kind: type[Material], opaque: bool = False) -> Material:
     """One of a kind. opaque: whether it stops all light from both sides."""
-    own = {field.name for field in fields(kind)}
-    given = DRAWERS[kind](draws) | {name: form for name, form in FORMS.items() if name in own}
-    material = kind(**given)
+    material = kind(**DRAWERS[kind](draws))
     if draws.chance(0.1):
         material = replace(material, emission=draws.vector(0.0, 0.6))
     if opaque or draws.chance(0.7):
@@ -111,6 +107,9 @@ def _metallic_roughness(draws: Draws) -> dict[str, Any]:
         "metallic": draws.one_of((0.0, 1.0, draws.number(0.0))), "smith": draws.one_of(get_args(Smith))}
     if draws.chance(0.3):
         given |= {"specular": draws.number(0.0), "specular_color": draws.color(0.2, 2.0)}
+    coupling = draws.one_of((None, *get_args(Coupling)))
+    # The oracle knows further bounces of metals below the albedo coupling alone.
+    given |= {"coupling": coupling, "multiple_scattering": None if coupling in (None, "albedo") else False}
     return given | {"preset": draws.one_of(F0_PRESETS) if draws.chance(0.2) else None}
 
 

@@ -10,7 +10,7 @@ import pytest
 from clrt.device.open import Device
 from clrt.rendering.compile import compile_scene
 from clrt.scene.material import Material
-from clrt.scene.materials import MATERIALS, Diffuse
+from clrt.scene.materials import MATERIALS, Diffuse, MetallicRoughness
 from clrt.scene.model import Camera, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.validate import scene_problems
 from clrt.study.probe import choices
@@ -82,6 +82,16 @@ def test_directions_are_drawn_by_their_density(kind: type[Material]) -> None:
                      ((uniform, integrand), (sample.wi, sample.weight))]
             error = np.sqrt(sum(each.var(axis=0) for each in sides) / len(wo))
             assert (abs(sides[0].mean(axis=0) - sides[1].mean(axis=0)) <= 4.5 * error).all(), (material, up)
+
+
+@pytest.mark.parametrize("roughness", [0.3, 1.0])
+@pytest.mark.parametrize("metallic", [0.0, 0.5, 1.0])
+def test_white_keeps_energy(roughness: float, metallic: float) -> None:
+    """By default, under the tables of directional albedos."""
+    white = MetallicRoughness(color=(1.0, 1.0, 1.0), roughness=roughness, metallic=metallic)
+    wo, at = view(0.4, 200_000)
+    weight = scattering_of(white, at).sample(wo, np.random.default_rng(1)).weight[:, 0]
+    assert abs(weight.mean() - 1) < 0.001 + 4.5 * weight.std() / np.sqrt(len(wo))
 
 
 def view(cosine: float, n: int) -> tuple[Doubles, Surface]:

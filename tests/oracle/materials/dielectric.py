@@ -63,7 +63,7 @@ class Glass(Scattering):
         return on * np.where(crosses, f, 0)[:, None]
 
     def sample(self, wo: Doubles, rng: np.random.Generator) -> Sample:
-        h = np.where(self.rough[:, None], visible_normals(wo, self.alpha, rng), [0.0, 0.0, 1.0])
+        h = np.where(self.rough[:, None], visible_normals(wo, self.alpha, rng.random((len(wo), 2))), [0.0, 0.0, 1.0])
         cos_o = dot(wo, h)
         back, on, cos_t = self.parts(cos_o)
         chance = back.mean(axis=1) / (back + on).mean(axis=1)

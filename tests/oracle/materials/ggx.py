@@ -57,7 +57,7 @@ class VisibleNormals:
         self._alpha = alpha
 
     def draw(self, wo: Doubles, rng: np.random.Generator) -> Doubles:
-        return reflected(wo, visible_normals(wo, self._alpha, rng))
+        return reflected(wo, visible_normals(wo, self._alpha, rng.random((len(wo), 2))))
 
     def density(self, wo: Doubles, wi: Doubles) -> Doubles:
         h = halfway(wo, wi)
@@ -73,15 +73,14 @@ def visible_density(wo: Doubles, h: Doubles, alpha: Doubles) -> Doubles:
     return np.asarray(g1 * np.maximum(dot(wo, h), 0) * distribution(h, alpha) / np.maximum(wo[:, 2], 1e-300))
 
 
-def visible_normals(wo: Doubles, alpha: Doubles, rng: np.random.Generator) -> Doubles:
-    """(n, 3) (Heitz 2018, listing 1)."""
+def visible_normals(wo: Doubles, alpha: Doubles, u: Doubles) -> Doubles:
+    """(n, 3) by numbers (n, 2) in [0, 1) (Heitz 2018, listing 1)."""
     v = unit(wo * np.column_stack([alpha, alpha, np.ones_like(alpha)]))
     across = np.hypot(v[:, 0], v[:, 1])
     steep = across < 1e-12
     safe = np.where(steep, 1, across)
     t1 = np.column_stack([np.where(steep, 1, -v[:, 1] / safe), np.where(steep, 0, v[:, 0] / safe), np.zeros_like(safe)])
     t2 = np.cross(v, t1)
-    u = rng.random((len(wo), 2))
     r, phi = np.sqrt(u[:, 0]), 2 * np.pi * u[:, 1]
     x, s = r * np.cos(phi), (1 + v[:, 2]) / 2
     y = (1 - s) * np.sqrt(np.maximum(1 - x * x, 0)) + s * r * np.sin(phi)

@@ -1,0 +1,67 @@
+"""Directional albedos of GGX's single bounce with Schlick's F, f0·by_f0 + f90·by_f90, by quadrature."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ..textures import bilinear
+from ..vectors import Doubles, dot
+from .ggx import alpha_of, shadowing, smith_lambda, visible_normals
+from .scattering import reflected
+
+#: Nodes of roughness from ROUGHNESS to 1, of the root of the cosine from 0 to 1, and of each of a direction's numbers.
+NODES, DIRECTIONS = 33, 40
+#: Smoother surfaces are not in the tables.
+ROUGHNESS = 0.25
+
+
+class Albedos:
+    """Of one form of masking and shadowing at roughnesses (n,)."""
+
+    def __init__(self, smith: str, roughness: Doubles) -> None:
+        assert roughness.min(initial=1.0) >= ROUGHNESS
+        self._table, self._row = _table(smith), (roughness - ROUGHNESS) / (1 - ROUGHNESS) * (NODES - 1)
+
+    def at(self, cosine: Doubles) -> tuple[Doubles, Doubles]:
+        """(n, 1) by_f0 and by_f90 of cosines (n,)."""
+        column = np.sqrt(np.clip(cosine, 0, 1)) * (NODES - 1)
+        found = bilinear(self._table[:, :NODES], column, self._row, "clamp", "clamp")
+        return found[:, :1], found[:, 1:]
+
+    def mean(self) -> tuple[Doubles, Doubles]:
+        """(n, 1) of both over the hemisphere, weighted by the cosine."""
+        found = bilinear(self._table[:, NODES:], np.zeros_like(self._row), self._row, "clamp", "clamp")
+        return found[:, :1], found[:, 1:]
+
+
+@cache
+def _table(smith: str) -> Doubles:
+    """(roughnesses, cosines, 2) of by_f0 and by_f90, in the last column the means."""
+    x, weights = np.polynomial.legendre.leggauss(NODES)
+    roots = np.append(np.maximum(np.linspace(0, 1, NODES), 1e-3), (x + 1) / 2)
+    rows = []
+    for alpha in alpha_of(np.linspace(ROUGHNESS, 1, NODES)):
+        row = np.array([_bounce(root**2, alpha, smith) for root in roots])
+        # With the cosine c = root², the weight 2·c·dc is 4·root³·droot.
+        mean = (weights / 2 * 4 * roots[NODES:]**3) @ row[NODES:]
+        rows.append(np.vstack([row[:NODES], mean]))
+    return np.array(rows)
+
+
+def _bounce(cosine: float, alpha: float, smith: str) -> tuple[float, float]:
+    """By_f0 and by_f90 of one cosine, over visible normals: their first number is sin² of an angle, in which they are
+    smooth."""
+    x, weights = np.polynomial.legendre.leggauss(DIRECTIONS)
+    angle, turn = np.meshgrid((x + 1) * np.pi / 4, (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS, indexing="ij")
+    u = np.column_stack([np.sin(angle).ravel()**2, turn.ravel()])
+    share = (np.sin(2 * angle) * weights[:, None] * np.pi / 4 / DIRECTIONS).ravel()
+    wo, alphas = np.tile([np.sqrt(1 - cosine**2), 0.0, cosine], (len(u), 1)), np.full(len(u), alpha)
+    h = visible_normals(wo, alphas, u)
+    cos_i = reflected(wo, h)[:, 2]
+    up = cos_i > 0
+    seen = shadowing(wo[:, 2], np.where(up, cos_i, 1), alphas, smith)
+    weight = share * np.where(up, seen * (1 + smith_lambda(wo[:, 2], alphas)), 0)     # G2/G1
+    grazing = np.maximum(1 - dot(wo, h), 0)**5
+    return float(weight @ (1 - grazing)), float(weight @ grazing)
