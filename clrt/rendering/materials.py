@@ -70,7 +70,11 @@ def pack_materials(users: Iterable[Material], textures: Textures, culling: Culli
             plain = material.without_textures()     # what it does not read itself is a number
             for name in records.dtype.names or ():
                 if name in named or getattr(plain, name, None) is not None:
-                    records[name][i] = named.get(name, getattr(plain, name, 0))
+                    value = named.get(name, getattr(plain, name, 0))
+                    if isinstance(value, tuple):
+                        records[name][i, :len(value)] = value
+                    else:
+                        records[name][i] = value
         buffers[kind.kernel] = (kind.__name__, records)
         names = {name for named in values for name in named}
         reads |= {f"{kind.kernel}_{name}": f"{name}_texture" in names for name in sorted(names)

@@ -75,13 +75,14 @@ FILTER = np.dtype([("quantile", "f4")])
 def material_record(values: Iterable[Mapping[str, Any]]) -> np.dtype[Any]:
     """The record of materials of one type, which have these values by name: all that one of them has.
 
-    Rows of a multiple of four first, then triples, each followed by a scalar or padding, then the other scalars; whole
-    numbers are int32.
+    Rows of a multiple of four first, as long as the longest, then triples, each followed by a scalar or padding, then
+    the other scalars; whole numbers are int32.
     """
     sizes: dict[str, int] = {}
     scalar: dict[str, str] = {}
     for named in values:
-        sizes |= {name: len(value) if isinstance(value, tuple) else 1 for name, value in named.items()}
+        for name, value in named.items():
+            sizes[name] = max(sizes.get(name, 0), len(value) if isinstance(value, tuple) else 1)
         scalar |= {name: "i4" if name.endswith("_texture") else "f4" for name in named}
     triples = [name for name, size in sizes.items() if size == 3]
     scalars = [name for name, size in sizes.items() if size == 1]

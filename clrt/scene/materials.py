@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from math import log
 from typing import Annotated, ClassVar
 
+from .dielectric_energy import ROWS, tables
 from .limits import Ge, Gt, Le
 from .material import Albedo as Albedo, Material as Material, Parameter, Unit
 from .metallic_roughness import MetallicRoughness as MetallicRoughness
@@ -77,13 +78,16 @@ class Dielectric(Material):
     roughness: of the surface, alpha = roughness² of GGX's microfacets; 0 is smooth. thin: a sheet without an inside,
     which bends nothing and passes `color` from face to face. Inside of others light becomes attenuation_color after the
     attenuation_distance, in units of the scene, and so on (glTF's KHR_materials_volume; None: never).
+    multiple_scattering: gives back what one bounce between microfacets leaves out (scene.dielectric_energy), so that
+    rough glass loses no light.
     """
 
     kernel: ClassVar[str] = "dielectric"
-    parts: ClassVar[tuple[str, ...]] = ("ROUGH_DIELECTRIC",)
+    parts: ClassVar[tuple[str, ...]] = ("ROUGH_DIELECTRIC", "DIELECTRIC_ENERGY")
     color: Albedo | Texture = (1.0, 1.0, 1.0)
     ior: Annotated[float, Ge(0.25), Le(4)] = 1.5
     roughness: Unit | Texture = 0.0
+    multiple_scattering: bool = True
     thin: bool = False
     attenuation_color: Albedo = (1.0, 1.0, 1.0)
     attenuation_distance: Annotated[float, Gt(0)] | None = None
@@ -92,6 +96,9 @@ class Dielectric(Material):
         values: dict[str, Parameter] = {"color": self.color, "ior": self.ior}
         if self.rough:
             values["roughness"] = self.roughness
+        if self.scatters_again:
+            one = None if isinstance(self.roughness, Texture) else self.roughness
+            values |= {"energy": tables(self.ior, one, self.thin), "last_row": ROWS - 1.0 if one is None else 0.0}
         if self.thin:
             values["thin"] = 1.0
         if (distance := self.attenuation_distance) is not None:
@@ -103,6 +110,11 @@ class Dielectric(Material):
     def rough(self) -> bool:
         """Whether some of it is."""
         return isinstance(self.roughness, Texture) or self.roughness > 0
+
+    @property
+    def scatters_again(self) -> bool:
+        """Whether light may leave after several bounces between microfacets."""
+        return self.multiple_scattering and not self.is_specular
 
     @property
     def is_specular(self) -> bool:
@@ -118,6 +130,7 @@ class Dielectric(Material):
 
     def features(self) -> frozenset[str]:
         has = {"TRANSMISSION": True, "ROUGH_DIELECTRIC": self.rough, "TRANSMISSION_LOBES": self.rough,
+               "DIELECTRIC_ENERGY": self.scatters_again,
                "THIN_DIELECTRIC": self.thin, "ATTENUATION": self.attenuation_distance is not None}
         return frozenset(name for name, present in has.items() if present)
 

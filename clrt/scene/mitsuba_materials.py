@@ -94,7 +94,8 @@ class MaterialReader:
         ior = _index(plugin, "int_ior", "bk7") / _index(plugin, "ext_ior", "air")
         _white(plugin, "specular_reflectance")
         color = self._textures.color(plugin, "specular_transmittance", 1.0)
-        return Look(Dielectric(ior=ior, color=color, thin=thin, roughness=self._roughness(plugin) if rough else 0.0))
+        return Look(Dielectric(ior=ior, color=color, thin=thin, roughness=self._roughness(plugin) if rough else 0.0,
+                               multiple_scattering=not rough))    # Mitsuba's follows a single bounce
 
     def _conductor(self, plugin: Plugin) -> Look:
         name = plugin.value("material", str, "" if {"eta", "k"} & {*plugin.values} else "none")

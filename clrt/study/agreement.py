@@ -19,6 +19,7 @@ from ..errors import UsageError
 from ..scene.model import Scene
 from .bias import ROUNDING
 from .contestants import Contestant, choices_on
+from .mitsuba_scene import single_bounces
 from .significance import FAMILY, corrected, t_test
 
 Doubles = NDArray[np.float64]
@@ -99,11 +100,14 @@ def _squared_error(rows: Doubles) -> Doubles:
 def agreement(scene: Scene, spp: int, seeds: int, device: str | int | None = None) -> dict[str, Any]:
     """`compared` of clrt's pictures of `scene` with Mitsuba's, with the scene's name and size.
 
+    Rough glass follows a single bounce between microfacets in both.
+
     UsageError where Mitsuba is not installed, or cannot draw it, or a picture is smaller than a block.
     """
     if min(scene.render.size) < BLOCK:
         width, height = scene.render.size
         raise UsageError(f"pictures of {width}x{height} pixels have no block of {BLOCK}x{BLOCK}; write a larger --size")
+    scene = single_bounces(scene)
     try:
         from .mitsuba_renderer import contestants
         theirs = contestants(scene)

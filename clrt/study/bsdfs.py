@@ -29,7 +29,8 @@ LAYERS: dict[str, tuple[dict[str, Any], ...]] = {"metallic_roughness": (
     {"sheen_color": COLOR}, {"sheen_color": (1.0, 1.0, 1.0), "sheen_roughness": 0.5},
     {"sheen_color": (0.2, 0.3, 0.4), "sheen_roughness": 1.0}, {"transmission": 1.0},
     {"transmission": 0.5, "specular": 0.5, "clearcoat": 0.7, "clearcoat_roughness": 0.2, "sheen_color": (0.5, 0.5, 0.5),
-     "sheen_roughness": 0.3})}
+     "sheen_roughness": 0.3}),
+    "dielectric": ({"multiple_scattering": False},)}
 #: cos θ of wo, down to grazing; these sines are float32 numbers or round to 1.
 COSINES = (1.0, 0.6, 0.1, 2.0**-7, 2.0**-10, 2.0**-13)
 #: Of wo that does not graze.

@@ -67,8 +67,8 @@ class Checked(NamedTuple):
     """known: of how many samples the area is known; lobes: how many maps there are; error: by what part the density
     reported for a sample misses 1/area at most, beyond the error of that.
 
-    Where there are several maps, one's 1/area times its probability is but a part of the density: then `error` is what
-    the density lacks of that part.
+    Where there are several maps, or one that folds, one's 1/area times its probability is but a part of the density:
+    then `error` is what the density lacks of that part.
     """
 
     known: int
@@ -86,11 +86,12 @@ def check_density(bsdfs: Bsdfs, which: int, cosine: float) -> Checked:
 
     known, error, single = 0, 0.0, False
     tried = np.linspace(0, 1 - 2.0**-24, LOBES)     # the least likely lobes are at the ends
+    folds = "DIELECTRIC_ENERGY" in bsdfs.materials[which].features()
     every = draw(np.repeat(u, LOBES, axis=0), np.tile(tried, len(u)))[0].reshape(len(u), LOBES, 3)
     lobes = _numbers_of_lobes(every[0], tried)
     for lobe in lobes:
         (wi, pdf), area = draw(u, lobe), areas(lambda at: draw(at, lobe)[0], u)
-        single = bool((every == every[:, :1]).all())
+        single = not folds and bool((every == every[:, :1]).all())
         told = (pdf > 0) & (wi[:, 2] != 0) & (area.error < LEAST_KNOWN)
         moved = draw((u[:, None] + MOVES).reshape(-1, 2), lobe)[0].reshape(len(u), -1, 3)
         told &= (moved[..., 2] * wi[:, 2:] > 0).all(axis=1)    # where a lobe ends in between, slopes mean nothing

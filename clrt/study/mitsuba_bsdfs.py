@@ -157,6 +157,8 @@ def _metallic_roughness(material: MetallicRoughness) -> Plugin:
 def _dielectric(material: Dielectric) -> Plugin:
     if material.thin and material.rough:
         raise ValueError("glass that is thin and rough")
+    if material.scatters_again:
+        raise ValueError("rough glass but with multiple_scattering = false: its own follows a single bounce")
     if untextured(material.roughness)**2 > NEARLY_SMOOTH:
         raise ValueError("glass rougher than 0.3: its own has the separable Smith term")
     if material.thin and untextured(material.color) != (1.0, 1.0, 1.0):

@@ -7,6 +7,7 @@ materials are there is in mitsuba_bsdfs.py.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import cos, radians, tan
 from typing import Any
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..rendering.features import biased_by
+from ..scene.editing import materials_of, with_material
 from ..scene.instancing import unfolded
 from ..scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ..scene.materials import Dielectric
@@ -51,6 +53,14 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
                 for kind in (Mesh, Sphere) for i, owner in enumerate(each for each in owners if isinstance(each, kind))}
     plugins |= {f"light{i}": _light(light, scene.camera) for i, light in enumerate(scene.lights)}
     return plugins | _environment(scene.environment)
+
+
+def single_bounces(scene: Scene) -> Scene:
+    """The scene with rough glass that follows a single bounce between microfacets, as Mitsuba's does."""
+    for material in materials_of(scene).values():
+        if isinstance(material, Dielectric) and material.scatters_again:
+            scene = with_material(scene, material, replace(material, multiple_scattering=False))
+    return scene
 
 
 def _sensor(scene: Scene, sampler: str) -> Plugin:

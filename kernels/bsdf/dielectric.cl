@@ -1,7 +1,7 @@
 // Glass or water: light is reflected with the probability F that Fresnel's equations give, and else refracted by Snell's
 // law (pbrt, 4th ed., 9.3 and 9.5). `ior` inside, 1 outside; what is refracted is multiplied by `color`.
 //
-// ROUGH_DIELECTRIC: the same at microfacets (rough_dielectric.cl).
+// ROUGH_DIELECTRIC: the same at microfacets (rough_dielectric.cl); DIELECTRIC_ENERGY: after several of them, too.
 // THIN_DIELECTRIC: a sheet whose two faces lie together. Of a wave that bounces between them
 //   F + (1 − F)²·c²F/(1 − c²F²) is reflected, 2F/(1 + F) for c = 1, and (1 − F)²·c/(1 − c²F²) passes without being bent,
 // c = color being what is left of light from face to face. A rough one spreads both ways alike (as glTF's transmission).
@@ -27,6 +27,12 @@ struct dielectric {
     real eta;           // index of refraction beyond the surface over that on wo's side
 #if ROUGH_DIELECTRIC
     real alpha;         // 0 where it is smooth
+#endif
+#if DIELECTRIC_ENERGY
+    const Scene *scene;
+    ireal index, inside;
+    real row, grazing;          // of the table of what is lost: the row, and a cosine below which that is much
+    real range, later, returned;    // of later bounces (read_later)
 #endif
 #if THIN_DIELECTRIC
     ireal thin;
@@ -109,6 +115,13 @@ static inline struct dielectric dielectric_at(const Scene *scene, ireal index, c
     ireal rough = (roughness > 0.0f) & ((ior != 1.0f) | IS_THIN(&m));    // where nothing is bent, nothing is spread
     m.alpha = rough ? maximum(roughness * roughness, (real)(ALPHA_MIN)) : ZERO;
 #endif
+#if DIELECTRIC_ENERGY
+    m.scene = scene;
+    m.index = index;
+    m.inside = !surface->front;
+    m.row = sqrt(roughness) * PARAMETER(dielectric, last_row);
+    read_later(&m, ior);
+#endif
 #if ATTENUATION
     m.absorption = choose(surface->front, PARAMETER3(dielectric, absorption), splat(ZERO));
 #endif
@@ -119,12 +132,14 @@ static inline BsdfSample dielectric_sample(const struct dielectric *m, real3 wo,
     BsdfSample sample = smooth_dielectric_sample(m, wo, lobe);
 #if ROUGH_DIELECTRIC
     ireal rough = m->alpha > 0.0f;
-    BsdfSample spread = rough_dielectric_sample(m, wo, u, lobe);
-    sample.wi = choose(rough, spread.wi, sample.wi);
-    sample.weight = choose(rough, spread.weight, sample.weight);
-    sample.pdf = rough ? spread.pdf : sample.pdf;
-    sample.spread = rough ? spread.spread : sample.spread;
-    sample.specular = sample.specular & !rough;
+    if (ANY(rough)) {
+        BsdfSample spread = rough_dielectric_sample(m, wo, u, lobe);
+        sample.wi = choose(rough, spread.wi, sample.wi);
+        sample.weight = choose(rough, spread.weight, sample.weight);
+        sample.pdf = rough ? spread.pdf : sample.pdf;
+        sample.spread = rough ? spread.spread : sample.spread;
+        sample.specular = sample.specular & !rough;
+    }
 #endif
     return sample;
 }

@@ -1,45 +1,66 @@
 // Ground glass: Fresnel's and Snell's laws at microfacets, whose normals h are drawn among those visible from wo (Walter et
 // al. 2007, eq. 20 and 21, with the height-correlated G2 for both sides). Local frame; beyond the surface wi.z < 0.
 //
-// A single bounce: light that meets a second microfacet is lost, so none is made. docs/scene-format.md says how much.
+// A single bounce: light that meets a second microfacet is lost. DIELECTRIC_ENERGY gives that back (dielectric_energy.cl).
 #include "bsdf/ggx.cl"
+#include DIELECTRIC_ENERGY_FILE
 
-// The density of wi, on either side of the surface; *weight: f·|cos| over it, but for the spread.
-static inline real rough_dielectric(const struct dielectric *m, real3 wo, real3 wi, real3 *weight) {
-    ireal reflected = wi.z > 0.0f, mirrored = reflected | IS_THIN(m);
-    real3 sum = choose(mirrored, add(wo, vector(wi.x, wi.y, absolute(wi.z))), mad3(wi, m->eta, wo));
+// The density with which microfacets reflect, or else pass, light to wi; that may be on the wrong side of the surface.
+// *d: how light divides there.
+static inline real scattered_pdf(const struct dielectric *m, real3 wo, real3 wi, ireal reflected, Division *d) {
+    ireal mirrored = reflected | IS_THIN(m);
+    real3 sum = choose(mirrored, add(wo, vector(wi.x, wi.y, reflected ? wi.z : -wi.z)), mad3(wi, m->eta, wo));
     real length2 = dot3(sum, sum), length = sqrt(length2);
     real3 h = scale(sum, (sum.z < 0.0f ? (real)(-1.0f) : ONE) / length);
     real cos_o = mirrored ? 0.5f * length : dot3(wo, h), cos_i = dot3(wi, h), cos_t;
     real f = fresnel_dielectric(cos_o, m->eta, &cos_t);
-    Division d = divide_light(m, mirrored ? f : fresnel_of_cosines(cos_o, -cos_i, m->eta));
-    real lambda_o = ggx_lambda(wo, m->alpha), lambda_i = ggx_lambda(wi, m->alpha);
+    *d = divide_light(m, mirrored ? f : fresnel_of_cosines(cos_o, -cos_i, m->eta));
     // Of the normals visible from wo, of which dωi = 4·cos_o dωh or |wo + eta·wi|²/(eta²·|cos_i|) dωh is made.
-    real visible = ggx_d(h, m->alpha) / (wo.z * (1.0f + lambda_o));
+    real visible = ggx_d(h, m->alpha) / (wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
     real turned = mirrored ? (real)(0.25f) : cos_o * m->eta * m->eta * absolute(cos_i) / length2;
-    real pdf = visible * turned * (reflected ? d.reflected : 1.0f - d.reflected);
-    real seen = (1.0f + lambda_o) / (1.0f + lambda_o + lambda_i);
-    *weight = scale(choose(reflected, d.reflection, d.transmission), seen);
-    ireal possible = (m->alpha > 0.0f) & (wo.z > 0.0f) & (cos_o > 0.0f) & (mirrored | (cos_i < 0.0f));
+    real pdf = visible * turned * (reflected ? d->reflected : 1.0f - d->reflected);
+    ireal possible = (m->alpha > 0.0f) & (wo.z > 0.0f) & (cos_o > 0.0f) & (mirrored ? sum.z > 0.0f : cos_i < 0.0f);
     return possible ? pdf : ZERO;
+}
+
+// The density of wi, on either side of the surface; *value: f·|cos|, but for the spread.
+static inline real rough_dielectric(const struct dielectric *m, real3 wo, real3 wi, real3 *value) {
+    *value = splat(ZERO);
+    if (!ANY(m->alpha > 0.0f)) return ZERO;
+    ireal reflected = wi.z > 0.0f;
+    Division d;
+    real pdf = scattered_pdf(m, wo, wi, reflected, &d);
+    real lambda_o = ggx_lambda(wo, m->alpha), lambda_i = ggx_lambda(wi, m->alpha);
+    real seen = pdf * (1.0f + lambda_o) / (1.0f + lambda_o + lambda_i);
+    *value = choose(pdf > 0.0f, scale(choose(reflected, d.reflection, d.transmission), seen), splat(ZERO));
+#if DIELECTRIC_ENERGY
+    ireal folds = keeps_light(m);
+    if (ANY(folds)) pdf += folds ? scattered_pdf(m, wo, vector(wi.x, wi.y, -wi.z), reflected, &d) : ZERO;
+    pdf = all_bounces(m, wo, wi, pdf, value);
+#endif
+    return pdf;
 }
 
 static inline ireal dielectric_transmits(const struct dielectric *m) { return m->alpha > 0.0f; }
 
 static inline real3 dielectric_eval(const struct dielectric *m, real3 wo, real3 wi) {
-    real3 weight;
-    real pdf = rough_dielectric(m, wo, wi, &weight);
-    real spread = wi.z > 0.0f ? ONE : dielectric_spread(m);
-    return choose(pdf > 0.0f, scale(weight, pdf * spread), splat(ZERO));
+    real3 value;
+    rough_dielectric(m, wo, wi, &value);
+    return scale(value, wi.z > 0.0f ? ONE : dielectric_spread(m));
 }
 
 static inline real dielectric_pdf(const struct dielectric *m, real3 wo, real3 wi) {
-    real3 weight;
-    return rough_dielectric(m, wo, wi, &weight);
+    real3 value;
+    return rough_dielectric(m, wo, wi, &value);
 }
 
 static inline BsdfSample rough_dielectric_sample(const struct dielectric *m, real3 wo, real2 u, real lobe) {
     real3 h = sample_visible_normal(wo, maximum(m->alpha, (real)(ALPHA_MIN)), u);
+#if DIELECTRIC_ENERGY
+    real chance = later_chance(m, lost_from(m, m->inside, wo.z));
+    ireal later = lobe < chance, returns = lobe < chance * m->returned;
+    lobe = minimum((lobe - chance) / (1.0f - chance), BELOW_ONE);
+#endif
     real cos_t, cos_o = dot3(wo, h);
     Division d = divide_light(m, fresnel_dielectric(cos_o, m->eta, &cos_t));
     ireal reflected = lobe < d.reflected;
@@ -49,10 +70,17 @@ static inline BsdfSample rough_dielectric_sample(const struct dielectric *m, rea
     real3 straight = vector(mirrored.x, mirrored.y, -mirrored.z);
     BsdfSample sample = no_sample();
     sample.wi = choose(reflected, mirrored, choose(IS_THIN(m), straight, refracted));
+#if DIELECTRIC_ENERGY
+    sample.wi = choose(later, sample_later(m, u), sample.wi);
+    reflected = later ? returns : reflected;
+    real folded = reflected ? absolute(sample.wi.z) : -absolute(sample.wi.z);
+    sample.wi.z = (later | keeps_light(m)) ? folded : sample.wi.z;
+#endif
     ireal kept = reflected ? sample.wi.z > 0.0f : sample.wi.z < 0.0f;
-    real pdf = rough_dielectric(m, wo, sample.wi, &sample.weight);
+    real3 value;
+    real pdf = rough_dielectric(m, wo, sample.wi, &value);
     sample.pdf = kept ? pdf : ZERO;
-    sample.weight = choose(sample.pdf > 0.0f, sample.weight, splat(ZERO));
+    sample.weight = choose(sample.pdf > 0.0f, scale(value, 1.0f / pdf), splat(ZERO));
     sample.spread = reflected ? ONE : dielectric_spread(m);
     return sample;
 }

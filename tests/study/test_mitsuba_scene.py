@@ -82,7 +82,8 @@ def test_materials_are_told_by_what_they_reflect() -> None:
 
 @pytest.mark.parametrize(("material", "words"), [
     (MetallicRoughness(clearcoat=0.5), "with layers"), (MetallicRoughness(smith="schlick"), 'smith = "separable"'),
-    (Dielectric(roughness=0.5), "rougher than 0.3"), (Diffuse(one_sided=True), "one side")])
+    (Dielectric(roughness=0.5, multiple_scattering=False), "rougher than 0.3"),
+    (Dielectric(roughness=0.2), "multiple_scattering = false"), (Diffuse(one_sided=True), "one side")])
 def test_what_has_no_counterpart_is_refused_by_name(material: Material, words: str) -> None:
     with pytest.raises(UsageError, match=f"the ball: Mitsuba cannot draw .*{words}"):
         mitsuba_scene(ball(material))
