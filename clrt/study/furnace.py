@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple, get_args
 
 import numpy as np
 
 from ..device.open import Device
-from ..scene.materials import Diffuse, MetallicRoughness, Mirror
+from ..scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror
 from ..scene.metallic_roughness import Smith
 from ..scene.microfacets import albedo
 from .bsdfs import Bsdfs, bsdfs
@@ -19,6 +19,10 @@ COSINES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 1e-2, 1e-3, 1e-4)
 SMITHS: tuple[Smith, ...] = get_args(Smith)
 IORS = (1.0, 1.2, 1.5, 2.5, 4.0)
 COLOR = (0.8, 0.5, 0.2)
+#: Rough glass from nearly smooth to the roughest, of every index, and thin sheets.
+GLASSES = [Dielectric(ior=ior, roughness=roughness, thin=thin)
+           for ior, thin in [*((ior, False) for ior in (0.25, 0.7, 0.99, 1.01, 1.1, 1.33, 1.5, 2.4, 4.0)), (1.5, True)]
+           for roughness in ROUGHNESSES[1:]]
 
 
 class Reflected(NamedTuple):
@@ -28,6 +32,15 @@ class Reflected(NamedTuple):
     cosine: float
     found: float
     exact: float
+
+
+class Kept(NamedTuple):
+    """Fraction of light that white glass reflects and transmits, seen from its front or back; 1 is exact."""
+
+    glass: Dielectric
+    front: bool
+    cosine: float
+    found: float
 
 
 def measure_metals(device: Device, samples: int, smiths: Iterable[Smith] = SMITHS) -> Iterator[Reflected]:
@@ -51,6 +64,16 @@ def measure_plastics(device: Device, samples: int) -> Iterator[Reflected]:
     for which, plastic in enumerate(plastics):
         for cosine in COSINES:
             yield Reflected(plastic, cosine, float(_weights(subject, which, cosine, numbers)[:, 0].mean()), 1.0)
+
+
+def measure_glass(device: Device, samples: int, glasses: Sequence[Dielectric] = GLASSES) -> Iterator[Kept]:
+    """White glasses seen from both sides, from every angle."""
+    subject, numbers = bsdfs(device, [*glasses]), evenly(samples)
+    for which, glass in enumerate(glasses):
+        for front in (True, False):
+            for cosine in COSINES:
+                found = float(_weights(subject, which, cosine, numbers, front)[:, 0].mean())
+                yield Kept(glass, front, cosine, found)
 
 
 def inexact(device: Device, samples: int) -> tuple[int, int]:
@@ -77,6 +100,6 @@ def _reversed_digits(count: int, base: int) -> Doubles:
     return mirrored
 
 
-def _weights(subject: Bsdfs, which: int, cosine: float, numbers: Doubles) -> Doubles:
+def _weights(subject: Bsdfs, which: int, cosine: float, numbers: Doubles, front: bool = True) -> Doubles:
     wo = np.array([np.sqrt(1 - cosine**2), 0.0, cosine])
-    return subject.sample(which, wo, numbers)[1]
+    return subject.sample(which, wo, numbers, front)[1]

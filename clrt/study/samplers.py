@@ -14,7 +14,7 @@ from ..scene.materials import Diffuse, Material
 from ..scene.model import Camera, RenderSettings, Scene, Sphere
 from .accumulation import accumulate, stream_errors
 from .bsdfs import Bsdfs, bsdfs
-from .furnace import SMITHS, inexact, measure_metals, measure_plastics
+from .furnace import GLASSES, SMITHS, inexact, measure_glass, measure_metals, measure_plastics
 from .jacobians import check_density
 from .light_sampling import light_tests
 from .probe import Probe
@@ -26,6 +26,8 @@ from .warps import warp_density_errors, warp_p_values, warp_probe
 
 #: What furnaces may be off the albedo of one bounce, and 1 with multiple scattering.
 FURNACE = 1e-3
+#: What furnaces of rough glass may be off 1.
+GLASS_FURNACE = 2e-3
 #: What a density may miss 1/area and a closed form by, and a mean of the film the true one.
 AREA, DENSITY, MEAN = 2e-3, 1e-5, 1e-6
 LAMP_SAMPLES = 64
@@ -74,6 +76,10 @@ def _furnaces(device: Device, effort: Effort) -> Iterator[Row]:
                         ("white under gloss reflects all", list(measure_plastics(device, effort.furnace)))):
         errors = [abs(each.found - each.exact) for each in found]
         yield Row("L1", what, len(errors), sum(not error <= FURNACE for error in errors), max(errors), "largest error")
+    glasses = list(measure_glass(device, 4 * effort.furnace, GLASSES[::effort.step]))
+    errors = [abs(kept.found - 1) for kept in glasses]
+    wrong = sum(not error <= GLASS_FURNACE for error in errors)
+    yield Row("L1", "white rough glass keeps all light", len(errors), wrong, max(errors), "largest error")
 
 
 def _materials(device: Device, effort: Effort) -> Iterator[Row]:

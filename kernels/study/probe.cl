@@ -74,14 +74,16 @@ kernel void probe_accumulate(SCENE_PARAMETERS, uint n, global const float *in, g
     put(out, n, 13, TO_REAL(a.dropped));
 }
 
-// A material, by its code, somewhere on a surface that is seen from wo; where its picture begins, if normal maps bend it under a coat.
+// A material, by its code, on a surface that is seen from wo, at the origin of its texture coordinates.
 static Bsdf material_at(const Scene *scene, real code, real3 wo, ireal front) {
     Surface surface;
     surface.material = TO_INT(code);
     surface.front = front;
     surface.cos_o = wo.z;
-#if COAT_NORMALS
+#if TEXTURES
     for (int i = 0; i < UV_SETS; ++i) surface.at.set[i] = (real2){ZERO, ZERO};
+#endif
+#if COAT_NORMALS
     surface.unbent = surface.ns = vector(ZERO, ZERO, ONE);
     surface.tangent = vector(ONE, ZERO, ZERO);
     surface.handedness = ONE;

@@ -12,14 +12,16 @@ from clrt.device.open import Device
 from clrt.rendering.choices import Choices
 from clrt.rendering.compile import compile_scene
 from clrt.scene.file import load
-from clrt.scene.materials import MetallicRoughness
+from clrt.scene.materials import Dielectric, MetallicRoughness
 from clrt.scene.metallic_roughness import Smith
-from clrt.scene.model import Scene, Sphere
+from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
+from clrt.scene.textures import Picture, Texture
 from clrt.study.bsdfs import bsdfs
-from clrt.study.furnace import SMITHS, Reflected, evenly, inexact, measure_metals
-from clrt.study.scattering import above
+from clrt.study.furnace import SMITHS, Reflected, evenly, inexact, measure_glass, measure_metals
+from clrt.study.scattering import ROUNDING, above, reciprocity
 
 from . import ggx
+from .pictures import film
 
 Doubles = NDArray[np.float64]
 SAMPLES = 1 << 14
@@ -103,6 +105,69 @@ def test_samples_weigh_little(device: Device) -> None:
         for cosine in (1.0, 0.1, 1e-3):
             wo = np.array([np.sqrt(1 - cosine**2), 0, cosine])
             assert whites.sample(which, wo, numbers)[1].max() < 4
+
+
+def random_glasses(rng: np.random.Generator, count: int) -> list[Dielectric]:
+    """Rough glasses of every index, a third of them near 1; every fourth a thin sheet."""
+    near = 1 + rng.choice([-1, 1], count) * 10**rng.uniform(-2.5, -1, count)
+    iors = np.where(rng.random(count) < 1 / 3, near, 4**rng.uniform(-1, 1, count))
+    return [Dielectric(ior=float(ior), roughness=float(roughness), thin=i % 4 == 3)
+            for i, (ior, roughness) in enumerate(zip(iors, rng.uniform(0.01, 1, count)))]
+
+
+def test_rough_glass_keeps_all_light(device: Device) -> None:
+    """As much light leaves as arrives, from both sides, every angle; at the most grazing one samples need longest."""
+    kept = list(measure_glass(device, 2 * SAMPLES, random_glasses(np.random.default_rng(3), 12)))
+    assert len(kept) == 240
+    assert not [glass for glass in kept if not abs(glass.found - 1) < (2e-3 if glass.cosine > 1e-4 else 5e-3)]
+
+
+def test_rough_glass_is_reciprocal(device: Device) -> None:
+    glasses = random_glasses(np.random.default_rng(4), 8)
+    subject = bsdfs(device, [*glasses])
+    for which, glass in enumerate(glasses):
+        assert reciprocity(subject, which, 4000, which).max() < 5 * ROUNDING, glass
+
+
+def test_rough_glass_from_inside_is_that_of_the_inverse_index(device: Device) -> None:
+    """Samples, weights and densities, of which the other tests look at those from outside."""
+    numbers = evenly(1 << 12)
+    for ior, roughness in ((1.5, 0.3), (2.0, 1.0), (0.5, 0.6), (1.25, 0.1)):
+        glass = bsdfs(device, [Dielectric(ior=ior, roughness=roughness), Dielectric(ior=1 / ior, roughness=roughness)])
+        for cosine in (0.9, 0.4, 0.05):
+            wo = np.array([np.sqrt(1 - cosine**2), 0.0, cosine])
+            inside, outside = glass.sample(0, wo, numbers, front=False), glass.sample(1, wo, numbers)
+            same = inside[2] > 0
+            assert same.mean() > 0.4 and np.mean(same == (outside[2] > 0)) > 0.999
+            wi = inside[0][same]
+            for found, expected in zip(glass.value(0, wo, wi, front=False), glass.value(1, wo, wi)):
+                np.testing.assert_allclose(found, expected, rtol=2e-3)
+            assert np.median(np.abs(inside[1] - outside[1])) < 1e-4
+
+
+def test_a_furnace_does_not_see_rough_glass(device: Device) -> None:
+    """Paths go through a sphere, and the picture is 1; a single bounce between microfacets loses most of it."""
+    for multiple in (True, False):
+        ball = Sphere(material=Dielectric(roughness=0.8, multiple_scattering=multiple))
+        camera = Camera(position=(0.0, 0.0, 9.0), fov_degrees=8.0)
+        mean = film(device, Scene(spheres=[ball], camera=camera, environment=Environment(color=WHITE),
+                                  render=RenderSettings(size=(32, 32), spp=256, max_depth=256))).mean.mean()
+        assert abs(mean - 1) < 3e-3 if multiple else mean < 0.8
+
+
+def test_textured_rough_glass_keeps_all_light(device: Device) -> None:
+    """Between the rows of its table too, which other glass of the scene does not have."""
+    textures = [Texture(picture=Picture(np.full((1, 1, 4), grey, np.uint8))) for grey in (0, 12, 31, 60, 129, 200, 255)]
+    glasses = [Dielectric(roughness=0.4), *(Dielectric(roughness=texture) for texture in textures)]
+    kept = list(measure_glass(device, 2 * SAMPLES, glasses))
+    assert not [glass for glass in kept if not abs(glass.found - 1) < 2e-3]
+    assert any(glass.found != 1 for glass in kept if glass.glass.roughness == textures[3])
+
+
+def test_single_scattering_of_rough_glass_loses_light(device: Device) -> None:
+    """What multiple scattering restores, by more than half at most."""
+    glass = Dielectric(roughness=1.0, multiple_scattering=False)
+    assert min(kept.found for kept in measure_glass(device, SAMPLES, [glass])) < 0.5
 
 
 def test_only_those_who_ask_pay(device: Device) -> None:
