@@ -22,7 +22,7 @@ WRONG_WARPS = {
     "visible normals": ("vector(wo.x * alpha, wo.y * alpha, wo.z)", "vector(wo.x * alpha, wo.y * alpha, 1.1f * wo.z)"),
 }
 WRONG_LIGHTS = {
-    "sphere": ("return sin2 < 1.0f ? sin2 /", "return sin2 < 1.0f ? 0.9f * sin2 /"),
+    "sphere": ("return outside ? sin2 /", "return outside ? 0.9f * sin2 /"),
     "few": ("below += chances[i];", "below += 1.01f * chances[i];"),
     "many": ("real chances[NODE], chance;", "real chances[NODE], chance; u *= 0.9f;"),
     "sky": ("(TO_REAL(column) + x)", "(TO_REAL(column) + 0.9f * x)"),
