@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from .accel.kernels import HitTests, tree_buffers, tree_defines, tree_features, tree_files
 from .accel.layouts import LANES, Layout
 from .accel.wide import EMPTY
-from .device.arrays import resident
+from .device.arrays import lent, resident
 from .device.launch import LaunchSize, run_seconds, wait_for
+from .device.lending import begin_copy, take_back
 from .device.loops import loop_turns
 from .device.open import Device
 from .device.preamble import defines, scene_struct, typedefs
@@ -160,23 +161,22 @@ class TreeQuery:
 
     def _ask_chunk(self, name: str, inputs: list[NDArray[np.float32]], answers: NDArray[Any]) -> None:
         """Writes over `answers`; a CPU works on the arrays themselves."""
-        n, context, queue, flags = len(answers), self.device.context, self.device.queue, cl.mem_flags
-        source = flags.USE_HOST_PTR if self.device.info.type == "cpu" else flags.COPY_HOST_PTR
-        buffers = [cl.Buffer(context, flags.READ_ONLY | source, hostbuf=array) for array in inputs]
-        output = cl.Buffer(context, flags.READ_WRITE | source, hostbuf=answers)
+        n = len(answers)
+        buffers, output = [lent(self.device, array) for array in inputs], lent(self.device, answers, writable=True)
         traversal = self._way(name, inputs[1])
         kernel, local = self._kernel(name, traversal), self.device.local_size
         groups = -(-n // ((SHARE if traversal == "pool" else self.device.lanes) * local))
         start = time.perf_counter()
         with self._lock:  # another thread's arguments must not come between
             kernel.set_args(*self._scene, self._counts[0], *buffers, output, np.float32(self.frame.unit), np.uint32(n))
-            launched = cl.enqueue_nd_range_kernel(queue, kernel, (groups * local,), (local,))
+            launched = cl.enqueue_nd_range_kernel(self.device.queue, kernel, (groups * local,), (local,))
         wait_for(launched)
         seconds = run_seconds(launched) or time.perf_counter() - start
         self.kernel_seconds += seconds
         self.longest_launch = max(self.longest_launch, seconds)
         self._sizes[name].learn(n, seconds)
-        wait_for(cl.enqueue_copy(queue, answers, output, is_blocking=False))
+        wait_for(begin_copy(self.device, answers, output))
+        take_back(*buffers, output)
 
     def _way(self, name: str, directions: NDArray[np.float32]) -> str:
         """The traversal for these rays."""

@@ -10,6 +10,7 @@ import pyopencl as cl
 from numpy.typing import DTypeLike, NDArray
 
 from .driver_errors import driver_errors
+from .lending import lend
 from .open import Device
 
 
@@ -65,12 +66,12 @@ def on_device(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
 
 
 @driver_errors()
-def lent(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
-    """A buffer to read from only: on a CPU the numpy array itself, which must not change then; elsewhere `on_device`.
-    """
+def lent(device: Device, array: NDArray[Any] | DeviceArray, writable: bool = False) -> cl.Buffer:
+    """A buffer to read from, or to write to as well: on a CPU the numpy array itself (see lending.py), which must not
+    change then; elsewhere `on_device`."""
     if isinstance(array, DeviceArray) or device.info.type != "cpu" or not array.flags.c_contiguous:
         return on_device(device, array)
-    return cl.Buffer(device.context, cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR, hostbuf=array)
+    return lend(device, array, cl.mem_flags.READ_WRITE if writable else cl.mem_flags.READ_ONLY)
 
 
 def resident(device: Device, array: NDArray[Any] | DeviceArray) -> DeviceArray:

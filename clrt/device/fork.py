@@ -13,6 +13,11 @@ def check_process() -> None:
     """UsageError in a process that was forked from one in which this was called before."""
     global _process
     _process = _process or os.getpid()
-    if _process != os.getpid():
+    if is_forked():
         raise UsageError("this process was forked from one that had used OpenCL, which does not work: start it with "
                          "multiprocessing's spawn method, or use clrt in children alone")
+
+
+def is_forked() -> bool:
+    """Whether this process was forked from one that uses OpenCL."""
+    return _process not in (0, os.getpid())

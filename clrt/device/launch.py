@@ -7,7 +7,6 @@ flight, and their events are polled. One that has not ended after `patience` has
 
 from __future__ import annotations
 
-import atexit
 import threading
 import time
 from collections import deque
@@ -17,9 +16,11 @@ from contextlib import contextmanager
 import pyopencl as cl
 
 from ..errors import DeviceError, HungError
+from .callbacks import when_complete
 from .contexts import share_no_more
 from .driver_errors import driver_errors
 from .fork import check_process
+from .lending import settle
 from .open import Device
 from .pulse import VARIABLE, counted_call, note_hang, patience
 
@@ -35,9 +36,6 @@ IN_FLIGHT = 2
 LONGEST_LOOK = 0.1
 #: Seconds after which a launch is no short one.
 SOON = 2e-4
-#: Of drivers, that are still to come; and whether no more should.
-_callbacks: set[threading.Event] = set()
-_python_ends = threading.Event()
 
 
 class LaunchSize:
@@ -180,33 +178,17 @@ def wait_for(event: cl.Event) -> None:
     start, wait = time.perf_counter(), Wait()
     while not wait.is_over(event):
         if time.perf_counter() - start > SOON:
-            return _wait_long(event, wait)
+            _wait_long(event, wait)
+            break
         time.sleep(1e-5)
+    settle()
 
 
 def _wait_long(event: cl.Event, wait: Wait) -> None:
     ended, pause = threading.Event(), SOON
-
-    def called(_: int) -> None:
-        ended.set()
-        _callbacks.discard(ended)
-
-    _callbacks.add(ended)
-    if _python_ends.is_set():
-        _callbacks.clear()
-    else:
-        with calling():
-            event.set_callback(cl.command_execution_status.COMPLETE, called)
+    with calling():
+        when_complete(event, ended.set)
     while not wait.is_over(event):
         ended.wait(pause)
         ended.clear()
         pause = min(2 * pause, LONGEST_LOOK)
-
-
-@atexit.register
-def _let_callbacks_end() -> None:
-    """One that came while Python ends would abort the process; threads that still wait then do without."""
-    _python_ends.set()
-    start = time.perf_counter()
-    while _callbacks and time.perf_counter() < start + 1:
-        time.sleep(1e-3)

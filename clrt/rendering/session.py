@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..accel.kernels import TREELESS
 from ..device.arrays import on_device
 from ..device.launch import Launches, calling, wait_for
+from ..device.lending import begin_copy
 from ..device.open import Device
 from ..errors import NoRoomError
 from ..scene.model import RenderSettings
@@ -110,7 +111,7 @@ class Session(Accumulation):
         self.wait()
         pixels = self._copies.array()
         with calling():
-            copied = cl.enqueue_copy(self.device.queue, pixels, self._film, is_blocking=False)
+            copied = begin_copy(self.device, pixels, self._film)
         wait_for(copied)
         film = Film(pixels)
         check_samples(self.device, film, self.work, self.size)
@@ -121,7 +122,7 @@ class Session(Accumulation):
         self.work = work
         self._begin_work()
         with calling():
-            copied = cl.enqueue_copy(self.device.queue, self._film, film.pixels, is_blocking=False)
+            copied = begin_copy(self.device, self._film, film.pixels)
         wait_for(copied)
 
 

@@ -11,6 +11,7 @@ import pyopencl as cl
 from numpy.typing import NDArray
 
 from ..device.launch import IN_FLIGHT, Launches, calling
+from ..device.lending import begin_copy
 from ..device.open import Device
 from ..errors import NoRoomError
 from .compile import CompiledScene
@@ -18,9 +19,6 @@ from .on_device import WINDOW, SceneOnDevice, largest_film
 from .session import FEWEST_TILES, first_launch_samples
 from .tiles import TILE_PIXELS
 from .work import Part
-
-#: Copies that belong to a share.
-COPIES = 3
 
 
 class Window(NamedTuple):
@@ -54,7 +52,6 @@ class Worker:
         self._windows = self._make_windows()
         self.launches = Launches(first_launch_samples(compiled))
         self.at: deque[Share] = deque()
-        self._copies: list[cl.Event] = []   # their end is waited for where they are given up
         self.samples = 0
 
     @property
@@ -81,17 +78,17 @@ class Worker:
 
     def begin(self, share: Share) -> None:
         """Enqueues a share of at most `window_tiles` tiles; its arrays belong to the device until it has ended."""
-        part, queue, window = share.part, self.scene.device.queue, self._windows[0]
+        part, device, window = share.part, self.scene.device, self._windows[0]
         self._windows.rotate(1)
         pixels, launch = len(share.tiles) * TILE_PIXELS, self.scene.launch
         launch["first_pixel"], launch["pixel_count"] = 0, pixels
         launch["first_sample"], launch["sample_count"] = part.samples, part.more
         with calling():
-            self._copies.append(cl.enqueue_copy(queue, window.tiles, share.tiles, is_blocking=False))
-            self._copies.append(cl.enqueue_copy(queue, window.film, share.pixels, is_blocking=False))
+            begin_copy(device, window.tiles, share.tiles)
+            begin_copy(device, window.film, share.pixels)
             event = self.scene.enqueue_pixels(window.film, window.tiles)
-            self._copies.append(last := cl.enqueue_copy(queue, share.pixels, window.film, is_blocking=False))
-            queue.flush()
+            last = begin_copy(device, share.pixels, window.film)
+            device.queue.flush()
         self.at.append(share)
         self.launches.begin(event, last, pixels * part.more)
 
@@ -100,6 +97,5 @@ class Worker:
         if not self.launches.poll():
             return None
         share = self.at.popleft()
-        del self._copies[:COPIES]
         self.samples += len(share.tiles) * TILE_PIXELS * share.part.more
         return share

@@ -1,0 +1,188 @@
+"""Arrays that are lent to a device: they outlive the commands that use them, wherever those who launched these leave.
+"""
+
+from __future__ import annotations
+
+import gc
+import subprocess
+import sys
+import time
+import weakref
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+import clrt
+from clrt.device import arrays, lending
+from clrt.device.open import Device
+
+RNG = np.random.default_rng(5)
+RAYS = RNG.normal(size=(2, 500, 3)).astype(np.float32)
+MESH = RNG.random((50, 3)).astype(np.float32), RNG.integers(0, 50, (100, 3), dtype=np.int32)
+#: Of clrt's, after a launch: those in which it is noted and waited for.
+LINES = 160
+
+
+class Gate:
+    """Lets no command that is enqueued while it is closed begin before it is opened."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.launched = self.closed = False
+        self.lent: list[weakref.ref[Any]] = []
+        self.at_launch: list[weakref.ref[Any]] = []
+        self._bars: list[cl.UserEvent] = []
+        enqueue, lend = cl.enqueue_nd_range_kernel, lending.lend
+
+        def launch(queue: cl.CommandQueue, *arguments: Any) -> cl.Event:
+            if self.closed:
+                self._bars.append(bar := cl.UserEvent(queue.context))
+                cl.enqueue_barrier(queue, wait_for=[bar])
+                self.launched, self.at_launch = True, [each for each in self.lent if each() is not None]
+            return enqueue(queue, *arguments)
+
+        def noted(device: Device, array: Any, access: int) -> lending.LentBuffer:
+            self.lent.append(weakref.ref(array))
+            return lend(device, array, access)
+
+        monkeypatch.setattr(cl, "enqueue_nd_range_kernel", launch)
+        monkeypatch.setattr(arrays, "lend", noted)
+        monkeypatch.setattr("clrt.device.launch.LONGEST_LOOK", 1e-3)
+
+    def open(self) -> None:
+        """Lets all begin."""
+        self.closed = False
+        while self._bars:
+            self._bars.pop().set_status(cl.command_execution_status.COMPLETE)
+
+
+@pytest.fixture
+def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
+    made = Gate(monkeypatch)
+    yield made
+    made.open()
+
+
+def left(references: list[weakref.ref[Any]]) -> int:
+    """How many of these objects there are."""
+    gc.collect()
+    return sum(each() is not None for each in references)
+
+
+def soon(condition: Callable[[], bool]) -> bool:
+    end = time.perf_counter() + 20
+    while not condition() and time.perf_counter() < end:
+        time.sleep(1e-3)
+    return condition()
+
+
+def query(device: Device) -> clrt.RayQuery:
+    return clrt.RayQuery(*MESH, device=device.info.index)
+
+
+def renderer(device: Device, count: int = 1) -> clrt.Renderer:
+    spheres = [clrt.Sphere(center=(x, 0.0, 0.0), radius=0.4) for x in range(-4, 5)]
+    scene = clrt.Scene(meshes=[clrt.Mesh(*MESH)], spheres=spheres, environment=clrt.Environment(color=(1.0, 1.0, 1.0)))
+    return clrt.Renderer(scene, size=(40, 24), spp=8, device=[device.info.index] * count)
+
+
+def first_hits(device: Device) -> Callable[[], object]:
+    made = renderer(device)
+    return partial(made.session.first_hits, made.scene, ["depth"])
+
+
+#: What is prepared to run launches when it is called.
+USES: dict[str, Callable[[Device], Callable[[], object]]] = {
+    "closest_hit": lambda device: partial(query(device).closest_hit, *RAYS),
+    "any_hit": lambda device: partial(query(device).any_hit, *RAYS),
+    "all_hits": lambda device: partial(query(device).all_hits, *RAYS),
+    "renderer": lambda device: partial(list, renderer(device).passes()),
+    "two devices": lambda device: partial(list, renderer(device, 2).passes()),
+    "first hits": first_hits}
+
+
+def interrupted(use: Callable[[], object], gate: Gate, line: int) -> None:
+    """Raises KeyboardInterrupt so many lines of clrt's after the first launch."""
+    passed = 0
+
+    def trace(frame: FrameType, event: str, _: object) -> Any:
+        nonlocal passed
+        passed += gate.launched and event == "line"
+        if passed > line:
+            passed = -10**9
+            raise KeyboardInterrupt
+        return trace if "/clrt/" in frame.f_code.co_filename else None
+
+    gate.closed = True
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        with suppress(KeyboardInterrupt):
+            use()
+    finally:
+        sys.settrace(before)
+
+
+@pytest.mark.parametrize("name", USES)
+def test_interrupted_at_any_line(device: Device, gate: Gate, name: str) -> None:
+    """Where all is forgotten at once there is still every array that the launch may use, and then none any more."""
+    if device.info.type != "cpu":
+        pytest.skip("arrays are lent to CPUs alone")
+    USES[name](device)()    # builds its programs
+    for line in RNG.permutation(LINES)[:12]:
+        gate.launched, gate.lent = False, []
+        use = USES[name](device)
+        interrupted(use, gate, int(line))
+        used = gate.at_launch
+        del use
+        assert gate.launched and used and left(used) == len(used), line
+        gate.open()
+        assert soon(lambda: left(used) == 0), line
+
+
+def test_memory_comes_back_by_itself(device: Device, gate: Gate) -> None:
+    """At once from an idle device, and from a busy one when its launches are done, without another call of clrt's."""
+    if device.info.type != "cpu":
+        pytest.skip("arrays are lent to CPUs alone")
+    for busy in (False, True):
+        gate.lent = []
+        running = renderer(device)
+        gate.closed = busy
+        running.session.wait()
+        next(running.session.render(1))
+        assert left(gate.lent)
+        del running
+        assert bool(left(gate.lent)) == busy
+        gate.open()
+        assert soon(lambda: left(gate.lent) == 0)
+
+
+LEAVING = """
+import sys, clrt
+scene = clrt.Scene(spheres=[clrt.Sphere()], environment=clrt.Environment(color=(1, 1, 1)))
+def some():
+    for number, state in enumerate(states):
+        if number == 3:
+            break
+states = clrt.Renderer(scene, size=(128, 128), spp=10**6, device=int(sys.argv[1])).passes()
+some()
+if sys.argv[2] == "break":
+    del states
+    clrt.render(scene, size=(16, 16), spp=1, device=int(sys.argv[1]))
+elif sys.argv[2] == "exception":
+    raise RuntimeError("as it is meant")
+"""
+
+
+@pytest.mark.parametrize("how", ["break", "end", "exception"])
+def test_process_lives(device: Device, how: str) -> None:
+    """Also where Python ends with launches in flight, and says nothing of its own then."""
+    done = subprocess.run([sys.executable, "-c", LEAVING, str(device.info.index), how], capture_output=True, text=True)
+    last = ["RuntimeError: as it is meant"] if how == "exception" else []
+    assert done.returncode == len(last) and done.stderr.splitlines()[-1:] == last, done.stderr
+    assert "ignored" not in done.stderr
