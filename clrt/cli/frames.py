@@ -7,7 +7,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from ..scene.model import Camera, Scene
 
 F = TypeVar("F", bound=Callable[..., Any])
+#: Fields of Outputs that say nothing of what is in a picture.
+FILES = {"inputs", "pictures", "report", "plot", "header", "spool", "_errors"}
 
 
 class Numbers(click.ParamType[str]):
@@ -102,10 +104,11 @@ class Sequence:
 
         facts = {**facts_of(scene, choices), "camera": ""}
         asked = self.outputs
+        shown = [(each.name, getattr(asked, each.name)) for each in fields(asked) if each.name not in FILES]
         if asked.spool:
             make_folder(asked.spool.parent)
         for number, camera in self._stills.items():
-            made_of = repr((sorted(facts.items()), camera, goal, asked.denoise, asked.view, asked.exposure, asked.aovs))
+            made_of = repr((sorted(facts.items()), camera, goal, shown))
             digest = hashlib.sha256(made_of.encode()).hexdigest()
             outputs = replace(self._of(number), header={"frame": number, "frame_hash": digest})
             done = self.resume and all(metadata_of(path, "clrt:frame_hash") == digest

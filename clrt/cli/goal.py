@@ -36,11 +36,12 @@ class Pace:
 
 @dataclass(frozen=True)
 class Goal:
-    """Where a render will stop, as far as that is known."""
+    """Where a render will stop, as far as that is known. percentile: of the tiles that are to have the error."""
 
     spp: int | None
     seconds: float | None
     error: float | None
+    percentile: float | None = None
 
     def done(self, state: State) -> float:
         """The part that is done, 0 to 1."""

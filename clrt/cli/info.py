@@ -25,8 +25,7 @@ if TYPE_CHECKING:
               help="For which device; see `clrt devices`. Default: the best, or a CPU where there is none.")
 @tracing_options
 def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple[str, ...], selector: str | None,
-            lanes: int | None, paths: str | None, triangle: str, box: str, sphere: str, offset: str,
-            builder: str | None, layout: str | None, tree: bool | None) -> None:
+            **chosen: Any) -> None:
     """Show what SCENE contains and what is compiled for it; renders nothing and needs no device."""
     if list_materials:
         from .material_list import material_lines
@@ -36,19 +35,19 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
         return
     if scene is None:
         raise click.UsageError("Missing argument 'SCENE'; write a scene file or a model, or --materials")
-    from ..accel.kernels import HitTests
-    from ..rendering.aovs import chosen_aovs, needs_direct_light, seen_first
-    from ..rendering.choices import WAVE_LANES, Choices, choices_on
+    from ..rendering.aovs import chosen_aovs, seen_first
+    from ..rendering.choices import choices_on
     from ..rendering.compile import compile_scene
     from ..rendering.first_hits import first_hit_program
+    from ..rendering.options import choices_of
     from ..scene.file import load
 
     names = chosen_aovs(",".join(aovs)) if aovs else ()
     content = load(scene)
-    choices = Choices(lanes or WAVE_LANES, layout, builder, HitTests(triangle, box, sphere), offset,
-                      needs_direct_light(names), paths, tree, bool(seen_first(names)))
+    choices = choices_of({**chosen, "aovs": names})
     device = _device(selector)
-    compiled = compile_scene(content, choices_on(device, choices, lanes) if device else choices, device=device)
+    choices = choices_on(device, choices, chosen["lanes"]) if device else choices
+    compiled = compile_scene(content, choices, device=device)
     built = compiled.tree
     film = prod(content.render.size) * compiled.choices.pixel.itemsize
     materials = {mesh.material for mesh in content.meshes} | {sphere.material for sphere in content.spheres}

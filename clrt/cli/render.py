@@ -140,13 +140,13 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         planned = planned_spp(content.render, spp, seconds, error)
         if denoiser is not None:
             check_denoisable(integrator or content.render.integrator)
+        goal = Goal(planned, seconds, error, error_percentile)
         if cluster and sequence:
-            goal = Goal(planned, seconds, error)
             if not render_frames(cluster, content, options, goal, sequence, progress):
                 sys.exit(130)
             return
         if cluster and is_huge(size or content.render.size):
-            if not render_huge(cluster, content, options, Goal(planned, seconds, error), results, progress):
+            if not render_huge(cluster, content, options, goal, results, progress):
                 sys.exit(130)
             return
         if opening is not None:
@@ -160,7 +160,6 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         atexit.register(gc.freeze)
         with Interruptible(renderer.interrupt) as interruptible:
             try:
-                goal = Goal(planned, seconds, error)
                 if sequence is None:
                     _render(renderer, results, goal, expected, denoiser, progress)
                 else:

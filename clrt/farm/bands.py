@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..errors import OutputError
 from ..output.rows import BLOCK_ROWS, write_rows
 from ..rendering.identity import facts_of
+from ..rendering.options import beyond
 from ..rendering.picture_warnings import DARK, bias_warnings, black_warnings, nonfinite_warnings
 from ..rendering.tiles import TILE, tiles_of
 from ..scene.validate import validate
@@ -36,6 +37,8 @@ BAND_PIXELS = 1 << 20
 BYTES = 12
 #: Of a band's report, what says nothing of the picture.
 OF_ONE = {"seconds", "samples_per_second", "rays_per_second", "stop_reason", "tile_noise", "clamped_part", "brightest"}
+#: Of an order, what is a fact by itself, and what differs from band to band.
+COMMON = {"scene", "options", "camera", "band"}
 
 
 @dataclass
@@ -128,9 +131,10 @@ class Banded:
     def _facts(self) -> dict[str, str]:
         """Of which render the bands are: with where it stops, for each stops by itself."""
         order = self.order
-        stops = {"spp": order.spp, "time": order.time, "error": order.error, "band_pixels": self.band_pixels,
-                 "error_percentile": order.options.get("error_percentile")}
-        return {**facts_of(order.settled, order.choices), **{name: str(value) for name, value in stops.items()}}
+        others = {"band_pixels": self.band_pixels, **beyond(order.options, order.scene.render),
+                  **{each.name: getattr(order, each.name) for each in fields(order) if each.name not in COMMON}}
+        return {**facts_of(order.settled, order.choices),
+                **{name: str(value) for name, value in others.items() if name != "device"}}
 
     def _span(self, band: tuple[int, int]) -> tuple[int, int]:
         """Where a band begins in the file, and its bytes."""

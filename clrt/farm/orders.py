@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..accel.kernels import HitTests
-from ..rendering.aovs import needs_direct_light
-from ..rendering.choices import WAVE_LANES, Choices
+from ..rendering.choices import Choices
+from ..rendering.options import choices_of, settings_of
 from ..scene.model import Camera, Scene
 
 
@@ -42,17 +41,10 @@ class PictureOrder:
     @property
     def settled(self) -> Scene:
         """The scene with those options that are settings of it."""
-        given = {name: value for name, value in self.options.items()
-                 if value is not None and hasattr(self.scene.render, name)}
         return replace(self.scene, camera=self.camera or self.scene.camera,
-                       render=replace(self.scene.render, **given))
+                       render=settings_of(self.scene.render, self.options))
 
     @property
     def choices(self) -> Choices:
         """What the options choose about the program."""
-        options = self.options
-        tests = HitTests(*(options.get(name, default) for name, default
-                           in (("triangle", "watertight"), ("box", "robust"), ("sphere", "robust"))))
-        return Choices(options.get("lanes") or WAVE_LANES, options.get("layout"), options.get("builder"), tests,
-                       options.get("offset", "bound"), needs_direct_light(options.get("aovs", ())),
-                       options.get("paths"), options.get("tree"))
+        return choices_of(self.options)

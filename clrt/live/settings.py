@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from ..errors import UsageError
 
 
 Selector = str | int | Sequence[str | int] | None
+#: Settings that are not a renderer's, or are given to it otherwise.
+OWN = {"device", "scale", "frame_rate", "samples", "denoise"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +43,7 @@ class Settings:
     @property
     def tracing(self) -> dict[str, Any]:
         """Those that a Renderer takes by the same names."""
-        return {name: getattr(self, name) for name in ("tree", "builder", "layout", "triangle")}
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in OWN}
 
     def size_of(self, size: tuple[int, int]) -> tuple[int, int]:
         """A scene's (width, height), scaled."""

@@ -14,6 +14,7 @@ from .camera import camera_file
 from .carried import Carried
 from .choices import Choices
 from .compile import CompiledScene, compile_scene
+from .identity import parts_of
 
 #: Settings that change neither buffers nor programs.
 PASSING = ("size", "spp", "max_depth", "seed", "adaptive")
@@ -62,6 +63,5 @@ class Compiler:
 def _differs_in_passing(scene: Scene, last: Scene) -> bool:
     """Whether no more than the camera and PASSING settings differ."""
     passing = {name: getattr(last.render, name) for name in PASSING}
-    packed = ("meshes", "instances", "spheres", "lights", "environment")
-    return (all(getattr(scene, name) is getattr(last, name) for name in packed)
+    return (all(getattr(scene, name) is getattr(last, name) for name in parts_of(scene) if name != "camera")
             and replace(scene.render, **passing) == last.render)

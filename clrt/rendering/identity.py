@@ -1,14 +1,15 @@
 """What makes a picture the one it is: facts by name, which two renders must share if one is to go on with the other.
 
-Of the scene all that shines, reflects or is seen, but no names; of the settings all but where to stop. What changes no
-more than rounding is left out: the device, how many lanes it has, and its trees.
+These are all fields of the scene, its settings and the choices but those that are named here, so what is added later
+counts by itself: names, what a scene holds beside what is seen, where to stop, and what changes no more than rounding
+(lanes and trees; the device, too).
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from dataclasses import asdict, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from importlib.metadata import version
 from typing import Any
 
@@ -16,40 +17,57 @@ import numpy as np
 
 from ..device.sources import kernel_digest
 from ..scene.instancing import prototypes
-from ..scene.model import Scene
+from ..scene.model import RenderSettings, Scene
 from .choices import Choices
 
-PARTS = ("camera", "meshes", "instances", "spheres", "lights", "environment")
-#: Of those in RenderSettings, beside the size.
-SETTINGS = ("max_depth", "seed", "integrator", "shadows", "sampler", "filter", "adaptive", "back_face_culling",
-            "clamp_direct", "clamp_indirect")
+#: What is left out of a Scene, of its settings, of Choices, and of all that is in a scene.
+UNSEEN = {"name", "render", "cameras", "animation", "materials", "source"}
+ENDS = {"spp"}
+ROUNDING = {"lanes", "layout", "builder", "paths", "tree", "first_hits"}
+NAMES = {"name", "material_name"}
 
 
 def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:
     """Each setting as text, each part of the scene and the kernels as the SHA-256 of what they are."""
-    settings = {name: getattr(scene.render, name) for name in SETTINGS} | asdict(choices.tests)
     width, height = scene.render.size
-    return {"version": version("clrt"), "kernels": kernel_digest(), "size": f"{width}x{height}",
-            **{name: str(value) for name, value in settings.items()}, "offset": choices.offset,
-            "direct_light": str(choices.direct_light),
-            **{part: _digest(_part(scene, part)) for part in PARTS}}
+    values = {**values_of(scene.render, choices), "size": f"{width}x{height}"}
+    return {"version": version("clrt"), "kernels": kernel_digest(),
+            **{name: str(value) for name, value in values.items()},
+            **{part: _digest(_part(scene, part)) for part in parts_of(scene)}}
+
+
+def values_of(settings: RenderSettings, choices: Choices) -> dict[str, Any]:
+    """The settings and choices that make a picture, by name; of the hit tests each."""
+    values = {field.name: getattr(settings, field.name) for field in fields(settings) if field.name not in ENDS}
+    for field in fields(choices):
+        value = getattr(choices, field.name)
+        if is_dataclass(value):
+            values |= {each.name: getattr(value, each.name) for each in fields(value)}
+        elif field.name not in ROUNDING:
+            values[field.name] = value
+    return values
+
+
+def parts_of(scene: Scene) -> list[str]:
+    """The names of what is seen of a scene."""
+    return [field.name for field in fields(scene) if field.name not in UNSEEN]
 
 
 def scene_hash(scene: Scene) -> str:
     """SHA-256 of all that shines, reflects or is seen in the scene."""
-    return _digest([_part(scene, part) for part in PARTS])
+    return _digest([_part(scene, part) for part in parts_of(scene)])
 
 
 def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:
     """What differs between two renders' facts, each in a few words, settings with both values."""
     told = []
-    for name, value in wanted.items():
-        if (other := found.get(name)) == value:
+    for name in {**wanted, **found}:
+        if (other := found.get(name)) == (value := wanted.get(name)):
             continue
         if name == "direct_light":
             told.append(f"{'without' if value == 'True' else 'with'} --aov direct or indirect")
         else:
-            hidden = name in (*PARTS, "kernels")
+            hidden = name == "kernels" or name in {field.name for field in fields(Scene)}
             told.append(f"other {name}" if hidden else f"{name} {other} instead of {value}")
     return told
 
@@ -81,11 +99,15 @@ def _pieces(value: object) -> Iterator[bytes | memoryview]:
                 yield from _pieces(item)
         case int() | float() | np.number():
             yield f"{float(value)!r},".encode()
+        case None | str():
+            yield f"{value!r},".encode()
+        case dict():
+            yield from _pieces([[name, value[name]] for name in sorted(value)])
         case _ if is_dataclass(value):
             yield f"{type(value).__name__}:".encode()
             for field in fields(value):
-                if field.name not in ("name", "material_name"):
+                if field.name not in NAMES:
                     yield f"{field.name}=".encode()
                     yield from _pieces(getattr(value, field.name))
         case _:
-            yield f"{value!r},".encode()
+            raise TypeError(f"a {type(value).__name__} in a scene, whose content is not known")

@@ -15,17 +15,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..accel.kernels import HitTests
 from ..device.open import Device, name_of, open_devices
 from ..errors import DeviceError
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validate import check_is_scene, validate
 from .accumulation import Accumulation
 from .adaptive import FLOOR_SPP, MOST_TIMES_PLANNED
-from .aovs import check_light, chosen_aovs, film_aovs, needs_direct_light, seen_first
+from .aovs import check_light, chosen_aovs, film_aovs, seen_first
 from .camera import camera_file
 from .checkpoint import check_of_none, open_checkpoints
-from .choices import WAVE_LANES, Choices, choices_on
+from .choices import choices_on
 from .compile import CompiledScene
 from .compiler import Compiler
 from .convergence import Convergence
@@ -33,6 +32,7 @@ from .crew import make_picture
 from .film import Film
 from .kept import Kept
 from .on_device import SceneOnDevice
+from .options import choices_of, settings_of
 from .picture_warnings import PictureWarnings
 from .session import depth_of
 from .state import State as State, check_reference
@@ -75,13 +75,12 @@ class Renderer:
                  checkpoint_seconds: float = 30.0, before: Renderer | None = None, first_hits: bool = False) -> None:
         check_is_scene(scene)
         check_stops(spp)
-        given = {name: value for name, value in locals().items() if value is not None and hasattr(scene.render, name)}
+        options = dict(locals())
         self._aovs, self._percentile = chosen_aovs(aovs), checked_percentile(error_percentile)
-        settings = replace(scene.render, **given)
+        settings = settings_of(scene.render, options)
         self.scene = replace(scene, render=settings)
         check_light(self._aovs, settings.integrator)
-        self.choices = Choices(lanes or WAVE_LANES, layout, builder, HitTests(triangle, box, sphere), offset,
-                               needs_direct_light(self._aovs), paths, tree, first_hits or bool(seen_first(self._aovs)))
+        self.choices = choices_of(options)
         self._open(device, lanes, on_phase, before)
         self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene, self.choices,
                                                    self.name)

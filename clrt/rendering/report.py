@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .features import biased_by
-from .identity import scene_hash
+from .identity import scene_hash, values_of
 from .renderer import Renderer, State
 
 
@@ -19,10 +19,7 @@ def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
         "scene": renderer.scene.name, "scene_hash": scene_hash(renderer.scene), "version": _version(),
         "device": renderer.name,
         "width": width, "height": height, "spp": state.spp,
-        "max_depth": settings.max_depth, "seed": settings.seed, "integrator": settings.integrator,
-        "shadows": settings.shadows, "sampler": settings.sampler, "filter": settings.filter,
-        "adaptive": settings.adaptive, "back_face_culling": settings.back_face_culling,
-        "clamp_direct": settings.clamp_direct, "clamp_indirect": settings.clamp_indirect,
+        **{name: value for name, value in values_of(settings, renderer.choices).items() if name != "size"},
         "seconds": renderer.seconds,
         "samples": samples, "samples_per_second": samples / seconds,
         "rays": state.film.rays, "rays_per_second": state.film.rays / seconds,

@@ -1,0 +1,190 @@
+"""Which picture a checkpoint, a frame, a band and a report are of: whatever is not exempted by name counts."""
+
+from __future__ import annotations
+
+import copy
+import inspect
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clrt
+from clrt.accel.kernels import HitTests
+from clrt.cli.frames import FILES, Sequence
+from clrt.cli.goal import Goal
+from clrt.cli.outputs import Outputs
+from clrt.device.open import Device
+from clrt.farm.bands import Banded
+from clrt.farm.orders import PictureOrder
+from clrt.live.settings import Settings
+from clrt.rendering.choices import Choices
+from clrt.rendering.identity import ENDS, NAMES, ROUNDING, UNSEEN, differences, facts_of, scene_hash
+from clrt.rendering.options import choices_of, settings_of
+from clrt.rendering.report import render_report
+from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
+from clrt.scene.materials import MATERIALS
+from clrt.scene.model import RenderSettings, Scene
+from clrt.scene.textures import Picture, Texture
+
+#: Of each setting and choice a value that is not the default.
+OTHER: dict[str, Any] = {
+    "size": (24, 16), "spp": 3, "max_depth": 3, "seed": 7, "integrator": "direct", "shadows": False,
+    "sampler": "independent", "filter": "tent", "adaptive": True, "back_face_culling": "all", "clamp_direct": 1.5,
+    "clamp_indirect": 2.5, "lanes": 1, "layout": "bvh2", "builder": "midpoint", "offset": "ulp", "direct_light": True,
+    "paths": "lanes", "tree": True, "first_hits": True, "triangle": "precomputed", "box": "plain", "sphere": "textbook"}
+TESTS = [each.name for each in fields(HitTests)]
+SETTINGS = [each.name for each in fields(RenderSettings)]
+CHOICES = [each.name for each in fields(Choices) if each.name != "tests"]
+WHITE, DOWN = (1.0, 1.0, 1.0), (0.0, -1.0, 0.0)
+LIGHTS = [PointLight(position=(0.0, 3.0, 0.0), intensity=WHITE), DirectionalLight(direction=DOWN, irradiance=WHITE),
+          SpotLight(position=(0.0, 3.0, 0.0), direction=DOWN, intensity=WHITE)]
+#: These alone a user does not name.
+BY_AOVS = {"direct_light"}
+
+
+def scene(**given: Any) -> Scene:
+    texture = Texture(picture=Picture(np.zeros((2, 2, 4), np.uint8)))
+    mesh = clrt.Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), clrt.Diffuse(color=texture))
+    return Scene(**{"meshes": [mesh], "instances": [clrt.Instance(mesh)], "spheres": [clrt.Sphere()],
+                    "lights": LIGHTS, **given})
+
+
+def changed(settings: RenderSettings, choices: Choices, name: str) -> tuple[RenderSettings, Choices]:
+    """With another value of one of them."""
+    if name in SETTINGS:
+        return replace(settings, **{name: OTHER[name]}), choices
+    if name in TESTS:
+        return settings, replace(choices, tests=replace(choices.tests, **{name: OTHER[name]}))
+    return settings, replace(choices, **{name: OTHER[name]})
+
+
+def test_no_name_is_without_an_example() -> None:
+    """So that a field that is added is tested by what follows."""
+    assert {*SETTINGS, *CHOICES, *TESTS} == OTHER.keys()
+
+
+@pytest.mark.parametrize("name", [*SETTINGS, *CHOICES, *TESTS])
+def test_every_setting_and_choice_counts_but_for_those_named(name: str) -> None:
+    content, choices = scene(), Choices()
+    settings, chosen = changed(content.render, choices, name)
+    told = differences(facts_of(content, choices), facts_of(replace(content, render=settings), chosen))
+    assert bool(told) == (name not in ENDS | ROUNDING), told
+    assert all(name in each or name == "direct_light" for each in told)
+
+
+def test_what_is_added_counts_by_itself() -> None:
+    """A setting, a choice, a part of a scene and a parameter of a material that nobody has heard of."""
+    def more(kind: type, value: object) -> Any:
+        return make_dataclass(f"More{kind.__name__}", [("novel", object, field(default=value, kw_only=True))],
+                              bases=(kind,), frozen=getattr(kind, "__dataclass_params__").frozen, eq=False)
+
+    for kind, made in ((RenderSettings, lambda new: (scene(render=new()), Choices())),
+                       (Choices, lambda new: (scene(), new())),
+                       (Scene, lambda new: (new(), Choices())),
+                       (clrt.Diffuse, lambda new: (scene(spheres=[clrt.Sphere(material=new())]), Choices()))):
+        one, other = (facts_of(*made(more(kind, value))) for value in (1, 2))
+        assert differences(one, other) and differences(other, one), kind
+    assert differences({**facts_of(scene(), Choices()), "novel": "1"}, facts_of(scene(), Choices()))
+
+
+def things(value: Any) -> Iterator[Any]:
+    """All dataclasses within a part of a scene."""
+    if isinstance(value, list | tuple):
+        for each in value:
+            yield from things(each)
+    elif is_dataclass(value):
+        yield value
+        for each in fields(value):
+            yield from things(getattr(value, each.name))
+
+
+def test_every_field_of_all_that_is_seen_counts() -> None:
+    """A number in the place of any field of any thing makes another scene, unless it is a name."""
+    parts = [each.name for each in fields(Scene) if each.name not in UNSEEN]
+    for material in MATERIALS:
+        content = scene(spheres=[clrt.Sphere(material=material())])
+        found = scene_hash(content)
+        for part in parts:
+            for thing in things(getattr(content, part)):
+                for each in fields(thing):
+                    value = getattr(thing, each.name)
+                    object.__setattr__(thing, each.name, [12.34] if isinstance(value, list) else 12.34)
+                    try:
+                        other = None if is_dataclass(value) else scene_hash(content)
+                    except AttributeError:    # what was read of that field is not there now
+                        other = None
+                    object.__setattr__(thing, each.name, value)
+                    assert (other != found) == (each.name not in NAMES) or is_dataclass(value), (thing, each.name)
+        assert scene_hash(content) == found
+
+
+def test_unknown_content_is_refused() -> None:
+    """What cannot be told from another is no part of a scene."""
+    content = scene(environment=clrt.Environment(color=object()))    # type: ignore[arg-type]
+    with pytest.raises(TypeError):
+        scene_hash(content)
+
+
+@pytest.mark.parametrize("name", [*SETTINGS, *CHOICES, *TESTS])
+def test_renderer_farm_and_report_take_every_one(device: Device, name: str) -> None:
+    """A renderer has each as an option, the farm's orders choose the same by it, and the report tells what counts."""
+    options: dict[str, Any] = {"size": (8, 8), "device": device.info.index}
+    options |= {"aovs": ("direct",)} if name in BY_AOVS else {name: OTHER[name]}
+    assert options.keys() <= inspect.signature(clrt.Renderer).parameters.keys()
+    content = scene(meshes=[], instances=[], lights=[], environment=clrt.Environment(color=(1.0, 1.0, 1.0)))
+    order, wanted = PictureOrder(content, options), changed(content.render, Choices(), name)
+    assert order.choices == choices_of(options) == wanted[1]
+    assert order.settled.render == settings_of(content.render, options) == replace(wanted[0], size=options["size"])
+    renderer = clrt.Renderer(content, **options)
+    assert renderer.choices == order.choices and renderer.settings == order.settled.render
+    if name not in ENDS | ROUNDING | {"size"}:
+        *_, state = renderer.passes(spp=1)
+        assert render_report(renderer, state)[name] == OTHER[name]
+
+
+@pytest.mark.parametrize("change", [{"spp": 5}, {"time": 1.0}, {"error": 0.5}, {"denoise": True}, {"seed": 3},
+                                    {"error_percentile": 90.0}, {"offset": "ulp"}, {"novel": 1}], ids=str)
+def test_bands_are_of_one_order(change: dict[str, Any]) -> None:
+    """Also with options that nobody has heard of."""
+    order = PictureOrder(scene(), {"seed": 1, "error_percentile": 95.0, "device": 0}, spp=4)
+    in_order = {each.name for each in fields(order)}
+    other = replace(order, **{name: value for name, value in change.items() if name in in_order},
+                    options=order.options | {name: value for name, value in change.items() if name not in in_order})
+    facts = [Banded(each, Path("a"))._facts() for each in (order, other)]
+    assert differences(*facts) and not differences(facts[0], facts[0])
+    elsewhere = replace(order, options=order.options | {"device": 1})
+    assert not differences(facts[0], Banded(elsewhere, Path("b"))._facts())
+
+
+def test_frames_are_of_one_goal_and_one_view(tmp_path: Path) -> None:
+    """Their hash depends on every field of Goal and of Outputs that is not a file."""
+    outputs = Outputs((), (tmp_path / "#.png",), (), False, "srgb", 0.0, None, None)
+    goal, content = Goal(4, None, 0.5, 95.0), scene()
+
+    def hash_of(outputs: Outputs, goal: Goal) -> Any:
+        sequence = Sequence(outputs, (), None, False)
+        sequence._stills = {0: content.camera}
+        return next(sequence.left(content, Choices(), goal))[0].header["frame_hash"]
+
+    first = hash_of(outputs, goal)
+    assert first == hash_of(copy.copy(outputs), copy.copy(goal))
+    for each in fields(goal):
+        assert hash_of(outputs, replace(goal, **{each.name: 7})) != first, each.name
+    for each in fields(outputs):
+        if each.name not in FILES:
+            novel: Any = ("depth",) if each.name == "aovs" else 7
+            assert hash_of(replace(outputs, **{each.name: novel}), goal) != first, each.name
+
+
+def test_live_settings_are_given_to_the_renderer() -> None:
+    """What is added is, too."""
+    @dataclass(frozen=True, kw_only=True)
+    class More(Settings):
+        box: str = "plain"
+
+    assert More().tracing == Settings().tracing | {"box": "plain"}
+    assert Settings().tracing.keys() <= {*CHOICES, *TESTS}
