@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import subprocess
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from datetime import datetime, timezone
 from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import IO, Any
 
+from ..awake import BEAT, AwakeClock
 from ..device.child import end_child, last_line, start_child, told_end
 from ..device.describe import DeviceInfo
 from ..device.sources import kernel_digest
@@ -27,19 +27,19 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
 
     DeviceError where nothing was wrong until a limit below LIMIT was over.
     """
-    start, kernels = time.monotonic(), kernel_digest()
+    clock, kernels = AwakeClock(), kernel_digest()
     part, failures, figures = "starting", list[str](), dict[str, float | str]()
     with tempfile.TemporaryFile() as errors:
         child = start_child(f"{__package__}.child", info.id, subprocess.PIPE, errors)
         try:
-            for told in _told(child, start + limit):
+            for told in _told(child, clock, limit):
                 if "begins" in told:
                     part = told["begins"]
                     on_part(part)
                 else:
                     failures += [f"{part}: {failure}" for failure in told["failures"]]
                     figures |= told["figures"]
-            if child.wait(max(0.0, start + limit - time.monotonic())):
+            if child.wait(max(0.0, limit - clock.seconds)):
                 failures.append(f"{part}: {told_end(child.returncode)}{last_line(errors)}")
         except (Empty, subprocess.TimeoutExpired):
             if limit < LIMIT and not failures:
@@ -49,11 +49,11 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
         finally:
             end_child(child)
     when = datetime.now(timezone.utc).isoformat(timespec="seconds")
-    return Verdict(not failures, failures, when, round(time.monotonic() - start, 1), kernels, figures)
+    return Verdict(not failures, failures, when, round(clock.seconds, 1), kernels, figures)
 
 
-def _told(child: subprocess.Popen[str], deadline: float) -> Iterator[dict[str, Any]]:
-    """What the child tells until it ends; raises Empty at the deadline. Nothing here waits for a process that hangs."""
+def _told(child: subprocess.Popen[str], clock: AwakeClock, limit: float) -> Iterator[dict[str, Any]]:
+    """What the child tells until it ends; raises Empty at the limit. Nothing here waits for a process that hangs."""
     lines: SimpleQueue[str] = SimpleQueue()
 
     def listen(output: IO[str]) -> None:
@@ -63,5 +63,12 @@ def _told(child: subprocess.Popen[str], deadline: float) -> Iterator[dict[str, A
 
     assert child.stdout is not None
     Thread(target=listen, args=(child.stdout,), daemon=True).start()
-    while (line := lines.get(timeout=max(0.0, deadline - time.monotonic()))).endswith("\n"):
+    while clock.look() < limit:
+        try:
+            line = lines.get(timeout=min(BEAT, limit))
+        except Empty:
+            continue
+        if not line.endswith("\n"):
+            return
         yield json.loads(line)
+    raise Empty

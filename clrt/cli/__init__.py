@@ -14,7 +14,7 @@ import click
 
 from ..errors import ClrtError, DeviceError, KernelError, OutputError
 from .options import Group
-from .streams import open_missing, patient_stdout, stdout_problem
+from .streams import open_missing, patient_stdout, stdout_problem, tell
 
 STARTED = time.perf_counter()
 #: What commands find as their context's object where they have the process to themselves.
@@ -53,7 +53,7 @@ def main(arguments: list[str] | None = None) -> None:
     stdout = patient_stdout()
     code = _run(arguments)
     if problem := stdout_problem(stdout):
-        print(f"error: {problem}", file=sys.stderr)
+        tell(f"error: {problem}")
         code = code or OutputError.exit_code
     _leave(code)
 
@@ -70,10 +70,10 @@ def _run(arguments: list[str] | None) -> str | int | None:
     except ClrtError as error:
         if isinstance(error, DeviceError | KernelError):
             _keep(str(error))
-        print("\n".join(f"error: {line}" for line in getattr(error, "problems", [str(error)])), file=sys.stderr)
+        tell("\n".join(f"error: {line}" for line in getattr(error, "problems", [str(error)])))
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
-        print("interrupted", file=sys.stderr)
+        tell("interrupted")
         return 130
     except SystemExit as stop:
         return stop.code

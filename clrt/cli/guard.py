@@ -17,7 +17,7 @@ from math import isinf
 from ..device.pulse import VARIABLE, call_in_progress, patience
 
 CRASHES = {signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL}
-HANDED_ON = {signal.SIGINT, signal.SIGTERM, signal.SIGTSTP}
+HANDED_ON = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP}
 #: Of a patience, how often it is looked.
 LOOKS = 20
 DEVICE = 4
@@ -30,7 +30,8 @@ def guarded(advice: Callable[[], str]) -> None:
     limit = patience()
     if isinf(limit) or not hasattr(signal, "sigtimedwait"):
         return
-    watched = HANDED_ON | {signal.SIGCHLD}
+    # What was started with nohup stays deaf to SIGHUP.
+    watched = {each for each in HANDED_ON if signal.getsignal(each) is not signal.SIG_IGN} | {signal.SIGCHLD}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, watched)
     parent = os.getpid()
     child = os.fork()
@@ -50,15 +51,19 @@ def _die_with(parent: int) -> None:
 
 
 def _watch(child: int, watched: set[signal.Signals], limit: float, advice: Callable[[], str]) -> int:
-    """The exit code, once the child has ended or was ended. Ticks are counted, not time: it may be stopped itself."""
-    waited, last_call = 0, 0
+    """The exit code, once the child has ended or was ended. Ticks are counted, not time: it may be stopped itself, and
+    while the child is stopped there are none."""
+    waited, last_call, stopped = 0, 0, False
     while True:
         came = signal.sigtimedwait(watched, limit / LOOKS)
-        ended, status = os.waitpid(child, os.WNOHANG)
-        if ended:
+        if came is not None and came.si_signo not in watched:   # what Python returns after a stop longer than the wait
+            came = None
+        changed, status = os.waitpid(child, os.WNOHANG | os.WUNTRACED | os.WCONTINUED)
+        if changed and (os.WIFEXITED(status) or os.WIFSIGNALED(status)):
             return _exit_code(status, advice)
+        stopped = os.WIFSTOPPED(status) if changed else stopped
         call = call_in_progress()
-        waited = waited + (came is None) if call and call == last_call else 0
+        waited = waited + (came is None and not stopped) if call and call == last_call else 0
         last_call = call
         if waited > LOOKS:
             os.kill(child, signal.SIGKILL)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import logging
 import sys
+from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from .goal import Goal, Pace, time_left
+from .streams import tell
 
 if TYPE_CHECKING:
     from ..rendering.renderer import State
@@ -61,19 +63,19 @@ class PlainProgress(Progress):
     """A line for each phase and state."""
 
     def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
-        _say(PHASES[name] + where(device, device_bytes))
+        tell(PHASES[name] + where(device, device_bytes))
 
     def frame(self, number: int, done: int, count: int) -> None:
         super().frame(number, done, count)
-        _say(f"frame {number}, {done + 1} of {count}")
+        tell(f"frame {number}, {done + 1} of {count}")
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)
-        _say(self._told(state, goal) + (f"  about {left:.0f} s left" if left is not None else ""))
+        tell(self._told(state, goal) + (f"  about {left:.0f} s left" if left is not None else ""))
 
     def bands(self, done: int, count: int) -> None:
         if done != self._bands:
-            _say(f"{done} of {count} bands")
+            tell(f"{done} of {count} bands")
         self._bands = done
 
 
@@ -87,7 +89,7 @@ class JsonProgress(Progress):
 
     def warning(self, message: str) -> None:
         """Something was logged."""
-        _say(json.dumps({"phase": self._phase, "warning": message}))
+        tell(json.dumps({"phase": self._phase, "warning": message}))
 
     def __enter__(self) -> Progress:
         logging.getLogger().addHandler(self._log)
@@ -99,11 +101,11 @@ class JsonProgress(Progress):
 
     def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
         self._phase = name
-        _say(json.dumps({"phase": name, **({"device": device, "device_bytes": device_bytes} if device else {})}))
+        tell(json.dumps({"phase": name, **({"device": device, "device_bytes": device_bytes} if device else {})}))
 
     def frame(self, number: int, done: int, count: int) -> None:
         super().frame(number, done, count)
-        _say(json.dumps({"phase": "frame", "frame": number, "done": done, "frames": count}))
+        tell(json.dumps({"phase": "frame", "frame": number, "done": done, "frames": count}))
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)
@@ -112,11 +114,11 @@ class JsonProgress(Progress):
                                   "seconds_left": left}
         if self._workers:
             values["workers"] = self._workers
-        _say(json.dumps(values))
+        tell(json.dumps(values))
 
     def bands(self, done: int, count: int) -> None:
         if done != self._bands:
-            _say(json.dumps({"phase": "render", "bands": done, "of": count}))
+            tell(json.dumps({"phase": "render", "bands": done, "of": count}))
         self._bands = done
 
 
@@ -166,7 +168,8 @@ class BarProgress(Progress):
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        self._bar.stop()
+        with suppress(OSError):     # of a terminal that has gone
+            self._bar.stop()
 
 
 def make_progress(kind: str | None, quiet: bool) -> Progress:
@@ -198,10 +201,3 @@ def describe_workers(workers: list[dict[str, Any]]) -> str:
     if not rates:
         return ""
     return f"  {len(rates)} workers, {min(rates):.2f} to {max(rates):.2f} Msamples/s each"
-
-
-def _say(line: str) -> None:
-    try:
-        print(line, file=sys.stderr, flush=True)
-    except OSError:
-        return  # who listened has gone; the render goes on

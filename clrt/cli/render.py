@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import gc
 import logging
-import signal
 import sys
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -21,7 +20,7 @@ from .farm import cluster_for, farm_options, is_huge, make_renderer, render_fram
 from .frames import Sequence, frame_options, make_sequence
 from .goal import Goal
 from .guard import guarded
-from .interrupt import Interruptible
+from .interrupt import Interruptible, end_by_signals
 from .logs import silence, verbose_option
 from .options import picture_options, tracing_options
 from .outputs import Outputs
@@ -116,7 +115,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     denoiser = _denoiser() if denoise else None
     if quiet:
         silence()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch system's end is Ctrl-C, too
+    end_by_signals()
     options: dict[str, Any] = {
         "size": size, "max_depth": depth, "seed": seed, "device": devices or None,
         "integrator": integrator, "shadows": shadows, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,

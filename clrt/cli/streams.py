@@ -6,6 +6,7 @@ import errno
 import io
 import os
 import sys
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -33,6 +34,12 @@ def open_missing() -> None:
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.open(os.devnull, os.O_WRONLY), "w", closefd=False))
+
+
+def tell(line: str) -> None:
+    """Prints it on standard error, unless nobody is there any more, such as a terminal that was closed."""
+    with suppress(OSError):
+        print(line, file=sys.stderr, flush=True)
 
 
 def patient_stdout() -> _Patient:

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
+from ..awake import wait_awake
 from ..errors import KernelError
 
 T = TypeVar("T")
@@ -30,9 +31,9 @@ def in_background(where: str, work: Callable[[], T]) -> T:
         done.set()
 
     threading.Thread(target=run, daemon=True, name="clrt compiles").start()
-    if not done.wait(SLOW):
+    if not wait_awake(done, SLOW):
         _log.warning("%s has been compiling a kernel for %g s; it is given up after %g s", where, SLOW, LIMIT)
-        if not done.wait(LIMIT - SLOW):
+        if not wait_awake(done, LIMIT - SLOW):
             raise KernelError(f"{where} has been compiling a kernel for {LIMIT:g} s: its compiler hangs, or is far too "
                               "slow. Update the driver, or choose another device (`clrt devices`)")
     if errors:

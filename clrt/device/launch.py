@@ -15,6 +15,7 @@ from contextlib import contextmanager
 
 import pyopencl as cl
 
+from ..awake import AwakeClock
 from ..errors import DeviceError, HungError
 from .callbacks import when_complete
 from .contexts import share_no_more
@@ -32,7 +33,7 @@ REMEMBERED = 0.7
 #: Launches of less than this part of the work and of the target tell nothing: most of them is what any launch costs.
 LEAST_TELLING = 0.25
 IN_FLIGHT = 2
-#: Waiting counts at most so much between two looks: a process that was stopped (Ctrl-Z) has not waited.
+#: The longest pause between two looks.
 LONGEST_LOOK = 0.1
 #: Seconds after which a launch is no short one.
 SOON = 2e-4
@@ -147,7 +148,7 @@ class Wait:
     """The wait for a launch, and how long it has taken so far."""
 
     def __init__(self) -> None:
-        self._seconds, self._looked = 0.0, time.perf_counter()
+        self._clock = AwakeClock()
 
     def is_over(self, event: cl.Event) -> bool:
         """Whether the event is complete; DeviceError where it failed, HungError once patience is exhausted."""
@@ -156,9 +157,7 @@ class Wait:
         if status < 0:
             share_no_more()
             raise DeviceError(f"the device stopped a launch with error {status}")
-        now = time.perf_counter()
-        self._seconds, self._looked = self._seconds + min(now - self._looked, LONGEST_LOOK), now
-        if status != cl.command_execution_status.COMPLETE and self._seconds > patience():
+        if self._clock.look() > patience() and status != cl.command_execution_status.COMPLETE:
             note_hang()
             share_no_more()
             raise HungError(f"the device has not ended a launch in {patience():g} s: its driver hangs, or it is lost; "

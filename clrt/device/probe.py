@@ -14,6 +14,7 @@ import time
 from collections.abc import Sequence
 from typing import IO
 
+from ..awake import AwakeClock
 from .child import activity, end_child, last_line, start_child, told_end
 from .describe import describe, size_of
 from .loader import devices_of, load
@@ -46,16 +47,16 @@ def _probe(libraries: Sequence[str], limit: float, folder: str) -> list[str]:
 
 def _wait(children: Sequence[subprocess.Popen[str]], limit: float) -> None:
     """Until all have ended, or those that have not do nothing, or have had the time of all for themselves."""
-    start = time.monotonic()
-    busy = {child: (0.0, start) for child in children}     # the processor time of each, and when it last did anything
+    clock = AwakeClock()
+    busy = {child: (0.0, 0.0) for child in children}     # the processor time of each, and when it last did anything
     while busy:
         time.sleep(0.02)
-        now = time.monotonic()
+        now = clock.look()
         for child, (before, since) in list(busy.items()):
             seconds, waits = activity(child)
             busy[child] = before, since = (seconds, now) if seconds > before or waits else (before, since)
-            late = now - start > limit and (now - since > min(IDLE, limit) or before > limit)
-            if child.poll() is not None or late or now - start > PATIENCE * limit:
+            late = now > limit and (now - since > min(IDLE, limit) or before > limit)
+            if child.poll() is not None or late or now > PATIENCE * limit:
                 del busy[child]
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..device.open import Device, name_of, open_devices
+from ..awake import AwakeClock, watched_clock
 from ..errors import DeviceError
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validate import check_is_scene, validate
@@ -89,7 +90,7 @@ class Renderer:
         self._planned_spp = kept.planned_spp if kept else planned
         self.session: Accumulation = self._make_picture(before.session.scenes if before else ())
         self._begin()
-        self._clock, self._interrupted, self._abandoned = 0.0, False, Event()
+        self._interrupted, self._abandoned = False, Event()
         if kept:
             self._convergence.restore(kept)
             self.session.restore(kept.film, kept.work)
@@ -164,7 +165,8 @@ class Renderer:
         """
         check_reference(reference, self.session.size)
         try:
-            yield from self._passes(planned_spp(self.settings, spp, time, error), time, error, reference)
+            with watched_clock(self.seconds) as watch:
+                yield from self._passes(planned_spp(self.settings, spp, time, error), time, error, reference, watch)
         except (GeneratorExit, KeyboardInterrupt):
             self._keep_unfinished()
             raise
@@ -173,8 +175,7 @@ class Renderer:
                 self._checkpoints.wait()
 
     def _passes(self, spp: int | None, time: float | None, error: float | None,
-                reference: NDArray[np.float32] | None) -> Iterator[State]:
-        self._clock = clock.perf_counter() - self.seconds
+                reference: NDArray[np.float32] | None, watch: AwakeClock) -> Iterator[State]:
         self._convergence.catch_up(self.session, self.seconds)
         self.stop_reason = self._reached(spp, time, error)
         if self.stop_reason is not None:
@@ -183,7 +184,7 @@ class Renderer:
         next_state, begun = 0.0, None
         while self.stop_reason is None:
             launches, begun = self._adaptive_pass(spp) if self._adapts else begun or self.session.advance(room), None
-            self._run_pass(launches, time)
+            self._run_pass(launches, time, watch)
             if self._abandoned.is_set():
                 return
             now, done = clock.perf_counter(), self.session.samples_done
@@ -195,7 +196,7 @@ class Renderer:
             if self.stop_reason is None and not due:
                 continue
             self.session.wait()
-            self.seconds = clock.perf_counter() - self._clock
+            self.seconds = watch.seconds
             film, tile_samples = self.session.film(), self.session.tile_samples
             if self.stop_reason is None and not (looks or self.settings.adaptive or self._checkpoints):
                 begun = self.session.advance_ahead(room)    # runs while the state is made
@@ -216,6 +217,7 @@ class Renderer:
             before = self.stop_reason, self.session.samples_done
             yield state
             if (self.stop_reason, self.session.samples_done) != before:    # another call went on meanwhile
+                watch.set(self.seconds)
                 self.stop_reason, begun = self._reached(spp, time, error), None
 
     def interrupt(self) -> None:
@@ -246,10 +248,10 @@ class Renderer:
         looks = done and error is not None and self._is_check(done) and not self.session.work.parts
         return "error" if looks and low_enough(self.state().stops_by, error) else None
 
-    def _run_pass(self, launches: Iterator[None], time: float | None) -> None:
+    def _run_pass(self, launches: Iterator[None], time: float | None, watch: AwakeClock) -> None:
         """One pass; sets the stop reason where `time` is over or it is interrupted, maybe inside the pass."""
         for _ in launches:
-            self.seconds = clock.perf_counter() - self._clock
+            self.seconds = watch.seconds
             self._heed_interrupt()
             if self._abandoned.is_set() or self._in_haste:
                 return

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..awake import wait_awake
 from ..errors import SceneError
 
 #: Seconds that one file may take. The largest picture that is read takes a tenth of it.
@@ -76,8 +77,14 @@ class _Process:
 
     def decode(self, kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
         """See above; raises _Ended where the process ends or must be ended."""
-        watch = threading.Timer(LIMIT, self._popen.kill)
-        watch.start()
+        ended, late = threading.Event(), threading.Event()
+
+        def watch() -> None:
+            if not wait_awake(ended, LIMIT):
+                late.set()
+                self._popen.kill()
+
+        threading.Thread(target=watch, daemon=True).start()
         try:
             self._requests.write(json.dumps([kind, str(file.absolute())]).encode() + b"\n")
             self._requests.flush()
@@ -86,13 +93,12 @@ class _Process:
                 raise EOFError
             arrays = {name: self._array(shape, dtype) for name, (shape, dtype) in reply["arrays"].items()}
         except (OSError, EOFError):
-            timed_out = not watch.is_alive()
-            raise _Ended(f"took more than {LIMIT:g} s" if timed_out else self._how_it_ended()) from None
+            raise _Ended(f"took more than {LIMIT:g} s" if late.is_set() else self._how_it_ended()) from None
         except BaseException:  # an interrupt, say, after which no reply would match its request
             self._popen.kill()
             raise
         finally:
-            watch.cancel()
+            ended.set()
         if "error" in reply:
             raise SceneError(reply["error"])
         return arrays, reply["facts"]

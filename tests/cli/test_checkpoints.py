@@ -101,7 +101,7 @@ def test_killed_at_any_moment_it_ends_as_if_it_were_not(folder: Path, kills: int
     assert read_image(folder / "a.exr").tobytes() == read_image(left_alone / "a.exr").tobytes()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_the_first_signal_keeps_everything(folder: Path, number: signal.Signals) -> None:
     process = started("--time", "600", "--report", "r.json", cwd=folder)
     time.sleep(0.2)
