@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from threading import Event
+from threading import Event, RLock
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,8 @@ from .options import choices_of, settings_of
 from .picture_warnings import PictureWarnings
 from .session import depth_of
 from .state import State as State, check_reference
-from .stops import check_step, check_stops, checked_percentile, low_enough, pass_room, planned_spp
+from .stops import check_stops, checked_percentile, count_or_time, is_check, low_enough, pass_room, planned_spp
+from .turns import in_turns
 
 #: Between two states at least this long passes, and this many times what making a state costs.
 STATE_SECONDS, STATE_COST = 0.5, 20
@@ -59,9 +60,6 @@ class Renderer:
     (docs/aovs.md), see `aovs`. first_hits: whether its session will be asked for a denoiser's guides, or for what is
     seen first. Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
     """
-
-    stop_reason: str | None
-    seconds: float
 
     def __init__(self, scene: Scene, *, device: str | int | Device | Sequence[str | int | Device] | None = None,
                  size: tuple[int, int] | None = None, spp: int | None = None, max_depth: int | None = None,
@@ -90,7 +88,7 @@ class Renderer:
         self._planned_spp = kept.planned_spp if kept else planned
         self.session: Accumulation = self._make_picture(before.session.scenes if before else ())
         self._begin()
-        self._interrupted, self._abandoned = False, Event()
+        self._interrupted, self._abandoned, self._turn = False, Event(), RLock()
         if kept:
             self._convergence.restore(kept)
             self.session.restore(kept.film, kept.work)
@@ -121,7 +119,8 @@ class Renderer:
         self._convergence = Convergence(self._planned_spp, self._percentile)
         seen = seen_first(self._aovs)   # now, so that an interrupted picture has them, too
         self._first_hits = self.session.first_hits(self.scene, seen) if seen else {}
-        self.stop_reason, self.seconds = None, 0.0
+        self.stop_reason: str | None = None
+        self.seconds = 0.0
 
     @property
     def history(self) -> list[dict[str, Any]]:
@@ -146,27 +145,30 @@ class Renderer:
         """
         check_of_none(self._checkpoints)
         validate(Scene(camera=camera, render=self.settings))
-        self.scene = replace(self.scene, camera=camera)
         files, file = self.compiled.chosen_files["CAMERA"], camera_file(camera, self.settings.integrator)
-        self._compiled = [each.seen_by(camera, file) for each in self._compiled]
-        if files == [file]:
-            self.session.look(camera)
-        else:
-            self.session = self._make_picture()
-        self._begin()
+        with self._turn:
+            self.scene = replace(self.scene, camera=camera)
+            self._compiled = [each.seen_by(camera, file) for each in self._compiled]
+            if files == [file]:
+                self.session.look(camera)
+            else:
+                self.session = self._make_picture()
+            self._begin()
 
     def passes(self, *, spp: int | None = None, time: float | None = None, error: float | None = None,
                reference: NDArray[np.float32] | None = None) -> Iterator[State]:
         """Renders, yielding a State at powers of two of the samples, from time to time between them, and at the end.
 
         It ends at `spp` samples a pixel, after `time` seconds or at a noise of `error` (√relMSE), whatever comes
-        first; without any of them at the renderer's `spp`, or else the scene's. Call it again to go on. Where it is
-        left early (`break`, Ctrl-C) it writes a checkpoint, or else is a launch ahead. reference: (height, width, 3).
+        first; without any of them at the renderer's `spp`, or else the scene's. Call it again to go on, in another
+        thread, too: threads take turns, a state each. Where it is left early (`break`, Ctrl-C) it writes a checkpoint,
+        or else is a launch ahead. reference: (height, width, 3).
         """
         check_reference(reference, self.session.size)
         try:
             with watched_clock(self.seconds) as watch:
-                yield from self._passes(planned_spp(self.settings, spp, time, error), time, error, reference, watch)
+                planned = planned_spp(self.settings, spp, time, error)
+                yield from in_turns(self._turn, self._passes(planned, time, error, reference, watch))
         except (GeneratorExit, KeyboardInterrupt):
             self._keep_unfinished()
             raise
@@ -188,10 +190,9 @@ class Renderer:
             if self._abandoned.is_set():
                 return
             now, done = clock.perf_counter(), self.session.samples_done
-            if self.stop_reason is None and spp is not None and done >= spp:
-                self.stop_reason = "spp"
+            self.stop_reason = self.stop_reason or count_or_time(done, self.seconds, spp, None)
             self._heed_interrupt()
-            looks = error is not None and self._is_check(done)
+            looks = error is not None and is_check(done, self._adapts)
             due = now >= next_state or done & (done - 1) == 0 or looks or self._adapts
             if self.stop_reason is None and not due:
                 continue
@@ -218,7 +219,10 @@ class Renderer:
             yield state
             if (self.stop_reason, self.session.samples_done) != before:    # another call went on meanwhile
                 watch.set(self.seconds)
+                self._convergence.catch_up(self.session, self.seconds)
                 self.stop_reason, begun = self._reached(spp, time, error), None
+                if self.stop_reason is not None:
+                    yield self.state(reference)
 
     def interrupt(self) -> None:
         """Has `passes` end after the launches in flight, with a state and a checkpoint; for signal handlers, too."""
@@ -230,8 +234,9 @@ class Renderer:
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
-        film, tile_samples = self.session.film(), self.session.tile_samples
-        return self._convergence.state(film, tile_samples, self.seconds, reference, self._in_haste)
+        with self._turn:
+            film, tile_samples = self.session.film(), self.session.tile_samples
+            return self._convergence.state(film, tile_samples, self.seconds, reference, self._in_haste)
 
     def aovs(self, state: State) -> dict[str, NDArray[np.generic]]:
         """The pictures beside the state's, by the names and in the order that they were asked for."""
@@ -241,11 +246,9 @@ class Renderer:
     def _reached(self, spp: int | None, time: float | None, error: float | None) -> str | None:
         """The stop reason where an earlier call, or the render it goes on with, came so far already."""
         done = self.session.samples_done
-        if done and time is not None and self.seconds >= time:
-            return "time"
-        if done and spp is not None and done >= spp:
-            return "spp"
-        looks = done and error is not None and self._is_check(done) and not self.session.work.parts
+        if reason := count_or_time(done, self.seconds, spp, time):
+            return reason
+        looks = done and error is not None and is_check(done, self._adapts) and not self.session.work.parts
         return "error" if looks and low_enough(self.state().stops_by, error) else None
 
     def _run_pass(self, launches: Iterator[None], time: float | None, watch: AwakeClock) -> None:
@@ -265,10 +268,6 @@ class Renderer:
     def _adapts(self) -> bool:
         """Whether the next pass goes by the error of the tiles; the picture so far is the newest state then."""
         return self.settings.adaptive and self.session.samples_done >= FLOOR_SPP
-
-    def _is_check(self, done: int) -> bool:
-        """Whether a wanted error is compared with the noise of so many samples; never by time, so all runs agree."""
-        return self._adapts or done % check_step(done) == 0
 
     def _adaptive_pass(self, spp: int | None) -> Iterator[None]:
         """Doubles the samples of those tiles where that takes most error away; ends the render at `spp`."""
@@ -296,6 +295,6 @@ class Renderer:
         """Writes a checkpoint where `passes` is left before its end, unless nobody wants it or the device fails now."""
         if self._checkpoints is None or self._abandoned.is_set() or sys.is_finalizing():    # threads have ended then
             return
-        with suppress(DeviceError):
+        with self._turn, suppress(DeviceError):
             if (film := self.session.whole_film()) is not None:
                 self._keep(film, last=True)

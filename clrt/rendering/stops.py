@@ -44,6 +44,18 @@ def check_step(done: int) -> int:
     return max(1, (1 << done.bit_length()) // (2 * CHECKS))
 
 
+def is_check(done: int, adapts: bool) -> bool:
+    """Whether a wanted error is compared with the noise of so many samples; never by time, so all runs agree."""
+    return adapts or done % check_step(done) == 0
+
+
+def count_or_time(done: int, seconds: float, spp: int | None, time: float | None) -> str | None:
+    """The stop reason where a picture has so many samples already, or has taken so long."""
+    if done and time is not None and seconds >= time:
+        return "time"
+    return "spp" if done and spp is not None and done >= spp else None
+
+
 def pass_end(done: int, spp: int | None, error: float | None) -> int:
     """The samples at which the pass after `done` ends at the latest: a power of two, so that the history has them, or
     `spp`, or where a wanted error is looked at."""
