@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,7 +48,16 @@ class InstancedRayQuery(TreeQuery):
                                  [(mesh_corners * unit).astype(np.float32)
                                   for mesh_corners, unit in zip(triangles, self._units)], self._mesh, triangle)
         tree, frame = self._placed(to_world)
-        super().__init__(opened, tree, (sum(map(len, triangles)), 0), frame, tests, traversal)
+        super().__init__(opened, tree, (sum(map(len, triangles)), 0), frame, tests, traversal, device)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """See TreeQuery."""
+        return {**super().__getstate__(), "_levels": self._levels.on(None, {})}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """See TreeQuery."""
+        super().__setstate__(state)
+        self._levels = self._levels.on(self.device, dict(self.tree.buffers))
 
     def move(self, transforms: ArrayLike) -> None:
         """Puts the same instances elsewhere: transforms (k, 3, 4) as before, SceneError likewise.

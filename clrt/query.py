@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -43,8 +45,12 @@ class RayQuery(TreeQuery):
         tests, opened = HitTests(triangle, box, sphere), open_device(device)
         self._vertices, self._layout, self._builder = len(points), layout or opened.layout, builder
         tree, frame = self._built(opened, points, triangle)
-        super().__init__(opened, tree, (len(self._faces), len(self._spheres)), frame, tests, traversal)
+        super().__init__(opened, tree, (len(self._faces), len(self._spheres)), frame, tests, traversal, device)
         self._refitter: Refitter | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """See TreeQuery."""
+        return {**super().__getstate__(), "_refitter": None}
 
     def refit(self, vertices: ArrayLike) -> None:
         """Moves the vertices, (n, 3) and as many as before; faces and spheres stay. SceneError for others.

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from .accel.kernels import HitTests, tree_buffers, tree_defines, tree_features, tree_files
 from .accel.layouts import LANES, Layout
 from .accel.wide import EMPTY
-from .device.arrays import lent, resident
+from .device.arrays import lent, on_host, resident
 from .device.launch import LaunchSize, run_seconds, wait_for
 from .device.lending import begin_copy, take_back
 from .device.loops import loop_turns
-from .device.open import Device
+from .device.open import Device, open_device
 from .device.preamble import defines, scene_struct, typedefs
 from .device.program import build, compose, make_kernel
 from .device.records import record
@@ -41,6 +41,8 @@ POOL, SHARE = 32, 512
 #: Rays are coherent if the mean cosine between one and the next is above this: a camera's are, reflected ones are not.
 COHERENT, PAIRS = 0.9, 1024
 QUERIES = ("closest_hit", "any_hit", "next_hit")
+#: Attributes of a query that are made anew where it is copied.
+ON_DEVICE = ("device", "_lock", "_kernels", "_scene")
 
 
 class TreeQuery:
@@ -55,16 +57,17 @@ class TreeQuery:
     Of a ray, origins and directions are (n, 3), or (3,) for all; t_max is (n,) or one number, and t counts lengths of
     the direction. Of hits at the same t the lowest primitive comes first. A ray whose direction is zero, or that holds
     a NaN or infinity, meets nothing; t_max may be infinite. UsageError where the arrays do not fit. Threads may share
-    a query, but not while its tree changes; a process forked from one that has used OpenCL gets a UsageError.
+    a query, but not while its tree changes; a process forked from one that has used OpenCL gets a UsageError. A copy,
+    or what was pickled and comes back, opens its device by the same selector, and answers the same.
     """
 
     def __init__(self, device: Device, tree: Layout, counts: tuple[int, int], frame: Frame, tests: HitTests,
-                 traversal: str | None) -> None:
-        """Of a tree over so many triangles and spheres, whose points are those of the rays in `frame`."""
-        self.device = device
+                 traversal: str | None, selector: str | int | None = None) -> None:
+        """Of a tree over so many triangles and spheres, whose points are those of the rays in `frame`. selector: what
+        the device was opened by."""
+        self.device, self._selector = device, selector
         self.kernel_seconds = self.longest_launch = 0.0
         self._sizes = {name: LaunchSize(FIRST) for name in QUERIES}
-        self._hit = INSTANCE_HIT if "instances" in tree.buffers else HIT
         self._counts = np.zeros(1, COUNTS)
         self._counts["triangles"], self._counts["spheres"] = counts
         self._tests = tests
@@ -80,10 +83,23 @@ class TreeQuery:
         counts = ", ".join(f"{self._counts[name][0]} {name}" for name in ("triangles", "spheres"))
         return f"<{type(self).__name__}: {counts}; {self.tree.name} on {self.device.info.name}>"
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What is not of the device, and its buffers as arrays."""
+        state = {name: value for name, value in vars(self).items() if name not in ON_DEVICE}
+        buffers = {name: on_host(self.device, array) for name, array in self.tree.buffers.items()}
+        return {**state, "tree": replace(self.tree, buffers=buffers, work=self.tree.sah_cost)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """DeviceError where the device is not there."""
+        vars(self).update(state)
+        self.device, self._lock, self._kernels = open_device(self._selector), threading.Lock(), {}
+        self._use(self.tree, self.frame)
+
     def _use(self, tree: Layout, frame: Frame) -> None:
         """Takes the rays to this tree from now on, which is uploaded."""
         buffers = {name: resident(self.device, array) for name, array in tree.buffers.items()}
         self.tree, self.frame = replace(tree, buffers=buffers), frame
+        self._hit = INSTANCE_HIT if "instances" in buffers else HIT
         self._scene = [array.buffer for array in buffers.values()]
 
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[Any]:

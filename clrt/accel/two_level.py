@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -58,6 +59,12 @@ class TwoLevels:
         self._nodes = sum(tree.nodes for tree in trees)
         self._buffers, self._roots = self._joined(trees)
         self._seconds = time.perf_counter() - start
+
+    def on(self, device: Device | None, buffers: dict[str, DeviceArray | NDArray[Any]]) -> TwoLevels:
+        """The same, with its buffers there."""
+        other = copy(self)
+        other._device, other._buffers = device, buffers
+        return other
 
     def place(self, to_world: Doubles) -> Layout:
         """The tree with the instances where transforms to the world (k, 3, 4), none singular, put them.
