@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .float_errors import with_default_errors
 from .output.data import check_denoisable
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
@@ -20,12 +21,14 @@ from .scene.file import load as _load
 from .scene.model import Scene
 
 
+@with_default_errors
 def load(path: str | Path, camera: str | None = None) -> Scene:
     """The scene in a .toml file or a bare model (.glb .gltf .obj .ply .stl .off), seen by a camera of the model file
     if one is named; SceneError lists all its mistakes."""
     return _load(path, camera)
 
 
+@with_default_errors
 def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | None = None, error: float | None = None,
            reference: NDArray[np.float32] | None = None, denoise: bool = False, **options: Any) -> Image:
     """Renders a scene, or the scene in a file, to the end: see `Renderer.passes` for the stop conditions and
@@ -55,6 +58,7 @@ def animate(scene: Scene | str | Path, *, frames: Iterable[int] | None = None, s
         yield number, _rendered(renderer, denoiser, None, spp=spp, time=time, error=error)
 
 
+@with_default_errors
 def _rendered(renderer: Renderer, denoiser: Denoiser | None, reference: NDArray[np.float32] | None,
               **stops: Any) -> Image:
     if denoiser:

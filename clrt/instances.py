@@ -13,6 +13,7 @@ from .accel.layouts import Layout
 from .accel.two_level import TwoLevels
 from .device.open import open_device
 from .errors import SceneError
+from .float_errors import with_default_errors
 from .tree_query import TreeQuery
 from .scene.mesh_arrays import mesh_arrays
 from .scene.numbers import real_array, whole_array
@@ -33,6 +34,7 @@ class InstancedRayQuery(TreeQuery):
     UsageError for other choices.
     """
 
+    @with_default_errors
     def __init__(self, meshes: Sequence[tuple[ArrayLike, ArrayLike]], mesh: ArrayLike, transforms: ArrayLike, *,
                  device: str | int | None = None, layout: str | None = None, builder: str | None = None,
                  triangle: str = "watertight", box: str = "robust", traversal: str | None = None) -> None:
@@ -59,6 +61,7 @@ class InstancedRayQuery(TreeQuery):
         super().__setstate__(state)
         self._levels = self._levels.on(self.device, dict(self.tree.buffers))
 
+    @with_default_errors
     def move(self, transforms: ArrayLike) -> None:
         """Puts the same instances elsewhere: transforms (k, 3, 4) as before, SceneError likewise.
 

@@ -13,6 +13,7 @@ from .accel.layouts import Layout
 from .accel.refit import Refitter, can_refit
 from .device.open import Device, open_device
 from .errors import SceneError
+from .float_errors import with_default_errors
 from .scene.mesh_arrays import finite_points, mesh_arrays, sphere_array
 from .scene.scaling import Frame, frame_around
 from .tree_query import TreeQuery
@@ -35,6 +36,7 @@ class RayQuery(TreeQuery):
     not above 0, and UsageError for other choices.
     """
 
+    @with_default_errors
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, spheres: ArrayLike | None = None,
                  device: str | int | None = None, layout: str | None = None, builder: str | None = None,
                  triangle: str = "watertight", box: str = "robust", sphere: str = "robust",
@@ -52,6 +54,7 @@ class RayQuery(TreeQuery):
         """See TreeQuery."""
         return {**super().__getstate__(), "_refitter": None}
 
+    @with_default_errors
     def refit(self, vertices: ArrayLike) -> None:
         """Moves the vertices, (n, 3) and as many as before; faces and spheres stay. SceneError for others.
 

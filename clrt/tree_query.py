@@ -24,6 +24,7 @@ from .device.preamble import defines, scene_struct, typedefs
 from .device.program import build, compose, make_kernel
 from .device.records import record
 from .errors import DeviceError, UsageError
+from .float_errors import with_default_errors
 from .scene.ray_arrays import Rays, ray_arrays
 from .scene.scaling import Frame
 
@@ -102,6 +103,7 @@ class TreeQuery:
         self._hit = INSTANCE_HIT if "instances" in buffers else HIT
         self._scene = [array.buffer for array in buffers.values()]
 
+    @with_default_errors
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[Any]:
         """(n,) records of t float32, primitive int32, u, v float32: the first at 0 < t < t_max; of a miss t inf and
         primitive −1.
@@ -112,11 +114,13 @@ class TreeQuery:
         rays = ray_arrays(origins, directions, t_max)
         return _shown(self._ask("closest_hit", rays, np.empty(len(rays[2]), self._hit)))
 
+    @with_default_errors
     def any_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[np.bool_]:
         """(n,) bool: whether anything lies at 0 < t < t_max."""
         rays = ray_arrays(origins, directions, t_max)
         return self._ask("any_hit", rays, np.empty(len(rays[2]), np.bool_))
 
+    @with_default_errors
     def all_hits(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf, *,
                  max_hits: int = 100) -> tuple[NDArray[np.int64], NDArray[Any]]:
         """Every hit at 0 < t < t_max, up to `max_hits` a ray: (k,) indices of rays, and (k,) records of `closest_hit`.

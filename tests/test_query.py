@@ -257,3 +257,17 @@ def test_a_forked_process_is_refused(device: Device) -> None:
 def test_a_query_says_what_it_is(device: Device) -> None:
     query = clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout="bvh2")
     assert repr(query) == f"<RayQuery: 400 triangles, 0 spheres; bvh2 on {device.info.name}>"
+
+
+@pytest.mark.parametrize("exponent", [-140, -130, -127, -126, 126])
+def test_scaled_to_the_ends_of_float32(device: Device, exponent: int) -> None:
+    """By a power of two, of coordinates that are exact at every scale: the very same hits, of spheres, too."""
+    rng = np.random.default_rng(7)
+    vertices, faces = rng.integers(-64, 64, (60, 3)) / 64, rng.integers(0, 60, (90, 3))
+    spheres = np.hstack([rng.integers(-64, 64, (20, 3)) / 64, np.full((20, 1), 0.0625)])
+    origins, directions, scale = rng.integers(-128, 128, (400, 3)) / 64, rng.normal(size=(400, 3)), 2.0**exponent
+    expected = clrt.RayQuery(vertices, faces, spheres=spheres, device=device.info.index)
+    scaled = clrt.RayQuery(vertices * scale, faces, spheres=spheres * scale, device=device.info.index)
+    hits, found = expected.closest_hit(origins, directions), scaled.closest_hit(origins * scale, directions)
+    assert (hits["primitive"] >= 0).sum() > 20
+    np.testing.assert_array_equal(found["primitive"], hits["primitive"])

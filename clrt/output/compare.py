@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError, UsageError
+from ..float_errors import with_default_errors
 from ..scene.pictures import read_picture
 from .image import Image
 
@@ -30,6 +31,7 @@ def compare_files(image: Path, reference: Path) -> dict[str, Any]:
     return _measures(pixels, truth, bool({image.suffix.lower(), reference.suffix.lower()} & {".exr", ".hdr"}))
 
 
+@with_default_errors
 def compare(image: Picture, reference: Picture, *, hdr: bool = True) -> dict[str, Any]:
     """Measures of the image x against the reference r, both (h, w, 3) float32 linear, computed in float64; an `Image`,
     or the path of a picture file, stands for its pixels.

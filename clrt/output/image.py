@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..float_errors import with_default_errors
 from .data import shown_data
 from .images import write_image
 
@@ -23,6 +24,7 @@ class Image:
     raw: NDArray[np.float32] | None = None
     aovs: dict[str, NDArray[np.generic]] = field(default_factory=dict)
 
+    @with_default_errors
     def save(self, path: str | Path, *, view: str = "srgb", exposure: float = 0.0) -> Path:
         """Writes .exr, .hdr (linear) or .png (through `view` after 2^exposure; normals and depths by `shown_data`).
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
+from ..float_errors import with_default_errors
 from .features import WITH_LIGHT
 from .film import Film
 from .first_hits import MEANS, OF_THE_MIDDLE
@@ -47,6 +48,7 @@ def seen_first(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in names if name in (*MEANS, *OF_THE_MIDDLE))
 
 
+@with_default_errors
 def film_aovs(film: Film, names: Iterable[str]) -> dict[str, NDArray[np.generic]]:
     """Those of OF_THE_FILM that `names` has: (height, width, 3) float32, but samples (height, width) uint32.
 

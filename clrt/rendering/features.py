@@ -18,8 +18,6 @@ from .pack import Packed
 from .records import COUNTS, GUIDE, LAUNCH, OUTLINE
 from .tiles import TILE
 
-#: Of a scene's unit, what float32 holds.
-LARGEST_UNIT = 2.0**127
 #: Integrators that follow paths, and the kernel files of those of light; others show what is seen first
 #: (kernels/picture.cl).
 WITH_LIGHT = ("path", "direct")
@@ -68,7 +66,7 @@ def preamble_of(packed: Packed, choices: Choices, features: set[str], part_bytes
     emitters, materials = packed.emitters, packed.materials
     # Only programs that know lengths of the scene's know its unit: others are shared whatever it is.
     lengths = choices.offset != "bound" or packed.scene.render.integrator == "depth"
-    unit = {"SCENE_UNIT": min(packed.frame.unit, LARGEST_UNIT)} if lengths else {}
+    unit = {"SCENE_UNIT": packed.frame.unit} if lengths else {}
     surfaces = [t for t in emitters.types if t in SURFACES]
     rasterised = [typedefs({"Outline": OUTLINE}), defines({"FILTER_REACH": filter_reach(packed.scene.render.filter)})]
     return "\n".join([

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from threading import Event, RLock
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..device.open import Device, name_of, open_devices
 from ..awake import AwakeClock, watched_clock
 from ..errors import DeviceError
+from ..float_errors import with_default_errors
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validate import check_is_scene, validate
 from .accumulation import Accumulation
@@ -38,7 +39,7 @@ from .picture_warnings import PictureWarnings
 from .session import depth_of
 from .state import State as State, check_reference
 from .stops import check_stops, checked_percentile, count_or_time, is_check, low_enough, pass_room, planned_spp
-from .turns import in_turns
+from .turns import Turns
 
 #: Between two states at least this long passes, and this many times what making a state costs.
 STATE_SECONDS, STATE_COST = 0.5, 20
@@ -55,12 +56,12 @@ class Renderer:
     they begin. checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the
     end; resume: go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
     error_percentile: a wanted error is reached where so many per cent of the tiles of 8 x 8 pixels have it. before: one
-    that is of no use any more; what it has on the devices is taken over as far as its scene is the same: parts of a
-    scene that are the same objects must not have been changed in place. aovs: names of pictures made beside
-    (docs/aovs.md), see `aovs`. first_hits: whether its session will be asked for a denoiser's guides, or for what is
-    seen first. Raises SceneError, DeviceError, KernelError, UsageError, OutputError, CheckpointError.
+    that is of no use any more; what it has on the devices is taken over as far as its scene is of the same objects,
+    which must not have been changed in place. aovs: names of pictures made beside (docs/aovs.md). first_hits: whether
+    its session will be asked for a denoiser's guides, or for what is seen first. Raises ClrtErrors of all kinds.
     """
 
+    @with_default_errors
     def __init__(self, scene: Scene, *, device: str | int | Device | Sequence[str | int | Device] | None = None,
                  size: tuple[int, int] | None = None, spp: int | None = None, max_depth: int | None = None,
                  seed: int | None = None, integrator: str | None = None, shadows: bool | None = None,
@@ -88,7 +89,7 @@ class Renderer:
         self._planned_spp = kept.planned_spp if kept else planned
         self.session: Accumulation = self._make_picture(before.session.scenes if before else ())
         self._begin()
-        self._interrupted, self._abandoned, self._turn = False, Event(), RLock()
+        self._interrupted, self._abandoned, self._turns = False, Event(), Turns()
         if kept:
             self._convergence.restore(kept)
             self.session.restore(kept.film, kept.work)
@@ -146,7 +147,7 @@ class Renderer:
         check_of_none(self._checkpoints)
         validate(Scene(camera=camera, render=self.settings))
         files, file = self.compiled.chosen_files["CAMERA"], camera_file(camera, self.settings.integrator)
-        with self._turn:
+        with self._turns.one():
             self.scene = replace(self.scene, camera=camera)
             self._compiled = [each.seen_by(camera, file) for each in self._compiled]
             if files == [file]:
@@ -160,15 +161,14 @@ class Renderer:
         """Renders, yielding a State at powers of two of the samples, from time to time between them, and at the end.
 
         It ends at `spp` samples a pixel, after `time` seconds or at a noise of `error` (√relMSE), whatever comes
-        first; without any of them at the renderer's `spp`, or else the scene's. Call it again to go on, in another
-        thread, too: threads take turns, a state each. Where it is left early (`break`, Ctrl-C) it writes a checkpoint,
-        or else is a launch ahead. reference: (height, width, 3).
+        first; without any at the renderer's `spp`, or the scene's. Call it again to go on, in another thread, too. Left
+        early (`break`, Ctrl-C) it writes a checkpoint, or else is a launch ahead. reference: (height, width, 3).
         """
         check_reference(reference, self.session.size)
         try:
             with watched_clock(self.seconds) as watch:
                 planned = planned_spp(self.settings, spp, time, error)
-                yield from in_turns(self._turn, self._passes(planned, time, error, reference, watch))
+                yield from self._turns.of(self._passes(planned, time, error, reference, watch))
         except (GeneratorExit, KeyboardInterrupt):
             self._keep_unfinished()
             raise
@@ -234,7 +234,7 @@ class Renderer:
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
-        with self._turn:
+        with self._turns.one():
             film, tile_samples = self.session.film(), self.session.tile_samples
             return self._convergence.state(film, tile_samples, self.seconds, reference, self._in_haste)
 
@@ -295,6 +295,6 @@ class Renderer:
         """Writes a checkpoint where `passes` is left before its end, unless nobody wants it or the device fails now."""
         if self._checkpoints is None or self._abandoned.is_set() or sys.is_finalizing():    # threads have ended then
             return
-        with self._turn, suppress(DeviceError):
+        with self._turns.one(), suppress(DeviceError):
             if (film := self.session.whole_film()) is not None:
                 self._keep(film, last=True)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import UsageError
+from ..float_errors import with_default_errors
 from ..scene.numbers import real_array
 from .film import RELATIVE_FLOOR, Film
 
@@ -40,6 +41,7 @@ class State:
         return self.noise / sqrt(self.relmse) if self.noise is not None and self.relmse else None
 
     @cached_property
+    @with_default_errors
     def pixels(self) -> NDArray[np.float32]:
         """(height, width, 3) float32, linear Rec. 709."""
         return self.film.picture()

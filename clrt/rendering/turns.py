@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from threading import RLock
 from typing import TypeVar
+
+from ..float_errors import default_errors
 
 T = TypeVar("T")
 
 
-def in_turns(turn: RLock, steps: Iterator[T]) -> Iterator[T]:
-    """The steps, each of which waits for its turn and gives it up at its end."""
-    while True:
-        with turn:
-            try:
-                step = next(steps)
-            except StopIteration:
-                return
-        yield step
+class Turns:
+    """Those of one renderer. The thread whose turn it is may take another one in it."""
+
+    def __init__(self) -> None:
+        self._lock = RLock()
+
+    @contextmanager
+    def one(self) -> Iterator[None]:
+        """A turn, for which this may wait."""
+        with self._lock, default_errors():
+            yield
+
+    def of(self, steps: Iterator[T]) -> Iterator[T]:
+        """The steps, a turn each."""
+        while True:
+            with self.one():
+                try:
+                    step = next(steps)
+                except StopIteration:
+                    return
+            yield step

@@ -82,7 +82,7 @@ class Mesh:
     def __post_init__(self) -> None:
         """Lists and arrays of other numbers become float32 and int32 where these hold them; what is wrong with an array
         is for `validate` to say."""
-        with suppress(ClrtError), np.errstate(over="ignore"):
+        with suppress(ClrtError), np.errstate(over="ignore", under="ignore"):
             self.vertices = real_array("vertices", self.vertices).astype(np.float32, copy=False)
         with suppress(ClrtError):
             faces = whole_array("faces", self.faces)

@@ -21,6 +21,8 @@ from .model import Camera, Instance, Mesh, Scene, Sphere, Vector
 
 #: Scenes whose largest coordinate (the camera's aside) lies between 2^-20 and 2^20 are left as large as they are.
 COMFORTABLE = 20
+#: The exponent of a unit, at most.
+MOST = 126
 #: Along an axis a scene is left where it is unless its middle is this many times half its largest extent from 0.
 FAR = 4.0
 
@@ -56,8 +58,9 @@ def frame_around(low: NDArray[np.floating], high: NDArray[np.floating]) -> Frame
 
 
 def unit_for(largest: float) -> float:
-    """The power of two that brings a largest coordinate near 1, or 1 where it is comfortable as it is."""
-    exponent = frexp(largest)[1]
+    """The power of two (a normal float32) that brings a largest coordinate near 1; 1 where it is comfortable already.
+    """
+    exponent = max(-MOST, min(MOST, frexp(largest)[1]))
     return 1.0 if largest == 0 or abs(exponent) <= COMFORTABLE else 2.0**-exponent
 
 
