@@ -30,8 +30,8 @@ Found = list[tuple[DeviceInfo, cl.Device | None]]
 
 def find_devices(again: bool = False, preference: Preference | None = None) -> Found:
     """Every device of every platform, best first, and what is there without one. `chosen` is the one that is used when
-    none is named: of a preference its own, if it has one alone, else no simulator, unless there is nothing else, as
-    they are a thousand times as slow.
+    none is named: of a preference its own, if it has one alone, and never a simulator: they are a thousand times as
+    slow.
 
     again: drivers that were faulty are tried once more, unless this process has loaded its drivers.
     """
@@ -39,7 +39,7 @@ def find_devices(again: bool = False, preference: Preference | None = None) -> F
     found = [(replace(info, index=index), device) for index, (info, device) in enumerate(found)]
     infos = [info for info, _ in found]
     usable = [info for info in infos if info.usable]
-    chosen = next((info for info in _real(usable) or usable if not info.failed), None)
+    chosen = next((info for info in _real(usable) if not info.failed), None)
     if preference:
         named = [info for info, _ in _matching(found, preference.selector)]
         chosen = named[0] if len(named) == 1 and named[0].usable else None
@@ -86,6 +86,9 @@ def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
     if not matches and selector is None and any(info.failed for info, _ in found):
         raise DeviceError(f"no usable device passed its check; `clrt devices` says what failed. Update the driver and "
                           f"run `clrt devices --check` again, or name a device to use it all the same:\n{listing}")
+    if not matches and selector is None and any(info.usable for info, _ in found):
+        raise DeviceError("no device but a simulator, a thousand times as slow, can be used; name that to use it, or "
+                          f"install a driver (`clrt devices` says what is wrong with others):\n{listing}")
     if not matches and selector is None:
         raise DeviceError(f"no device can be used; `clrt devices` says why and what to do:\n{listing}")
     if not matches:

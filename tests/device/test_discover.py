@@ -14,6 +14,8 @@ from clrt.device.discover import choose, devices, find_devices
 from clrt.device.open import Device, open_device
 from clrt.errors import ClrtError, DeviceError, UsageError
 
+#: As it is, whatever a test puts in its place.
+find_all = find_devices
 FIELDS = ["index", "id", "name", "platform", "platform_version", "driver", "type", "compute_units", "global_bytes",
           "max_alloc_bytes", "usable", "why", "chosen"]
 
@@ -58,6 +60,22 @@ def test_a_kind_is_of_devices_alone(machine: list[DeviceInfo], monkeypatch: pyte
     monkeypatch.setattr(discover, "find_devices", lambda: [(own, None)])
     with pytest.raises(DeviceError, match="no usable device matches 'gpu'"):
         choose("gpu")
+
+
+def test_simulators_are_used_only_if_named(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where there is nothing else that can be used: by an option, the variable, or the configuration file."""
+    only = [(machine[2], None), discover.find_devices()[4]]
+    monkeypatch.setattr(discover, "_everything", lambda again: only)
+    monkeypatch.setattr(discover, "find_devices", find_all)
+    assert [(info.type, info.chosen) for info, _ in find_all()] == [("simulator", False), ("gpu", False)]
+    with pytest.raises(DeviceError, match="(?s)no device but a simulator.*Oclgrind Simulator"):
+        choose()
+    for selector in ("gpu", "cpu"):
+        with pytest.raises(DeviceError):
+            choose(selector)
+    assert choose("oclgrind")[0].type == choose(0)[0].type == "simulator"
+    monkeypatch.setenv("CLRT_DEVICE", "simulator")
+    assert choose()[0].type == "simulator"
 
 
 def test_environment_variable(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch) -> None:
