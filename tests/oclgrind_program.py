@@ -78,5 +78,5 @@ def main(form: str, path: str) -> None:
                           (on_device, alone)):
         for name, value in values.items():
             setattr(owner, name, value)
-    answers = {f"{way}/{name}": array for way, found in work(open_device()) for name, array in found.items()}
+    answers = {f"{way}/{name}": array for way, found in work(open_device("oclgrind")) for name, array in found.items()}
     np.savez(path, compiled_files=compiled_files(), **answers)  # type: ignore[arg-type]
