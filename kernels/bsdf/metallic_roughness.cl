@@ -123,22 +123,9 @@ static inline real3 transmitted(const struct metallic_roughness *m, real c) {
 
 static inline real inverse_or_zero(real x) { return x > 0.0f ? 1.0f / x : ZERO; }
 
-static inline LobeShares lobe_shares(const struct metallic_roughness *m, real cos_o) {
-    real3 f = base_fresnel(m, cos_o);
-    LobeShares share = {luminance(f), ZERO, luminance(mul(sub(splat(ONE), f), m->albedo))};
-#if GGX_ALBEDO
-    Bounce bounce = ggx_bounce(&m->bounces, cos_o);
-#endif
-#if COUPLING_ALBEDO
-    real3 left = sub(splat(ONE), bounce_albedo(m->body_f0, m->body_f90, bounce));
-    share.specular = BY_ALBEDO(m) ? luminance(bounce_albedo(m->f0, F90(m), bounce)) : share.specular;
-    share.diffuse = BY_ALBEDO(m) ? luminance(mul(left, m->albedo)) : share.diffuse;
-#endif
-#if MULTIPLE_SCATTERING
-    share.multiple = luminance(m->multiple) * bounce.lost;
-#endif
-    real sum = share.specular + share.multiple + share.diffuse, inverse = inverse_or_zero(sum);
-    return (LobeShares){sum > 0.0f ? share.specular * inverse : ONE, share.multiple * inverse, share.diffuse * inverse};
+static inline LobeShares lobe_shares(real specular, real multiple, real diffuse) {
+    real sum = specular + multiple + diffuse, inverse = inverse_or_zero(sum);
+    return (LobeShares){sum > 0.0f ? specular * inverse : ONE, multiple * inverse, diffuse * inverse};
 }
 
 static inline struct metallic_roughness metallic_roughness_at(const Scene *scene, ireal index, const Surface *surface) {
@@ -188,19 +175,25 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     m.spread = log(1.0f + 1.0f / square(m.alpha));
 #endif
     real cos_o = maximum(surface->cos_o, ZERO);
+    real3 fresnel_o = base_fresnel(&m, cos_o);
+    real specular_o = luminance(fresnel_o), multiple_o = ZERO;
+    real diffuse_o = luminance(mul(sub(splat(ONE), fresnel_o), m.albedo));
 #if GGX_ALBEDO
     Bounce bounce_o = ggx_bounce(&m.bounces, cos_o);
 #endif
 #if MULTIPLE_SCATTERING
     m.lost_o = bounce_o.lost / lost;
+    multiple_o = luminance(m.multiple) * bounce_o.lost;
 #endif
 #if COUPLING_ALBEDO
     m.body_f0 = specular;
     m.body_f90 = f90;
     real3 mean = left_albedo(&m, m.bounces.mean), left = left_albedo(&m, bounce_o);
     m.left_o = vector(left.x * inverse_or_zero(mean.x), left.y * inverse_or_zero(mean.y), left.z * inverse_or_zero(mean.z));
+    specular_o = BY_ALBEDO(&m) ? luminance(bounce_albedo(m.f0, F90(&m), bounce_o)) : specular_o;
+    diffuse_o = BY_ALBEDO(&m) ? luminance(body_left(&m, bounce_o)) : diffuse_o;
 #endif
-    m.shares = lobe_shares(&m, cos_o);
+    m.shares = lobe_shares(specular_o, multiple_o, diffuse_o);
     return m;
 }
 
