@@ -14,6 +14,7 @@ from .bench_mitsuba_data import mitsuba_data_command
 from .bench_numerics import numerics_command
 from .bench_peers import peers_command
 from .bench_rays import rays_command
+from .bench_render_fidelity import render_fidelity_command
 from .bench_theses import theses_command
 from .options import Group
 
@@ -21,9 +22,10 @@ from .options import Group
 @click.group(cls=Group)
 def command() -> None:
     """Measure this machine: rays, build, hits, peers, converge, agree, combinations,
-    mitsuba-data, numerics, theses, farm."""
+    mitsuba-data, render-fidelity, numerics, theses, farm."""
 
 
 for each in (rays_command, build_command, hits_command, peers_command, converge_command, agree_command,
-             combinations_command, mitsuba_data_command, numerics_command, theses_command, farm_command):
+             combinations_command, mitsuba_data_command, render_fidelity_command, numerics_command, theses_command,
+             farm_command):
     command.add_command(each)

@@ -1,0 +1,74 @@
+"""`clrt bench render-fidelity`: Khronos' scenarios of glTF models beside other path tracers' images of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+@click.command("render-fidelity")
+@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@click.option("--scenario", "scenarios_", multiple=True, metavar="TEXT",
+              help="Only scenarios whose names hold this; repeatable.")
+@click.option("--width", type=click.IntRange(min=16), default=256, show_default=True,
+              help="Pixels per row; the others' images are reduced to that.")
+@click.option("--spp", type=click.IntRange(min=1), default=64, show_default=True, help="Samples per pixel.")
+@click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
+              help="Write clrt's picture and the others', side by side, there as PNG.")
+@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: int, spp: int, pictures: Path | None,
+                            device: str | None, json_file: Path | None) -> None:
+    """Render the glTF models in DIR, a checkout of github.com/KhronosGroup/glTF-Render-Fidelity with its submodules,
+    and compare the pictures with those of Cycles, V-Ray, Stellar, dspbr and three-gpu-pathtracer.
+
+    A scenario is inside if clrt is no further from the others than one of them is, by FLIP, and its means are within
+    5 % of theirs, of the whole and by material. Those whose files are missing are listed.
+    """
+    from ..errors import UsageError
+    from ..output.files import check_target
+    from ..output.report import write_report
+    from ..study.fidelity_suite import scenarios
+    from ..study.render_fidelity import judge
+
+    if json_file is not None:
+        check_target(json_file)
+    chosen = [each for each in scenarios(folder) if not scenarios_ or any(text in each.name for text in scenarios_)]
+    if not chosen:
+        raise UsageError(f"--scenario {scenarios_[0]}: is in no scenario's name; leave it out to see all")
+    rows = []
+    click.echo(f"{'':32}{'result':10}{'FLIP':>6}{'spread':>8}{'whole':>8}  regions beyond the range of the others")
+    for judged in judge(chosen, width, spp, device):
+        click.echo(_line(judged.row))
+        rows.append(judged.row)
+        if pictures is not None and judged.images:
+            _write_pictures(pictures / f"{judged.row['scenario']}.png", judged.images)
+    results = [row["result"] for row in rows]
+    click.echo("  " + ", ".join(f"{results.count(word)} {word}" for word in dict.fromkeys(results)))
+    if json_file is not None:
+        write_report(json_file, {"width": width, "spp": spp, "scenarios": rows})
+        click.echo(str(json_file))
+
+
+def _line(row: Mapping[str, Any]) -> str:
+    start = f"{row['scenario']:32}{row['result']:10}"
+    if "flip" not in row:
+        return f"{start}{', '.join(row['problems'])}"
+    if "spread" not in row:
+        return f"{start}{', '.join(row['flip'])} alone"
+    means = row["means"]
+    strayed = ", ".join(f"{name} {means[name]['beyond']:.2f}" for name in row["strayed"] if name)
+    return (f"{start}{row['mean_flip']:6.3f}{row['spread']:8.3f}{means['']['beyond']:8.3f}  {strayed}"
+            + "".join(f"  ({warning})" for warning in row["warnings"]))
+
+
+def _write_pictures(path: Path, images: Mapping[str, Any]) -> None:
+    import numpy as np
+
+    from ..output.image import Image
+
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image(np.concatenate([*images.values()], axis=1), {}).save(path)

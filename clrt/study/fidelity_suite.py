@@ -1,0 +1,125 @@
+"""The scenarios of github.com/KhronosGroup/glTF-Render-Fidelity, and the images that other path tracers made of them.
+
+A scenario is a model, an environment map, and a camera on an orbit (`test/config.json` of the repository's submodule,
+glTF-Render-Fidelity-Generator). The images ("goldens") are those of the submodule, or else the smaller ones of the
+website. All were tone mapped by three.js' fit of ACES, then encoded.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import UsageError
+from ..scene.model import Camera
+from ..scene.pictures import linear_from_srgb, read_texels
+
+Floats = NDArray[np.float32]
+
+GENERATOR = "glTF-Render-Fidelity-Generator"
+#: The path tracers among the renderers, by the names of their files.
+PATH_TRACERS = ("blender-cycles", "vray", "stellar", "dspbr-pt", "three-gpu-pathtracer")
+#: Their scripts encode by a power of 1/2.2 where the others use the sRGB curve.
+POWER = {"blender-cycles": 2.2, "vray": 2.2}
+#: What a scenario does not say (src/config-reader.ts).
+LIGHTING, SIZE, FOV = "environments/lightroom_14b.hdr", {"width": 768, "height": 768}, 45.0
+TARGET, ORBIT = {"x": 0.0, "y": 0.0, "z": 0.0}, {"theta": 0.0, "phi": 90.0, "radius": 1.0}
+#: Linear Rec. 709 to the space of the fit, what the fit multiplies values by first, and back (Hill, BakingLab; MIT).
+EXPOSURE = 1 / 0.6
+ACES_IN = np.array([[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]])
+ACES_OUT = np.array([[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]])
+
+
+class Scenario(NamedTuple):
+    """lighting: an environment map, which is the background as well if `skybox`, which is transparent otherwise. size:
+    (width, height) that were meant; goldens: image files by path tracer."""
+
+    name: str
+    model: Path
+    lighting: Path
+    camera: Camera
+    size: tuple[int, int]
+    skybox: bool
+    goldens: dict[str, Path]
+
+
+def scenarios(folder: Path) -> list[Scenario]:
+    """Those of a checkout that a path tracer has an image of. UsageError where there are none."""
+    config = folder / GENERATOR / "test" / "config.json"
+    try:
+        entries = json.loads(config.read_text(encoding="utf-8"))["scenarios"]
+        found = [_scenario(folder, entry) for entry in entries]
+    except FileNotFoundError:
+        raise UsageError(f"{config}: is missing; clone KhronosGroup/glTF-Render-Fidelity with --recurse-submodules "
+                         f"and name its folder") from None
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UsageError(f"{config}: is no list of scenarios ({error!r}); fetch it again") from None
+    found = [scenario for scenario in found if scenario.goldens]
+    if not found:
+        raise UsageError(f"{folder}: has no image by {', '.join(PATH_TRACERS)}; fetch its files in Git LFS")
+    return found
+
+
+def _scenario(folder: Path, entry: dict[str, Any]) -> Scenario:
+    """The scenario of an entry of the config; its paths are relative to a folder of the generator's website."""
+    generator, name = folder / GENERATOR, entry["name"]
+    size = SIZE | entry.get("dimensions", {})
+    golden = {"": generator / "test" / "goldens" / name, ".thumb": folder / "public" / "thumbnails" / "goldens" / name}
+    goldens = {renderer: path for renderer in PATH_TRACERS for part, place in golden.items()
+               for path in [place / f"{renderer}-golden{part}{'.webp' if part else '.png'}"] if path.is_file()}
+    return Scenario(name, generator / _inside(entry["model"]), generator / _inside(entry.get("lighting", LIGHTING)),
+                    orbit_camera(TARGET | entry.get("target", {}), ORBIT | entry.get("orbit", {}),
+                                 float(entry.get("verticalFoV", FOV))),
+                    (int(size["width"]), int(size["height"])), bool(entry.get("renderSkybox", False)), goldens)
+
+
+def _inside(path: str) -> str:
+    return path.removeprefix("/").replace("../", "")
+
+
+def orbit_camera(target: dict[str, float], orbit: dict[str, float], fov_degrees: float) -> Camera:
+    """A camera `radius` away from the target: phi degrees from +Y, theta from +Z towards +X."""
+    theta, phi = np.radians([orbit["theta"], orbit["phi"]])
+    away = np.array([np.sin(phi) * np.sin(theta), np.cos(phi), np.sin(phi) * np.cos(theta)])
+    center = np.array([target["x"], target["y"], target["z"]])
+    x, y, z = (center + orbit["radius"] * away).tolist()
+    at_x, at_y, at_z = (center + (orbit["radius"] - 1) * away).tolist() if orbit["radius"] < 1e-5 else center.tolist()
+    return Camera(position=(x, y, z), look_at=(at_x, at_y, at_z), fov_degrees=fov_degrees)
+
+
+def tone_mapped(linear: NDArray[Any]) -> Floats:
+    """Linear Rec. 709 to the display's linear light, in [0, 1]."""
+    v = np.maximum(linear, 0).astype(np.float64) @ (EXPOSURE * ACES_IN.T)
+    fitted = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081)
+    return np.clip(fitted @ ACES_OUT.T, 0, 1).astype(np.float32)
+
+
+def golden(renderer: str, path: Path, size: tuple[int, int]) -> tuple[Floats, Floats] | None:
+    """The display's linear light over white, (h, w, 3), and the alpha, (h, w), reduced to `size`; None where the shape
+    is another, as of images that were framed differently."""
+    texels = read_texels(path).astype(np.float32) / 255
+    alpha = texels[..., 3:]
+    decoded = texels[..., :3] ** POWER[renderer] if renderer in POWER else linear_from_srgb(texels[..., :3])
+    width, height = size
+    if abs(texels.shape[0] * width / (texels.shape[1] * height) - 1) > 0.02:
+        return None
+    return reduced(decoded * alpha + 1 - alpha, size), reduced(alpha, size)[..., 0]
+
+
+def reduced(pixels: Floats, size: tuple[int, int]) -> Floats:
+    """(h, w, c) to (height, width, c): means over the area of each pixel."""
+    width, height = size
+    return np.ascontiguousarray(_averages(pixels.shape[1], width) @ (
+        _averages(pixels.shape[0], height) @ pixels.transpose(2, 0, 1)).transpose(0, 2, 1)).transpose(2, 1, 0)
+
+
+def _averages(n: int, m: int) -> Floats:
+    """(m, n): row i has the parts of the i-th of m equal intervals that each of n equal ones covers."""
+    edges = np.linspace(0, n, m + 1)
+    cells = np.arange(n)
+    covered = np.minimum(edges[1:, None], cells + 1) - np.maximum(edges[:-1, None], cells)
+    return (np.maximum(covered, 0) * m / n).astype(np.float32)

@@ -1,0 +1,178 @@
+"""clrt beside the path tracers of glTF-Render-Fidelity (`fidelity_suite`): is it as close to them as they are to each
+other?
+
+Two questions, whose measures are of what a display shows, after the suite's tone mapping. FLIP: is clrt's mean distance
+to the others at most that of the one that is furthest from the rest? Mean luminance, of the whole image and of each
+material's region: is it within the range of theirs, widened by MARGIN? (A fifth renderer like four others lies outside
+of their range by chance in two cases of five.)
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.discover import choose
+from ..errors import SceneError, UsageError
+from ..output.compare import compare
+from ..rendering.renderer import Renderer
+from ..scene.materials import Diffuse, Material
+from ..scene.meshes import read_model
+from ..scene.model import Environment, Mesh, RenderSettings, Scene
+from ..scene.pictures import read_picture
+from ..scene.validate import validate
+from .fidelity_suite import Floats, Scenario, golden, tone_mapped
+
+#: By how much a mean may be beyond those of the others; the part of an image that a region has at least.
+MARGIN, LEAST = 0.05, 0.005
+#: Path edges; the environment map's middle is +X in three.js and Cycles, +Z in clrt.
+DEPTH, ROTATION = 16, 90.0
+#: A pixel belongs to a region where the model covers all of it; the others' alphas were stored lossily.
+COVERED, STORED_COVERED = 0.999, 0.98
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+Means = Mapping[str, float]
+
+
+class Judged(NamedTuple):
+    """A line of the table; the display's linear light by renderer, clrt's first, where there are images."""
+
+    row: dict[str, Any]
+    images: dict[str, Floats]
+
+
+def judge(found: Sequence[Scenario], width: int, spp: int, device: str | int | None = None) -> Iterator[Judged]:
+    """Each scenario in turn, rendered with `width` pixels in a row. UsageError without flip-evaluator.
+
+    The row's result: inside or outside of the others' spread; no spread where fewer than two have an image; missing
+    where files are, not read where clrt cannot, `problems` says what.
+    """
+    try:
+        import flip_evaluator  # noqa: F401
+    except ImportError:
+        raise UsageError("FLIP needs flip-evaluator; run pip install 'clrt[flip]'") from None
+    number = choose(device)[0].index
+    for scenario in found:
+        row: dict[str, Any] = {"scenario": scenario.name}
+        missing = [str(path) for path in (scenario.model, scenario.lighting) if not path.is_file()]
+        if missing:
+            yield Judged(row | {"result": "missing", "problems": missing}, {})
+            continue
+        try:
+            with _warnings() as warnings:
+                scene = _scene(scenario, width)
+        except SceneError as error:
+            yield Judged(row | {"result": "not read", "problems": error.problems}, {})
+        else:
+            yield _judged(row | {"warnings": warnings}, scenario, scene, spp, number)
+
+
+@contextmanager
+def _warnings() -> Iterator[list[str]]:
+    """What readers of scenes warn of meanwhile, without the file's name."""
+    heard: list[str] = []
+    handler = logging.Handler(logging.WARNING)
+    handler.emit = lambda record: heard.append(record.getMessage().partition(": ")[2])  # type: ignore[method-assign]
+    log = logging.getLogger("clrt.scene")
+    log.addHandler(handler)
+    try:
+        yield heard
+    finally:
+        log.removeHandler(handler)
+
+
+def _scene(scenario: Scenario, width: int) -> Scene:
+    """The model with its own lights, in the scenario's light and before its camera."""
+    model = read_model(scenario.model)
+    height = max(round(width * scenario.size[1] / scenario.size[0]), 1)
+    scene = Scene(meshes=model.meshes, instances=model.instances, lights=model.lights, camera=scenario.camera,
+                  environment=Environment(image=read_picture(scenario.lighting), rotation_degrees=ROTATION),
+                  render=RenderSettings(size=(width, height), max_depth=DEPTH), name=scenario.name)
+    validate(scene)
+    return scene
+
+
+def _judged(row: dict[str, Any], scenario: Scenario, scene: Scene, spp: int, device: int) -> Judged:
+    pixels, objects = _rendered(scene, spp, device)
+    inside = np.ones(objects.shape, np.bool_)
+    if not scenario.skybox:
+        pixels, inside = _over_white(scene, pixels, spp, device)
+    images = {"clrt": pixels if not scenario.skybox else tone_mapped(pixels)}
+    for renderer, path in scenario.goldens.items():
+        if (read := golden(renderer, path, scene.render.size)) is not None:
+            images[renderer], alpha = read
+            inside &= scenario.skybox | (alpha > STORED_COVERED)
+    names = np.array([_material_name(part) for part in [*scene.meshes, *(one.mesh for one in scene.instances)]] + [""])
+    regions = {"": np.ones(objects.shape, np.bool_)} | {
+        str(name): inside & (objects >= 0) & (names[objects] == name) for name in dict.fromkeys(names[:-1])}
+    means = {name: {renderer: float((image[where] @ LUMINANCE).mean()) for renderer, image in images.items()}
+             for name, where in regions.items() if where.mean() >= LEAST}
+    return Judged(row | verdict(images, means), images)
+
+
+def _material_name(mesh: Mesh) -> str:
+    return mesh.material_name or mesh.name or "?"
+
+
+def _rendered(scene: Scene, spp: int, device: int) -> tuple[Floats, NDArray[np.int32]]:
+    """The pixels, and the numbers of the objects seen first."""
+    renderer = Renderer(scene, device=device, spp=spp, aovs="object")
+    *_, state = renderer.passes(spp=spp)
+    return state.pixels, np.asarray(renderer.aovs(state)["object"], np.int32)
+
+
+def _over_white(scene: Scene, pixels: Floats, spp: int, device: int) -> tuple[Floats, NDArray[np.bool_]]:
+    """The display's light with white where no surface is, and where the model covers pixels wholly.
+
+    A pixel's light is that of the surfaces and the rest of the background's; tone mapping is of the first alone.
+    """
+    def white(material: Material) -> Diffuse:
+        return Diffuse(color=(1.0, 1.0, 1.0), opacity=material.opacity, alpha_cutoff=material.alpha_cutoff)
+
+    def masked(mesh: Mesh) -> Mesh:
+        return replace(mesh, material=white(mesh.material), colors=None if mesh.colors is None else np.concatenate(
+            [np.ones_like(mesh.colors[:, :3]), mesh.colors[:, 3:]], axis=1))
+
+    meshes = {id(mesh): masked(mesh) for mesh in [*scene.meshes, *(one.mesh for one in scene.instances)]}
+    mask = replace(scene, meshes=[meshes[id(mesh)] for mesh in scene.meshes], instances=[
+        replace(one, mesh=meshes[id(one.mesh)], material=None) for one in scene.instances], lights=[],
+        environment=Environment(), render=replace(scene.render, integrator="albedo"))
+    alpha = np.clip(_rendered(mask, spp, device)[0][..., :1], 0, 1)
+    background, _ = _rendered(replace(scene, meshes=[], instances=[], lights=[]), spp, device)
+    surfaces = np.maximum(pixels - (1 - alpha) * background, 0) / np.maximum(alpha, 1e-3)
+    return alpha * tone_mapped(surfaces) + 1 - alpha, alpha[..., 0] > COVERED
+
+
+def verdict(images: Mapping[str, Floats], means: Mapping[str, Means]) -> dict[str, Any]:
+    """result; flip: clrt's to each; mean_flip: their mean, spread: the largest such mean of theirs; means: by region,
+    "" the whole, with `beyond`, by how much clrt's is outside of the range of theirs (1 inside, below 1 too dark)."""
+    others = [name for name in images if name != "clrt"]
+    distances = {(a, b): _flip(images[a], images[b]) for i, a in enumerate(images) for b in [*images][i + 1:]}
+    mean_flip = {a: float(np.mean([value for pair, value in distances.items() if a in pair and (
+        a == "clrt" or "clrt" not in pair)])) for a in images if len(others) > 1}
+    found: dict[str, Any] = {"flip": {name: distances["clrt", name] for name in others},
+                             "means": {name: {**each, "beyond": _beyond(each)} for name, each in means.items()}}
+    if len(others) < 2:
+        return found | {"result": "no spread"}
+    spread = max(mean_flip[name] for name in others)
+    strayed = [name for name, each in found["means"].items() if abs(np.log(each["beyond"])) > np.log1p(MARGIN)]
+    inside = mean_flip["clrt"] <= spread and not strayed
+    return found | {"mean_flip": mean_flip["clrt"], "spread": spread, "strayed": strayed,
+                    "result": "inside" if inside else "outside"}
+
+
+def _beyond(means: Means) -> float:
+    ours, others = means["clrt"], [value for name, value in means.items() if name != "clrt"]
+    nearest = min(max(ours, min(others)), max(others))
+    return max(ours, 1e-4) / max(nearest, 1e-4)
+
+
+def _flip(a: Floats, b: Floats) -> float:
+    value = compare(a, b, hdr=False)["flip"]
+    assert isinstance(value, float)
+    return value
