@@ -13,15 +13,16 @@ import click
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
 @click.option("--scenario", "scenarios_", multiple=True, metavar="TEXT",
               help="Only scenarios whose names hold this; repeatable.")
-@click.option("--width", type=click.IntRange(min=16), default=256, show_default=True,
+@click.option("--width", type=click.IntRange(min=16), default=512, show_default=True,
               help="Pixels per row; the others' images are reduced to that.")
-@click.option("--spp", type=click.IntRange(min=1), default=64, show_default=True, help="Samples per pixel.")
+@click.option("--spp", type=click.IntRange(min=1), default=32, show_default=True, help="Samples per pixel.")
+@click.option("--denoise", is_flag=True, help="Denoise clrt's pictures, as Cycles' were.")
 @click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
               help="Write clrt's picture and the others', side by side, there as PNG.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
 @click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
-def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: int, spp: int, pictures: Path | None,
-                            device: str | None, json_file: Path | None) -> None:
+def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: int, spp: int, denoise: bool,
+                            pictures: Path | None, device: str | None, json_file: Path | None) -> None:
     """Render the glTF models in DIR, a checkout of github.com/KhronosGroup/glTF-Render-Fidelity with its submodules,
     and compare the pictures with those of Cycles, V-Ray, Stellar, dspbr and three-gpu-pathtracer.
 
@@ -41,7 +42,7 @@ def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: in
         raise UsageError(f"--scenario {scenarios_[0]}: is in no scenario's name; leave it out to see all")
     rows = []
     click.echo(f"{'':32}{'result':10}{'FLIP':>6}{'spread':>8}{'whole':>8}  regions beyond the range of the others")
-    for judged in judge(chosen, width, spp, device):
+    for judged in judge(chosen, width, spp, denoise, device):
         click.echo(_line(judged.row))
         rows.append(judged.row)
         if pictures is not None and judged.images:
@@ -49,7 +50,7 @@ def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: in
     results = [row["result"] for row in rows]
     click.echo("  " + ", ".join(f"{results.count(word)} {word}" for word in dict.fromkeys(results)))
     if json_file is not None:
-        write_report(json_file, {"width": width, "spp": spp, "scenarios": rows})
+        write_report(json_file, {"width": width, "spp": spp, "denoise": denoise, "scenarios": rows})
         click.echo(str(json_file))
 
 

@@ -1,12 +1,12 @@
 """Read glTF 2.0 (.glb, .gltf): every triangle of its scene, its metallic-roughness materials, cameras and lights.
 
-What is left out (skins, morph targets, ...) is named in one warning in the log.
+What is left out (skins, lines, ...) is named in one warning in the log.
 """
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from .gltf_draco import decompress
 from .gltf_instancing import matrices, shown
 from .gltf_lights import read_lights
 from .gltf_material import Materials
+from .gltf_morphs import morphed, weights_of
 from .instancing import meshes_by_id
 from .model import Mesh, Model
 from .normals import Normals, choose_normals
@@ -93,18 +94,21 @@ def _local(node: gltf.Node, index: int) -> Matrix:
 
 
 def _places(data: GltfData, nodes: list[Placed], normals: Normals) -> Iterator[tuple[Mesh, Matrix]]:
-    """The meshes of all nodes, and where they stand; each mesh is read once, however many nodes show it."""
+    """The meshes of all nodes, and where they stand; each mesh is read once, however many nodes show it alike."""
     materials = Materials(data)
-    read: dict[int, list[Mesh]] = {}
+    read: dict[tuple[int, tuple[float, ...]], list[Mesh]] = {}
     for node, matrix in nodes:
         if node.mesh is not None:
-            if node.mesh not in read:
-                read[node.mesh] = list(_primitives(data, materials, node.mesh, normals))
-            yield from ((mesh, place) for place in matrices(data, node, matrix) for mesh in read[node.mesh])
+            weights = weights_of(node, gltf.entry(data.document.meshes, node.mesh, "mesh", "a node"))
+            key = node.mesh, weights
+            if key not in read:
+                read[key] = list(_primitives(data, materials, node.mesh, weights, normals))
+            yield from ((mesh, place) for place in matrices(data, node, matrix) for mesh in read[key])
 
 
-def _primitives(data: GltfData, materials: Materials, index: int, normals: Normals) -> Iterator[Mesh]:
-    """The primitives of a mesh that have triangles, in the mesh's own coordinates."""
+def _primitives(data: GltfData, materials: Materials, index: int, weights: Sequence[float],
+                normals: Normals) -> Iterator[Mesh]:
+    """The primitives of a mesh that have triangles, in the mesh's own coordinates, its morph targets with weights."""
     source = gltf.entry(data.document.meshes, index, "mesh", "a node")
     for number, primitive in enumerate(source.primitives):
         name = source.name or f"mesh {index}"
@@ -124,7 +128,10 @@ def _primitives(data: GltfData, materials: Materials, index: int, normals: Norma
         normal, tangent, uv, uv1 = (_attribute(data, primitive, key, kind, len(vertices), where) for key, kind in [
             ("NORMAL", "VEC3"), ("TANGENT", "VEC4"), ("TEXCOORD_0", "VEC2"), ("TEXCOORD_1", "VEC2")])
         faces = corners.astype(np.int32)
-        yield Mesh(vertices, faces, materials.material(primitive, where),
+        vertices = morphed(data, primitive, "POSITION", vertices, weights, where)
+        normal, tangent = (None if values is None else morphed(data, primitive, key, values, weights, where)
+                           for key, values in [("NORMAL", normal), ("TANGENT", tangent)])
+        yield Mesh(vertices, faces, materials.material(primitive, where, [uv, uv1], faces),
                    choose_normals(normals, vertices, faces, normal), name, uv=uv, uv1=uv1,
                    colors=_colors(data, primitive, len(vertices), where),
                    tangents=tangent if normals == "file" and normal is not None else None,
@@ -184,7 +191,6 @@ def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
     primitives = [primitive for mesh in document.meshes for primitive in mesh.primitives]
     left_out = {
         "skins": any(node.skin is not None for node in document.nodes),
-        "morph targets": any(primitive.targets for primitive in primitives),
         "points and lines": any(primitive.mode < TRIANGLES for primitive in primitives),
     }
     names = [name for name, present in left_out.items() if present]

@@ -6,7 +6,7 @@ Imported only when a glTF file is read, since it needs pydantic. Unknown propert
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field, ValidationError
 
@@ -84,12 +84,13 @@ class Primitive(Part):
     indices: Index | None = None
     material: Index | None = None
     mode: Annotated[int, Field(ge=0, le=6)] = 4
-    targets: list[Any] = []
+    targets: list[dict[str, Index]] = []
     extensions: PrimitiveExtensions = PrimitiveExtensions()
 
 
 class Mesh(Part):
     primitives: list[Primitive]
+    weights: list[float] = []
     name: str | None = None
 
 
@@ -146,6 +147,7 @@ class Node(Part):
     mesh: Index | None = None
     camera: Index | None = None
     skin: Index | None = None
+    weights: list[float] = []
     matrix: Annotated[list[float], Field(min_length=16, max_length=16)] | None = None
     translation: Vec3 = (0.0, 0.0, 0.0)
     rotation: Vec4 = (0.0, 0.0, 0.0, 1.0)

@@ -8,12 +8,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import SceneError
 from . import gltf_document as gltf
 from . import gltf_looks as looks
 from .gltf_data import GltfData
-from .materials import Dielectric, Material, MetallicRoughness
+from .gltf_glass import glass
+from .materials import Material, MetallicRoughness
 from .pictures import read_texels
 from .textures import Channel, Picture, Texture, Wrap
 
@@ -37,8 +39,10 @@ class Materials:
         self.names = gltf.material_names(data.document)
         self._pictures: dict[int, Picture | None] = {}
 
-    def material(self, primitive: gltf.Primitive, user: str) -> Material:
+    def material(self, primitive: gltf.Primitive, user: str, uv: list[NDArray[np.float32] | None],
+                 faces: NDArray[np.int32]) -> Material:
         """The primitive's material with all values cut to their limits; the specification's default if it has none.
+        uv, faces: its texture coordinates, both sets, and triangles.
 
         A texture for which the primitive has no coordinates counts as white, as does one that cannot be read, but for
         base colours, grey then, and emission, black.
@@ -55,9 +59,9 @@ class Materials:
             roughness=_numbered(_unit(pbr.roughnessFactor), gloss, "green"),
             emission=self._emission(source, primitive, user), double_sided=source.doubleSided,
             **self._layers(source.extensions, primitive, user))
-        glass = _glass(source.extensions, made)
-        if glass is not None:
-            return glass
+        solid = glass(source.extensions, made, uv, faces)
+        if solid is not None:
+            return solid
         made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
         if source.alphaMode == "OPAQUE":
             return made
@@ -152,18 +156,6 @@ def _colored(factor: tuple[float, float, float], texture: Texture | None, info: 
 
 def _numbered(factor: float, texture: Texture | None, channel: Channel) -> float | Texture:
     return factor if texture is None else replace(texture, factor=factor, channel=channel)
-
-
-def _glass(extensions: looks.MaterialExtensions, made: MetallicRoughness) -> Dielectric | None:
-    """The material as a solid that light passes through, if it has a volume and nothing else than its surface."""
-    volume = extensions.KHR_materials_volume
-    if volume.thicknessFactor <= 0 or made.transmission != 1 or made.metallic != 0:
-        return None
-    distance = volume.attenuationDistance
-    return Dielectric(color=made.color, ior=made.ior, roughness=made.roughness, emission=made.emission,
-                      double_sided=made.double_sided,
-                      attenuation_color=_cut(volume.attenuationColor),
-                      attenuation_distance=distance if distance is not None and distance > 0 else None)
 
 
 def _positive(color: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -95,13 +95,13 @@ def tone_mapped(linear: NDArray[Any]) -> Floats:
     """Linear Rec. 709 to the display's linear light, in [0, 1]."""
     v = np.maximum(linear, 0).astype(np.float64) @ (EXPOSURE * ACES_IN.T)
     fitted = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081)
-    return np.clip(fitted @ ACES_OUT.T, 0, 1).astype(np.float32)
+    return np.asarray(np.clip(fitted @ ACES_OUT.T, 0, 1), np.float32)
 
 
 def golden(renderer: str, path: Path, size: tuple[int, int]) -> tuple[Floats, Floats] | None:
     """The display's linear light over white, (h, w, 3), and the alpha, (h, w), reduced to `size`; None where the shape
     is another, as of images that were framed differently."""
-    texels = read_texels(path).astype(np.float32) / 255
+    texels = np.asarray(read_texels(path) / 255, np.float32)
     alpha = texels[..., 3:]
     decoded = texels[..., :3] ** POWER[renderer] if renderer in POWER else linear_from_srgb(texels[..., :3])
     width, height = size
@@ -122,4 +122,4 @@ def _averages(n: int, m: int) -> Floats:
     edges = np.linspace(0, n, m + 1)
     cells = np.arange(n)
     covered = np.minimum(edges[1:, None], cells + 1) - np.maximum(edges[:-1, None], cells)
-    return (np.maximum(covered, 0) * m / n).astype(np.float32)
+    return np.asarray(np.maximum(covered, 0) * (m / n), np.float32)

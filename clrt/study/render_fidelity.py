@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ..device.discover import choose
 from ..errors import SceneError, UsageError
 from ..output.compare import compare
+from ..output.denoise import Denoiser
 from ..rendering.renderer import Renderer
 from ..scene.materials import Diffuse, Material
 from ..scene.meshes import read_model
@@ -46,7 +47,20 @@ class Judged(NamedTuple):
     images: dict[str, Floats]
 
 
-def judge(found: Sequence[Scenario], width: int, spp: int, device: str | int | None = None) -> Iterator[Judged]:
+class Effort(NamedTuple):
+    """Pixels in a row, samples per pixel, what takes their noise away, and the device's number.
+
+    Tone mapping bends: noise and highlights smaller than a pixel change means of what a display shows.
+    """
+
+    width: int
+    spp: int
+    denoiser: Denoiser | None
+    device: int
+
+
+def judge(found: Sequence[Scenario], width: int, spp: int, denoise: bool = False,
+          device: str | int | None = None) -> Iterator[Judged]:
     """Each scenario in turn, rendered with `width` pixels in a row. UsageError without flip-evaluator.
 
     The row's result: inside or outside of the others' spread; no spread where fewer than two have an image; missing
@@ -56,7 +70,7 @@ def judge(found: Sequence[Scenario], width: int, spp: int, device: str | int | N
         import flip_evaluator  # noqa: F401
     except ImportError:
         raise UsageError("FLIP needs flip-evaluator; run pip install 'clrt[flip]'") from None
-    number = choose(device)[0].index
+    effort = Effort(width, spp, Denoiser() if denoise else None, choose(device)[0].index)
     for scenario in found:
         row: dict[str, Any] = {"scenario": scenario.name}
         missing = [str(path) for path in (scenario.model, scenario.lighting) if not path.is_file()]
@@ -65,11 +79,11 @@ def judge(found: Sequence[Scenario], width: int, spp: int, device: str | int | N
             continue
         try:
             with _warnings() as warnings:
-                scene = _scene(scenario, width)
+                scene = _scene(scenario, effort.width)
         except SceneError as error:
             yield Judged(row | {"result": "not read", "problems": error.problems}, {})
         else:
-            yield _judged(row | {"warnings": warnings}, scenario, scene, spp, number)
+            yield _judged(row | {"warnings": warnings}, scenario, scene, effort)
 
 
 @contextmanager
@@ -97,11 +111,11 @@ def _scene(scenario: Scenario, width: int) -> Scene:
     return scene
 
 
-def _judged(row: dict[str, Any], scenario: Scenario, scene: Scene, spp: int, device: int) -> Judged:
-    pixels, objects = _rendered(scene, spp, device)
+def _judged(row: dict[str, Any], scenario: Scenario, scene: Scene, effort: Effort) -> Judged:
+    pixels, objects = _rendered(scene, effort)
     inside = np.ones(objects.shape, np.bool_)
     if not scenario.skybox:
-        pixels, inside = _over_white(scene, pixels, spp, device)
+        pixels, inside = _over_white(scene, pixels, effort._replace(denoiser=None))
     images = {"clrt": pixels if not scenario.skybox else tone_mapped(pixels)}
     for renderer, path in scenario.goldens.items():
         if (read := golden(renderer, path, scene.render.size)) is not None:
@@ -119,14 +133,19 @@ def _material_name(mesh: Mesh) -> str:
     return mesh.material_name or mesh.name or "?"
 
 
-def _rendered(scene: Scene, spp: int, device: int) -> tuple[Floats, NDArray[np.int32]]:
+def _rendered(scene: Scene, effort: Effort) -> tuple[Floats, NDArray[np.int32]]:
     """The pixels, and the numbers of the objects seen first."""
-    renderer = Renderer(scene, device=device, spp=spp, aovs="object")
-    *_, state = renderer.passes(spp=spp)
-    return state.pixels, np.asarray(renderer.aovs(state)["object"], np.int32)
+    renderer = Renderer(scene, device=effort.device, spp=effort.spp, aovs="object",
+                        first_hits=effort.denoiser is not None)
+    *_, state = renderer.passes(spp=effort.spp)
+    objects = np.asarray(renderer.aovs(state)["object"], np.int32)
+    if effort.denoiser is None:
+        return state.pixels, objects
+    guides = renderer.session.guides()
+    return effort.denoiser(state.pixels, guides["albedo"], guides["normal"]), objects
 
 
-def _over_white(scene: Scene, pixels: Floats, spp: int, device: int) -> tuple[Floats, NDArray[np.bool_]]:
+def _over_white(scene: Scene, pixels: Floats, effort: Effort) -> tuple[Floats, NDArray[np.bool_]]:
     """The display's light with white where no surface is, and where the model covers pixels wholly.
 
     A pixel's light is that of the surfaces and the rest of the background's; tone mapping is of the first alone.
@@ -142,8 +161,8 @@ def _over_white(scene: Scene, pixels: Floats, spp: int, device: int) -> tuple[Fl
     mask = replace(scene, meshes=[meshes[id(mesh)] for mesh in scene.meshes], instances=[
         replace(one, mesh=meshes[id(one.mesh)], material=None) for one in scene.instances], lights=[],
         environment=Environment(), render=replace(scene.render, integrator="albedo"))
-    alpha = np.clip(_rendered(mask, spp, device)[0][..., :1], 0, 1)
-    background, _ = _rendered(replace(scene, meshes=[], instances=[], lights=[]), spp, device)
+    alpha = np.clip(_rendered(mask, effort)[0][..., :1], 0, 1)
+    background, _ = _rendered(replace(scene, meshes=[], instances=[], lights=[]), effort)
     surfaces = np.maximum(pixels - (1 - alpha) * background, 0) / np.maximum(alpha, 1e-3)
     return alpha * tone_mapped(surfaces) + 1 - alpha, alpha[..., 0] > COVERED
 

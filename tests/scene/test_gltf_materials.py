@@ -117,6 +117,27 @@ def test_layers_and_glass(tmp_path: Path) -> None:
         color=(1, 0.5, 1), ior=1.4, roughness=0.5, attenuation_color=(0.5, 1, 1), attenuation_distance=2)
 
 
+@pytest.mark.parametrize("wrap, name", [(10497, "repeat"), (33648, "mirror"), (33071, "clamp")])
+def test_glass_beside_metal_in_one_picture(tmp_path: Path, wrap: int, name: str) -> None:
+    """The picture's left half is metal. Faces on the right one alone are glass, whatever their coordinates outside of
+    the picture come to; the others, and all where the factor makes no metal of it, are as they say."""
+    import imageio.v3 as imageio
+    where = {"repeat": lambda u: u % 1, "mirror": lambda u: abs((u + 1) % 2 - 1), "clamp": lambda u: min(max(u, 0), 1)}
+    for middle, factor in [(u, f) for u in (-1.3, -0.7, -0.2, 0.3, 0.7, 1.2, 1.8, 2.4) for f in (1, 0)]:
+        gltf = Gltf()
+        picture = imageio.imwrite("<bytes>", np.array([[[0, 128, 255], [0, 128, 7]]], np.uint8), extension=".png")
+        gltf.document |= {"images": [{"bufferView": gltf.view(picture), "mimeType": "image/png"}],
+                          "samplers": [{"wrapS": wrap, "wrapT": wrap}], "textures": [{"source": 0, "sampler": 0}],
+                          "materials": [{"extensions": {"KHR_materials_transmission": {"transmissionFactor": 1},
+                                                        "KHR_materials_volume": {"thicknessFactor": 1}},
+                                         "pbrMetallicRoughness": {"metallicFactor": factor,
+                                                                  "metallicRoughnessTexture": {"index": 0}}}]}
+        uv = gltf.accessor(np.array([[middle - 0.1, 0.5], [middle + 0.1, 0.1], [middle, 1.0]]))
+        gltf.mesh(attributes={"POSITION": gltf.accessor(TRIANGLE), "TEXCOORD_0": uv}, material=0)
+        is_glass = isinstance(read(gltf, tmp_path).meshes[0].material, Dielectric)
+        assert is_glass == (factor == 0 or where[name](middle) > 0.5), (middle, factor)
+
+
 @pytest.mark.parametrize("mode, fades, cutoff", [("OPAQUE", False, None), ("BLEND", True, None), ("MASK", True, 1.0)])
 def test_alpha_of_vertex_colors(tmp_path: Path, mode: str, fades: bool, cutoff: float | None) -> None:
     """It multiplies an opacity of 1 as any other, which opaque materials do not have."""

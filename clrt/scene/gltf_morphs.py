@@ -1,0 +1,42 @@
+"""Morph targets of a glTF primitive at the weights that the file gives them (specification 3.7.2.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from . import gltf_document as gltf
+from .gltf_data import GltfData
+
+Floats = NDArray[np.float32]
+
+
+def weights_of(node: gltf.Node, mesh: gltf.Mesh) -> tuple[float, ...]:
+    """The node's weights, else the mesh's; none where all targets rest."""
+    weights = node.weights or mesh.weights
+    return tuple(weights) if any(weights) else ()
+
+
+def morphed(data: GltfData, primitive: gltf.Primitive, key: str, values: Floats, weights: Sequence[float],
+            user: str) -> Floats:
+    """An attribute's values (n, k), plus the displacements of its first three components times `weights`.
+
+    Raises SceneError for weights of another number than the targets, and displacements of another number than values.
+    """
+    if not weights:
+        return values
+    if len(weights) != len(primitive.targets):
+        raise SceneError(f"{user}: has {len(primitive.targets)} morph targets, but {len(weights)} weights; export it "
+                         "again")
+    moved = values.astype(np.float64)
+    for weight, target in zip(weights, primitive.targets):
+        if weight and key in target:
+            moves = data.array(target[key], "VEC3", f"{user}, morph target")
+            if len(moves) != len(values):
+                raise SceneError(f"{user}: a morph target has {len(moves)} of {key} for {len(values)} vertices; export "
+                                 "it again")
+            moved[:, :3] += weight * np.where(np.isfinite(moves), moves, 0)
+    return moved.astype(np.float32)
