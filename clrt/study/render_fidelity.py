@@ -32,6 +32,8 @@ from .fidelity_suite import Floats, Scenario, golden, tone_mapped
 
 #: By how much a mean may be beyond those of the others; the part of an image that a region has at least.
 MARGIN, LEAST = 0.05, 0.005
+#: Is added to means, since nobody sees by how much black differs from black.
+DARK = 0.01
 #: Path edges; the environment map's middle is +X in three.js and Cycles, +Z in clrt.
 DEPTH, ROTATION = 16, 90.0
 #: A pixel belongs to a region where the model covers all of it; the others' alphas were stored lossily.
@@ -188,7 +190,7 @@ def verdict(images: Mapping[str, Floats], means: Mapping[str, Means]) -> dict[st
 def _beyond(means: Means) -> float:
     ours, others = means["clrt"], [value for name, value in means.items() if name != "clrt"]
     nearest = min(max(ours, min(others)), max(others))
-    return max(ours, 1e-4) / max(nearest, 1e-4)
+    return (ours + DARK) / (nearest + DARK)
 
 
 def _flip(a: Floats, b: Floats) -> float:

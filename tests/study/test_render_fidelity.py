@@ -1,0 +1,168 @@
+"""Khronos' scenarios beside other path tracers: a made-up suite whose images are known, or clrt's own."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.typing import NDArray
+
+from clrt.cli.bench_render_fidelity import render_fidelity_command
+from clrt.errors import UsageError
+from clrt.output.image import Image
+from clrt.scene.pictures import linear_from_srgb
+from clrt.study.fidelity_suite import GENERATOR, golden, orbit_camera, reduced, scenarios, tone_mapped
+from clrt.study.render_fidelity import judge, verdict
+from tests.scene.glb import Gltf
+
+SIZE = 32
+#: A black wall that fills the image's left half, and the radiance that it emits.
+COLOR = [0.5, 0.25, 0.75]
+WALL = np.array([[-9, -9, 0], [0, -9, 0], [0, 9, 0], [-9, 9, 0]], np.float32)
+
+
+def suite(folder: Path, skybox: bool = False) -> Path:
+    """A checkout with one scenario: an emissive wall before a sky of radiance 1."""
+    generator = folder / GENERATOR
+    for place in ("test", "environments", "models"):
+        (generator / place).mkdir(parents=True)
+    gltf = Gltf()
+    gltf.document["materials"] = [{"name": "glow", "emissiveFactor": COLOR,
+                                   "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 1}}]
+    gltf.mesh(attributes={"POSITION": gltf.accessor(WALL)}, material=0,
+              indices=gltf.accessor(np.array([0, 1, 2, 0, 2, 3]), "<u2"))
+    gltf.write(generator / "models" / "wall.glb")
+    Image(np.ones((8, 16, 3), np.float32)).save(generator / "environments" / "sky.hdr")
+    (generator / "test" / "config.json").write_text(json.dumps({"scenarios": [{
+        "name": "wall", "model": "../../../models/wall.glb", "lighting": "../../../environments/sky.hdr",
+        "renderSkybox": skybox, "orbit": {"radius": 4}, "dimensions": {"width": 64, "height": 64}}]}))
+    return folder
+
+
+def expected(skybox: bool) -> NDArray[np.float32]:
+    """The display's light at twice the size: the wall, then white or the sky."""
+    wall, sky = tone_mapped(np.array([[COLOR, [1.0, 1.0, 1.0]]]))[0]
+    image = np.broadcast_to(sky if skybox else 1.0, (2 * SIZE, 2 * SIZE, 3)).astype(np.float32)
+    image[:, :SIZE] = wall
+    return image
+
+
+def write(folder: Path, renderer: str, image: NDArray[np.float32], website: bool = False) -> None:
+    """As the suite's own PNG, or as the website's WebP."""
+    place = (folder / "public" / "thumbnails" if website else folder / GENERATOR / "test") / "goldens" / "wall"
+    place.mkdir(parents=True, exist_ok=True)
+    path = place / f"{renderer}-golden.png"
+    Image(image).save(path)
+    if website:
+        import imageio.v3 as imageio
+        imageio.imwrite(path.with_name(f"{renderer}-golden.thumb.webp"), imageio.imread(path), lossless=True)
+
+
+@pytest.mark.parametrize("skybox", [False, True])
+@pytest.mark.parametrize("change", [1.0, 0.7])
+def test_what_is_inside_of_the_spread(tmp_path: Path, skybox: bool, change: float) -> None:
+    """Two path tracers whose walls differ slightly; clrt's is like theirs, or theirs are both darker."""
+    folder = suite(tmp_path, skybox)
+    for renderer, factor, website in (("stellar", 0.95 * change, False), ("three-gpu-pathtracer", 1.05 * change, True)):
+        image = expected(skybox)
+        image[:, :SIZE] *= factor
+        write(folder, renderer, image, website)
+    (judged,) = judge(scenarios(folder), SIZE, 8)
+    row = judged.row
+    assert row["result"] == ("inside" if change == 1 else "outside"), row
+    wall = tone_mapped(np.array([COLOR]))[0] @ [0.2126, 0.7152, 0.0722]
+    means = row["means"]["glow"]
+    assert means["clrt"] == pytest.approx(wall, rel=0.01)
+    assert means["stellar"] == pytest.approx(0.95 * change * wall, rel=0.02)
+    assert row["strayed"] == ([] if change == 1 else ["", "glow"]) and len(judged.images) == 3
+
+
+def test_an_image_alone_and_what_is_missing(tmp_path: Path) -> None:
+    folder = suite(tmp_path)
+    with pytest.raises(UsageError, match="has no image by blender-cycles"):
+        scenarios(folder)
+    write(folder, "stellar", expected(False))
+    (judged,) = judge(scenarios(folder), SIZE, 1)
+    assert judged.row["result"] == "no spread" and judged.row["flip"]["stellar"] < 0.05
+    (folder / GENERATOR / "models" / "wall.glb").write_bytes(b"glTF")
+    assert next(judge(scenarios(folder), SIZE, 1)).row["result"] == "not read"
+    (folder / GENERATOR / "environments" / "sky.hdr").unlink()
+    assert next(judge(scenarios(folder), SIZE, 1)).row["problems"] == [
+        str(folder / GENERATOR / "environments" / "sky.hdr")]
+    (folder / GENERATOR / "test" / "config.json").write_text('{"scenarios": [7]}')
+    with pytest.raises(UsageError, match="is no list of scenarios"):
+        scenarios(folder)
+    shutil.rmtree(folder / GENERATOR)
+    with pytest.raises(UsageError, match="--recurse-submodules"):
+        scenarios(folder)
+
+
+def test_the_camera_is_on_its_orbit() -> None:
+    """theta turns from +Z towards +X, phi is measured from +Y (three.js' spherical coordinates)."""
+    target = {"x": 1.0, "y": 2.0, "z": 3.0}
+    camera = orbit_camera(target, {"theta": 90, "phi": 90, "radius": 2}, 45)
+    assert camera.position == pytest.approx((3, 2, 3)) and camera.look_at == pytest.approx((1, 2, 3))
+    above = orbit_camera(target, {"theta": 0, "phi": 60, "radius": 2}, 45)
+    assert above.position == pytest.approx((1, 3, 3 + 3**0.5))
+    inside = orbit_camera(target, {"theta": 90, "phi": 90, "radius": 0}, 45)
+    assert inside.position == pytest.approx((1, 2, 3)) and inside.look_at == pytest.approx((0, 2, 3))
+
+
+def test_tone_mapping() -> None:
+    """By hand: for white w the rows of the first matrix sum to 1, so v = w/0.6, and those of the second to 1."""
+    v = 0.3 / 0.6
+    fitted = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081)
+    assert tone_mapped(np.full((1, 1, 3), 0.3)) == pytest.approx(np.full((1, 1, 3), fitted), rel=1e-4)
+    assert tone_mapped(np.array([[[1e9, 1e9, 1e9], [0.0, 0.0, 0.0]]])).tolist() == [[[1, 1, 1], [0, 0, 0]]]
+
+
+def test_reduction_keeps_means() -> None:
+    image = np.random.default_rng(5).random((30, 42, 4)).astype(np.float32)
+    assert reduced(image, (42, 30)) == pytest.approx(image, abs=1e-6)
+    assert reduced(image, (21, 10)) == pytest.approx(image.reshape(10, 3, 21, 2, 4).mean((1, 3)), abs=1e-6)
+    assert reduced(image, (17, 11)).mean((0, 1)) == pytest.approx(image.mean((0, 1)), abs=1e-6)
+
+
+def test_images_are_decoded_as_they_were_encoded(tmp_path: Path) -> None:
+    """Cycles' by a power, others by the sRGB curve; transparency is over white; other shapes are left out."""
+    import imageio.v3 as imageio
+    texels = np.full((4, 4, 4), 51, np.uint8)
+    texels[..., 3] = 255
+    texels[:, 2:, 3] = 0
+    path = Path(imageio.imwrite(tmp_path / "a.png", texels) or tmp_path / "a.png")
+    for renderer, value in (("blender-cycles", 0.2**2.2), ("stellar", linear_from_srgb(np.array(0.2, np.float32)))):
+        read = golden(renderer, path, (2, 2))
+        assert read is not None
+        assert read[0][:, :, 1] == pytest.approx(np.tile([float(value), 1.0], (2, 1)), abs=1e-5)
+        assert read[1].tolist() == [[1, 0], [1, 0]]
+    assert golden("stellar", path, (2, 3)) is None
+
+
+def test_one_of_the_others_may_be_far_off() -> None:
+    """clrt may be as far from the rest as the furthest of them, but no further; means within their range and 5 %."""
+    images = {name: np.full((32, 32, 3), value, np.float32)
+              for name, value in {"clrt": 0.3, "a": 0.5, "b": 0.5, "c": 0.2}.items()}
+    means = {"": {name: float(image.mean()) for name, image in images.items()}}
+    assert verdict(images, means)["result"] == "inside"
+    images["clrt"] = np.full((32, 32, 3), 0.1, np.float32)
+    means["part"] = {"clrt": 0.9, "a": 0.5, "b": 0.8, "c": 0.7}
+    found = verdict(images, means)
+    assert found["result"] == "outside" and found["strayed"] == ["part"] and found["mean_flip"] > found["spread"]
+    assert found["means"]["part"]["beyond"] == pytest.approx(0.91 / 0.81)
+
+
+def test_command(tmp_path: Path) -> None:
+    folder = suite(tmp_path)
+    write(folder, "vray", expected(False))
+    write(folder, "stellar", expected(False))
+    arguments = [str(folder), "--width", "16", "--spp", "1", "--json", str(tmp_path / "a.json"),
+                 "--pictures", str(tmp_path / "pictures")]
+    run = CliRunner().invoke(render_fidelity_command, arguments, catch_exceptions=False)
+    assert run.exit_code == 0 and "wall" in run.output and (tmp_path / "pictures" / "wall.png").is_file()
+    assert json.loads((tmp_path / "a.json").read_text())["scenarios"][0]["scenario"] == "wall"
+    with pytest.raises(UsageError, match="is in no scenario's name"):
+        CliRunner().invoke(render_fidelity_command, [str(folder), "--scenario", "roof"], catch_exceptions=False)
