@@ -21,30 +21,25 @@ static inline void bsdf_at(const Scene *scene, const Surface *surface, Bsdf *bsd
     MATERIAL_TYPES(READ)
 }
 
-static inline real3 bsdf_eval(const Bsdf *bsdf, real3 wo, real3 wi) {
-    real3 value = splat(ZERO);
+static inline BsdfValue bsdf_eval(const Bsdf *bsdf, real3 wo, real3 wi) {
+    BsdfValue value = no_value();
 #define EVAL(name, number) { \
         ireal is_type = bsdf->type == number; \
-        if (ANY(is_type)) value = choose(is_type, name##_eval(&bsdf->name, wo, wi), value); \
+        if (ANY(is_type)) value = choose_value(is_type, name##_eval(&bsdf->name, wo, wi), value); \
     }
     MATERIAL_TYPES(EVAL)
     return value;
-}
-
-static inline real bsdf_pdf(const Bsdf *bsdf, real3 wo, real3 wi) {
-    real pdf = ZERO;
-#define PDF(name, number) { \
-        ireal is_type = bsdf->type == number; \
-        if (ANY(is_type)) pdf = is_type ? name##_pdf(&bsdf->name, wo, wi) : pdf; \
-    }
-    MATERIAL_TYPES(PDF)
-    return pdf;
 }
 
 #if TRANSMISSION
 #define SAMPLE_SPREAD(is_type) sample.spread = is_type ? s.spread : sample.spread;
 #else
 #define SAMPLE_SPREAD(is_type)
+#endif
+#if HORIZON
+#define SAMPLE_MATTE(is_type) sample.matte = choose(is_type, s.matte, sample.matte);
+#else
+#define SAMPLE_MATTE(is_type)
 #endif
 
 static inline BsdfSample bsdf_sample(const Bsdf *bsdf, real3 wo, real2 u, real lobe) {
@@ -58,6 +53,7 @@ static inline BsdfSample bsdf_sample(const Bsdf *bsdf, real3 wo, real2 u, real l
             sample.pdf = is_type ? s.pdf : sample.pdf; \
             sample.specular = is_type ? s.specular : sample.specular; \
             SAMPLE_SPREAD(is_type) \
+            SAMPLE_MATTE(is_type) \
         } \
     }
     MATERIAL_TYPES(SAMPLE)
@@ -96,17 +92,6 @@ static inline ireal is_lit_from_behind(const Bsdf *bsdf) {
 }
 #endif
 
-#if HORIZON
-static inline real3 bsdf_matte(const Bsdf *bsdf, real3 wo, real3 wi) {
-    real3 value = splat(ZERO);
-#define MATTE(name, number) { \
-        ireal is_type = bsdf->type == number; \
-        if (ANY(is_type)) value = choose(is_type, name##_matte(&bsdf->name, wo, wi), value); \
-    }
-    MATERIAL_TYPES(MATTE)
-    return value;
-}
-#endif
 #include HORIZON_FILE
 
 #if ATTENUATION

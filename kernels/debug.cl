@@ -91,14 +91,15 @@ static inline void note_light(const Scene *scene, const Path *path, const Surfac
     real probability;
     ireal light = chosen_light(scene, surface->p, n, &again, &u, &probability);
     LightSample sample = sample_of_light(scene, light, surface->p, u);
-    real pdf = sample.pdf * probability, other = shading_pdf(shading, surface, sample.wi);
+    BsdfValue bsdf = shading_eval(shading, surface, sample.wi);
+    real pdf = sample.pdf * probability;
     v->light = active ? light : (ireal)(-1);
     v->light_probability = active ? probability : ZERO;
     v->light_direction = choose(active, sample.wi, splat(ZERO));
     v->light_radiance = choose(active, sample.radiance, splat(ZERO));
-    v->light_bsdf = choose(active, shading_eval(shading, surface, sample.wi), splat(ZERO));
+    v->light_bsdf = choose(active, bsdf.value, splat(ZERO));
     v->light_pdf = active ? pdf : ZERO;
-    v->light_weight = (active & !sample.delta) ? light_sample_weight(pdf, other) : ONE;
+    v->light_weight = (active & !sample.delta) ? light_sample_weight(pdf, bsdf.pdf) : ONE;
 
     ShadowRay shadow;
     ireal sent = aim_at_light(scene, path, surface, shading, active, sampler, &shadow);

@@ -110,7 +110,8 @@ typedef struct {
 static inline ireal aim_at_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
                                  ireal active, Sampler *sampler, ShadowRay *ray) {
     LightSample light = light_sample(scene, surface->p, choosing_normal(shading), sampler);
-    real3 contribution = mul(shading_eval(shading, surface, light.wi), light.radiance);
+    BsdfValue bsdf = shading_eval(shading, surface, light.wi);
+    real3 contribution = mul(bsdf.value, light.radiance);
     ireal useful = active & (light.pdf > 0.0f) & is_positive3(contribution);
     if (!ANY(useful)) return useful;
     ray->origin = offset_origin(surface->p, surface->p_error, surface->ng, light.wi);
@@ -122,8 +123,7 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
     real distance = light.infinite ? (real)(INFINITY) : length3(sub(light.target, ray->origin));
     contribution = mul(contribution, attenuated(absorption, distance));
 #endif
-    real pdf = shading_pdf(shading, surface, light.wi);
-    real weight = (light.delta ? ONE : light_sample_weight(light.pdf, pdf)) / light.pdf;
+    real weight = (light.delta ? ONE : light_sample_weight(light.pdf, bsdf.pdf)) / light.pdf;
     ray->light = at_eye(path, scale(contribution, weight));
     return useful;
 }

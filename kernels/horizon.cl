@@ -26,11 +26,11 @@ static inline ireal ends_on_side(real3 w, real side) {
 }
 
 // Adds the gloss that is folded to w, and the density of all that is.
-static inline void add_folded(const Bsdf *bsdf, real3 ng, real3 wo, real3 w, real side, real3 *value, real *pdf) {
+static inline void add_folded(const Bsdf *bsdf, real3 ng, real3 wo, real3 w, real side, BsdfValue *at) {
     real3 mirrored = mirrored_at(ng, w, side);
     ireal folded = ends_on_side(mirrored, side);
     if (!ANY(folded)) return;
-    real3 gloss = sub(bsdf_eval(bsdf, wo, mirrored), bsdf_matte(bsdf, wo, mirrored));
-    *value = choose(folded, add(*value, gloss), *value);
-    *pdf += folded ? bsdf_pdf(bsdf, wo, mirrored) : ZERO;
+    BsdfValue other = bsdf_eval(bsdf, wo, mirrored);
+    at->value = choose(folded, add(at->value, sub(other.value, other.matte)), at->value);
+    at->pdf += folded ? other.pdf : ZERO;
 }

@@ -1,8 +1,7 @@
 // What the material of a surface is where a ray met it, in the frame of its shading normal, and how light is scattered there:
 //
-//   shading_eval(shading, surface, wi)           bsdf_eval, 0 where wi is not on the side of the geometric surface that it
-//                                                belongs to: reflected light above, transmitted light below
-//   shading_pdf(shading, surface, wi)            density with which shading_sample chooses such a wi
+//   shading_eval(shading, surface, wi)           bsdf_eval: value and density, 0 where wi is not on the side of the geometric
+//                                                surface that it belongs to: reflected light above, transmitted light below
 //   shading_sample(shading, surface, u, lobe)    bsdf_sample, its wi in the world frame, with a density of 0 where it failed
 //
 // wi: unit, world frame. HORIZON: what lobes around a bent or interpolated normal send to the wrong side is not lost
@@ -43,44 +42,28 @@ static inline Shading shading_at(const Scene *scene, real3 direction, Surface *s
 }
 
 #if HORIZON
-// Takes from *value, eval in the direction w (local), what bumps take of its matte part. Returns where that is anything.
-static inline ireal shadow_by_bumps(const Shading *shading, const Surface *surface, real3 w, real3 *value) {
+// What bumps take of the matte part of light from w (local).
+static inline real taken_by_bumps(const Shading *shading, const Surface *surface, real3 w) {
 #if NORMAL_MAPS
-    real taken = 1.0f - bump_shadowing(surface, to_world(shading->frame, w));
-    ireal some = taken > 0.0f;
-    if (ANY(some)) *value = choose(some, sub(*value, scale(bsdf_matte(&shading->bsdf, shading->wo, w), taken)), *value);
-    return some;
+    return 1.0f - bump_shadowing(surface, to_world(shading->frame, w));
 #else
-    return NO_LANES;
+    return ZERO;
 #endif
 }
 #endif
 
-static inline real3 shading_eval(const Shading *shading, const Surface *surface, real3 wi) {
+static inline BsdfValue shading_eval(const Shading *shading, const Surface *surface, real3 wi) {
     real3 w = to_local(shading->frame, wi);
     real side = dot3(wi, surface->ng);
-    real3 value = bsdf_eval(&shading->bsdf, shading->wo, w);
+    BsdfValue at = bsdf_eval(&shading->bsdf, shading->wo, w);
 #if HORIZON
-    shadow_by_bumps(shading, surface, w, &value);
+    at.value = mad3(at.matte, -taken_by_bumps(shading, surface, w), at.value);
 #endif
-    value = choose(same_side(w.z, side), value, splat(ZERO));
+    at = choose_value(same_side(w.z, side), at, no_value());
 #if HORIZON
-    real pdf = ZERO;
-    add_folded(&shading->bsdf, shading->ng, shading->wo, w, side, &value, &pdf);
+    add_folded(&shading->bsdf, shading->ng, shading->wo, w, side, &at);
 #endif
-    return value;
-}
-
-static inline real shading_pdf(const Shading *shading, const Surface *surface, real3 wi) {
-    real3 w = to_local(shading->frame, wi);
-    real pdf = bsdf_pdf(&shading->bsdf, shading->wo, w);
-#if HORIZON
-    real side = dot3(wi, surface->ng);
-    real3 value = splat(ZERO);
-    pdf = same_side(w.z, side) ? pdf : ZERO;
-    add_folded(&shading->bsdf, shading->ng, shading->wo, w, side, &value, &pdf);
-#endif
-    return pdf;
+    return at;
 }
 
 #if HORIZON
@@ -92,19 +75,21 @@ static inline real shading_pdf(const Shading *shading, const Surface *surface, r
 
 // Mirrors a sample that was drawn on the wrong side. Its weight becomes that of both directions that end where it does.
 static inline void fold_sample(const Shading *shading, const Surface *surface, BsdfSample *sample) {
-    const Bsdf *bsdf = &shading->bsdf;
-    real3 drawn = sample->wi, value = scale(sample->weight, sample->pdf * SPREAD(sample));
-    real side = dot3(drawn, shading->ng), pdf = sample->pdf;
-    real3 other = mirrored_at(shading->ng, drawn, side);
-    ireal moved = !same_side(drawn.z, side);
-    sample->wi = choose(moved, other, drawn);
-    ireal both = ends_on_side(other, moved ? -side : side), changed = shadow_by_bumps(shading, surface, sample->wi, &value);
+    real3 drawn = sample->wi;
+    BsdfValue own = {scale(sample->weight, sample->pdf * SPREAD(sample)), sample->matte, sample->pdf};
+    real side = dot3(drawn, shading->ng);
+    real3 mirrored = mirrored_at(shading->ng, drawn, side);
+    ireal moved = !same_side(drawn.z, side), both = ends_on_side(mirrored, moved ? -side : side);
+    sample->wi = choose(moved, mirrored, drawn);
+    BsdfValue folded = no_value();
     if (ANY(both)) {
-        real3 lost = bsdf_matte(bsdf, shading->wo, choose(moved, drawn, other));
-        value = choose(both, add(value, sub(bsdf_eval(bsdf, shading->wo, other), lost)), value);
-        pdf += both ? bsdf_pdf(bsdf, shading->wo, other) : ZERO;
+        BsdfValue other = choose_value(both, bsdf_eval(&shading->bsdf, shading->wo, mirrored), folded);
+        folded = choose_value(moved, own, other);
+        own = choose_value(moved, other, own);
     }
-    changed = (changed | both) & (sample->pdf > 0.0f) & !sample->specular;
+    real taken = taken_by_bumps(shading, surface, sample->wi), pdf = own.pdf + folded.pdf;
+    real3 value = add(mad3(own.matte, -taken, own.value), sub(folded.value, folded.matte));
+    ireal changed = (both | (taken > 0.0f)) & (sample->pdf > 0.0f) & !sample->specular;
     sample->weight = choose(changed, scale(value, 1.0f / (pdf * SPREAD(sample))), sample->weight);
     sample->pdf = changed ? pdf : sample->pdf;
 }

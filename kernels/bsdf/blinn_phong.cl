@@ -11,25 +11,20 @@ static inline struct blinn_phong blinn_phong_at(const Scene *scene, ireal index,
     return m;
 }
 
-static inline real3 blinn_phong_eval(const struct blinn_phong *m, real3 wo, real3 wi) {
-    real n = m->lobes.shininess, lobe = power(normalize3(add(wo, wi)).z, n);
+static inline BsdfValue blinn_phong_eval(const struct blinn_phong *m, real3 wo, real3 wi) {
+    real3 sum = add(wo, wi);
+    real length = length3(sum), cos_h = sum.z / length, n = m->lobes.shininess, lobe = power(cos_h, n);
+    real share = gloss_share(&m->lobes);
 #if LOCAL
     real3 value = mad3(m->lobes.color, wi.z, scale(m->lobes.specular, lobe));
 #else
     real brightest = (n + 2.0f) * (n + 4.0f) / (8.0f * (power((real)(0.5f), 0.5f * n) + n));
     real3 value = scale(mad3(m->lobes.specular, brightest * lobe, m->lobes.color), wi.z);
 #endif
-    return choose((wo.z > 0.0f) & (wi.z > 0.0f), scale(value, (real)(1.0f / PI)), splat(ZERO));
-}
-
-static inline real3 blinn_phong_matte(const struct blinn_phong *m, real3 wo, real3 wi) { return scale(m->lobes.color, wo.z > 0.0f ? cosine_pdf(wi.z) : ZERO); }
-
-static inline real blinn_phong_pdf(const struct blinn_phong *m, real3 wo, real3 wi) {
-    real3 sum = add(wo, wi);
-    real length = length3(sum), share = gloss_share(&m->lobes);
     // dωi = 4·(wo·h) dωh, with wo·h = |wo + wi|/2.
-    real pdf = share * power_pdf(sum.z / length, m->lobes.shininess) / (2.0f * length) + (1.0f - share) * cosine_pdf(wi.z);
-    return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
+    real pdf = share * power_pdf(cos_h, n) / (2.0f * length) + (1.0f - share) * cosine_pdf(wi.z);
+    BsdfValue at = {scale(value, (real)(1.0f / PI)), scale(m->lobes.color, wi.z * (1.0f / PI)), pdf};
+    return choose_value((wo.z > 0.0f) & (wi.z > 0.0f), at, no_value());
 }
 
 static inline real3 blinn_phong_albedo(const struct blinn_phong *m) { return lobes_albedo(&m->lobes); }
@@ -38,7 +33,6 @@ static inline BsdfSample blinn_phong_sample(const struct blinn_phong *m, real3 w
     real3 h = sample_power(u, m->lobes.shininess);
     BsdfSample sample = no_sample();
     sample.wi = choose(lobe < gloss_share(&m->lobes), sub(scale(h, 2.0f * dot3(wo, h)), wo), sample_cosine(u));
-    sample.pdf = blinn_phong_pdf(m, wo, sample.wi);
-    sample.weight = scale(blinn_phong_eval(m, wo, sample.wi), sample.pdf > 0.0f ? 1.0f / sample.pdf : ZERO);
+    weigh_sample(&sample, blinn_phong_eval(m, wo, sample.wi), ALL_LANES);
     return sample;
 }

@@ -35,20 +35,13 @@ static inline real3 conductor_fresnel(const struct conductor *m, real cos_o) {
                   fresnel_conductor(cos_o, m->eta.z, m->k.z));
 }
 
-static inline real3 conductor_eval(const struct conductor *m, real3 wo, real3 wi) {
+static inline BsdfValue conductor_eval(const struct conductor *m, real3 wo, real3 wi) {
     real3 sum = add(wo, wi);
-    real length = length3(sum);
+    real length = length3(sum), lambda_o = ggx_lambda(wo, m->alpha), lambda_i = ggx_lambda(wi, m->alpha);
     real3 f = conductor_fresnel(m, 0.5f * length);     // of wi·h = wo·h
-    real g = 1.0f / (1.0f + ggx_lambda(wo, m->alpha) + ggx_lambda(wi, m->alpha));
-    real value = ggx_d(scale(sum, 1.0f / length), m->alpha) * g / (4.0f * wo.z);
-    return choose((wo.z > 0.0f) & (wi.z > 0.0f), scale(f, value), splat(ZERO));
-}
-
-static inline real3 conductor_matte(const struct conductor *m, real3 wo, real3 wi) { return splat(ZERO); }
-
-static inline real conductor_pdf(const struct conductor *m, real3 wo, real3 wi) {
-    real visible = ggx_d(normalize3(add(wo, wi)), m->alpha) / (4.0f * wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
-    return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? visible : ZERO;
+    real visible = ggx_d(scale(sum, 1.0f / length), m->alpha) / (4.0f * wo.z * (1.0f + lambda_o));
+    real seen = visible * (1.0f + lambda_o) / (1.0f + lambda_o + lambda_i);
+    return choose_value((wo.z > 0.0f) & (wi.z > 0.0f), (BsdfValue){scale(f, seen), splat(ZERO), visible}, no_value());
 }
 
 static inline real3 conductor_albedo(const struct conductor *m) { return conductor_fresnel(m, ONE); }
@@ -57,9 +50,6 @@ static inline BsdfSample conductor_sample(const struct conductor *m, real3 wo, r
     real3 h = sample_visible_normal(wo, m->alpha, u);
     BsdfSample sample = no_sample();
     sample.wi = sub(scale(h, 2.0f * dot3(wo, h)), wo);
-    sample.pdf = conductor_pdf(m, wo, sample.wi);
-    real lambda_o = ggx_lambda(wo, m->alpha), lambda_i = ggx_lambda(sample.wi, m->alpha);
-    real3 f = scale(conductor_fresnel(m, 0.5f * length3(add(wo, sample.wi))), (1.0f + lambda_o) / (1.0f + lambda_o + lambda_i));
-    sample.weight = choose(sample.pdf > 0.0f, f, splat(ZERO));
+    weigh_sample(&sample, conductor_eval(m, wo, sample.wi), ALL_LANES);
     return sample;
 }

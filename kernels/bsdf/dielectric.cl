@@ -50,8 +50,6 @@ struct dielectric {
 
 static inline real3 dielectric_albedo(const struct dielectric *m) { return m->color; }
 
-static inline real3 dielectric_matte(const struct dielectric *m, real3 wo, real3 wi) { return splat(ZERO); }
-
 // How light divides where Fresnel's equations give F: the probability of following what is reflected, and what each then
 // weighs.
 typedef struct { real reflected; real3 reflection, transmission; } Division;
@@ -96,9 +94,7 @@ static inline BsdfSample smooth_dielectric_sample(const struct dielectric *m, re
 
 #include ROUGH_DIELECTRIC_FILE
 #if !ROUGH_DIELECTRIC
-static inline real3 dielectric_eval(const struct dielectric *m, real3 wo, real3 wi) { return splat(ZERO); }
-
-static inline real dielectric_pdf(const struct dielectric *m, real3 wo, real3 wi) { return ZERO; }
+static inline BsdfValue dielectric_eval(const struct dielectric *m, real3 wo, real3 wi) { return no_value(); }
 #endif
 
 static inline struct dielectric dielectric_at(const Scene *scene, ireal index, const Surface *surface) {

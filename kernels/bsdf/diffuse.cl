@@ -8,13 +8,11 @@ static inline struct diffuse diffuse_at(const Scene *scene, ireal index, const S
     return (struct diffuse){COLOR(diffuse)};
 }
 
-static inline real3 diffuse_eval(const struct diffuse *m, real3 wo, real3 wi) {
-    return scale(m->color, wo.z > 0.0f ? cosine_pdf(wi.z) : ZERO);
+static inline BsdfValue diffuse_eval(const struct diffuse *m, real3 wo, real3 wi) {
+    real pdf = cosine_pdf(wi.z);
+    real3 value = scale(m->color, wo.z > 0.0f ? pdf : ZERO);
+    return (BsdfValue){value, value, pdf};
 }
-
-static inline real3 diffuse_matte(const struct diffuse *m, real3 wo, real3 wi) { return diffuse_eval(m, wo, wi); }
-
-static inline real diffuse_pdf(const struct diffuse *m, real3 wo, real3 wi) { return cosine_pdf(wi.z); }
 
 static inline real3 diffuse_albedo(const struct diffuse *m) { return m->color; }
 
@@ -23,5 +21,8 @@ static inline BsdfSample diffuse_sample(const struct diffuse *m, real3 wo, real2
     sample.wi = sample_cosine(u);
     sample.pdf = cosine_pdf(sample.wi.z);
     sample.weight = m->color;
+#if HORIZON
+    sample.matte = scale(m->color, sample.pdf);
+#endif
     return sample;
 }

@@ -3,17 +3,15 @@
 //   struct NAME                              its parameters where it was hit, of every lane
 //   NAME_at(scene, index, surface)           reads them: PARAMETER(NAME, x), PARAMETER3(NAME, x) for its
 //                                            dataclass's x, and COLOR(NAME) for its color
-//   NAME_eval(m, wo, wi)                     f·|cos wi|, the spread included
-//   NAME_pdf(m, wo, wi)                      density per solid angle with which NAME_sample chooses wi
+//   NAME_eval(m, wo, wi)                     a BsdfValue: f·|cos wi|, and the density with which NAME_sample chooses wi
 //   NAME_sample(m, wo, u, lobe)              a direction with its weight f·|cos|/pdf; u in [0,1)², lobe in [0,1)
 //   NAME_albedo(m)                           what part of white light from straight above it reflects or lets through,
 //                                            in [0, 1]
-//   NAME_matte(m, wo, wi)                    the part of NAME_eval that spreads light about as Lambert's law does (horizon.cl)
 //
 // m: const struct NAME *. wo, wi: unit, local frame, both pointing away from the surface, +z the shading normal on the
 // side of wo; surface->front: whether that is the outside. wi.z < 0 goes through it: then the material has the feature
-// TRANSMISSION; TRANSMISSION_LOBES, too, where eval and pdf know directions beyond the surface, with NAME_transmits(m):
-// whether eval can be other than 0 there; and ATTENUATION with a real3 `absorption` in its struct, where light is absorbed
+// TRANSMISSION; TRANSMISSION_LOBES, too, where eval knows directions beyond the surface, with NAME_transmits(m): whether it
+// can be other than 0 there; and ATTENUATION with a real3 `absorption` in its struct, where light is absorbed
 // there.
 #include "surface.cl"
 
@@ -33,13 +31,23 @@
 #define COLOR(kind) PARAMETER3(kind, color)
 #endif
 
+// Of one direction wi. Both are evaluated together, since they share most of what they are made of.
+typedef struct {
+    real3 value;        // f·|cos wi|, the spread included
+    real3 matte;        // the part of it that spreads light about as Lambert's law does (horizon.cl)
+    real pdf;           // density per solid angle
+} BsdfValue;
+
 typedef struct {
     real3 weight, wi;
     real pdf;
+#if HORIZON
+    real3 matte;        // as in BsdfValue
+#endif
 #if TRANSMISSION
     real spread;        // radiance along wo over that along wi, which a denser medium bundles, beside the weight
 #endif
-    ireal specular;     // a single direction: eval and pdf are zero for it, and no light sample can find it
+    ireal specular;     // a single direction: eval is zero for it, and no light sample can find it
 } BsdfSample;
 
 // What a sample is until a material says otherwise.
@@ -49,8 +57,27 @@ static inline BsdfSample no_sample() {
     sample.wi = vector(ZERO, ZERO, ONE);
     sample.pdf = ZERO;
     sample.specular = NO_LANES;
+#if HORIZON
+    sample.matte = splat(ZERO);
+#endif
 #if TRANSMISSION
     sample.spread = ONE;
 #endif
     return sample;
+}
+
+// Gives a sample the weight and density of its direction, where those are what `kept` lanes have.
+static inline void weigh_sample(BsdfSample *sample, BsdfValue at, ireal kept) {
+    sample->pdf = kept ? at.pdf : ZERO;
+    real inverse = sample->pdf > 0.0f ? 1.0f / sample->pdf : ZERO;
+    sample->weight = scale(at.value, inverse);
+#if HORIZON
+    sample->matte = at.matte;
+#endif
+}
+
+static inline BsdfValue no_value() { return (BsdfValue){splat(ZERO), splat(ZERO), ZERO}; }
+
+static inline BsdfValue choose_value(ireal mask, BsdfValue a, BsdfValue b) {
+    return (BsdfValue){choose(mask, a.value, b.value), choose(mask, a.matte, b.matte), mask ? a.pdf : b.pdf};
 }

@@ -94,96 +94,61 @@ static inline ireal metallic_roughness_transmits(const struct metallic_roughness
 #endif
 
 // What each lobe reflects, and what passes on.
-static inline real3 layers_reflected(const struct metallic_roughness *m, real3 wo, real3 wi) {
+static inline BsdfValue layers_reflected(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), coat_o = IN_COAT(m, wo), coat_i = IN_COAT(m, wi);
-    real3 value = scale(base_eval(m, base_o, base_i), under_sheen(m, base_o, base_i));
+    real fibres = under_sheen(m, base_o, base_i), film = under_coat(m, coat_o, coat_i);
+    BsdfValue at = base_eval(m, base_o, base_i);
+    at.matte = scale(at.matte, fibres * film);
+    at.value = scale(at.value, fibres);
+    at.pdf *= share.base;
 #if SHEEN
-    value = add(value, sheen_value(m, base_o, base_i));
+    at.value = add(at.value, sheen_value(m, base_o, base_i));
+    at.pdf += IF_ABOVE(base_o, base_i, share.sheen * (0.5f / PI));
 #endif
-    value = scale(value, under_coat(m, coat_o, coat_i));
+    at.value = scale(at.value, film);
 #if CLEARCOAT
-    real hidden;
-    real coat = reflected_density(coat_o, coat_i, m->coat_alpha, &hidden) * hidden;
-    value = add(value, splat(IF_ABOVE(coat_o, coat_i, coat_fresnel(m, 0.5f * length3(add(wo, wi))) * coat)));
+    real hidden, density = reflected_density(coat_o, coat_i, m->coat_alpha, &hidden);
+    real coat = coat_fresnel(m, 0.5f * length3(add(wo, wi))) * density * hidden;
+    at.value = add(at.value, splat(IF_ABOVE(coat_o, coat_i, coat)));
+    at.pdf += IF_ABOVE(coat_o, coat_i, share.coat * density);
 #endif
-    return value;
-}
-
-static inline real3 layers_matte(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi);
-    real left = under_sheen(m, base_o, base_i) * under_coat(m, IN_COAT(m, wo), IN_COAT(m, wi));
-    return scale(base_matte(m, base_o, base_i), left);
+    return at;
 }
 
 #if THROUGH
-static inline real3 layers_transmitted(const struct metallic_roughness *m, real3 wo, real3 wi) {
+static inline BsdfValue layers_transmitted(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), mirrored = vector(base_i.x, base_i.y, -base_i.z);
-    real seen;
-    real density = reflected_density(base_o, mirrored, m->alpha, &seen) * seen;
+    real seen, density = reflected_density(base_o, mirrored, m->alpha, &seen);
     real3 on = mul(sub(splat(ONE), base_fresnel(m, 0.5f * length3(add(base_o, mirrored)))), m->through);
-    density *= under_coat(m, IN_COAT(m, wo), IN_COAT(m, wi)) * under_sheen(m, base_o, base_i);
-    return scale(on, IF_ABOVE(base_o, mirrored, density));
+    seen *= density * under_coat(m, IN_COAT(m, wo), IN_COAT(m, wi)) * under_sheen(m, base_o, base_i);
+    return (BsdfValue){scale(on, IF_ABOVE(base_o, mirrored, seen)), splat(ZERO),
+                       IF_ABOVE(base_o, mirrored, share.through * density)};
 }
 #endif
 
-static inline real3 metallic_roughness_eval(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    real3 value = layers_reflected(m, wo, wi);
+static inline BsdfValue layers_eval(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
+    BsdfValue at = layers_reflected(m, share, wo, wi);
 #if COAT_NORMALS
     real3 across = vector(wi.x, wi.y, -wi.z);
-    value = add(value, sub(layers_reflected(m, wo, across), layers_matte(m, wo, across)));
+    BsdfValue folded = layers_reflected(m, share, wo, across);
+    at.value = add(at.value, sub(folded.value, folded.matte));
+    at.pdf += folded.pdf;
 #endif
-    value = choose((wo.z > 0.0f) & (wi.z > 0.0f), value, splat(ZERO));
+    at = choose_value((wo.z > 0.0f) & (wi.z > 0.0f), at, no_value());
 #if THROUGH
-    real3 on = layers_transmitted(m, wo, wi);
+    BsdfValue on = layers_transmitted(m, share, wo, wi);
 #if COAT_NORMALS
-    on = add(on, layers_transmitted(m, wo, across));
+    folded = layers_transmitted(m, share, wo, across);
+    on.value = add(on.value, folded.value);
+    on.pdf += folded.pdf;
 #endif
-    value = choose((wo.z > 0.0f) & (wi.z < 0.0f), on, value);
+    at = choose_value((wo.z > 0.0f) & (wi.z < 0.0f), on, at);
 #endif
-    return value;
+    return at;
 }
 
-static inline real3 metallic_roughness_matte(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    return choose((wo.z > 0.0f) & (wi.z > 0.0f), layers_matte(m, wo, wi), splat(ZERO));
-}
-
-// The densities with which each is drawn.
-static inline real reflected_pdf(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
-    real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), coat_o = IN_COAT(m, wo), coat_i = IN_COAT(m, wi);
-    real hidden, pdf = share.base * base_pdf(m, base_o, base_i);
-#if CLEARCOAT
-    pdf += IF_ABOVE(coat_o, coat_i, share.coat * reflected_density(coat_o, coat_i, m->coat_alpha, &hidden));
-#endif
-#if SHEEN
-    pdf += IF_ABOVE(base_o, base_i, share.sheen * (0.5f / PI));
-#endif
-    return pdf;
-}
-
-#if THROUGH
-static inline real transmitted_pdf(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
-    real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), mirrored = vector(base_i.x, base_i.y, -base_i.z);
-    real hidden;
-    return IF_ABOVE(base_o, mirrored, share.through * reflected_density(base_o, mirrored, m->alpha, &hidden));
-}
-#endif
-
-static inline real metallic_roughness_pdf(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    LayerShares share = layer_shares(m, IN_BASE(m, wo), IN_COAT(m, wo));
-    real pdf = reflected_pdf(m, share, wo, wi);
-#if COAT_NORMALS
-    real3 across = vector(wi.x, wi.y, -wi.z);
-    pdf += reflected_pdf(m, share, wo, across);
-#endif
-    pdf = ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
-#if THROUGH
-    real on = transmitted_pdf(m, share, wo, wi);
-#if COAT_NORMALS
-    on += transmitted_pdf(m, share, wo, across);
-#endif
-    pdf = ((wo.z > 0.0f) & (wi.z < 0.0f)) ? on : pdf;
-#endif
-    return pdf;
+static inline BsdfValue metallic_roughness_eval(const struct metallic_roughness *m, real3 wo, real3 wi) {
+    return layers_eval(m, layer_shares(m, IN_BASE(m, wo), IN_COAT(m, wo)), wo, wi);
 }
 
 static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m) {
@@ -232,14 +197,11 @@ static inline BsdfSample metallic_roughness_sample(const struct metallic_roughne
 #if COAT_NORMALS
     sample.wi.z = (through ? sample.wi.z > 0.0f : sample.wi.z < 0.0f) ? -sample.wi.z : sample.wi.z;
 #endif
-    real pdf = metallic_roughness_pdf(m, wo, sample.wi);
-    sample.pdf = (through ? sample.wi.z < 0.0f : sample.wi.z > 0.0f) ? pdf : ZERO;
+    ireal kept = through ? sample.wi.z < 0.0f : sample.wi.z > 0.0f;
 #if COAT_NORMALS
     // What a lobe sends below its own horizon has failed, though another lobe may send something there.
-    own_side = lobe < share.coat ? reflected.z > 0.0f : own_side;
-    sample.pdf = own_side ? sample.pdf : ZERO;
+    kept = kept & (lobe < share.coat ? reflected.z > 0.0f : own_side);
 #endif
-    real inverse = sample.pdf > 0.0f ? 1.0f / sample.pdf : ZERO;
-    sample.weight = scale(metallic_roughness_eval(m, wo, sample.wi), inverse);
+    weigh_sample(&sample, layers_eval(m, share, wo, sample.wi), kept);
     return sample;
 }

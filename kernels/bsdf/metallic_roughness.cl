@@ -206,54 +206,38 @@ static inline real3 crossing_value(const struct metallic_roughness *m, real3 wo,
     return mul(crossing, m->albedo);
 }
 
-// Of the lobes of the body and of multiple scattering: f·pi.
-static inline real3 diffuse_value(const struct metallic_roughness *m, real3 wo, real3 wi, real cos_h) {
-    real3 value = splat(ZERO);
+// The lobes of the body and of multiple scattering. matte: of the body alone; where both share a lobe, that part which is the
+// body's own by wi.
+static inline BsdfValue diffuse_lobes(const struct metallic_roughness *m, real3 wo, real3 wi, real cos_h) {
+    real3 body = splat(ZERO);
+#if OTHER_COUPLINGS
+    body = crossing_value(m, wo, wi, cos_h);
+#endif
+    real3 both = body;
+    real pdf = m->shares.diffuse * cosine_pdf(wi.z);
 #if GGX_ALBEDO
     Bounce bounce_i = ggx_bounce(&m->bounces, wi.z);
 #endif
-#if OTHER_COUPLINGS
-    value = crossing_value(m, wo, wi, cos_h);
-#endif
 #if MULTIPLE_SCATTERING
-    value = mad3(m->multiple, m->lost_o * bounce_i.lost, value);
+    both = mad3(m->multiple, m->lost_o * bounce_i.lost, both);
+    pdf += m->shares.multiple * multiple_pdf(m, wi.z);
 #endif
 #if COUPLING_ALBEDO
-    value = choose(BY_ALBEDO(m), mul(m->left_o, left_albedo(m, bounce_i)), value);
+    body = choose(BY_ALBEDO(m), mul(m->left_o, body_left(m, bounce_i)), body);
+    both = choose(BY_ALBEDO(m), mul(m->left_o, left_albedo(m, bounce_i)), both);
 #endif
-    return value;
+    real cosine = wi.z * (1.0f / PI);
+    return (BsdfValue){scale(both, cosine), scale(body, cosine), pdf};
 }
 
-// Of the body alone. Where it shares its lobe with multiple scattering, that part which is its own by wi.
-static inline real3 BASE(matte)(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    real3 value = splat(ZERO);
-#if OTHER_COUPLINGS
-    value = crossing_value(m, wo, wi, 0.5f * length3(add(wo, wi)));
-#endif
-#if COUPLING_ALBEDO
-    value = choose(BY_ALBEDO(m), mul(m->left_o, body_left(m, ggx_bounce(&m->bounces, wi.z))), value);
-#endif
-    return choose((wo.z > 0.0f) & (wi.z > 0.0f), scale(value, wi.z * (1.0f / PI)), splat(ZERO));
-}
-
-static inline real3 BASE(eval)(const struct metallic_roughness *m, real3 wo, real3 wi) {
+static inline BsdfValue BASE(eval)(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 sum = add(wo, wi);
     real length = length3(sum), cos_h = 0.5f * length;     // wi·h = wo·h, which as products differ near wi = −wo
-    real3 h = scale(sum, 1.0f / length);
-    real specular = ggx_d(h, m->alpha) * smith_shadowing(wo, wi, m->alpha, m->smith) / (4.0f * wo.z);
-    real3 diffuse = scale(diffuse_value(m, wo, wi, cos_h), wi.z * (1.0f / PI));
-    return choose((wo.z > 0.0f) & (wi.z > 0.0f), mad3(base_fresnel(m, cos_h), specular, diffuse), splat(ZERO));
-}
-
-static inline real BASE(pdf)(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    real3 h = normalize3(add(wo, wi));
-    real visible = ggx_d(h, m->alpha) / (4.0f * wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
-    LobeShares share = m->shares;
-    real pdf = share.specular * visible + share.diffuse * cosine_pdf(wi.z);
-#if MULTIPLE_SCATTERING
-    pdf += share.multiple * multiple_pdf(m, wi.z);
-#endif
-    return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
+    real facets = ggx_d(scale(sum, 1.0f / length), m->alpha) / (4.0f * wo.z);
+    BsdfValue at = diffuse_lobes(m, wo, wi, cos_h);
+    at.value = mad3(base_fresnel(m, cos_h), facets * smith_shadowing(wo, wi, m->alpha, m->smith), at.value);
+    at.pdf += m->shares.specular * facets / (1.0f + ggx_lambda(wo, m->alpha));
+    return choose_value((wo.z > 0.0f) & (wi.z > 0.0f), at, no_value());
 }
 
 // As if no light were lost between microfacets, without fits of their albedos: f0, and what goes through the surface
@@ -278,9 +262,7 @@ static inline BsdfSample BASE(sample)(const struct metallic_roughness *m, real3 
 #if MULTIPLE_SCATTERING
     sample.wi = choose(lobe >= 1.0f - share.multiple, sample_multiple(m, u), sample.wi);
 #endif
-    sample.pdf = BASE(pdf)(m, wo, sample.wi);
-    real inverse = sample.pdf > 0.0f ? 1.0f / sample.pdf : ZERO;
-    sample.weight = scale(BASE(eval)(m, wo, sample.wi), inverse);
+    weigh_sample(&sample, BASE(eval)(m, wo, sample.wi), ALL_LANES);
     return sample;
 }
 

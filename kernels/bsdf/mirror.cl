@@ -7,11 +7,7 @@ static inline struct mirror mirror_at(const Scene *scene, ireal index, const Sur
     return (struct mirror){COLOR(mirror)};
 }
 
-static inline real3 mirror_eval(const struct mirror *m, real3 wo, real3 wi) { return splat(ZERO); }
-
-static inline real3 mirror_matte(const struct mirror *m, real3 wo, real3 wi) { return splat(ZERO); }
-
-static inline real mirror_pdf(const struct mirror *m, real3 wo, real3 wi) { return ZERO; }
+static inline BsdfValue mirror_eval(const struct mirror *m, real3 wo, real3 wi) { return no_value(); }
 
 static inline real3 mirror_albedo(const struct mirror *m) { return m->color; }
 

@@ -13,22 +13,17 @@ static inline struct phong phong_at(const Scene *scene, ireal index, const Surfa
 
 static inline real mirrored_cosine(real3 wo, real3 wi) { return wo.z * wi.z - wo.x * wi.x - wo.y * wi.y; }
 
-static inline real3 phong_eval(const struct phong *m, real3 wo, real3 wi) {
+static inline BsdfValue phong_eval(const struct phong *m, real3 wo, real3 wi) {
     real lobe = power(maximum(mirrored_cosine(wo, wi), ZERO), m->lobes.shininess);
 #if LOCAL
     real3 value = mad3(m->lobes.color, wi.z, scale(m->lobes.specular, lobe));
 #else
     real3 value = scale(mad3(m->lobes.specular, (0.5f * m->lobes.shininess + 1.0f) * lobe, m->lobes.color), wi.z);
 #endif
-    return choose((wo.z > 0.0f) & (wi.z > 0.0f), scale(value, (real)(1.0f / PI)), splat(ZERO));
-}
-
-static inline real3 phong_matte(const struct phong *m, real3 wo, real3 wi) { return scale(m->lobes.color, wo.z > 0.0f ? cosine_pdf(wi.z) : ZERO); }
-
-static inline real phong_pdf(const struct phong *m, real3 wo, real3 wi) {
     real share = gloss_share(&m->lobes);
     real pdf = share * power_pdf(mirrored_cosine(wo, wi), m->lobes.shininess) + (1.0f - share) * cosine_pdf(wi.z);
-    return ((wo.z > 0.0f) & (wi.z > 0.0f)) ? pdf : ZERO;
+    BsdfValue at = {scale(value, (real)(1.0f / PI)), scale(m->lobes.color, wi.z * (1.0f / PI)), pdf};
+    return choose_value((wo.z > 0.0f) & (wi.z > 0.0f), at, no_value());
 }
 
 static inline real3 phong_albedo(const struct phong *m) { return lobes_albedo(&m->lobes); }
@@ -38,7 +33,6 @@ static inline BsdfSample phong_sample(const struct phong *m, real3 wo, real2 u, 
     BsdfSample sample = no_sample();
     sample.wi = choose(lobe < gloss_share(&m->lobes), to_world(mirrored, sample_power(u, m->lobes.shininess)),
                        sample_cosine(u));
-    sample.pdf = phong_pdf(m, wo, sample.wi);
-    sample.weight = scale(phong_eval(m, wo, sample.wi), sample.pdf > 0.0f ? 1.0f / sample.pdf : ZERO);
+    weigh_sample(&sample, phong_eval(m, wo, sample.wi), ALL_LANES);
     return sample;
 }

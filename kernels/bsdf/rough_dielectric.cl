@@ -43,15 +43,11 @@ static inline real rough_dielectric(const struct dielectric *m, real3 wo, real3 
 
 static inline ireal dielectric_transmits(const struct dielectric *m) { return m->alpha > 0.0f; }
 
-static inline real3 dielectric_eval(const struct dielectric *m, real3 wo, real3 wi) {
-    real3 value;
-    rough_dielectric(m, wo, wi, &value);
-    return scale(value, wi.z > 0.0f ? ONE : dielectric_spread(m));
-}
-
-static inline real dielectric_pdf(const struct dielectric *m, real3 wo, real3 wi) {
-    real3 value;
-    return rough_dielectric(m, wo, wi, &value);
+static inline BsdfValue dielectric_eval(const struct dielectric *m, real3 wo, real3 wi) {
+    BsdfValue at = no_value();
+    at.pdf = rough_dielectric(m, wo, wi, &at.value);
+    at.value = scale(at.value, wi.z > 0.0f ? ONE : dielectric_spread(m));
+    return at;
 }
 
 static inline BsdfSample rough_dielectric_sample(const struct dielectric *m, real3 wo, real2 u, real lobe) {

@@ -116,8 +116,9 @@ kernel void probe_bsdf_sample(SCENE_PARAMETERS, uint n, global const float *in, 
 kernel void probe_bsdf_value(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint front) {
     ELEMENTS
     Bsdf bsdf = material_at(&scene, ROW(in, 0), ROW3(in, 1), front ? ALL_LANES : NO_LANES);
-    put3(out, n, 0, bsdf_eval(&bsdf, ROW3(in, 1), ROW3(in, 4)));
-    put(out, n, 3, bsdf_pdf(&bsdf, ROW3(in, 1), ROW3(in, 4)));
+    BsdfValue at = bsdf_eval(&bsdf, ROW3(in, 1), ROW3(in, 4));
+    put3(out, n, 0, at.value);
+    put(out, n, 3, at.pdf);
 }
 
 #if PRIMITIVES
@@ -165,8 +166,9 @@ kernel void probe_shading_value(SCENE_PARAMETERS, uint n, global const float *in
     ELEMENTS
     Surface surface;
     Shading shading = shading_between(&scene, ROW(in, 0), ROW3(in, 1), ROW3(in, 4), ROW3(in, 7), &surface);
-    put3(out, n, 0, shading_eval(&shading, &surface, ROW3(in, 10)));
-    put(out, n, 3, shading_pdf(&shading, &surface, ROW3(in, 10)));
+    BsdfValue at = shading_eval(&shading, &surface, ROW3(in, 10));
+    put3(out, n, 0, at.value);
+    put(out, n, 3, at.pdf);
 }
 #endif
 

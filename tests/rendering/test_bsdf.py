@@ -20,9 +20,9 @@ SAMPLES = 1 << 15
 OTHERWISE = {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR"}
 #: Text of the kernels and what makes it wrong by little: densities, the directions drawn, and a value.
 WRONG = {
-    "density of the microfacets": ("(4.0f * wo.z * (1.0f + ggx_lambda(wo, m->alpha)))",
-                                   "(4.2f * wo.z * (1.0f + ggx_lambda(wo, m->alpha)))"),
-    "density of the cosine": ("share.diffuse * cosine_pdf(wi.z)", "share.diffuse * (0.5f / PI)"),
+    "density of the microfacets": ("facets / (1.0f + ggx_lambda(wo, m->alpha))",
+                                   "facets / (1.05f + ggx_lambda(wo, m->alpha))"),
+    "density of the cosine": ("shares.diffuse * cosine_pdf(wi.z)", "shares.diffuse * (0.5f / PI)"),
     "density of further bounces": ("cos_theta * cos_theta + m->alpha", "cos_theta * cos_theta + 1.5f * m->alpha"),
     "shares of the lobes": ("choose(lobe < share.specular,", "choose(lobe < 0.9f * share.specular,"),
     "visible normals": ("1.0f - u.y * (1.0f + stretched.z)", "1.0f - u.y * (1.0f + 0.9f * stretched.z)"),
