@@ -10,7 +10,7 @@ import pytest
 from clrt.device.open import Device
 from clrt.rendering.compile import compile_scene
 from clrt.scene.material import Material
-from clrt.scene.materials import MATERIALS, Diffuse, MetallicRoughness
+from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, MetallicRoughness
 from clrt.scene.model import Camera, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.validate import scene_problems
 from clrt.study.probe import choices
@@ -92,6 +92,20 @@ def test_white_keeps_energy(roughness: float, metallic: float) -> None:
     wo, at = view(0.4, 200_000)
     weight = scattering_of(white, at).sample(wo, np.random.default_rng(1)).weight[:, 0]
     assert abs(weight.mean() - 1) < 0.001 + 4.5 * weight.std() / np.sqrt(len(wo))
+
+
+@pytest.mark.parametrize("roughness", [0.3, 1.0])
+@pytest.mark.parametrize("ior", [0.7, 1.5, 2.0])
+@pytest.mark.parametrize("front", [False, True])
+@pytest.mark.parametrize("thin", [False, True])
+def test_clear_glass_keeps_energy(roughness: float, ior: float, front: bool, thin: bool) -> None:
+    """In radiance over the square of the index."""
+    glass = Dielectric(color=(1.0, 1.0, 1.0), ior=ior, roughness=roughness, thin=thin)
+    wo, at = view(0.4, 200_000)
+    sample = scattering_of(glass, replace(at, front=np.full(len(wo), front))).sample(wo, np.random.default_rng(1))
+    beyond = 1.0 if thin else ior if front else 1 / ior
+    flux = sample.weight[:, 0] * np.where(sample.wi[:, 2] > 0, 1, beyond**2)
+    assert abs(flux.mean() - 1) < 0.002 + 4.5 * flux.std() / np.sqrt(len(wo))
 
 
 def view(cosine: float, n: int) -> tuple[Doubles, Surface]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..textures import bilinear
 from ..vectors import Doubles, dot
-from .ggx import alpha_of, shadowing, smith_lambda, visible_normals
+from .ggx import alpha_of, shadowing, smith_lambda, visible_nodes
 from .scattering import reflected
 
 #: Nodes of roughness from ROUGHNESS to 1, of the root of the cosine from 0 to 1, and of each of a direction's numbers.
@@ -51,15 +51,9 @@ def _table(smith: str) -> Doubles:
 
 
 def _bounce(cosine: float, alpha: float, smith: str) -> tuple[float, float]:
-    """By_f0 and by_f90 of one cosine, over visible normals: their first number is sin² of an angle, in which they are
-    smooth."""
-    x, weights = np.polynomial.legendre.leggauss(DIRECTIONS)
-    angle, turn = np.meshgrid((x + 1) * np.pi / 4, (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS, indexing="ij")
-    u = np.column_stack([np.sin(angle).ravel()**2, turn.ravel()])
-    share = (np.sin(2 * angle) * weights[:, None] * np.pi / 4 / DIRECTIONS).ravel()
-    wo, alphas = np.tile([np.sqrt(1 - cosine**2), 0.0, cosine], (len(u), 1)), np.full(len(u), alpha)
-    h = visible_normals(wo, alphas, u)
-    cos_i = reflected(wo, h)[:, 2]
+    """By_f0 and by_f90 of one cosine."""
+    wo, h, share = visible_nodes(cosine, alpha, DIRECTIONS)
+    alphas, cos_i = np.full(len(wo), alpha), reflected(wo, h)[:, 2]
     up = cos_i > 0
     seen = shadowing(wo[:, 2], np.where(up, cos_i, 1), alphas, smith)
     weight = share * np.where(up, seen * (1 + smith_lambda(wo[:, 2], alphas)), 0)     # G2/G1

@@ -1,5 +1,5 @@
 """Glass: Fresnel's equations and Snell's law at a smooth surface, at GGX's microfacets (Walter et al. 2007, with the
-height-correlated G2 of Heitz 2014), and at both faces of a thin sheet.
+height-correlated G2 of Heitz 2014), and at both faces of a thin sheet; what a single bounce loses, see glass_energy.
 
 Radiance is bundled where it enters a denser medium, by the square of the relative index (Walter 2007, sec. 4.1).
 """
@@ -11,10 +11,11 @@ import numpy as np
 from clrt.scene.materials import Dielectric
 
 from ..surface import Surface
-from ..vectors import Doubles, dot, unit
+from ..vectors import Bools, Doubles, dot, unit
 from . import fresnel
 from .ggx import LEAST, distribution, reflection, shadowing, smith_lambda, visible_normals
-from .scattering import Sample, Scattering, halfway, mirrored_below, reflected
+from .glass_energy import Energy
+from .scattering import Cosine, Sample, Scattering, halfway, mirrored_below, reflected
 
 
 class Glass(Scattering):
@@ -26,27 +27,56 @@ class Glass(Scattering):
         self.eta = np.where(at.front | material.thin, material.ior, 1 / material.ior)
         self.alpha = np.maximum(roughness**2, LEAST)
         self.rough = (roughness > 0) & (material.thin or material.ior != 1)
+        self.outside, self.energy = at.front | material.thin, None
+        if material.multiple_scattering and self.rough.any():
+            assert self.rough.all()
+            self.energy = Energy(material.ior, material.thin, roughness)
         if not material.thin:
             self.absorption_beyond = np.where(at.front[:, None], _absorption(material), 0.0)
 
-    def parts(self, cos_o: Doubles) -> tuple[Doubles, Doubles, Doubles]:
-        """(n, 3) what microfacets reflect and what they pass, and the cosine of what is refracted."""
-        f, cos_t = fresnel.dielectric(cos_o, self.eta)
+    def parts(self, f: Doubles) -> tuple[Doubles, Doubles]:
+        """(n, 3) what microfacets of a Fresnel term F reflect and what they pass."""
         f, c = f[:, None], self.color
         if not self.thin:
-            return np.tile(f, (1, 3)), (1 - f) * c, cos_t
+            return np.tile(f, (1, 3)), (1 - f) * c
         # All bounces between the faces: a geometric series.
         between = 1 - (c * f)**2
         safe = np.where(between > 0, between, 1)
-        return f + (1 - f)**2 * c**2 * f / safe, (1 - f)**2 * c / safe, cos_o
+        return f + (1 - f)**2 * c**2 * f / safe, (1 - f)**2 * c / safe
 
     def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
-        same_side = wi[:, 2] > 0
-        up = np.where(same_side[:, None], wi, mirrored_below(wi))
-        back, on, _ = self.parts(np.abs(dot(wo, halfway(wo, up))))
+        same_side = wi[:, 2:] > 0
+        up = np.where(same_side, wi, mirrored_below(wi))
+        f, _ = fresnel.dielectric(np.abs(dot(wo, halfway(wo, up))), self.eta)
+        back, on = self.parts(f)
         mirrored = reflection(wo, up, self.alpha)[:, None]
         passed = on * mirrored if self.thin else self._refracted(wo, wi)
-        return np.where(self.rough[:, None], np.where(same_side[:, None], back * mirrored, passed), 0.0)
+        once = np.where(self.rough[:, None], np.where(same_side, back * mirrored, passed), 0.0)
+        return np.asarray(once * self._raised(wo, wi) + self._later(wo, wi))
+
+    def _raised(self, wo: Doubles, wi: Doubles) -> Doubles | float:
+        """What later bounces like the first make of that, (n, 1)."""
+        if self.energy is None:
+            return 1.0
+        losses = [self.energy.at(np.abs(w[:, 2]), self._side_of(w))[0] for w in (wo, wi)]
+        return np.asarray(1 / (1 - np.minimum(*losses)))[:, None]
+
+    def _later(self, wo: Doubles, wi: Doubles) -> Doubles | float:
+        """f·|cos wi| of the other later bounces, (n, 3)."""
+        if self.energy is None:
+            return 0.0
+        rest = [self.energy.at(np.abs(w[:, 2]), self._side_of(w))[1] for w in (wo, wi)]
+        own, other = self.energy.mean_rest(self.outside)
+        if self.thin:
+            mean, (back, on) = own, self.parts(np.full_like(own, _mean_fresnel(self.eta[0])))
+        else:
+            mean, back, on = own + self.eta**2 * other, np.ones_like(self.color), self.color
+        f = rest[0] * rest[1] * np.abs(wi[:, 2]) / (np.pi * np.maximum(mean, 1e-300))
+        return np.asarray(f[:, None] * np.where(wi[:, 2:] > 0, back, on))
+
+    def _side_of(self, w: Doubles) -> Bools:
+        """Whether it is outside; that of a sheet is like its inside."""
+        return np.asarray(self.outside if self.thin else self.outside ^ (w[:, 2] < 0))
 
     def _refracted(self, wo: Doubles, wi: Doubles) -> Doubles:
         """f·|cos wi| (Walter 2007, eq. 16 and 21)."""
@@ -56,16 +86,28 @@ class Glass(Scattering):
         h = np.where(h[:, 2:] < 0, -h, h)
         cos_o, cos_i = dot(wo, h), dot(wi, h)
         crosses = (cos_o > 0) & (cos_i < 0) & (wi[:, 2] < 0)
-        _, on, _ = self.parts(np.abs(cos_o))
+        _, on = self.parts(fresnel.dielectric(np.abs(cos_o), self.eta)[0])
         g = shadowing(wo[:, 2], np.maximum(-wi[:, 2], 1e-300), self.alpha)
         stretch = np.where(crosses, (cos_o + self.eta * cos_i)**2, 1)
         f = np.abs(cos_i * cos_o) / wo[:, 2] * distribution(h, self.alpha) * g / stretch
         return on * np.where(crosses, f, 0)[:, None]
 
     def sample(self, wo: Doubles, rng: np.random.Generator) -> Sample:
+        once = self._sample_once(wo, rng)
+        if self.energy is None:
+            return once
+        up = Cosine().draw(wo, rng)
+        spread = np.where(rng.random((len(wo), 1)) < 0.5, up, mirrored_below(up))
+        later, density = rng.random((len(wo), 1)) < 0.5, up[:, 2:] / np.pi / 2
+        weight = np.where(later, self._later(wo, spread) / density, once.weight * self._raised(wo, once.wi))
+        return Sample(np.where(later, spread, once.wi), 2 * weight)
+
+    def _sample_once(self, wo: Doubles, rng: np.random.Generator) -> Sample:
+        """By a single bounce."""
         h = np.where(self.rough[:, None], visible_normals(wo, self.alpha, rng.random((len(wo), 2))), [0.0, 0.0, 1.0])
         cos_o = dot(wo, h)
-        back, on, cos_t = self.parts(cos_o)
+        f, cos_t = fresnel.dielectric(cos_o, self.eta)
+        back, on = self.parts(f)
         chance = back.mean(axis=1) / (back + on).mean(axis=1)
         returns = (rng.random(len(wo)) < chance)[:, None]
         eta = self.eta[:, None]
@@ -91,3 +133,10 @@ def _absorption(material: Dielectric) -> Doubles:
         return np.zeros(3)
     color = np.maximum(np.array(material.attenuation_color, float), 1e-300)
     return np.asarray(-np.log(color) / material.attenuation_distance)
+
+
+def _mean_fresnel(eta: float) -> float:
+    """F of diffuse light."""
+    x, weights = np.polynomial.legendre.leggauss(200)
+    cosine = (x + 1) / 2
+    return float(fresnel.dielectric(cosine, np.full_like(cosine, eta))[0] @ (weights * cosine))

@@ -86,3 +86,16 @@ def visible_normals(wo: Doubles, alpha: Doubles, u: Doubles) -> Doubles:
     y = (1 - s) * np.sqrt(np.maximum(1 - x * x, 0)) + s * r * np.sin(phi)
     h = x[:, None] * t1 + y[:, None] * t2 + np.sqrt(np.maximum(1 - x * x - y * y, 0))[:, None] * v
     return unit(np.column_stack([alpha * h[:, 0], alpha * h[:, 1], np.maximum(h[:, 2], 1e-300)]))
+
+
+def visible_nodes(cosine: float, alpha: float, count: int) -> tuple[Doubles, Doubles, Doubles]:
+    """Of a quadrature over the normals visible from an angle: wo (n, 3), h (n, 3), and weights (n,), of 1 in all.
+
+    A normal's first number is sin² of an angle, in which it is smooth; count: of nodes for each number.
+    """
+    x, weights = np.polynomial.legendre.leggauss(count)
+    angle, turn = np.meshgrid((x + 1) * np.pi / 4, (np.arange(count) + 0.5) / count, indexing="ij")
+    u = np.column_stack([np.sin(angle).ravel()**2, turn.ravel()])
+    wo = np.tile([np.sqrt(1 - cosine**2), 0.0, cosine], (len(u), 1))
+    share = (np.sin(2 * angle) * weights[:, None] * np.pi / 4 / count).ravel()
+    return wo, visible_normals(wo, np.full(len(u), alpha), u), share
