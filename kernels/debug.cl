@@ -107,7 +107,7 @@ static inline void note_light(const Scene *scene, const Path *path, const Surfac
     if (!ANY(sent)) return;
     v->unshadowed = choose(sent, shadow.light, splat(ZERO));
     v->direct = light_along(scene, &shadow, sent);
-    ireal stopped = sent & is_positive3(v->unshadowed) & !is_positive3(v->direct);
+    ireal stopped = sent & carries_light(v->unshadowed) & !carries_light(v->direct);
     if (!ANY(stopped)) return;
     Hits blocker = blocker_of(scene, &shadow, stopped);
     v->blocker = stopped ? blocker.primitive : (ireal)(-1);
@@ -129,7 +129,7 @@ static inline ireal note_direction(Path *path, const Surface *surface, const Sha
     v->pdf = active ? sample.pdf : ZERO;
     v->specular = flag(active & sample.specular);
     ireal why = !(sample.pdf > 0.0f) ? (ireal)(END_SIDE) : (ireal)(END_ROULETTE);
-    why = !is_positive3(sample.weight) ? (ireal)(END_ABSORBED) : why;
+    why = !carries_light(sample.weight) ? (ireal)(END_ABSORBED) : why;
     v->end = goes ? (ireal)(END_NONE) : why;
     return goes;
 }

@@ -112,7 +112,7 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
     LightSample light = light_sample(scene, surface->p, choosing_normal(shading), sampler);
     BsdfValue bsdf = shading_eval(shading, surface, light.wi);
     real3 contribution = mul(bsdf.value, light.radiance);
-    ireal useful = active & (light.pdf > 0.0f) & is_positive3(contribution);
+    ireal useful = active & !(light.pdf <= 0.0f) & carries_light(contribution);
     if (!ANY(useful)) return useful;
     ray->origin = offset_origin(surface->p, surface->p_error, surface->ng, light.wi);
     ray->target = light.target;
@@ -148,7 +148,7 @@ static inline ireal go_on(Path *path, const Surface *surface, const Shading *sha
     path->n = choosing_normal(shading);
     path->pdf = sample.pdf;
     path->specular = sample.specular;
-    active = active & (sample.pdf > 0.0f) & is_positive3(sample.weight);
+    active = active & !(sample.pdf <= 0.0f) & carries_light(sample.weight);
     path->beta = choose(active, mul(path->beta, sample.weight), path->beta);
 #if TRANSMISSION
     path->spread *= sample.spread;

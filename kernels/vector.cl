@@ -34,7 +34,8 @@ static inline real3 choose(ireal mask, real3 a, real3 b) {
 }
 static inline real largest(real3 a) { return maximum(a.x, maximum(a.y, a.z)); }
 static inline real luminance(real3 a) { return 0.2126f * a.x + 0.7152f * a.y + 0.0722f * a.z; }
-static inline ireal is_positive3(real3 a) { return (a.x > 0.0f) | (a.y > 0.0f) | (a.z > 0.0f); }
+// A NaN does, so that it ends in the film, which counts it, and not unseen.
+static inline ireal carries_light(real3 a) { return !(a.x <= 0.0f) | !(a.y <= 0.0f) | !(a.z <= 0.0f); }
 
 // A right-handed frame (s, t, n) around a unit normal (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").
 typedef struct { real3 s, t, n; } Frame;

@@ -31,7 +31,7 @@ static inline real3 light_of_one(const Scene *scene, int light, const Surface *s
                                  ireal active, real2 u, ureal *rays) {
     LightSample sample = sample_of_light(scene, (ireal)(light), surface->p, u);
     real3 contribution = scale(mul(shading_eval(shading, surface, sample.wi).value, sample.radiance), 1.0f / sample.pdf);
-    ireal useful = active & (sample.pdf > 0.0f) & is_positive3(contribution);
+    ireal useful = active & (sample.pdf > 0.0f) & carries_light(contribution);
     if (!ANY(useful)) return splat(ZERO);
 #if NO_SHADOWS
     return choose(useful, contribution, splat(ZERO));

@@ -69,7 +69,7 @@ static inline BsdfSample no_sample() {
 // Gives a sample the weight and density of its direction, where those are what `kept` lanes have.
 static inline void weigh_sample(BsdfSample *sample, BsdfValue at, ireal kept) {
     sample->pdf = kept ? at.pdf : ZERO;
-    real inverse = sample->pdf > 0.0f ? 1.0f / sample->pdf : ZERO;
+    real inverse = sample->pdf <= 0.0f ? ZERO : 1.0f / sample->pdf;
     sample->weight = scale(at.value, inverse);
 #if HORIZON
     sample->matte = at.matte;

@@ -182,7 +182,7 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     Bounce bounce_o = ggx_bounce(&m.bounces, cos_o);
 #endif
 #if MULTIPLE_SCATTERING
-    m.lost_o = bounce_o.lost / lost;
+    m.lost_o = bounce_o.lost * inverse_or_zero(lost);     // the program has no fits of forms whose materials need none
     multiple_o = luminance(m.multiple) * bounce_o.lost;
 #endif
 #if COUPLING_ALBEDO

@@ -13,6 +13,9 @@ from clrt.study.samplers import AREA, scattering_rows
 from clrt.study.scattering import FITTED, ROUNDING, Scattered, above, cases, reciprocity, scatter
 from clrt.study.significance import rejected
 
+from tests.oracle.draws import DRAWERS, Draws, random_material
+from tests.oracle.scenes import todays_seed
+
 from .ggx import cook_torrance
 
 SAMPLES = 1 << 15
@@ -99,6 +102,22 @@ def test_below_the_horizon_nothing_is_reflected(every: Bsdfs) -> None:
         for a, b in ((wo, wi), (wi, wi)):
             assert not every.value(which, a, b)[0].any(), material
         assert not every.value(which, wo, wi)[1].any(), material
+
+
+def test_the_others_of_a_scene_change_nothing(device: Device) -> None:
+    """A few materials share a program with less in it than that of many."""
+    seed, (wo, wi) = todays_seed(), (above(300, 7), above(300, 8))
+    print(f"seed {seed}")
+    kinds: list[type[Material]] = [MetallicRoughness, MetallicRoughness, *DRAWERS]
+    many = bsdfs(device, [random_material(Draws(seed, number, 0), kinds[number % len(kinds)]) for number in range(72)])
+    alike = [i for i, material in enumerate(many.materials) if type(material) is MetallicRoughness]
+    rng = np.random.default_rng(seed)
+    for number in range(8):
+        chosen = rng.choice(alike if number % 2 else len(many.materials), 5, replace=False)
+        few = bsdfs(device, [many.materials[i] for i in chosen])
+        for which, among_many in enumerate(chosen):
+            for one, other in zip(few.value(which, wo, wi), many.value(among_many, wo, wi)):
+                np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-6, err_msg=str(few.materials))
 
 
 def test_cook_torrance(every: Bsdfs) -> None:
