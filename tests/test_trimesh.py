@@ -141,14 +141,90 @@ def test_what_is_no_mesh_is_refused(other: Any) -> None:
         clrt.trimesh.RayMeshIntersector(other)
 
 
-def test_coincident_surfaces_all_count(device: Device) -> None:
-    """A triangle 64 times, and once more a rounding further: every one is hit, once, in order."""
+def test_coincident_surfaces_are_one_place(device: Device) -> None:
+    """A triangle 64 times is one, as for trimesh's engines; a rounding further is another."""
     corners = np.array([[-1, -1, 0], [3, -1, 0], [-1, 3, 0]], np.float32)
     further = corners + np.array([0, 0, np.finfo(np.float32).eps], np.float32)
     mesh = trimesh.Trimesh(np.concatenate([corners, further]), [[0, 1, 2]] * 64 + [[3, 4, 5]], process=False)
     ray = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index)
-    triangle, index_ray = ray.intersects_id([[0, 0, -1]], [[0, 0, 1]])
-    np.testing.assert_array_equal(triangle, np.arange(65))
-    np.testing.assert_array_equal(index_ray, np.zeros(65))
-    triangle, _ = ray.intersects_id([[0, 0, -1]], [[0, 0, 1]], max_hits=10)
-    np.testing.assert_array_equal(triangle, np.arange(10))
+    for most, expected in ((None, [0, 64]), (2, [0, 64]), (1, [0])):
+        triangle, index_ray = ray.intersects_id([[0, 0, -1]], [[0, 0, 1]], max_hits=most)
+        assert triangle.tolist() == expected and not index_ray.any()
+
+
+def test_a_doubled_surface_contains_what_it_did(device: Device) -> None:
+    """Each face of a ball twice: a ray passes one surface, as for trimesh's engines."""
+    ball = trimesh.creation.icosphere()
+    double = trimesh.Trimesh(ball.vertices, np.concatenate([ball.faces, ball.faces]), process=False)
+    points = RNG.uniform(-1.2, 1.2, (500, 3))
+    expected = clrt.trimesh.RayMeshIntersector(ball, device=device.info.index).contains_points(points)
+    np.testing.assert_array_equal(
+        clrt.trimesh.RayMeshIntersector(double, device=device.info.index).contains_points(points), expected)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e7])
+def test_edges_and_corners_are_one_place(device: Device, scale: float) -> None:
+    """A ray from outside through the inside of a convex mesh enters once and leaves once, wherever it does."""
+    for mesh in (trimesh.creation.box(), trimesh.creation.icosphere(subdivisions=2), trimesh.creation.cylinder(1, 2)):
+        mesh.apply_transform(trimesh.transformations.random_rotation_matrix(RNG.random(3)))
+        mesh.apply_scale(scale)
+        mesh.apply_translation(scale * RNG.normal(size=3))
+        ends, along = mesh.vertices[mesh.edges_unique], RNG.random((len(mesh.edges_unique), 1))
+        met = np.concatenate([mesh.vertices, ends[:, 0] + along * (ends[:, 1] - ends[:, 0]), ends.mean(axis=1)])
+        # Through the middle: half of the others are below the mesh's horizon.
+        directions = mesh.center_mass - met
+        origins = met - directions * RNG.uniform(0.5, 20, (len(met), 1))
+        ray = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index)
+        locations, index_ray, index_tri = ray.intersects_location(origins, directions)
+        np.testing.assert_array_equal(np.bincount(index_ray, minlength=len(met)), 2)
+        np.testing.assert_allclose(locations[::2], met, atol=2e-6 * mesh.scale, rtol=0)
+        assert [each.tolist() for each in ray.intersects_id(origins, directions)] == [index_tri.tolist(),
+                                                                                      index_ray.tolist()]
+
+
+@pytest.mark.parametrize("middle", [0.0, 3e5])
+def test_a_surface_that_a_ray_leaves_counts(device: Device, middle: float) -> None:
+    """As for trimesh's engine in float64; a ten-thousandth of the mesh further it does not."""
+    mesh = trimesh.creation.icosphere()
+    mesh.apply_translation((middle, -middle, middle))
+    points, face = trimesh.sample.sample_surface(mesh, 500, seed=1)
+    outward, ray = mesh.face_normals[face], clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index)
+    for method in ("intersects_first", "intersects_any"):
+        for step in (0.0, 1e-4):
+            ours, theirs = (getattr(each, method)(points + step * outward, outward) for each in (ray, reference(mesh)))
+            np.testing.assert_array_equal(ours, theirs)
+    inward, _ = ray.intersects_id(points, -outward)
+    np.testing.assert_array_equal(inward[::2], face)
+    assert len(inward) == 2 * len(face)
+
+
+def test_what_is_made_when_asked_for(device: Device) -> None:
+    """A primitive has no faces before that; nor has an intersector a tree."""
+    box: Any = trimesh.primitives.Box(extents=(2, 2, 2))
+    box.ray = clrt.trimesh.RayMeshIntersector(box, False, device=device.info.index)
+    box.primitive.extents = (4, 4, 4)
+    np.testing.assert_allclose(box.ray.intersects_location([[0.1, 0.2, -9]], [[0, 0, 1]])[0][:, 2], [-2, 2])
+
+
+def test_arguments_by_place_are_trimeshs(device: Device) -> None:
+    """multiple_hits, max_hits, return_locations, as its default engine has them."""
+    mesh = trimesh.creation.box()
+    ray, through = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index), ([[0.1, 0.2, -9]], [[0, 0, 1]])
+    ours, theirs = (each.intersects_id(*through, True, 1, True) for each in (ray, mesh.ray))
+    assert [each.tolist() for each in ours] == [each.tolist() for each in theirs]
+
+
+def test_a_mesh_without_faces_is_met_by_nothing(device: Device) -> None:
+    ray = clrt.trimesh.RayMeshIntersector(trimesh.Trimesh(), device=device.info.index)
+    assert not ray.intersects_any([[0, 0, 0]], [[0, 0, 1]]).any()
+    assert [len(each) for each in ray.intersects_location([[0, 0, 0]], [[0, 0, 1]])] == [0, 0, 0]
+
+
+@pytest.mark.filterwarnings("error")
+def test_numpy_that_raises_is_no_matter(device: Device) -> None:
+    ray = clrt.trimesh.RayMeshIntersector(trimesh.creation.icosphere(), device=device.info.index)
+    with np.errstate(all="raise"):
+        for directions in ([[0, 0, 1]], [[0, 0, 0]], [[1e-300, 0, 1e-200]], [[0, np.nan, np.inf]]):
+            for origin in ([[0, 0, 0]], [[1e-300, 0, -3]], [[1e30, 0, 0]], [[np.inf, 0, 0]]):
+                assert len(ray.intersects_location(origin, directions)[1]) <= 2
+                assert ray.intersects_any(origin, directions).shape == ray.intersects_first(origin, directions).shape
