@@ -12,7 +12,9 @@ def main() -> None:
     atexit.register(_end, code)     # before all others are, so it is called after them
     try:
         from .cli import main as run
+        from .device import background
 
+        background.ends_at_once = True
         run()
     except KeyboardInterrupt:
         sys.exit(130)

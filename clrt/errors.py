@@ -15,6 +15,8 @@ Everything public raises only these for users' mistakes; any other exception is 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class ClrtError(Exception):
     """Base of all errors that clrt raises on purpose; `exit_code` is what the command line returns."""
@@ -68,3 +70,11 @@ class OutputError(ClrtError):
     """A result cannot be written."""
 
     exit_code = 6
+
+
+def check_choice(name: str, value: object, known: Iterable[object]) -> None:
+    """UsageError unless the value is one of those known; None, which is for a default, goes unnamed."""
+    values = tuple(known)
+    if not isinstance(value, str | int | None) or value not in values:
+        named = ", ".join(str(each) for each in values if each is not None)
+        raise UsageError(f"{name} {value!r} is unknown; choose from {named}")

@@ -46,7 +46,7 @@ class InstancedRayQuery(TreeQuery):
         self._units = np.array([unit_for(largest) for largest in self._extents.max(axis=1).tolist()])
         to_world = _matrices(transforms, len(self._mesh))
         tests, opened = HitTests(triangle, box), open_device(device)
-        self._levels = TwoLevels(opened, layout or opened.layout, builder,
+        self._levels = TwoLevels(opened, opened.layout if layout is None else layout, builder,
                                  [(mesh_corners * unit).astype(np.float32)
                                   for mesh_corners, unit in zip(triangles, self._units)], self._mesh, triangle)
         tree, frame = self._placed(to_world)

@@ -45,7 +45,8 @@ class RayQuery(TreeQuery):
         points, self._faces = mesh_arrays(vertices, faces)
         self._spheres = sphere_array(np.zeros((0, 4)) if spheres is None else spheres)
         tests, opened = HitTests(triangle, box, sphere), open_device(device)
-        self._vertices, self._layout, self._builder = len(points), layout or opened.layout, builder
+        self._vertices, self._builder = len(points), builder
+        self._layout = opened.layout if layout is None else layout
         tree, frame = self._built(opened, points, triangle)
         super().__init__(opened, tree, (len(self._faces), len(self._spheres)), frame, tests, traversal, device)
         self._refitter: Refitter | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -23,7 +23,7 @@ from .device.open import Device, open_device
 from .device.preamble import defines, scene_struct, typedefs
 from .device.program import build, compose, make_kernel
 from .device.records import record
-from .errors import DeviceError, UsageError
+from .errors import DeviceError, UsageError, check_choice
 from .float_errors import with_default_errors
 from .scene.ray_arrays import Rays, ray_arrays
 from .scene.scaling import Frame
@@ -72,7 +72,7 @@ class TreeQuery:
         self._counts = np.zeros(1, COUNTS)
         self._counts["triangles"], self._counts["spheres"] = counts
         self._tests = tests
-        _check("traversal", traversal, (None, *TRAVERSALS))
+        check_choice("traversal", traversal, (None, *TRAVERSALS))
         if traversal in ("packet", "pool") and tree.name != "bvh8":
             raise UsageError(f"the traversal {traversal} is for the layout bvh8, not {tree.name}; leave it out")
         self._traversal = traversal if tree.name == "bvh8" and any(counts) else "single"
@@ -222,8 +222,8 @@ class TreeQuery:
 
     def source(self, name: str, traversal: str) -> str:
         """The program that answers `name`, one of QUERIES, by a traversal of TRAVERSALS."""
-        _check("query", name, QUERIES)
-        _check("traversal", traversal, TRAVERSALS)
+        check_choice("query", name, QUERIES)
+        check_choice("traversal", traversal, TRAVERSALS)
         triangles, spheres = bool(self._counts["triangles"]), bool(self._counts["spheres"])
         instances = self._hit is INSTANCE_HIT
         has = tree_features(triangles, spheres) | {"INSTANCES": instances, "NEXT_HIT": name == "next_hit",
@@ -237,11 +237,6 @@ class TreeQuery:
         files = tree_files(self.tree.name, self._tests, triangles, spheres, instances=instances)
         return compose(preamble, "query_pool.cl" if traversal == "pool" else "query.cl",
                        files | {"PACKETS": ["traverse/packet.cl"] if traversal == "packet" else []})
-
-
-def _check(kind: str, name: str | None, known: Sequence[str | None]) -> None:
-    if name not in known:
-        raise UsageError(f"there is no {kind} {name!r}: take one of {', '.join(filter(None, known))}")
 
 
 def _shown(hits: NDArray[Any]) -> NDArray[Any]:

@@ -8,10 +8,10 @@ import numpy as np
 
 from ..device.arrays import DeviceArray
 from ..device.open import Device
-from ..errors import UsageError
+from ..errors import UsageError, check_choice
 from . import device_builder
 from .builders import BUILDERS
-from .layouts import LEAF_SPHERE, PACK, Layout, pack
+from .layouts import LAYOUTS, LEAF_SPHERE, PACK, Layout, pack
 from .tree import FloatArray, Triangles
 from .triangle_forms import in_form
 
@@ -48,6 +48,7 @@ def build_tree(device: Device | None, layout: str, builder: str | None, triangle
     primitives, those on the device are stood in for by `sah`. triangle: the test that the leaves are for. Raises
     UsageError for unknown names and for layouts that the builder, or the test, cannot use.
     """
+    check_choice("layout", layout, LAYOUTS)
     if layout == "packs" and triangle != "watertight":
         raise UsageError(f"the layout packs is for the watertight triangle test, not {triangle}: take another layout")
     spheres = np.zeros((0, 4), np.float32) if spheres is None else spheres
@@ -65,8 +66,7 @@ def builder_source(device: Device, layout: str, builder: str | None, triangles: 
 
 def _fitting_builder(device: Device | None, layout: str, builder: str | None, count: int) -> str:
     known = [*DEVICE_BUILDERS, *BUILDERS]
-    if builder not in (None, *known):
-        raise UsageError(f"there is no tree builder {builder!r}: take one of {', '.join(known)}")
+    check_choice("builder", builder, (None, *known))
     if builder is None:
         device_can = layout in device_builder.SHAPES and device_builder.fits(device, count)
         builder = "ploc" if device_can and count >= LARGE else "sah"

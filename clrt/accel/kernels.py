@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ..errors import UsageError
+from ..errors import check_choice
 from .build import DEVICE_BUILDERS
 from .builders import BUILDERS
 from .layouts import NO_RAYS, PACK, Layout
@@ -43,8 +43,7 @@ class HitTests:
 
     def __post_init__(self) -> None:
         for (name, value), known in zip(asdict(self).items(), (TRIANGLE_TESTS, BOX_TESTS, SPHERE_TESTS)):
-            if value not in known:
-                raise UsageError(f"{name} {value!r} is unknown; choose from {', '.join(known)}")
+            check_choice(name, value, known)
 
 
 def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:

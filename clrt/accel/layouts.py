@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import UsageError
+from ..errors import check_choice
 from .builders import BUILDERS
 from .cwbvh import MAX_LEAF, compress
 from .grouping import packs_of
@@ -107,9 +107,8 @@ def pack(layout: str, builder: str, triangles: FloatArray, spheres: FloatArray) 
     corners; spheres: (s, 4) float32 centre and radius; all finite. Raises UsageError for an unknown name, and
     SceneError for more primitives than the layout can count.
     """
-    for kind, name, known in (("tree layout", layout, LAYOUTS), ("tree builder", builder, BUILDERS)):
-        if name not in known:
-            raise UsageError(f"there is no {kind} {name!r}: take one of {', '.join(known)}")
+    check_choice("layout", layout, LAYOUTS)
+    check_choice("builder", builder, BUILDERS)
     started = time.perf_counter()
     packed = LAYOUTS[layout](builder, triangles, spheres)
     return replace(packed, build_seconds=time.perf_counter() - started, builder=builder)

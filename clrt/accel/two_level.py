@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from ..device.arrays import DeviceArray, on_host, put, room_for
 from ..device.open import Device
 from ..device.records import record
-from ..errors import UsageError
+from ..errors import UsageError, check_choice
 from .build import build_tree
-from .layouts import Layout, sphere_boxes
+from .layouts import LAYOUTS, Layout, sphere_boxes
 from .tree import FloatArray, IntArray
 from .upper_level import FORMS, upper_level
 
@@ -44,6 +44,7 @@ class TwoLevels:
 
     def __init__(self, device: Device | None, layout: str, builder: str | None, meshes: Sequence[FloatArray],
                  mesh: IntArray, triangle: str = "watertight", spheres: FloatArray | None = None) -> None:
+        check_choice("layout", layout, LAYOUTS)
         if layout not in FORMS:
             raise UsageError(f"the layout {layout} is no tree, which instances need: take one of {', '.join(FORMS)}")
         start = time.perf_counter()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
 import threading
 from collections.abc import Callable
@@ -14,6 +15,9 @@ T = TypeVar("T")
 #: Seconds after which a compiler is slow, and after which it is taken for one that hangs.
 SLOW, LIMIT = 15.0, 600.0
 _log = logging.getLogger(__name__)
+#: Whether the process ends without that Python is taken apart, as that of the command line does (clrt.__main__).
+ends_at_once = False
+_compiling: set[threading.Thread] = set()
 
 
 def in_background(where: str, work: Callable[[], T]) -> T:
@@ -28,9 +32,12 @@ def in_background(where: str, work: Callable[[], T]) -> T:
             results.append(work())
         except BaseException as error:  # whatever it is, it belongs to who waits
             errors.append(error)
+        _compiling.discard(thread)
         done.set()
 
-    threading.Thread(target=run, daemon=True, name="clrt compiles").start()
+    thread = threading.Thread(target=run, daemon=True, name="clrt compiles")
+    _compiling.add(thread)
+    thread.start()
     if not wait_awake(done, SLOW):
         _log.warning("%s has been compiling a kernel for %g s; it is given up after %g s", where, SLOW, LIMIT)
         if not wait_awake(done, LIMIT - SLOW):
@@ -39,3 +46,10 @@ def in_background(where: str, work: Callable[[], T]) -> T:
     if errors:
         raise errors[0]
     return results[0]
+
+
+@atexit.register
+def _await_compilers() -> None:
+    """One that nobody waits for any more would, coming back while Python ends, abort the process."""
+    for thread in [] if ends_at_once else list(_compiling):
+        thread.join(SLOW)

@@ -184,7 +184,7 @@ def _from_binary(device: Device, binary: bytes | None) -> cl.Program | None:
 
 
 def _compile(device: Device, source: str) -> cl.Program:
-    start = time.perf_counter()
+    start, log = time.perf_counter(), "interrupted"
     program = cl.Program(device.context, source)
     try:
         options = OPTIONS + (SIMULATOR_OPTIONS if device.info.type == "simulator" else [])

@@ -22,7 +22,11 @@ AOVS = (*MEANS, *OF_THE_MIDDLE, *OF_THE_FILM)
 
 def chosen_aovs(names: str | Iterable[str]) -> tuple[str, ...]:
     """The names, each once; text is taken for names with commas between. UsageError for one that is none of AOVS."""
-    given = names.split(",") if isinstance(names, str) else names
+    if not isinstance(names, Iterable):
+        raise UsageError(f"aovs is {names!r}; give names, in a list or with commas between")
+    given = names.split(",") if isinstance(names, str) else list(names)
+    if not all(isinstance(name, str) for name in given):
+        raise UsageError(f"aovs is {names!r}; give names, in a list or with commas between")
     chosen = tuple(dict.fromkeys(name.strip() for name in given))
     for name in chosen:
         if name not in AOVS:

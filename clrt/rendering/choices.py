@@ -9,7 +9,7 @@ import numpy as np
 
 from ..accel.kernels import BUILDER_NAMES, TREELESS, TREES, HitTests
 from ..device.open import Device
-from ..errors import UsageError
+from ..errors import UsageError, check_choice
 from .records import PIXEL, PIXEL_WITH_DIRECT
 
 #: Where rays leave a surface.
@@ -46,11 +46,9 @@ class Choices:
     def __post_init__(self) -> None:
         known: dict[str, tuple[object, ...]] = {"layout": (None, *TREES), "builder": (None, *BUILDER_NAMES),
                                                 "lanes": LANES, "paths": (None, *PATHS), "offset": tuple(OFFSETS),
-                                                "tree": (None, True, False)}
+                                                "tree": (None, True, False), "first_hits": (True, False)}
         for name, values in known.items():
-            if (value := getattr(self, name)) not in values:
-                named = ", ".join(str(known_value) for known_value in values if known_value is not None)
-                raise UsageError(f"{name} {value!r} is unknown; choose from {named}")
+            check_choice(name, getattr(self, name), values)
         if self.paths == "waves" and self.lanes != WAVE_LANES:
             raise UsageError(f"paths in waves need {WAVE_LANES} lanes, not {self.lanes}; leave out one of the choices")
         if self.tree is not None and self.layout is not None and self.tree == (self.layout in TREELESS):

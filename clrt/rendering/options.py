@@ -21,8 +21,7 @@ def choices_of(options: Mapping[str, Any]) -> Choices:
     """What is chosen, also by the AOVs that are asked for. UsageError for what is unknown."""
     aovs = chosen_aovs(options.get("aovs") or ())
     tests, chosen = HitTests(**_given(options, HitTests)), _given(options, Choices)
-    by_aovs = {"direct_light": needs_direct_light(aovs),
-               "first_hits": chosen.get("first_hits", False) or bool(seen_first(aovs))}
+    by_aovs = {"direct_light": needs_direct_light(aovs)} | ({"first_hits": True} if seen_first(aovs) else {})
     return Choices(**{**chosen, **by_aovs, "tests": tests})
 
 

@@ -32,11 +32,13 @@ def check_stops(spp: int | None, time: float | None = None, error: float | None 
             raise UsageError(f"{name} is {value}; it must be above 0{finite}")
 
 
-def checked_percentile(percentile: float | None) -> float | None:
+def checked_percentile(percentile: Any) -> float | None:
     """It; UsageError unless it is one, if it is given."""
-    if percentile is not None and not 0 < percentile <= 100:
-        raise UsageError(f"error_percentile is {percentile}; it must be above 0 and at most 100")
-    return percentile
+    if percentile is None:
+        return None
+    if not isinstance(percentile, Real) or not 0 < float(percentile) <= 100:
+        raise UsageError(f"error_percentile is {percentile!r}; it must be a number above 0 and at most 100")
+    return float(percentile)
 
 
 def check_step(done: int) -> int:
