@@ -14,6 +14,7 @@ from . import pocl
 from .contexts import Shared, shared_by
 from .describe import DeviceInfo
 from .discover import choose
+from .fork import check_process
 from .pulse import take_any_time
 
 #: The name of PoCL's platform.
@@ -24,16 +25,23 @@ TIMED = cl.command_queue_properties.PROFILING_ENABLE
 
 @dataclass(frozen=True)
 class Device:
-    """An opened device. Its queue runs in order."""
+    """An opened device. In a process that was forked from that which opened it, queue and context are a UsageError."""
 
     info: DeviceInfo
     cl: cl.Device
     shared: Shared
-    queue: CommandQueue
+    _queue: CommandQueue
+
+    @property
+    def queue(self) -> CommandQueue:
+        """Which runs in order."""
+        check_process()
+        return self._queue
 
     @property
     def context(self) -> Context:
         """Of its buffers and programs."""
+        check_process()
         return self.shared.context
 
     @property
