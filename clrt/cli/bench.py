@@ -9,6 +9,7 @@ from .bench_build import build_command
 from .bench_combinations import combinations_command
 from .bench_converge import converge_command
 from .bench_farm import farm_command
+from .bench_floor import floor_command
 from .bench_hits import hits_command
 from .bench_mitsuba_data import mitsuba_data_command
 from .bench_numerics import numerics_command
@@ -21,11 +22,11 @@ from .options import Group
 
 @click.group(cls=Group)
 def command() -> None:
-    """Measure this machine: rays, build, hits, peers, converge, agree, combinations,
+    """Measure this machine: rays, build, hits, peers, converge, agree, combinations, floor,
     mitsuba-data, render-fidelity, numerics, theses, farm."""
 
 
 for each in (rays_command, build_command, hits_command, peers_command, converge_command, agree_command,
-             combinations_command, mitsuba_data_command, render_fidelity_command, numerics_command, theses_command,
-             farm_command):
+             combinations_command, floor_command, mitsuba_data_command, render_fidelity_command, numerics_command,
+             theses_command, farm_command):
     command.add_command(each)

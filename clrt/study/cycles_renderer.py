@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
 from importlib import import_module
@@ -14,9 +14,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..output.images import read_image
+from ..scene.materials import Material
 from ..scene.model import Scene
 from .contestants import Contestant, Picture
-from .cycles_scene import blender_scene, check_scene
+from .cycles_scene import Bsdf, blender_scene, check_scene
 
 
 def contestants(scene: Scene) -> dict[str, Contestant]:
@@ -27,10 +28,13 @@ def contestants(scene: Scene) -> dict[str, Contestant]:
 
 
 class Cycles:
-    """A contestant. Each picture is prepared by Blender, and read from a file: both are in its time."""
+    """A contestant; bsdfs: see `blender_scene`.
 
-    def __init__(self, library: Any, content: Scene) -> None:
-        self._library, self._content = library, content
+    Each picture is prepared by Blender, and read from a file: both are in its time.
+    """
+
+    def __init__(self, library: Any, content: Scene, bsdfs: Mapping[type[Material], Bsdf] | None = None) -> None:
+        self._library, self._content, self._bsdfs = library, content, bsdfs
         self._folder = TemporaryDirectory()
         self._warm = False
 
@@ -48,7 +52,7 @@ class Cycles:
 
     @cached_property
     def _scene(self) -> Any:
-        return blender_scene(self._library.data, self._content, Path(self._folder.name))
+        return blender_scene(self._library.data, self._content, Path(self._folder.name), self._bsdfs)
 
 
 @contextmanager

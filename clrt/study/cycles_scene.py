@@ -6,7 +6,7 @@ write its node in BSDFS.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -56,14 +56,15 @@ def check_scene(scene: Scene) -> None:
         raise UsageError(f'{scene.name}: Cycles is compared with filter = "box", and two path edges or more')
 
 
-def blender_scene(data: Any, scene: Scene, folder: Path) -> Any:
-    """A scene of `data` (bpy.data); pictures that Blender reads are written to `folder`."""
+def blender_scene(data: Any, scene: Scene, folder: Path, bsdfs: Mapping[type[Material], Bsdf] | None = None) -> Any:
+    """A scene of `data` (bpy.data); pictures that Blender reads are written to `folder`. bsdfs: in place of BSDFS."""
     made = data.scenes.new(scene.name)
     _set_up(made, scene)
+    bsdfs = bsdfs or BSDFS
     for mesh in unfolded(scene).meshes:
-        _place(data, made, _mesh(data, mesh.vertices, mesh.faces, mesh.normals, mesh.material))
+        _place(data, made, _mesh(data, mesh.vertices, mesh.faces, mesh.normals, _material(data, mesh.material, bsdfs)))
     for sphere in scene.spheres:
-        _place(data, made, _mesh(data, *sphere_triangles(sphere), sphere.material))
+        _place(data, made, _mesh(data, *sphere_triangles(sphere), _material(data, sphere.material, bsdfs)))
     for light in scene.lights:
         _place(data, made, *_light(data, light))
     made.camera = _place(data, made, *_camera(data, scene.camera))
@@ -129,7 +130,8 @@ def _dielectric(nodes: Nodes, material: Dielectric) -> Any:
     return nodes("MixShader", {0: part, 1: refraction.outputs[0], 2: reflection.outputs[0]})
 
 
-BSDFS: dict[type[Material], Callable[[Nodes, Any], Any]] = {
+Bsdf = Callable[[Nodes, Any], Any]
+BSDFS: dict[type[Material], Bsdf] = {
     Diffuse: _diffuse, Mirror: _mirror, MetallicRoughness: _metal, Dielectric: _dielectric}
 
 
@@ -138,11 +140,11 @@ def _is_metal(material: MetallicRoughness) -> bool:
             and not material.features() & {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR"})
 
 
-def _material(data: Any, material: Material) -> Any:
+def _material(data: Any, material: Material, bsdfs: Mapping[type[Material], Bsdf]) -> Any:
     """Its BSDF, and its emission, from the front or from both sides."""
     made = data.materials.new(material.kernel)
     nodes = Nodes(made)
-    shader = BSDFS[type(material)](nodes, material).outputs[0]
+    shader = bsdfs[type(material)](nodes, material).outputs[0]
     if any(material.radiance):
         back = nodes("NewGeometry").outputs["Backfacing"]
         front = nodes("Math", {0: 1.0, 1: back}, operation="SUBTRACT").outputs[0]
@@ -155,10 +157,10 @@ def _material(data: Any, material: Material) -> Any:
 
 
 def _mesh(data: Any, vertices: NDArray[Any], faces: NDArray[Any], normals: NDArray[Any] | None,
-          material: Material) -> Any:
+          material: Any) -> Any:
     made = data.meshes.new("mesh")
     made.from_pydata(turned(vertices).tolist(), [], faces.tolist())
-    made.materials.append(_material(data, material))
+    made.materials.append(material)
     if normals is None:
         made.shade_flat()
     else:

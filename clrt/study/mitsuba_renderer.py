@@ -28,7 +28,7 @@ LLVM_FOLDERS = ("usr/lib", "usr/lib64", "usr/lib/*-linux-gnu", "usr/lib/llvm*/li
 
 def contestants(scene: Scene) -> dict[str, Contestant]:
     """Mitsuba with each of SAMPLERS. ImportError where it is not installed, UsageError for what it cannot draw."""
-    library, name = _library()
+    library, name = load()
     return {name + suffix: Mitsuba(library, mitsuba_scene(scene, sampler)) for suffix, sampler in SAMPLERS.items()}
 
 
@@ -62,7 +62,7 @@ def newest_llvm(root: Path = Path("/")) -> tuple[int, Path | None]:
     return max(found.items(), default=(0, None))
 
 
-def _library() -> tuple[Any, str]:
+def load() -> tuple[Any, str]:
     """The module with its variant chosen, and a name: compiled for all cores, or without an LLVM for that scalar."""
     version, file = newest_llvm()
     if version >= OLDEST_LLVM:

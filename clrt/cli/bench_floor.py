@@ -1,0 +1,52 @@
+"""`clrt bench floor`: a plastic floor beside physical models and other renderers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+@click.command("floor")
+@click.option("--light", "chosen", multiple=True, metavar="NAME",
+              help="Only this light: sun above, sun at 60°, point, HDRI, low lamp; repeatable.")
+@click.option("--spp", type=click.IntRange(min=1), default=1024, show_default=True, help="Samples per pixel.")
+@click.option("--seeds", type=click.IntRange(min=2), default=4, show_default=True, help="Images of each renderer.")
+@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+def floor_command(chosen: tuple[str, ...], spp: int, seeds: int, device: str | None, json_file: Path | None) -> None:
+    """What a white plastic floor reflects under a sun, a point, an HDRI with a low sun and a low lamp.
+
+    In float64: clrt's model, the same with Fresnel's equations in place of Schlick's approximation, and that layered
+    by the view alone. Then clrt, Mitsuba's roughplastic and principled (pip install mitsuba), and Cycles' Principled
+    BSDF (pip install bpy). 1 is what a white Lambertian floor reflects.
+    """
+    from ..errors import UsageError
+    from ..output.files import check_target
+    from ..output.report import write_report
+    from ..study.floor import judges, lights, measure_floor
+    from ..study.floor_model import MODELS
+
+    if json_file is not None:
+        check_target(json_file)
+    if unknown := [name for name in chosen if name not in lights()]:
+        raise UsageError(f"--light {unknown[0]}: is none of {', '.join(lights())}")
+    found, missing = judges(device)
+    columns = [*MODELS, *found]
+    click.echo(f"{'light':15}{'view':7}{'material':15}" + "".join(f"{name:>17}" for name in columns))
+    rows = []
+    for row in measure_floor(found, spp, seeds, chosen):
+        click.echo(_line(row, columns))
+        rows.append(row)
+    for name, why in missing.items():
+        click.echo(f"  {name}: {why}")
+    if json_file is not None:
+        write_report(json_file, {"spp": spp, "seeds": seeds, "missing": missing, "rows": rows})
+        click.echo(str(json_file))
+
+
+def _line(row: Mapping[str, Any], columns: list[str]) -> str:
+    values = ("{:.4f}±{:.4f}".format(*row["values"][name]) for name in columns)
+    return f"{row['light']:15}{row['view']:7}{row['material']:15}" + "".join(f"{value:>17}" for value in values)
