@@ -15,6 +15,7 @@ from .device.open import Device, open_device
 from .errors import SceneError
 from .float_errors import with_default_errors
 from .scene.mesh_arrays import finite_points, mesh_arrays, sphere_array
+from .scene.ray_arrays import Rays
 from .scene.scaling import Frame, frame_around
 from .tree_query import TreeQuery
 
@@ -50,6 +51,7 @@ class RayQuery(TreeQuery):
         tree, frame = self._built(opened, points, triangle)
         super().__init__(opened, tree, (len(self._faces), len(self._spheres)), frame, tests, traversal, device)
         self._refitter: Refitter | None = None
+        self._moving: NDArray[np.floating] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """See TreeQuery."""
@@ -70,10 +72,19 @@ class RayQuery(TreeQuery):
         if not can_refit(self.tree) or not self._comfortable(points):
             self._refitter = None
             self._use(*self._built(self.device, points, self._tests.triangle))
+            self._moving = None
             return
         if self._refitter is None:
             self._refitter = Refitter(self.device, self.tree, self._faces, len(points))
+        self._moving = points
         self._refitter.refit(self.frame.points(points))
+        self._moving = None
+
+    def _ask(self, name: str, rays: Rays, answers: NDArray[Any]) -> NDArray[Any]:
+        """See `TreeQuery`; a refit that was interrupted is done first."""
+        if self._moving is not None:
+            self.refit(self._moving)
+        return super()._ask(name, rays, answers)
 
     def _built(self, device: Device, points: NDArray[np.floating], triangle: str) -> tuple[Layout, Frame]:
         """A new tree for that test of triangles, and its frame."""

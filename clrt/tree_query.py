@@ -99,9 +99,9 @@ class TreeQuery:
     def _use(self, tree: Layout, frame: Frame) -> None:
         """Takes the rays to this tree from now on, which is uploaded."""
         buffers = {name: resident(self.device, array) for name, array in tree.buffers.items()}
-        self.tree, self.frame = replace(tree, buffers=buffers), frame
-        self._hit = INSTANCE_HIT if "instances" in buffers else HIT
-        self._scene = [array.buffer for array in buffers.values()]
+        tree, scene = replace(tree, buffers=buffers), [array.buffer for array in buffers.values()]
+        hit = INSTANCE_HIT if "instances" in buffers else HIT
+        self.tree, self.frame, self._hit, self._scene = tree, frame, hit, scene    # all or none, if it is interrupted
 
     @with_default_errors
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[Any]:

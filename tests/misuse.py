@@ -21,8 +21,8 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -92,8 +92,8 @@ class Sequence:
         """What lies in freed memory after that, a kernel that still runs would write over."""
         origins, directions = np.tile(self.rays[0], (60, 1)), np.tile(self.rays[1], (60, 1))
         for _ in range(3):
-            with self._interrupt(0.1):
-                self._any((self.query.closest_hit, self.query.any_hit, self.query.all_hits))(origins, directions)
+            self._interrupt(0.1, self._any((self.query.closest_hit, self.query.any_hit, self.query.all_hits)),
+                            origins, directions)
         guards = [np.full((5000, 4), 7.0) for _ in range(50)]
         time.sleep(0.05)
         assert all((guard == 7.0).all() for guard in guards)
@@ -115,14 +115,17 @@ class Sequence:
         if self.rng.random() < 0.5:
             self.query.refit(moved)
         else:
-            with self._interrupt(0.02):
-                self.query.refit(moved)
+            self._interrupt(0.02, self.query.refit, moved)
         self.query.refit(self.vertices)
 
     def build(self) -> None:
-        with self._interrupt(0.3), suppress(UsageError):      # not every builder makes every layout
-            self.kept.append(clrt.RayQuery(self.vertices, self.faces, layout=self._any(LAYOUTS),
-                                           builder=self._any(("sah", "midpoint", "ploc", "reinsertion", None))))
+        layout, builder = self._any(LAYOUTS), self._any(("sah", "midpoint", "ploc", "reinsertion", None))
+
+        def keep() -> None:
+            with suppress(UsageError):      # not every builder makes every layout
+                self.kept.append(clrt.RayQuery(self.vertices, self.faces, layout=layout, builder=builder))
+
+        self._interrupt(0.3, keep)
 
     def copy_query(self) -> None:
         how = self._any((copy.copy, copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))))
@@ -147,8 +150,7 @@ class Sequence:
         places = np.concatenate([np.tile(np.eye(3), (3, 1, 1)), self.rng.normal(size=(3, 3, 1))], axis=2)
         many = clrt.InstancedRayQuery([(self.vertices, self.faces)], [0, 0, 0], places)
         before = many.closest_hit(*self.rays)
-        with self._interrupt(0.02):
-            many.move(places + 1)
+        self._interrupt(0.02, many.move, places + 1)
         many.move(places)
         np.testing.assert_array_equal(many.closest_hit(*self.rays), before)
 
@@ -167,8 +169,7 @@ class Sequence:
         """And then on: the picture is what it would have been."""
         renderer = self._renderer()
         for _ in range(2):
-            with self._interrupt(0.05):
-                list(renderer.passes(spp=SPP))
+            self._interrupt(0.05, self._finished, renderer)
         np.testing.assert_array_equal(self._finished(renderer), self.pixels)
 
     def drop_generators(self) -> None:
@@ -203,8 +204,7 @@ class Sequence:
         renderer = self._renderer()
         passes = renderer.passes(spp=SPP)
         next(passes)
-        with self._interrupt(0.02):
-            renderer.look(self.scene.camera)
+        self._interrupt(0.02, renderer.look, self.scene.camera)
         renderer.look(self.scene.camera)
         with suppress(ClrtError):
             list(passes)
@@ -244,13 +244,13 @@ class Sequence:
         if faults:
             raise faults[0]
 
-    @contextmanager
-    def _interrupt(self, seconds: float) -> Iterator[None]:
-        """An exception out of a signal's handler at any time within so many seconds, if what is done takes as long."""
-        self.armed = True
-        signal.setitimer(signal.ITIMER_REAL, max(self.rng.random() * seconds, 1e-6))
+    def _interrupt(self, seconds: float, call: Callable[..., object], *given: Any) -> None:
+        """An exception out of a signal's handler within so many seconds, if what is called takes as long."""
+        delay = max(self.rng.random() * seconds, 1e-6)
         try:
-            yield
+            self.armed = True
+            signal.setitimer(signal.ITIMER_REAL, delay)
+            call(*given)
         except Interrupted:
             pass
         finally:

@@ -34,11 +34,9 @@ class Ahead:
         self._before = np.zeros_like(self.film)    # which takes memory as far as it is written to
         self._begun = np.zeros(len(self.film), bool)
 
-    def begin(self) -> Work:
-        """What is the pass in work from now on."""
-        assert self.work is not None
-        work, self.work = self.work, None
-        return work
+    def begin(self) -> None:
+        """Its work is the pass in work from now on."""
+        self.work = None
 
     def cut(self, work: Work, most: int, least_tiles: int, most_tiles: int, busy: Sequence[Part],
             ) -> tuple[Work, Part] | None:

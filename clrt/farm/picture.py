@@ -153,19 +153,26 @@ class FarmPicture(Accumulation):
 
     def advance(self, room: Callable[[int], int]) -> Iterator[None]:
         """See `Accumulation.advance`; the pass may have begun, and the next one may begin before it ends."""
+        self.mend()
         done = self.samples_done
         if not self._busy:
             if self._ahead.work and self._ahead.samples <= room(done):
-                self.work = self._ahead.begin()
+                self.work = self._ahead.work
+                self._ahead.begin()
             else:
+                self._forget_ahead()
                 self.work.add_to_all(max(1, min(room(done), self.pass_limit())))
-                self._begin_work()
         then = int(self.work.then.flat[0])
         if self._ahead.work is None and room(then):
             self._ahead.plan(self.work, min(room(then), self.pass_limit()))
-        yield from self._work()
+        yield from self._run()
 
-    def _begin_work(self) -> None:
+    def double(self, tiles: NDArray[np.intp]) -> Iterator[None]:
+        """See `Accumulation.double`."""
+        self._forget_ahead()
+        yield from super().double(tiles)
+
+    def _forget_ahead(self) -> None:
         """What was begun ahead is not what follows."""
         self.dispatch.forget([task for task in self.dispatch.tasks if task not in self._at_pass])
         self._ahead.forget()
@@ -195,14 +202,14 @@ class FarmPicture(Accumulation):
 
     def wait(self) -> None:
         """Waits for what is in flight of the pass, but not for slow workers: what they are at is in hand again."""
-        for task in self.dispatch.drain(self._at_pass, DRAIN * self._task_seconds):
-            self.work.give_back(task.what[1])
-        self.work.settle()
+        with self._tearing():
+            for task in self.dispatch.drain(self._at_pass, DRAIN * self._task_seconds):
+                self.work.give_back(task.what[1])
+            self._settle()
 
     def work_left(self) -> Work:
         """The work of the pass with what is in flight in hand."""
-        kept = Work(self.work.samples)
-        kept.then, kept.tiles, kept.parts = self.work.then, self.work.tiles, self.work.parts.copy()
+        kept = Work(self.work.samples, self.work.then, self.work.tiles, self.work.parts)
         for task in self._at_pass:
             kept.give_back(task.what[1])
         return kept

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -19,8 +19,6 @@ from .on_device import SceneOnDevice
 from .tiles import mean_samples, tiles_of
 from .work import Work
 
-_log = logging.getLogger(__name__)
-
 
 class Accumulation(ABC):
     """The samples of one compiled scene at one size. Nothing depends on how the work is cut, or on who does it."""
@@ -31,6 +29,7 @@ class Accumulation(ABC):
     def __init__(self, size: tuple[int, int]) -> None:
         self.size = size
         self.work = Work(np.zeros(tiles_of(size), np.int64))
+        self._torn = False
 
     @property
     def tile_samples(self) -> NDArray[np.int64]:
@@ -47,10 +46,10 @@ class Accumulation(ABC):
 
         All tiles must have as many. If it is left before its end, the next call, of `double` too, first ends that.
         """
+        self.mend()
         if not self._busy:
             self.work.add_to_all(samples)
-            self._begin_work()
-        yield from self._work()
+        yield from self._run()
 
     def advance(self, room: Callable[[int], int]) -> Iterator[None]:
         """Adds a pass: as many samples to every pixel as there is `room` for after those done, `pass_limit` at most;
@@ -63,10 +62,10 @@ class Accumulation(ABC):
 
     def double(self, tiles: NDArray[np.intp]) -> Iterator[None]:
         """Doubles the samples of these tiles, by their number in `tile_samples`; otherwise like `render`."""
+        self.mend()
         if not self._busy:
             self.work.double(tiles)
-            self._begin_work()
-        yield from self._work()
+        yield from self._run()
 
     @property
     def _busy(self) -> bool:
@@ -77,8 +76,33 @@ class Accumulation(ABC):
         """The work as a checkpoint keeps it, beside the film as it is now."""
         return self.work
 
-    def _begin_work(self) -> None:
-        """Hears that other work is in hand."""
+    def _run(self) -> Iterator[None]:
+        with self._tearing():
+            yield from self._work()
+
+    @contextmanager
+    def _tearing(self) -> Iterator[None]:
+        """Around what an exception, as of Ctrl-C, may end between two steps, so that the film has not what the work
+        says."""
+        try:
+            yield
+        except GeneratorExit:    # it comes between launches
+            raise
+        except BaseException:
+            self._torn = True
+            raise
+
+    def mend(self) -> None:
+        """Where the work was torn it becomes what the film has not."""
+        if self._torn:
+            self.wait()
+            self.work.take_stock(self.film().tile_samples)
+            self._torn = False
+
+    def _settle(self) -> None:
+        """Where nothing is in hand or in flight; of torn work it is not known what is missing."""
+        if not self._torn:
+            self.work.settle()
 
     @abstractmethod
     def _work(self) -> Iterator[None]:
@@ -87,7 +111,7 @@ class Accumulation(ABC):
     def look(self, camera: Camera) -> None:
         """Begins anew, without any samples, as this camera sees the scene (see `SceneOnDevice.look`)."""
         self.wait()
-        self.work = Work(np.zeros(tiles_of(self.size), np.int64))
+        self.work, self._torn = Work(np.zeros(tiles_of(self.size), np.int64)), False
         for scene in self.scenes:
             scene.look(camera)
         self._clear()
@@ -108,14 +132,10 @@ class Accumulation(ABC):
     def film(self) -> Film:
         """The film so far; waits for the launches in flight."""
 
-    def whole_film(self) -> Film | None:
-        """The film; None where it has not what the work says, as Ctrl-C came between the two."""
-        film = self.film()
-        if film.samples == self.work_left().rendered(self.size):
-            self.work.settle()
-            return film
-        _log.warning("interrupted as a launch was being made: the checkpoint from before stays")
-        return None
+    def whole_film(self) -> Film:
+        """The film, which has what the work says, whatever was interrupted."""
+        self.mend()
+        return self.film()
 
     @abstractmethod
     def restore(self, film: Film, work: Work) -> None:

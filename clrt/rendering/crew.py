@@ -74,7 +74,9 @@ class Crew(Accumulation):
 
     def wait(self) -> None:
         """Waits for the launches in flight, and for none that is still in hand."""
-        self.team.drain(self.work, self._film)
+        with self._tearing():
+            self.team.drain(self.work, self._film)
+            self._settle()
 
     def pass_limit(self) -> int:
         """As many samples a pixel as keep all busy for some launches."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .bands import in_bands
 from .expected import REACH, expected
-from .tiles import tile_sums
+from .tiles import TILE, tile_sums
 
 #: Added to the squared reference in relMSE, so that black pixels do not divide by zero.
 RELATIVE_FLOOR = 0.01
@@ -140,6 +140,12 @@ class Film:
     def samples(self) -> int:
         """Samples in the film, dropped ones included."""
         return self._totals["count"] + self.nonfinite_samples
+
+    @property
+    def tile_samples(self) -> NDArray[np.int64]:
+        """(rows, columns): those of each tile's pixels, of its first one's."""
+        pixels = self.pixels[::TILE, ::TILE]
+        return np.asarray(pixels["count"] + pixels["dropped"], np.int64)
 
     @property
     def nonfinite_samples(self) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,15 +54,14 @@ def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -
             0 <= seconds < np.inf and _film_fits(header, arrays, size) and _work_fits(arrays, size)
             and _noise_fits(arrays, size)):
         raise ValueError(NO_SENSE)
-    work, noise = Work(arrays["samples"]), NoiseEstimate(planned)
+    work = Work(arrays["samples"], arrays["then"], arrays["tiles"], map(Part._make, arrays["parts"].tolist()))
+    noise = NoiseEstimate(planned)
     film = arrays["film"]
     if arrays["direct"].size:
         film = np.empty(film.shape, PIXEL_WITH_DIRECT)
         for part in ("film", "direct"):
             for name in arrays[part].dtype.names or ():
                 film[name] = arrays[part][name]
-    work.then, work.tiles = arrays["then"], arrays["tiles"]
-    work.parts = deque(Part(*part) for part in arrays["parts"].tolist())
     noise.restore(arrays["noise_mean"], arrays["noise_changes"], arrays["noise_level"])
     history = []
     for spp, second, error, relmse in arrays["history"].tolist():

@@ -90,6 +90,7 @@ class Renderer:
         self.session: Accumulation = self._make_picture(before.session.scenes if before else ())
         self._begin()
         self._interrupted, self._abandoned, self._turns = False, Event(), Turns()
+        self._asked_for: Camera | None = None
         if kept:
             self._convergence.restore(kept)
             self.session.restore(kept.film, kept.work)
@@ -146,15 +147,23 @@ class Renderer:
         """
         check_of_none(self._checkpoints)
         validate(Scene(camera=camera, render=self.settings))
-        files, file = self.compiled.chosen_files["CAMERA"], camera_file(camera, self.settings.integrator)
         with self._turns.one():
-            self.scene = replace(self.scene, camera=camera)
-            self._compiled = [each.seen_by(camera, file) for each in self._compiled]
-            if files == [file]:
-                self.session.look(camera)
-            else:
-                self.session = self._make_picture()
-            self._begin()
+            self._asked_for = camera
+            self._see()
+
+    def _see(self) -> None:
+        """Turns to the camera asked for; whoever is next does where that was interrupted."""
+        if (camera := self._asked_for) is None:
+            return
+        files, file = self.session.compiled.chosen_files["CAMERA"], camera_file(camera, self.settings.integrator)
+        self.scene = replace(self.scene, camera=camera)
+        self._compiled = [each.seen_by(camera, file) for each in self._compiled]
+        if files == [file]:
+            self.session.look(camera)
+        else:
+            self.session = self._make_picture()
+        self._begin()
+        self._asked_for = None
 
     def passes(self, *, spp: int | None = None, time: float | None = None, error: float | None = None,
                reference: NDArray[np.float32] | None = None) -> Iterator[State]:
@@ -178,6 +187,8 @@ class Renderer:
 
     def _passes(self, spp: int | None, time: float | None, error: float | None,
                 reference: NDArray[np.float32] | None, watch: AwakeClock) -> Iterator[State]:
+        self._see()
+        self.session.mend()
         self._convergence.catch_up(self.session, self.seconds)
         self.stop_reason = self._reached(spp, time, error)
         if self.stop_reason is not None:
@@ -235,6 +246,7 @@ class Renderer:
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
         """The picture as it is now, also in the middle of a pass that was interrupted."""
         with self._turns.one():
+            self._see()
             film, tile_samples = self.session.film(), self.session.tile_samples
             return self._convergence.state(film, tile_samples, self.seconds, reference, self._in_haste)
 
@@ -296,5 +308,4 @@ class Renderer:
         if self._checkpoints is None or self._abandoned.is_set() or sys.is_finalizing():    # threads have ended then
             return
         with self._turns.one(), suppress(DeviceError):
-            if (film := self.session.whole_film()) is not None:
-                self._keep(film, last=True)
+            self._keep(self.session.whole_film(), last=True)

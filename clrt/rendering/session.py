@@ -39,6 +39,14 @@ BLACK = np.zeros(8, np.uint32)
 QUICKLY_MET = 128
 
 
+class _Tiles:
+    """Numbers of tiles, and a buffer of them: another one for others, as this one may be in use."""
+
+    def __init__(self, device: Device, numbers: NDArray[np.uint32]) -> None:
+        with calling():
+            self.numbers, self.buffer = numbers, on_device(device, numbers)
+
+
 class Session(Accumulation):
     """Renders samples of one compiled scene at one size. Raises NoRoomError where scene or film do not fit."""
 
@@ -54,8 +62,8 @@ class Session(Accumulation):
         self._launches = Launches(first_launch_samples(compiled))
         with self._scene.allocating():
             self._film = on_device(device, np.zeros(size[0] * size[1], compiled.choices.pixel))
-            self._tiles = on_device(device, np.zeros(1, np.uint32))
-            self._scene.warm_up(self._film, self._tiles)
+            self._tiles = _Tiles(device, np.zeros(1, np.uint32))
+            self._scene.warm_up(self._film, self._tiles.buffer)
 
     @property
     def scene(self) -> SceneOnDevice:
@@ -73,11 +81,6 @@ class Session(Accumulation):
         next(launches)
         return chain((None,), launches)
 
-    def _begin_work(self) -> None:
-        if len(self.work.tiles):
-            with calling():
-                self._tiles = on_device(self.device, self.work.tiles)   # not the last one's, which may be in use
-
     def _work(self) -> Iterator[None]:
         while share := self.work.cut(self._launches.size // TILE_PIXELS, FEWEST_TILES,
                                      most_samples=self._scene.most_samples):
@@ -91,7 +94,9 @@ class Session(Accumulation):
 
     def _launch(self) -> cl.Event:
         """Enqueues the kernel for the range in the launch record."""
-        return self._scene.enqueue_pixels(self._film, self._tiles)
+        if self._tiles.numbers is not self.work.tiles:
+            self._tiles = _Tiles(self.device, self.work.tiles)
+        return self._scene.enqueue_pixels(self._film, self._tiles.buffer)
 
     def _clear(self) -> None:
         with calling():
@@ -120,7 +125,6 @@ class Session(Accumulation):
     def restore(self, film: Film, work: Work) -> None:
         """Goes on from a film of this size and the work that it was rendered by."""
         self.work = work
-        self._begin_work()
         with calling():
             copied = begin_copy(self.device, self._film, film.pixels)
         wait_for(copied)

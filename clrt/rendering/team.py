@@ -88,7 +88,6 @@ class Team:
         while self.at:
             if not self._collect(work, film):
                 time.sleep(PAUSE)
-        work.settle()
 
     def _feed(self, worker: Worker, work: Work, film: NDArray[Any], numbers: NDArray[np.uint32]) -> None:
         """Gives a worker that has too little in flight a share, smaller near the end, so that all end together."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .tiles import scattered, tile_pixels
+from .tiles import scattered
 
 
 class Part(NamedTuple):
@@ -25,25 +24,54 @@ class Part(NamedTuple):
         return self.first < other.end and other.first < self.end
 
 
+class _Now(NamedTuple):
+    """What `Work` knows, in one value: an exception out of a signal's handler leaves all of it as it was, or as it is
+    to be."""
+
+    samples: NDArray[np.int64]
+    then: NDArray[np.int64]
+    tiles: NDArray[np.uint32]
+    parts: tuple[Part, ...]
+
+
 class Work:
     """What has been rendered, and what is to be rendered before anything else is chosen.
 
     samples: (rows, columns) that the pixels of each tile have, or had before the work in hand; then: what they will
-    have after it. tiles: uint32 numbers of those in hand, in their order on the device.
+    have after it. tiles: uint32 numbers of those in hand, in their order on the device. parts: what is left in hand.
     """
 
-    def __init__(self, samples: NDArray[np.int64]) -> None:
-        self.samples = self.then = samples
-        self.tiles = np.zeros(0, np.uint32)
-        self.parts: deque[Part] = deque()
+    def __init__(self, samples: NDArray[np.int64], then: NDArray[np.int64] | None = None,
+                 tiles: NDArray[np.uint32] | None = None, parts: Iterable[Part] = ()) -> None:
+        self._now = _Now(samples, samples if then is None else then,
+                         np.zeros(0, np.uint32) if tiles is None else tiles, tuple(parts))
+
+    @property
+    def samples(self) -> NDArray[np.int64]:
+        """See above."""
+        return self._now.samples
+
+    @property
+    def then(self) -> NDArray[np.int64]:
+        """See above."""
+        return self._now.then
+
+    @property
+    def tiles(self) -> NDArray[np.uint32]:
+        """See above."""
+        return self._now.tiles
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """See above."""
+        return self._now.parts
 
     def take(self, tiles: NDArray[np.integer[Any]], parts: Iterable[Part]) -> None:
         """Takes these tiles in hand; there must be none."""
-        self.tiles = tiles.astype(np.uint32)
-        self.parts.extend(parts)
-        self.then = self.samples.copy()
-        for part in self.parts:
-            self.then.ravel()[tiles[part.first:part.end]] += part.more
+        parts, then = tuple(parts), self.samples.copy()
+        for part in parts:
+            then.ravel()[tiles[part.first:part.end]] += part.more
+        self._now = _Now(self.samples, then, tiles.astype(np.uint32), parts)
 
     def add_to_all(self, samples: int) -> None:
         """Takes it in hand that every tile gets so many more; all must have as many."""
@@ -74,19 +102,12 @@ class Work:
         more = min(part.more, most_samples or part.more)
         end = min(free_end, first + min(max(least_tiles, most // more), most_tiles or part.end))
         share = Part(first, end, part.samples, min(more, max(1, most // (end - first))))
-        del self.parts[place]
-        if end < part.end:
-            self.parts.insert(place, part._replace(first=end))
-        if part.first < first:
-            self.parts.insert(place, part._replace(end=first))
+        rest = [piece for piece in (part._replace(end=first), part._replace(first=end)) if piece.first < piece.end]
+        left = [*self.parts[:place], *rest, *self.parts[place + 1:]]
         if share.more < part.more:
-            self._put_last(Part(first, end, part.samples + share.more, part.more - share.more))
+            _put_last(left, Part(first, end, part.samples + share.more, part.more - share.more))
+        self._now = self._now._replace(parts=tuple(left))
         return share
-
-    def _put_last(self, rest: Part) -> None:
-        """Behind all in hand but what the same tiles get after it, which is there where a share was given back."""
-        place = next((i for i, part in enumerate(self.parts) if part.meets(rest)), len(self.parts))
-        self.parts.insert(place, rest)
 
     def _first_free(self, busy: Sequence[Part]) -> tuple[int, int, int] | None:
         """The place in hand of a part, and the first stretch of its tiles, none of which is busy or comes before."""
@@ -103,21 +124,29 @@ class Work:
 
     def give_back(self, share: Part) -> None:
         """Takes a share in hand again, which was not rendered."""
-        self.parts.appendleft(share)
+        self._now = self._now._replace(parts=(share, *self.parts))
 
     def settle(self) -> None:
         """Once all that was cut is rendered: where nothing is left in hand, all tiles have their samples."""
         if not self.parts:
-            self.samples = self.then
+            self._now = self._now._replace(samples=self.then)
 
-    def rendered(self, size: tuple[int, int]) -> int:
-        """Samples that all pixels of a picture of (width, height) have by now."""
-        now = self.then.copy()
-        for part in self.parts:
-            now.ravel()[self.tiles[part.first:part.end]] -= part.more
-        return int(np.sum(now * tile_pixels(size)))
+    def take_stock(self, found: NDArray[np.int64]) -> None:
+        """Has in hand what is not among the samples found, (rows, columns) of each tile's pixels, whatever became of
+        what was cut; nothing may be in flight."""
+        has, then = found.ravel()[self.tiles], self.then.ravel()[self.tiles]
+        ends = [*(np.flatnonzero((np.diff(has) != 0) | (np.diff(then) != 0)) + 1).tolist(), len(has)]
+        parts = [Part(first, end, int(has[first]), int(then[first] - has[first]))
+                 for first, end in zip([0, *ends], ends) if first < end and has[first] < then[first]]
+        self._now = self._now._replace(parts=tuple(parts))
+        self.settle()
 
     @property
     def left(self) -> int:
         """Samples of a tile's pixels that are in hand."""
         return sum((part.end - part.first) * part.more for part in self.parts)
+
+
+def _put_last(parts: list[Part], rest: Part) -> None:
+    """Behind all in hand but what the same tiles get after it, which is there where a share was given back."""
+    parts.insert(next((i for i, part in enumerate(parts) if part.meets(rest)), len(parts)), rest)

@@ -48,5 +48,7 @@ def test_every_pass_ends_as_if_all_had_waited(seed: int) -> None:
             in_flight.clear()
             work.add_to_all(2)
         else:
-            work = ahead.begin()
+            assert ahead.work
+            work = ahead.work
+            ahead.begin()
     assert early

@@ -179,20 +179,26 @@ def goes_on_to_the_same(device: Device, path: Path, adaptive: bool) -> None:
     assert same(at_once, running)
 
 
-def test_work_that_was_cut_and_not_launched_is_not_kept(device: Device, tmp_path: Path, small_launches: None,
-                                                        caplog: pytest.LogCaptureFixture) -> None:
-    """Its samples would be missing for ever."""
+def test_work_that_was_cut_and_not_launched_is_kept(device: Device, tmp_path: Path, small_launches: None) -> None:
+    """As work in hand: its samples would be missing for ever."""
+    at_once = renderer(device)
+    run(at_once, spp=24)
     left = renderer(device, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e9)
-    cut = left.session.work.cut
+    cut, before = left.session.work.cut, iter(range(9))
 
     def interrupted(*arguments: Any, **limits: Any) -> Any:
-        cut(*arguments, **limits)
-        raise KeyboardInterrupt
+        share = cut(*arguments, **limits)
+        if next(before, None) is None:
+            raise KeyboardInterrupt
+        return share
 
     setattr(left.session.work, "cut", interrupted)
     with pytest.raises(KeyboardInterrupt):
         run(left, spp=24)
-    assert not (tmp_path / "a.ck").exists() and "the checkpoint from before stays" in caplog.text
+    running = renderer(device, checkpoint=tmp_path / "a.ck", resume=True)
+    assert running.session.work.parts
+    run(running, spp=24)
+    assert same(at_once, running)
 
 
 def test_an_abandoned_picture_is_not_kept(device: Device, tmp_path: Path) -> None:

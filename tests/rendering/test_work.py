@@ -19,7 +19,7 @@ def test_samples_come_once_and_in_their_order(seed: int) -> None:
         if step % 2:
             work.double(rng.permutation(35)[:rng.integers(1, 36)])
         else:
-            work.samples = work.then = np.full((5, 7), done.max())
+            work = Work(np.full((5, 7), done.max()))
             done[:] = done.max()
             work.add_to_all(int(rng.integers(1, 40)))
         while work.parts or in_flight:
@@ -37,6 +37,23 @@ def test_samples_come_once_and_in_their_order(seed: int) -> None:
                 done[tiles] += ended.more
         work.settle()
         assert np.array_equal(done, work.samples.ravel())
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_was_lost_is_in_hand_again(seed: int) -> None:
+    """Shares of which nobody knows what became, and some were rendered: the samples that are there tell."""
+    rng = np.random.default_rng(seed)
+    work, done = Work(rng.integers(0, 3, (5, 7))), np.zeros(35, np.int64)
+    done[:] = work.samples.ravel()
+    work.double(rng.permutation(np.flatnonzero(done))[:20])
+    expected = work.then.copy()
+    while not np.array_equal(work.samples, expected):
+        for _ in range(int(rng.integers(1, 4))):
+            if (share := work.cut(int(rng.integers(0, 20)), int(rng.integers(1, 9)))) and rng.random() < 0.5:
+                done[work.tiles[share.first:share.end]] += share.more * (done[work.tiles[share.first:share.end]]
+                                                                         == share.samples)
+        work.take_stock(done.reshape(5, 7))
+    assert np.array_equal(done, expected.ravel()) and not work.parts
 
 
 @pytest.mark.parametrize("most, least, expected", [

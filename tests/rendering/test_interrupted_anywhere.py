@@ -1,0 +1,123 @@
+"""An exception out of a signal's handler may come at any line: whoever goes on gets what there would have been."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clrt
+from clrt.device.open import Device
+from clrt.rendering.renderer import Renderer
+
+from .test_noise import room
+
+SIZE, SPP = (40, 24), 12
+#: Places that are tried of each call, spread at random over all lines that it runs.
+PLACES = 40
+#: Of the package, where there is state between two lines; not in callbacks of the garbage collector.
+FOLDERS = tuple(str(Path(clrt.__file__).parent / name) for name in ("rendering", "query.py", "tree_query.py", "accel"))
+
+
+class Interrupted(Exception):
+    """As if a signal had come."""
+
+
+def run(call: Callable[[], object], last: int = -1) -> int:
+    """Calls it up to its line of this number, counted over all that it runs in FOLDERS; how many there were."""
+    count = 0
+
+    def trace(frame: FrameType, event: str, argument: Any) -> Any:
+        nonlocal count
+        if not frame.f_code.co_filename.startswith(FOLDERS):
+            return None
+        count += event == "line"
+        if count == last:
+            raise Interrupted
+        return trace
+
+    sys.settrace(trace)
+    try:
+        call()
+    except Interrupted:
+        pass
+    finally:
+        sys.settrace(None)
+    return count
+
+
+def places(lines: int) -> Iterator[int]:
+    """Numbers of lines, the last ones among them."""
+    yield from np.random.default_rng(lines).integers(1, lines + 1, PLACES).tolist()
+
+
+@pytest.fixture
+def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that a pass is some of them."""
+    monkeypatch.setattr("clrt.rendering.team.FEWEST_TILES", 5)
+    monkeypatch.setattr("clrt.rendering.session.FEWEST_TILES", 5)
+    monkeypatch.setattr("clrt.device.launch.TARGET_SECONDS", 1e-9)
+
+
+def renderer(device: Device, count: int, adaptive: bool) -> Renderer:
+    """Of the same device once, or several times, which is a crew."""
+    return Renderer(room(), device=[device.info.index] * count, size=SIZE, spp=SPP, adaptive=adaptive)
+
+
+def finish(running: Renderer) -> Any:
+    """The picture's mean, and each pixel's samples."""
+    *_, state = running.passes(spp=SPP)
+    return np.concatenate([state.film.mean, state.film.pixels["count"][..., None]], axis=-1)
+
+
+@pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
+@pytest.mark.parametrize("count", [1, 2])
+def test_passes(device: Device, small_launches: None, count: int, adaptive: bool) -> None:
+    """Twice, as what mends the first may be interrupted, too; with the floor of an adaptive render behind it."""
+    expected = finish(renderer(device, count, adaptive))
+    lines = run(lambda: finish(renderer(device, count, adaptive)))
+    for place in places(lines):
+        running = renderer(device, count, adaptive)
+        run(lambda: list(running.passes(spp=SPP)), place)
+        run(lambda: list(running.passes(spp=SPP)), max(1, place // 3))
+        np.testing.assert_array_equal(finish(running), expected, f"interrupted at line {place} of {lines}")
+
+
+@pytest.mark.parametrize("lens", [0.0, 0.2])
+def test_look(device: Device, lens: float) -> None:
+    """To the same place, by another program with a lens."""
+    scene = room()
+    there = replace(scene.camera, position=(0.3, 0.2, 4.0), aperture_radius=lens)
+    other = Renderer(replace(scene, camera=there), device=device.info.index, size=SIZE, spp=SPP)
+    expected = finish(other)
+    lines = run(lambda: other.look(there))
+    for place in places(lines):
+        running = Renderer(scene, device=device.info.index, size=SIZE, spp=SPP)
+        next(running.passes(spp=SPP))
+        run(lambda: running.look(there), place)
+        found = finish(running)
+        if running.scene.camera == there:
+            np.testing.assert_array_equal(found, expected, f"interrupted at line {place} of {lines}")
+
+
+def test_refit(device: Device) -> None:
+    """The tree is of the old vertices or of the new ones."""
+    rng = np.random.default_rng(2)
+    vertices, faces = rng.random((900, 3)), np.arange(900).reshape(-1, 3)
+    rays = rng.random((2000, 3)), rng.normal(size=(2000, 3))
+    moved = vertices[:, ::-1].copy()
+    before, after = (clrt.RayQuery(points, faces, device=device.info.index, layout="bvh2", builder="ploc")
+                     for points in (vertices, moved))
+    expected = [each.closest_hit(*rays)["primitive"] for each in (before, after)]
+    lines = run(lambda: before.refit(moved))
+    for place in places(lines):
+        query = clrt.RayQuery(vertices, faces, device=device.info.index, layout="bvh2", builder="ploc")
+        run(lambda: query.refit(moved), place)
+        found = query.closest_hit(*rays)["primitive"]
+        assert any((found == each).mean() > 0.999 for each in expected), f"interrupted at line {place} of {lines}"
