@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any, NamedTuple
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +76,16 @@ def _scenario(folder: Path, entry: dict[str, Any]) -> Scenario:
                     orbit_camera(TARGET | entry.get("target", {}), ORBIT | entry.get("orbit", {}),
                                  float(entry.get("verticalFoV", FOV))),
                     (int(size["width"]), int(size["height"])), bool(entry.get("renderSkybox", False)), goldens)
+
+
+def files_of(model: Path) -> list[Path]:
+    """The model's file, and where that is glTF's JSON, those that it names beside it."""
+    try:
+        document = json.loads(model.read_text(encoding="utf-8")) if model.suffix == ".gltf" else {}
+        named = [one.get("uri", "data:") for part in ("buffers", "images") for one in document.get(part, [])]
+    except (OSError, ValueError, AttributeError):
+        named = []    # whoever reads the model says what is wrong
+    return [model, *(model.parent / unquote(uri) for uri in named if not uri.startswith("data:"))]
 
 
 def _inside(path: str) -> str:

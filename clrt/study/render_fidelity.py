@@ -28,7 +28,7 @@ from ..scene.meshes import read_model
 from ..scene.model import Environment, Mesh, RenderSettings, Scene
 from ..scene.pictures import read_picture
 from ..scene.validate import validate
-from .fidelity_suite import Floats, Scenario, golden, tone_mapped
+from .fidelity_suite import Floats, Scenario, files_of, golden, tone_mapped
 
 #: By how much a mean may be beyond those of the others; the part of an image that a region has at least.
 MARGIN, LEAST = 0.05, 0.005
@@ -75,7 +75,7 @@ def judge(found: Sequence[Scenario], width: int, spp: int, denoise: bool = False
     effort = Effort(width, spp, Denoiser() if denoise else None, choose(device)[0].index)
     for scenario in found:
         row: dict[str, Any] = {"scenario": scenario.name}
-        missing = [str(path) for path in (scenario.model, scenario.lighting) if not path.is_file()]
+        missing = [str(path) for path in (*files_of(scenario.model), scenario.lighting) if not path.is_file()]
         if missing:
             yield Judged(row | {"result": "missing", "problems": missing}, {})
             continue

@@ -101,6 +101,17 @@ def test_an_image_alone_and_what_is_missing(tmp_path: Path) -> None:
         scenarios(folder)
 
 
+def test_a_texture_that_is_missing_is_no_difference(tmp_path: Path) -> None:
+    """A model is read without it, but the picture is another: nothing is judged."""
+    folder = suite(tmp_path)
+    write(folder, "stellar", expected(False))
+    models = folder / GENERATOR / "models"
+    (models / "wall.gltf").write_text(json.dumps({"asset": {"version": "2.0"}, "images": [{"uri": "a%20b.png"}]}))
+    (one,) = scenarios(folder)
+    (judged,) = judge([one._replace(model=models / "wall.gltf")], SIZE, 1)
+    assert judged.row["result"] == "missing" and judged.row["problems"] == [str(models / "a b.png")]
+
+
 def test_the_camera_is_on_its_orbit() -> None:
     """theta turns from +Z towards +X, phi is measured from +Y (three.js' spherical coordinates)."""
     target = {"x": 1.0, "y": 2.0, "z": 3.0}
