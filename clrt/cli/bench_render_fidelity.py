@@ -13,15 +13,15 @@ import click
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
 @click.option("--scenario", "scenarios_", multiple=True, metavar="TEXT",
               help="Only scenarios whose names hold this; repeatable.")
-@click.option("--width", type=click.IntRange(min=16), default=512, show_default=True,
-              help="Pixels per row; the others' images are reduced to that.")
+@click.option("--width", type=click.IntRange(min=16),
+              help="Pixels per row; the others' images are shrunk to that. Default: as many as they had.")
 @click.option("--spp", type=click.IntRange(min=1), default=32, show_default=True, help="Samples per pixel.")
 @click.option("--denoise", is_flag=True, help="Denoise clrt's pictures, as Cycles' were.")
 @click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
               help="Write clrt's picture and the others', side by side, there as PNG.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
 @click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
-def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: int, spp: int, denoise: bool,
+def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: int | None, spp: int, denoise: bool,
                             pictures: Path | None, device: str | None, json_file: Path | None) -> None:
     """Render the glTF models in DIR, a checkout of github.com/KhronosGroup/glTF-Render-Fidelity with its submodules,
     and compare the pictures with those of Cycles, V-Ray, Stellar, dspbr and three-gpu-pathtracer.
@@ -41,7 +41,7 @@ def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: in
     if not chosen:
         raise UsageError(f"--scenario {scenarios_[0]}: is in no scenario's name; leave it out to see all")
     rows = []
-    click.echo(f"{'':32}{'result':10}{'FLIP':>6}{'spread':>8}{'whole':>8}  regions beyond the range of the others")
+    click.echo(f"{'':36}{'result':10}{'FLIP':>6}{'spread':>8}{'whole':>8}  regions beyond the range of the others")
     for judged in judge(chosen, width, spp, denoise, device):
         click.echo(_line(judged.row))
         rows.append(judged.row)
@@ -55,7 +55,7 @@ def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: in
 
 
 def _line(row: Mapping[str, Any]) -> str:
-    start = f"{row['scenario']:32}{row['result']:10}"
+    start = f"{row['scenario']:36}{row['result']:10}"
     if "flip" not in row:
         return f"{start}{', '.join(row['problems'])}"
     if "spread" not in row:

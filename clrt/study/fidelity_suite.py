@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
+from ..output.view import srgb
 from ..scene.model import Camera
 from ..scene.pictures import linear_from_srgb, read_texels
 
@@ -29,6 +30,8 @@ POWER = {"blender-cycles": 2.2, "vray": 2.2}
 #: What a scenario does not say (src/config-reader.ts).
 LIGHTING, SIZE, FOV = "environments/lightroom_14b.hdr", {"width": 768, "height": 768}, 45.0
 TARGET, ORBIT = {"x": 0.0, "y": 0.0, "z": 0.0}, {"theta": 0.0, "phi": 90.0, "radius": 1.0}
+#: Columns of the website's images, to which larger ones were shrunk by the means of encoded values.
+WEBSITE_WIDTH = 512
 #: Linear Rec. 709 to the space of the fit, what the fit multiplies values by first, and back (Hill, BakingLab; MIT).
 EXPOSURE = 1 / 0.6
 ACES_IN = np.array([[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]])
@@ -110,15 +113,23 @@ def tone_mapped(linear: NDArray[Any]) -> Floats:
 
 
 def golden(renderer: str, path: Path, size: tuple[int, int]) -> tuple[Floats, Floats] | None:
-    """The display's linear light over white, (h, w, 3), and the alpha, (h, w), reduced to `size`; None where the shape
-    is another, as of images that were framed differently."""
+    """The display's linear light over white, (h, w, 3), and the alpha, (h, w), shrunk to `size` as the website does;
+    None where the shape is another, as of images that were framed differently."""
     texels = np.asarray(read_texels(path) / 255, np.float32)
-    alpha = texels[..., 3:]
-    decoded = texels[..., :3] ** POWER[renderer] if renderer in POWER else linear_from_srgb(texels[..., :3])
     width, height = size
     if abs(texels.shape[0] * width / (texels.shape[1] * height) - 1) > 0.02:
         return None
-    return reduced(decoded * alpha + 1 - alpha, size), reduced(alpha, size)[..., 0]
+    alpha = reduced(texels[..., 3:], size)
+    encoded: Floats = np.divide(reduced(texels[..., :3] * texels[..., 3:], size), np.maximum(alpha, 1 / 255),
+                                dtype=np.float32)
+    decoded = encoded ** POWER[renderer] if renderer in POWER else linear_from_srgb(encoded)
+    return np.asarray(decoded * alpha + 1 - alpha, np.float32), alpha[..., 0]
+
+
+def shrunk(linear: Floats, size: tuple[int, int]) -> Floats:
+    """The display's linear light of an image shrunk as the website does, by the means of encoded values: text and
+    highlights smaller than a pixel are darker than by the means of light."""
+    return linear_from_srgb(reduced(np.asarray(srgb(linear), np.float32), size))
 
 
 def reduced(pixels: Floats, size: tuple[int, int]) -> Floats:

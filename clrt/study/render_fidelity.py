@@ -28,7 +28,7 @@ from ..scene.meshes import read_model
 from ..scene.model import Environment, Mesh, RenderSettings, Scene
 from ..scene.pictures import read_picture
 from ..scene.validate import validate
-from .fidelity_suite import Floats, Scenario, files_of, golden, tone_mapped
+from .fidelity_suite import WEBSITE_WIDTH, Floats, Scenario, files_of, golden, reduced, shrunk, tone_mapped
 
 #: By how much a mean may be beyond those of the others; the part of an image that a region has at least.
 MARGIN, LEAST = 0.05, 0.005
@@ -50,20 +50,22 @@ class Judged(NamedTuple):
 
 
 class Effort(NamedTuple):
-    """Pixels in a row, samples per pixel, what takes their noise away, and the device's number.
+    """Pixels in a row (None: as many as the scenario has), samples per pixel, what takes their noise away, and the
+    device's number.
 
-    Tone mapping bends: noise and highlights smaller than a pixel change means of what a display shows.
+    Tone mapping bends: noise, and text and highlights smaller than a pixel, change means of what a display shows.
     """
 
-    width: int
+    width: int | None
     spp: int
     denoiser: Denoiser | None
     device: int
 
 
-def judge(found: Sequence[Scenario], width: int, spp: int, denoise: bool = False,
+def judge(found: Sequence[Scenario], width: int | None, spp: int, denoise: bool = False,
           device: str | int | None = None) -> Iterator[Judged]:
-    """Each scenario in turn, rendered with `width` pixels in a row. UsageError without flip-evaluator.
+    """Each scenario in turn, rendered with `width` pixels in a row, the scenario's own where that is None, and compared
+    at no more than the website's. UsageError without flip-evaluator.
 
     The row's result: inside or outside of the others' spread; no spread where fewer than two have an image; missing
     where files are, not read where clrt cannot, `problems` says what.
@@ -102,15 +104,19 @@ def _warnings() -> Iterator[list[str]]:
         log.removeHandler(handler)
 
 
-def _scene(scenario: Scenario, width: int) -> Scene:
+def _scene(scenario: Scenario, width: int | None) -> Scene:
     """The model with its own lights, in the scenario's light and before its camera."""
     model = read_model(scenario.model)
-    height = max(round(width * scenario.size[1] / scenario.size[0]), 1)
     scene = Scene(meshes=model.meshes, instances=model.instances, lights=model.lights, camera=scenario.camera,
                   environment=Environment(image=read_picture(scenario.lighting), rotation_degrees=ROTATION),
-                  render=RenderSettings(size=(width, height), max_depth=DEPTH), name=scenario.name)
+                  render=RenderSettings(size=_size(scenario, width or scenario.size[0]), max_depth=DEPTH),
+                  name=scenario.name)
     validate(scene)
     return scene
+
+
+def _size(scenario: Scenario, width: int) -> tuple[int, int]:
+    return width, max(round(width * scenario.size[1] / scenario.size[0]), 1)
 
 
 def _judged(row: dict[str, Any], scenario: Scenario, scene: Scene, effort: Effort) -> Judged:
@@ -118,17 +124,25 @@ def _judged(row: dict[str, Any], scenario: Scenario, scene: Scene, effort: Effor
     inside = np.ones(objects.shape, np.bool_)
     if not scenario.skybox:
         pixels, inside = _over_white(scene, pixels, effort._replace(denoiser=None))
-    images = {"clrt": pixels if not scenario.skybox else tone_mapped(pixels)}
+    size = _size(scenario, min(scene.render.size[0], WEBSITE_WIDTH))
+    images = {"clrt": shrunk(pixels if not scenario.skybox else tone_mapped(pixels), size)}
+    stored = np.ones(images["clrt"].shape[:2], np.bool_)
     for renderer, path in scenario.goldens.items():
-        if (read := golden(renderer, path, scene.render.size)) is not None:
+        if (read := golden(renderer, path, size)) is not None:
             images[renderer], alpha = read
-            inside &= scenario.skybox | (alpha > STORED_COVERED)
+            stored &= scenario.skybox | (alpha > STORED_COVERED)
     names = np.array([_material_name(part) for part in [*scene.meshes, *(one.mesh for one in scene.instances)]] + [""])
-    regions = {"": np.ones(objects.shape, np.bool_)} | {
-        str(name): inside & (objects >= 0) & (names[objects] == name) for name in dict.fromkeys(names[:-1])}
+    regions = {"": np.ones(stored.shape, np.bool_)} | {
+        str(name): stored & _wholly(inside & (objects >= 0) & (names[objects] == name), size)
+        for name in dict.fromkeys(names[:-1])}
     means = {name: {renderer: float((image[where] @ LUMINANCE).mean()) for renderer, image in images.items()}
              for name, where in regions.items() if where.mean() >= LEAST}
     return Judged(row | verdict(images, means), images)
+
+
+def _wholly(part: NDArray[np.bool_], size: tuple[int, int]) -> NDArray[np.bool_]:
+    """The pixels of a smaller image that lie in a part of a larger one."""
+    return np.asarray(reduced(part[..., None].astype(np.float32), size)[..., 0] > COVERED)
 
 
 def _material_name(mesh: Mesh) -> str:

@@ -15,7 +15,7 @@ from clrt.cli.bench_render_fidelity import render_fidelity_command
 from clrt.errors import UsageError
 from clrt.output.image import Image
 from clrt.scene.pictures import linear_from_srgb
-from clrt.study.fidelity_suite import GENERATOR, golden, orbit_camera, reduced, scenarios, tone_mapped
+from clrt.study.fidelity_suite import GENERATOR, golden, orbit_camera, reduced, scenarios, shrunk, tone_mapped
 from clrt.study.render_fidelity import judge, verdict
 from tests.scene.glb import Gltf
 
@@ -136,6 +136,19 @@ def test_reduction_keeps_means() -> None:
     assert reduced(image, (42, 30)) == pytest.approx(image, abs=1e-6)
     assert reduced(image, (21, 10)) == pytest.approx(image.reshape(10, 3, 21, 2, 4).mean((1, 3)), abs=1e-6)
     assert reduced(image, (17, 11)).mean((0, 1)) == pytest.approx(image.mean((0, 1)), abs=1e-6)
+
+
+def test_images_are_shrunk_as_the_website_does(tmp_path: Path) -> None:
+    """By means of encoded values: 51 and 204 of 255 become 127.5, not the mean of their light."""
+    import imageio.v3 as imageio
+    texels = np.tile(np.array([[51, 204], [204, 51]], np.uint8)[..., None], (4, 4, 3))
+    path = tmp_path / "a.png"
+    imageio.imwrite(path, texels)
+    read = golden("stellar", path, (4, 4))
+    assert read is not None and read[0] == pytest.approx(((0.5 + 0.055) / 1.055) ** 2.4, rel=1e-5)
+    light = linear_from_srgb(np.asarray(texels / 255, np.float32))
+    assert shrunk(light, (4, 4)) == pytest.approx(read[0], rel=1e-5)
+    assert shrunk(light, (8, 8)) == pytest.approx(light, rel=1e-5)
 
 
 def test_images_are_decoded_as_they_were_encoded(tmp_path: Path) -> None:
