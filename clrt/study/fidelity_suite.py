@@ -119,7 +119,7 @@ def golden(renderer: str, path: Path, size: tuple[int, int]) -> tuple[Floats, Fl
     width, height = size
     if abs(texels.shape[0] * width / (texels.shape[1] * height) - 1) > 0.02:
         return None
-    alpha = reduced(texels[..., 3:], size)
+    alpha = np.minimum(reduced(texels[..., 3:], size), np.float32(1))
     encoded: Floats = np.divide(reduced(texels[..., :3] * texels[..., 3:], size), np.maximum(alpha, 1 / 255),
                                 dtype=np.float32)
     decoded = encoded ** POWER[renderer] if renderer in POWER else linear_from_srgb(encoded)
