@@ -93,11 +93,13 @@ class Accumulation(ABC):
             raise
 
     def mend(self) -> None:
-        """Where the work was torn it becomes what the film has not."""
+        """Where the work was torn it becomes what the film has not; where it was left after its last launch it ends."""
         if self._torn:
             self.wait()
             self.work.take_stock(self.film().tile_samples)
             self._torn = False
+        elif not self._busy:
+            self.work.settle()
 
     def _settle(self) -> None:
         """Where nothing is in hand or in flight; of torn work it is not known what is missing."""

@@ -67,6 +67,23 @@ def test_interrupted_it_goes_on_alone_and_together(device: Device, tmp_path: Pat
     assert hops > 4 and in_hand > 2 and same(at_once, running)
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_passes_left_after_any_launch(device: Device, small_launches: None, count: int) -> None:
+    """The last one, too: whoever goes on adds each sample once."""
+    whole = crew(device, count).session
+    launches = sum(1 for _ in whole.render(4))
+    expected = whole.film().pixels.tobytes()
+    for left_after in range(1, launches + 1):
+        session = crew(device, count).session
+        begun = session.render(3)
+        for _ in range(left_after):
+            next(begun, None)
+        begun.close()   # type: ignore[attr-defined]
+        while session.samples_done < 4:
+            list(session.advance(lambda done: 4 - done))
+        assert session.film().pixels.tobytes() == expected
+
+
 @pytest.mark.parametrize("when", [2, 5, 9, 14])
 @pytest.mark.parametrize("where", ["begin", "ended"])
 def test_one_that_fails_is_left_out(device: Device, small_launches: None, caplog: pytest.LogCaptureFixture,
