@@ -13,7 +13,7 @@ from ..device.launch import wait_for
 from ..device.open import Device
 from ..device.program import make_kernel
 from ..errors import UsageError
-from ..rendering.adaptive import MOST_TIMES_PLANNED
+from ..rendering.adaptive import most_planned
 from ..rendering.choices import Choices, choices_on
 from ..rendering.compile import CompiledScene, compile_scene
 from ..rendering.features import WITH_LIGHT
@@ -80,7 +80,7 @@ def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: C
     compiled = compile_scene(scene, choices_on(device, choices, lanes), "debug.cl", device)
     compiled = replace(compiled, preamble=f"{compiled.preamble}\n{vertex_preamble()}")
     depth = depth_of(settings)
-    planned = settings.spp * (MOST_TIMES_PLANNED if settings.adaptive else 1)
+    planned = most_planned(settings.spp, settings.adaptive)
     launch = first_launch(compiled, settings.size, depth, settings.seed, planned)
     launch["first_pixel"] = pixel[1] * settings.size[0] + pixel[0]
     batch = min(settings.spp, max(1, min(first_launch_samples(compiled), MOST_RECORDS // depth)))

@@ -81,7 +81,11 @@ class Device:
         return "bvh8" if self.vectors else "cwbvh"
 
 
-def open_devices(selectors: str | int | Device | Sequence[str | int | Device] | None) -> list[Device]:
+#: One device or several, by names (see `choose`) or open; None is the best.
+Selectors = str | int | Device | Sequence[str | int | Device] | None
+
+
+def open_devices(selectors: Selectors) -> list[Device]:
     """Opens the devices that are named (see `choose`), at least one; DeviceError where that fails.
 
     Those that are open already are taken as they are. UsageError where there are no names.

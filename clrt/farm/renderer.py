@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.open import Device
+from ..device.open import Device, Selectors
 from ..errors import DeviceError, UsageError
-from ..rendering.checkpoint import check_of_none
 from ..rendering.on_device import SceneOnDevice
 from ..rendering.picture_warnings import PictureWarnings
 from ..rendering.renderer import Renderer, State
@@ -49,8 +48,8 @@ class FarmRenderer(Renderer):
                 self._checkpoints.wait()
             raise
 
-    def _open(self, device: str | int | Device | Sequence[str | int | Device] | None, lanes: int | None,
-              on_phase: Callable[[str], None], before: Renderer | None) -> None:
+    def _open(self, device: Selectors, lanes: int | None, on_phase: Callable[[str], None],
+              before: Renderer | None) -> None:
         validate(self.scene)
         given = [device] if device is None or isinstance(device, str | int | Device) else list(device)
         selectors = tuple(each for each in given if isinstance(each, str | int))
@@ -67,13 +66,10 @@ class FarmRenderer(Renderer):
         self.warnings = PictureWarnings(self.scene, facts["report"]["kernel"]["features"])
         return picture
 
-    def look(self, camera: Camera) -> None:
-        """Begins another picture. Of many, each is better rendered by one worker (whole_pictures.py)."""
-        check_of_none(self._checkpoints)
-        validate(Scene(camera=camera, render=self.settings))
+    def _turn_to(self, camera: Camera) -> None:
+        """Makes all anew. Of many pictures each is better rendered by one worker (whole_pictures.py)."""
         self.scene = replace(self.scene, camera=camera)
         self.session = self._make_picture()
-        self._begin()
 
     @property
     def name(self) -> str:

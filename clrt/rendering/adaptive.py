@@ -22,6 +22,11 @@ GROWTH = 0.5
 MOST_TIMES_PLANNED = 4
 
 
+def most_planned(spp: int | None, adaptive: bool) -> int | None:
+    """The samples that any pixel may get, where so many are planned for each."""
+    return None if spp is None else int(spp) * (MOST_TIMES_PLANNED if adaptive else 1)
+
+
 def tiles_to_double(film: Film, tile_samples: NDArray[np.int64], errors: NDArray[np.float64],
                     spp: int | None) -> NDArray[np.intp]:
     """The tiles of a round, by number; none where `spp` samples a pixel are reached. tile_samples, errors: (rows,

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from ..errors import UsageError
 from ..float_errors import with_default_errors
+from ..scene.model import Scene
+from .accumulation import Accumulation
 from .features import WITH_LIGHT
 from .film import Film
 from .first_hits import MEANS, OF_THE_MIDDLE
@@ -18,6 +20,26 @@ from .first_hits import MEANS, OF_THE_MIDDLE
 LIGHT = ("direct", "indirect")
 OF_THE_FILM = (*LIGHT, "variance", "samples")
 AOVS = (*MEANS, *OF_THE_MIDDLE, *OF_THE_FILM)
+
+
+class Aovs:
+    """Those of one render, by the names and in the order that they were asked for. UsageError as of `chosen_aovs` and
+    `check_light`."""
+
+    def __init__(self, names: str | Iterable[str], integrator: str) -> None:
+        self._names = chosen_aovs(names)
+        check_light(self._names, integrator)
+        self._first_hits = dict[str, NDArray[np.generic]]()
+
+    def begin(self, picture: Accumulation, scene: Scene) -> None:
+        """Makes those of first hits, so that an interrupted picture has them, too."""
+        seen = seen_first(self._names)
+        self._first_hits = picture.first_hits(scene, seen) if seen else {}
+
+    def of(self, film: Film) -> dict[str, NDArray[np.generic]]:
+        """All of them, with this film."""
+        made = self._first_hits | film_aovs(film, self._names)
+        return {name: made[name] for name in self._names}
 
 
 def chosen_aovs(names: str | Iterable[str]) -> tuple[str, ...]:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import sys
-import time as clock
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from threading import Event
 from typing import Any
@@ -15,15 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.open import Device, name_of, open_devices
+from ..device.open import Selectors, name_of, open_devices
 from ..awake import AwakeClock, watched_clock
 from ..errors import DeviceError
 from ..float_errors import with_default_errors
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validate import check_is_scene, validate
 from .accumulation import Accumulation
-from .adaptive import FLOOR_SPP, MOST_TIMES_PLANNED
-from .aovs import check_light, chosen_aovs, film_aovs, seen_first
+from .adaptive import most_planned
+from .aovs import Aovs
 from .camera import camera_file
 from .checkpoint import check_of_none, open_checkpoints
 from .choices import choices_on
@@ -35,14 +33,12 @@ from .film import Film
 from .kept import Kept
 from .on_device import SceneOnDevice
 from .options import choices_of, settings_of
+from .pace import Pace
 from .picture_warnings import PictureWarnings
 from .session import depth_of
 from .state import State as State, check_reference
-from .stops import check_stops, checked_percentile, count_or_time, is_check, low_enough, pass_room, planned_spp
+from .stops import Limits, check_stops, checked_percentile
 from .turns import Turns
-
-#: Between two states at least this long passes, and this many times what making a state costs.
-STATE_SECONDS, STATE_COST = 0.5, 20
 
 
 class Renderer:
@@ -62,31 +58,29 @@ class Renderer:
     """
 
     @with_default_errors
-    def __init__(self, scene: Scene, *, device: str | int | Device | Sequence[str | int | Device] | None = None,
-                 size: tuple[int, int] | None = None, spp: int | None = None, max_depth: int | None = None,
-                 seed: int | None = None, integrator: str | None = None, shadows: bool | None = None,
-                 sampler: str | None = None, filter: str | None = None, adaptive: bool | None = None,
-                 back_face_culling: str | None = None, clamp_direct: float | None = None,
-                 clamp_indirect: float | None = None, triangle: str = "watertight", box: str = "robust",
-                 sphere: str = "robust", offset: str = "bound", builder: str | None = None, layout: str | None = None,
-                 lanes: int | None = None, paths: str | None = None, tree: bool | None = None,
-                 error_percentile: float | None = None, on_phase: Callable[[str], None] = lambda phase: None,
-                 aovs: str | Iterable[str] = (), checkpoint: str | Path | None = None, resume: bool = False,
-                 checkpoint_seconds: float = 30.0, before: Renderer | None = None, first_hits: bool = False) -> None:
+    def __init__(self, scene: Scene, *, device: Selectors = None, size: tuple[int, int] | None = None,
+                 spp: int | None = None, max_depth: int | None = None, seed: int | None = None,
+                 integrator: str | None = None, shadows: bool | None = None, sampler: str | None = None,
+                 filter: str | None = None, adaptive: bool | None = None, back_face_culling: str | None = None,
+                 clamp_direct: float | None = None, clamp_indirect: float | None = None, triangle: str = "watertight",
+                 box: str = "robust", sphere: str = "robust", offset: str = "bound", builder: str | None = None,
+                 layout: str | None = None, lanes: int | None = None, paths: str | None = None,
+                 tree: bool | None = None, error_percentile: float | None = None,
+                 on_phase: Callable[[str], None] = lambda phase: None, aovs: str | Iterable[str] = (),
+                 checkpoint: str | Path | None = None, resume: bool = False, checkpoint_seconds: float = 30.0,
+                 before: Renderer | None = None, first_hits: bool = False) -> None:
         check_is_scene(scene)
         check_stops(spp)
         options = dict(locals())
-        self._aovs, self._percentile = chosen_aovs(aovs), checked_percentile(error_percentile)
-        settings = settings_of(scene.render, options)
-        self.scene = replace(scene, render=settings)
-        check_light(self._aovs, settings.integrator)
+        self._percentile = checked_percentile(error_percentile)
+        self.scene = replace(scene, render=settings_of(scene.render, options))
+        self._aovs = Aovs(aovs, self.settings.integrator)
         self.choices = choices_of(options)
         self._open(device, lanes, on_phase, before)
         self._checkpoints, kept = open_checkpoints(checkpoint, resume, checkpoint_seconds, self.scene, self.choices,
                                                    self.name)
         on_phase("compile")
-        planned = None if spp is None else int(spp) * (MOST_TIMES_PLANNED if settings.adaptive else 1)
-        self._planned_spp = kept.planned_spp if kept else planned
+        self._planned_spp = kept.planned_spp if kept else most_planned(spp, self.settings.adaptive)
         self.session: Accumulation = self._make_picture(before.session.scenes if before else ())
         self._begin()
         self._interrupted, self._abandoned, self._turns = False, Event(), Turns()
@@ -97,8 +91,8 @@ class Renderer:
             self.seconds = kept.seconds
             self.state()
 
-    def _open(self, device: str | int | Device | Sequence[str | int | Device] | None, lanes: int | None,
-              on_phase: Callable[[str], None], before: Renderer | None) -> None:
+    def _open(self, device: Selectors, lanes: int | None, on_phase: Callable[[str], None],
+              before: Renderer | None) -> None:
         """Opens the devices, and compiles the scene for them; without `lanes` with as many as suit each."""
         self.device, *_ = self.devices = open_devices(device)
         on_phase("build")
@@ -119,8 +113,7 @@ class Renderer:
     def _begin(self) -> None:
         """A picture without any samples."""
         self._convergence = Convergence(self._planned_spp, self._percentile)
-        seen = seen_first(self._aovs)   # now, so that an interrupted picture has them, too
-        self._first_hits = self.session.first_hits(self.scene, seen) if seen else {}
+        self._aovs.begin(self.session, self.scene)
         self.stop_reason: str | None = None
         self.seconds = 0.0
 
@@ -153,8 +146,12 @@ class Renderer:
 
     def _see(self) -> None:
         """Turns to the camera asked for; whoever is next does where that was interrupted."""
-        if (camera := self._asked_for) is None:
-            return
+        if self._asked_for is not None:
+            self._turn_to(self._asked_for)
+            self._begin()
+            self._asked_for = None
+
+    def _turn_to(self, camera: Camera) -> None:
         files, file = self.session.compiled.chosen_files["CAMERA"], camera_file(camera, self.settings.integrator)
         self.scene = replace(self.scene, camera=camera)
         self._compiled = [each.seen_by(camera, file) for each in self._compiled]
@@ -162,8 +159,6 @@ class Renderer:
             self.session.look(camera)
         else:
             self.session = self._make_picture()
-        self._begin()
-        self._asked_for = None
 
     def passes(self, *, spp: int | None = None, time: float | None = None, error: float | None = None,
                reference: NDArray[np.float32] | None = None) -> Iterator[State]:
@@ -176,8 +171,8 @@ class Renderer:
         check_reference(reference, self.session.size)
         try:
             with watched_clock(self.seconds) as watch:
-                planned = planned_spp(self.settings, spp, time, error)
-                yield from self._turns.of(self._passes(planned, time, error, reference, watch))
+                limits = Limits.of(self.settings, spp, time, error)
+                yield from self._turns.of(self._passes(limits, reference, watch))
         except (GeneratorExit, KeyboardInterrupt):
             self._keep_unfinished()
             raise
@@ -185,33 +180,29 @@ class Renderer:
             if self._checkpoints is not None:
                 self._checkpoints.wait()
 
-    def _passes(self, spp: int | None, time: float | None, error: float | None,
-                reference: NDArray[np.float32] | None, watch: AwakeClock) -> Iterator[State]:
+    def _passes(self, limits: Limits, reference: NDArray[np.float32] | None, watch: AwakeClock) -> Iterator[State]:
         self._see()
         self.session.mend()
-        self._convergence.catch_up(self.session, self.seconds)
-        self.stop_reason = self._reached(spp, time, error)
-        if self.stop_reason is not None:
+        if self._catch_up(limits):
             yield self.state(reference)
-        room = partial(pass_room, spp=spp, error=error, even_to=FLOOR_SPP if self.settings.adaptive else None)
-        next_state, begun = 0.0, None
+        pace, begun = Pace(), None
         while self.stop_reason is None:
-            launches, begun = self._adaptive_pass(spp) if self._adapts else begun or self.session.advance(room), None
-            self._run_pass(launches, time, watch)
+            launches, begun = begun or self._next_pass(limits), None
+            self._run_pass(launches, limits, watch)
             if self._abandoned.is_set():
                 return
-            now, done = clock.perf_counter(), self.session.samples_done
-            self.stop_reason = self.stop_reason or count_or_time(done, self.seconds, spp, None)
+            done = self.session.samples_done
+            self.stop_reason = self.stop_reason or limits.reached(done, self.seconds)
             self._heed_interrupt()
-            looks = error is not None and is_check(done, self._adapts)
-            due = now >= next_state or done & (done - 1) == 0 or looks or self._adapts
+            looks = limits.looks(done)
+            due = pace.due or done & (done - 1) == 0 or looks or limits.adapts(done)
             if self.stop_reason is None and not due:
                 continue
             self.session.wait()
             self.seconds = watch.seconds
             film, tile_samples = self.session.film(), self.session.tile_samples
             if self.stop_reason is None and not (looks or self.settings.adaptive or self._checkpoints):
-                begun = self.session.advance_ahead(room)    # runs while the state is made
+                begun = self.session.advance_ahead(limits.room)    # runs while the state is made
             state = None if self._in_haste else self._convergence.record_if_wanted(
                 film, tile_samples, self.seconds, reference,
                 lambda: self._abandoned.is_set() or self._interrupted and self.stop_reason is None)
@@ -222,17 +213,16 @@ class Renderer:
                 self._keep(film, last=True)
                 state = self._convergence.record(film, tile_samples, self.seconds, reference, in_haste=begun is None)
             else:
-                if self.stop_reason is None and looks and low_enough(state.stops_by, error):
+                if self.stop_reason is None and looks and limits.low_enough(state.stops_by):
                     self.stop_reason = "error"
                 self._keep(film, last=self.stop_reason is not None)
-            next_state = now + max(STATE_SECONDS, STATE_COST * (clock.perf_counter() - now))
+            pace.made()
             before = self.stop_reason, self.session.samples_done
             yield state
             if (self.stop_reason, self.session.samples_done) != before:    # another call went on meanwhile
                 watch.set(self.seconds)
-                self._convergence.catch_up(self.session, self.seconds)
-                self.stop_reason, begun = self._reached(spp, time, error), None
-                if self.stop_reason is not None:
+                begun = None
+                if self._catch_up(limits):
                     yield self.state(reference)
 
     def interrupt(self) -> None:
@@ -252,40 +242,39 @@ class Renderer:
 
     def aovs(self, state: State) -> dict[str, NDArray[np.generic]]:
         """The pictures beside the state's, by the names and in the order that they were asked for."""
-        made = self._first_hits | film_aovs(state.film, self._aovs)
-        return {name: made[name] for name in self._aovs}
+        return self._aovs.of(state.film)
 
-    def _reached(self, spp: int | None, time: float | None, error: float | None) -> str | None:
-        """The stop reason where an earlier call, or the render it goes on with, came so far already."""
+    def _catch_up(self, limits: Limits) -> bool:
+        """Whether an earlier call, or the render this goes on with, came so far already; records what is new of it."""
+        self._convergence.catch_up(self.session, self.seconds)
         done = self.session.samples_done
-        if reason := count_or_time(done, self.seconds, spp, time):
-            return reason
-        looks = done and error is not None and is_check(done, self._adapts) and not self.session.work.parts
-        return "error" if looks and low_enough(self.state().stops_by, error) else None
+        self.stop_reason = limits.reached(done, self.seconds)
+        looks = self.stop_reason is None and done and limits.looks(done) and not self.session.work.parts
+        if looks and limits.low_enough(self.state().stops_by):
+            self.stop_reason = "error"
+        return self.stop_reason is not None
 
-    def _run_pass(self, launches: Iterator[None], time: float | None, watch: AwakeClock) -> None:
+    def _next_pass(self, limits: Limits) -> Iterator[None]:
+        """Over the whole picture; or one that doubles the samples of those tiles where that takes most error away,
+        which ends the render where none are left."""
+        if not limits.adapts(self.session.samples_done):
+            return self.session.advance(limits.room)
+        if not len(tiles := self._convergence.tiles_to_double(self.session.tile_samples, limits.spp)):
+            self.stop_reason = "spp"
+        return self.session.double(tiles)
+
+    def _run_pass(self, launches: Iterator[None], limits: Limits, watch: AwakeClock) -> None:
         """One pass; sets the stop reason where `time` is over or it is interrupted, maybe inside the pass."""
         for _ in launches:
             self.seconds = watch.seconds
             self._heed_interrupt()
             if self._abandoned.is_set() or self._in_haste:
                 return
-            if time is not None and self.seconds >= time and self.session.samples_done:
+            if limits.time_over(self.session.samples_done, self.seconds):
                 self.stop_reason = "time"
                 return
             if self.session.work.parts:
                 self._keep()
-
-    @property
-    def _adapts(self) -> bool:
-        """Whether the next pass goes by the error of the tiles; the picture so far is the newest state then."""
-        return self.settings.adaptive and self.session.samples_done >= FLOOR_SPP
-
-    def _adaptive_pass(self, spp: int | None) -> Iterator[None]:
-        """Doubles the samples of those tiles where that takes most error away; ends the render at `spp`."""
-        if not len(tiles := self._convergence.tiles_to_double(self.session.tile_samples, spp)):
-            self.stop_reason = "spp"
-        yield from self.session.double(tiles)
 
     def _heed_interrupt(self) -> None:
         if self.stop_reason is None and self._interrupted:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Any
 
 from ..errors import UsageError
 from ..scene.model import RenderSettings
+from .adaptive import FLOOR_SPP
 
 #: With a wanted error the noise is looked at so many times between two powers of two of the samples.
 CHECKS = 8
@@ -41,21 +43,51 @@ def checked_percentile(percentile: Any) -> float | None:
     return float(percentile)
 
 
+@dataclass(frozen=True)
+class Limits:
+    """The stop conditions of a render, each None or given; adaptive: whether tiles get samples by their error."""
+
+    spp: int | None
+    time: float | None
+    error: float | None
+    adaptive: bool
+
+    @staticmethod
+    def of(settings: RenderSettings, spp: int | None, time: float | None, error: float | None) -> Limits:
+        """Those given, or else the samples of the scene. UsageError as of `check_stops`."""
+        return Limits(planned_spp(settings, spp, time, error), time, error, settings.adaptive)
+
+    def reached(self, done: int, seconds: float) -> str | None:
+        """The stop reason where a picture has so many samples already, or has taken so long."""
+        if self.time_over(done, seconds):
+            return "time"
+        return "spp" if done and self.spp is not None and done >= self.spp else None
+
+    def time_over(self, done: int, seconds: float) -> bool:
+        """Whether its time is; never of a picture without samples."""
+        return bool(done) and self.time is not None and seconds >= self.time
+
+    def adapts(self, done: int) -> bool:
+        """Whether the pass after `done` samples goes by the error of the tiles."""
+        return self.adaptive and done >= FLOOR_SPP
+
+    def looks(self, done: int) -> bool:
+        """Whether the wanted error is compared with the noise of so many samples; never by time, so all runs agree."""
+        return self.error is not None and (self.adapts(done) or done % check_step(done) == 0)
+
+    def low_enough(self, noise: float | None) -> bool:
+        """Whether the noise, if it is known, is at most the wanted error, if there is one."""
+        return noise is not None and self.error is not None and noise <= self.error
+
+    def room(self, done: int) -> int:
+        """Samples that a pass after `done` may add to every pixel; none where the count is reached, or tiles adapt."""
+        ends = self.spp is not None and done >= self.spp or self.adapts(done)
+        return 0 if ends else pass_end(done, self.spp, self.error) - done
+
+
 def check_step(done: int) -> int:
     """From `done` samples on a wanted error is looked at wherever they are a multiple of this."""
     return max(1, (1 << done.bit_length()) // (2 * CHECKS))
-
-
-def is_check(done: int, adapts: bool) -> bool:
-    """Whether a wanted error is compared with the noise of so many samples; never by time, so all runs agree."""
-    return adapts or done % check_step(done) == 0
-
-
-def count_or_time(done: int, seconds: float, spp: int | None, time: float | None) -> str | None:
-    """The stop reason where a picture has so many samples already, or has taken so long."""
-    if done and time is not None and seconds >= time:
-        return "time"
-    return "spp" if done and spp is not None and done >= spp else None
 
 
 def pass_end(done: int, spp: int | None, error: float | None) -> int:
@@ -64,15 +96,3 @@ def pass_end(done: int, spp: int | None, error: float | None) -> int:
     step = check_step(done)
     checked = None if error is None else done + step - done % step
     return min(end for end in (1 << done.bit_length(), spp, checked) if end is not None)
-
-
-def pass_room(done: int, spp: int | None, error: float | None, even_to: int | None) -> int:
-    """Samples that a pass after `done` may add to every pixel; none from `spp` on, and from `even_to` on, if it is
-    given, where tiles get theirs by their error."""
-    ends = spp is not None and done >= spp or even_to is not None and done >= even_to
-    return 0 if ends else pass_end(done, spp, error) - done
-
-
-def low_enough(noise: float | None, error: float | None) -> bool:
-    """Whether the noise, if it is known, is at most the wanted error, if there is one."""
-    return noise is not None and error is not None and noise <= error
