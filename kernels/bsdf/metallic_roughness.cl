@@ -180,6 +180,7 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     real diffuse_o = luminance(mul(sub(splat(ONE), fresnel_o), m.albedo));
 #if GGX_ALBEDO
     Bounce bounce_o = ggx_bounce(&m.bounces, cos_o);
+    specular_o = m.coupling == 0 ? luminance(bounce_albedo(m.f0, F90(&m), bounce_o)) : specular_o;
 #endif
 #if MULTIPLE_SCATTERING
     m.lost_o = bounce_o.lost * inverse_or_zero(lost);     // the program has no fits of forms whose materials need none
@@ -190,7 +191,6 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     m.body_f90 = f90;
     real3 mean = left_albedo(&m, m.bounces.mean), left = left_albedo(&m, bounce_o);
     m.left_o = vector(left.x * inverse_or_zero(mean.x), left.y * inverse_or_zero(mean.y), left.z * inverse_or_zero(mean.z));
-    specular_o = BY_ALBEDO(&m) ? luminance(bounce_albedo(m.f0, F90(&m), bounce_o)) : specular_o;
     diffuse_o = BY_ALBEDO(&m) ? luminance(body_left(&m, bounce_o)) : diffuse_o;
 #endif
     m.shares = lobe_shares(specular_o, multiple_o, diffuse_o);
