@@ -16,8 +16,9 @@ from math import isinf
 
 from ..device.pulse import VARIABLE, call_in_progress, patience
 
-CRASHES = {signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL}
-HANDED_ON = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP}
+#: By their names, as Windows has few of them, and imports this, too.
+CRASHES = {"SIGSEGV", "SIGABRT", "SIGBUS", "SIGFPE", "SIGILL"}
+HANDED_ON = {"SIGINT", "SIGTERM", "SIGHUP", "SIGTSTP"}
 #: Of a patience, how often it is looked.
 LOOKS = 20
 DEVICE = 4
@@ -31,7 +32,8 @@ def guarded(advice: Callable[[], str]) -> None:
     if isinf(limit) or not hasattr(signal, "sigtimedwait"):
         return
     # What was started with nohup stays deaf to SIGHUP.
-    watched = {each for each in HANDED_ON if signal.getsignal(each) is not signal.SIG_IGN} | {signal.SIGCHLD}
+    handed_on = map(signal.Signals.__getitem__, HANDED_ON)
+    watched = {each for each in handed_on if signal.getsignal(each) is not signal.SIG_IGN} | {signal.SIGCHLD}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, watched)
     parent = os.getpid()
     child = os.fork()
@@ -82,7 +84,7 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
     if os.WIFEXITED(status):
         return os.WEXITSTATUS(status)
     name = signal.Signals(os.WTERMSIG(status)).name
-    if os.WTERMSIG(status) in CRASHES:
+    if name in CRASHES:
         from ..device.pocl_cache import kept_programs, remove_damaged
 
         damaged = remove_damaged()

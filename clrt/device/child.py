@@ -32,7 +32,8 @@ def activity(child: subprocess.Popen[str]) -> tuple[float, bool]:
     """The processor time that it took so far, and whether it wants more, or waits for a disk; (0, False) where that is
     not known (it has ended, or this is not Linux)."""
     try:
-        fields = Path(f"/proc/{child.pid}/stat").read_text(errors="replace").rpartition(")")[2].split()
+        status = Path(f"/proc/{child.pid}/stat").read_text(encoding="utf-8", errors="replace")
+        fields = status.rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK"), fields[0] in "RD"
     except (OSError, IndexError, ValueError):
         return 0.0, False

@@ -74,7 +74,7 @@ def _system() -> dict[str, Any]:
     for file, pattern, name in (("/proc/cpuinfo", r"model name\s*: (.*)", "processor"),
                                 ("/proc/meminfo", r"MemTotal:\s*(.*)", "memory")):
         with suppress(OSError):
-            found = re.search(pattern, Path(file).read_text())
+            found = re.search(pattern, Path(file).read_text(encoding="utf-8", errors="replace"))
             told[name] = found[1] if found else ""
     return told
 

@@ -62,7 +62,7 @@ def _driver(path: str, variable: str) -> Driver:
     if os.sep not in path:
         path = os.path.join(VENDORS, path)
     try:
-        name = Path(path).read_text(errors="replace").partition("\n")[0].strip()
+        name = Path(path).read_text(encoding="utf-8", errors="replace").partition("\n")[0].strip()
     except OSError:
         name = ""
     return Driver(_located(name, os.path.dirname(path)) if name else path, path)
@@ -94,5 +94,5 @@ def _linker_folders() -> list[str]:
     folders = os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep)
     with suppress(OSError):
         for file in sorted(os.scandir("/etc/ld.so.conf.d"), key=lambda entry: entry.name):
-            folders += [line.strip() for line in Path(file).read_text(errors="replace").splitlines()]
+            folders += [line.strip() for line in Path(file).read_text(encoding="utf-8", errors="replace").splitlines()]
     return [folder for folder in [*folders, *FOLDERS] if folder.startswith("/")]

@@ -55,7 +55,7 @@ def _only(libraries: Sequence[str]) -> Iterator[None]:
     before = {name: os.environ.get(name) for name in VARIABLES}
     with tempfile.TemporaryDirectory(prefix="clrt-drivers-") as folder:
         for number, library in enumerate(libraries):
-            (Path(folder) / f"{number:03}.icd").write_text(f"{library}\n")
+            (Path(folder) / f"{number:03}.icd").write_bytes(os.fsencode(f"{library}\n"))
         os.environ |= {"OCL_ICD_VENDORS": folder, "OPENCL_VENDOR_PATH": folder, "PYOPENCL_HOME": folder}
         os.environ.pop("OCL_ICD_FILENAMES", None)
         try:

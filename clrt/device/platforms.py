@@ -10,6 +10,7 @@ import hashlib
 import json
 import logging
 import os
+import platform
 import sys
 import time
 from typing import Any
@@ -89,4 +90,4 @@ def _state(driver: Driver) -> list[Any]:
             files.append([os.path.realpath(path), status.st_mtime_ns, status.st_size])
         except OSError:
             files.append([path])
-    return [*files, *os.uname()[1:4]]
+    return [*files, platform.node(), platform.release(), platform.version()]

@@ -44,7 +44,7 @@ def lacks_linker(device: cl.Device) -> bool:
 def processor_flags() -> frozenset[str]:
     """The instructions that this machine has, as Linux names them; empty elsewhere."""
     try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return frozenset()
     return next((frozenset(line.split(":")[1].split()) for line in lines if line.startswith("flags")), frozenset())

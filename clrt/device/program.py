@@ -65,7 +65,7 @@ def compose(preamble: str, entry: str, choices: Mapping[str, Sequence[str]], fol
             return
         seen.add(name)
         lines.append(f'#line 1 "{name}"')
-        for number, line in enumerate(folder.joinpath(name).read_text().splitlines(), start=1):
+        for number, line in enumerate(folder.joinpath(name).read_text(encoding="utf-8").splitlines(), start=1):
             match = _INCLUDE.match(line)
             if not match:
                 lines.append(line)

@@ -186,7 +186,7 @@ def _scaled(color: tuple[float, float, float], factor: float) -> tuple[float, fl
 
 def _without_local_form(material: Material) -> Material:
     """Return a Lambertian material in place of one whose kernel has another form in the local integrators."""
-    if "LOCAL" not in kernel_folder().joinpath(f"bsdf/{material.kernel}.cl").read_text():
+    if "LOCAL" not in kernel_folder().joinpath(f"bsdf/{material.kernel}.cl").read_text(encoding="utf-8"):
         return material
     return Diffuse(color=getattr(material, "color", Diffuse().color), emission=material.emission)
 

@@ -1,0 +1,55 @@
+"""Commands where Python lacks what it lacks on Windows, and in locales that are not UTF-8."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from clrt.cli import COMMANDS
+
+HOUSE = Path(__file__).parents[2]
+SMALL = ("--size", "16x16", "--spp", "1", "-q")
+#: A call of each command; of those that need a display or other software, what they say of themselves.
+CALLS = {"render": ("render", "scene.toml", *SMALL, "-o", "image.png"),
+         "debug": ("debug", "scene.toml", "--pixel", "5,5"), "info": ("info", "scene.toml"),
+         "convert": ("convert", "model.obj", "other.toml"), "compare": ("compare", "red.png", "red.png"),
+         "devices": ("devices", "--check"), "doctor": ("doctor", "-o", "report.zip"), "cache": ("cache",),
+         "bench": ("bench", "rays", "--help"), "view": ("view", "--help")}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """With a scene, which has a name beyond ASCII, a model and an image."""
+    import imageio.v3
+    import numpy as np
+
+    (tmp_path / "scene.toml").write_text('[environment]\ncolor = [1, 1, 1]\n[materials."grün"]\ntype = "diffuse"\n'
+                                         '[[sphere]]\nmaterial = "grün"\n', encoding="utf-8")
+    (tmp_path / "model.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", encoding="utf-8")
+    imageio.v3.imwrite(tmp_path / "red.png", np.full((8, 8, 3), (255, 0, 0), np.uint8))
+    return tmp_path
+
+
+def test_every_command_is_called() -> None:
+    assert set(CALLS) == set(COMMANDS)
+
+
+@pytest.mark.parametrize("call", CALLS.values(), ids=list(CALLS))
+def test_commands_need_nothing_that_windows_lacks(folder: Path, call: tuple[str, ...]) -> None:
+    program = [sys.executable, "-X", "warn_default_encoding", str(HOUSE / "tests" / "windows_python.py")]
+    done = subprocess.run([*program, *call], cwd=folder, capture_output=True, text=True, encoding="utf-8",
+                          env=os.environ | {"PYTHONUTF8": "0"})
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", ["render", "info", "convert"])
+def test_commands_in_the_c_locale(folder: Path, name: str) -> None:
+    """Where Python takes text for ASCII."""
+    ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    done = subprocess.run([sys.executable, "-m", "clrt", *CALLS[name]], cwd=folder, capture_output=True,
+                          env=os.environ | ascii_only)
+    assert done.returncode == 0, done.stderr.decode(errors="replace")

@@ -1,0 +1,57 @@
+"""`clrt ARGUMENTS` as Windows' Python would meet its own modules: what os and signal lack there is taken away once all
+libraries are loaded, and text that is opened without an encoding is an error. A simulation: drivers, paths and
+processes stay.
+
+usage: python -X warn_default_encoding -m tests.windows_python ARGUMENTS
+"""
+
+from __future__ import annotations
+
+import concurrent.futures  # noqa: F401
+import importlib.metadata
+import importlib.resources  # noqa: F401
+import logging.handlers  # noqa: F401
+import multiprocessing.connection  # noqa: F401
+import os
+import shutil  # noqa: F401
+import signal
+import subprocess  # noqa: F401
+import sys
+import tempfile  # noqa: F401
+import warnings
+
+import click  # noqa: F401
+import numpy  # noqa: F401
+import OpenImageIO  # noqa: F401
+import platformdirs  # noqa: F401
+import pydantic  # noqa: F401
+import pyopencl.array  # noqa: F401
+import rich.console  # noqa: F401
+import rich.progress  # noqa: F401
+
+#: Of those that the standard library documents as available on Unix alone; subprocess needs some others here.
+LACKS = {
+    os: "chown fchmod fork forkpty getegid geteuid getgid getuid killpg mkfifo mknod nice O_DIRECT posix_fadvise pread "
+        "pwrite register_at_fork sched_getaffinity sched_setaffinity setsid statvfs uname",
+    signal: "SIGALRM SIGBUS SIGCHLD SIGCONT SIGHUP SIGPIPE SIGQUIT SIGSTOP SIGTSTP SIGUSR1 SIGUSR2 SIG_BLOCK "
+            "SIG_SETMASK SIG_UNBLOCK alarm pthread_kill pthread_sigmask setitimer sigtimedwait sigwait"}
+MODULES = ("fcntl", "grp", "pwd", "resource", "termios")
+
+
+def take_away() -> None:
+    """What is not there on Windows."""
+    for module, names in LACKS.items():
+        for name in names.split():
+            if hasattr(module, name):
+                delattr(module, name)
+    for name in MODULES:
+        sys.modules[name] = None    # type: ignore[assignment]
+
+
+if __name__ == "__main__":
+    take_away()
+    warnings.filterwarnings("error", category=EncodingWarning, module="clrt")
+    from clrt.__main__ import main
+
+    sys.argv = ["clrt", *sys.argv[1:]]
+    main()
