@@ -56,7 +56,7 @@ class Cycles:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Blender tells standard output of every file that it saves."""
+    """Blender and its Python add-ons tell standard output of every file that they save."""
     sys.stdout.flush()
     kept = os.dup(1)
     with open(os.devnull, "w") as nothing:
@@ -64,5 +64,6 @@ def quiet() -> Iterator[None]:
     try:
         yield
     finally:
+        sys.stdout.flush()
         os.dup2(kept, 1)
         os.close(kept)
