@@ -57,7 +57,7 @@ def test_area_lights_keep_their_power_place_and_side() -> None:
 
 
 def test_normal_map_is_that_of_a_surface() -> None:
-    """Unit normals, whose slopes are the gradient of one height: its mixed derivatives agree, by periodic differences."""
+    """Unit normals, whose slopes are a gradient: mixed derivatives of the height agree, by periodic differences."""
     normal = 2 * bumps() - 1
     np.testing.assert_allclose(np.linalg.norm(normal, axis=2), 1)
     slope = -normal[..., :2] / normal[..., 2:]
