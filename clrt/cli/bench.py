@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from .bench_agree import agree_command
+from .bench_blender import blender_command
 from .bench_build import build_command
 from .bench_combinations import combinations_command
 from .bench_converge import converge_command
@@ -22,11 +23,11 @@ from .options import Group
 
 @click.group(cls=Group)
 def command() -> None:
-    """Measure this machine: rays, build, hits, peers, converge, agree, combinations, floor,
+    """Measure this machine: rays, build, hits, peers, converge, agree, combinations, floor, blender,
     mitsuba-data, render-fidelity, numerics, theses, farm."""
 
 
 for each in (rays_command, build_command, hits_command, peers_command, converge_command, agree_command,
-             combinations_command, floor_command, mitsuba_data_command, render_fidelity_command, numerics_command,
-             theses_command, farm_command):
+             combinations_command, floor_command, blender_command, mitsuba_data_command, render_fidelity_command,
+             numerics_command, theses_command, farm_command):
     command.add_command(each)

@@ -31,6 +31,7 @@ def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: in
     """
     from ..errors import UsageError
     from ..output.files import check_target
+    from ..output.image import save_side_by_side
     from ..output.report import write_report
     from ..study.fidelity_suite import scenarios
     from ..study.render_fidelity import judge
@@ -46,7 +47,7 @@ def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: in
         click.echo(_line(judged.row))
         rows.append(judged.row)
         if pictures is not None and judged.images:
-            _write_pictures(pictures / f"{judged.row['scenario']}.png", judged.images)
+            save_side_by_side(pictures / f"{judged.row['scenario']}.png", judged.images.values())
     results = [row["result"] for row in rows]
     click.echo("  " + ", ".join(f"{results.count(word)} {word}" for word in dict.fromkeys(results)))
     if json_file is not None:
@@ -64,12 +65,3 @@ def _line(row: Mapping[str, Any]) -> str:
     strayed = ", ".join(f"{name} {means[name]['beyond']:.2f}" for name in row["strayed"] if name)
     return (f"{start}{row['mean_flip']:6.3f}{row['spread']:8.3f}{means['']['beyond']:8.3f}  {strayed}"
             + "".join(f"  ({warning})" for warning in row["warnings"]))
-
-
-def _write_pictures(path: Path, images: Mapping[str, Any]) -> None:
-    import numpy as np
-
-    from ..output.image import Image
-
-    path.parent.mkdir(parents=True, exist_ok=True)
-    Image(np.concatenate([*images.values()], axis=1), {}).save(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -47,3 +48,9 @@ class Image:
 
         with tempfile.TemporaryDirectory() as folder:
             return self.save(Path(folder) / "image.png").read_bytes()
+
+
+def save_side_by_side(path: Path, images: Iterable[NDArray[np.float32]]) -> None:
+    """Write images (height, width, 3) of one height, float32, linear Rec. 709, as one; makes the folder."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image(np.concatenate([*images], axis=1)).save(path)

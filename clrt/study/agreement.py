@@ -62,7 +62,7 @@ def compared(ours: Means, theirs: Means) -> dict[str, Any]:
     relative one; p: the least, corrected; rejected: how many blocks and channels are below FAMILY after correction.
     agree: the means within MEAN, and no block rejected. Blocks that are black in both agree.
     """
-    ratio, error = _ratio(ours.whole, theirs.whole)
+    ratio, error = mean_ratio(ours.whole, theirs.whole)
     t, freedom, difference, noise = _welch(ours.blocks, theirs.blocks)
     p = np.array([corrected(t_test(*each), t.size) for each in zip(t.ravel().tolist(), freedom.ravel().tolist())])
     rejected = int(np.count_nonzero(p < FAMILY))
@@ -72,7 +72,7 @@ def compared(ours: Means, theirs: Means) -> dict[str, Any]:
             "agree": bool(np.all(np.abs(ratio - 1) < MEAN)) and not rejected and all(map(isfinite, ratio))}
 
 
-def _ratio(ours: Doubles, theirs: Doubles) -> tuple[Doubles, Doubles]:
+def mean_ratio(ours: Doubles, theirs: Doubles) -> tuple[Doubles, Doubles]:
     """Of the means of (seeds, channels), and its standard error; 1 where both are black."""
     black = (ours.mean(0) == 0) & (theirs.mean(0) == 0)
     mean = np.where(black, 1, theirs.mean(0))

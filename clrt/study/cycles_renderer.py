@@ -5,36 +5,35 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..output.images import read_image
-from ..scene.materials import Material
 from ..scene.model import Scene
 from .contestants import Contestant, Picture
-from .cycles_scene import Bsdf, blender_scene, check_scene
+from .cycles_scene import blender_scene, check_scene
 
 
 def contestants(scene: Scene) -> dict[str, Contestant]:
     """Cycles. ImportError where it is not installed, UsageError for what it cannot draw."""
     library = import_module("bpy")
     check_scene(scene)
-    return {"cycles": Cycles(library, scene)}
+    return {"cycles": Cycles(library, partial(blender_scene, library.data, scene))}
 
 
 class Cycles:
-    """A contestant; bsdfs: see `blender_scene`.
+    """A contestant; make: Blender's scene, whose images may be written to a folder (see `blender_scene`).
 
     Each picture is prepared by Blender, and read from a file: both are in its time.
     """
 
-    def __init__(self, library: Any, content: Scene, bsdfs: Mapping[type[Material], Bsdf] | None = None) -> None:
-        self._library, self._content, self._bsdfs = library, content, bsdfs
+    def __init__(self, library: Any, make: Callable[[Path], Any]) -> None:
+        self._library, self._make = library, make
         self._folder = TemporaryDirectory()
         self._warm = False
 
@@ -45,19 +44,19 @@ class Cycles:
             self(1, seed)
         scene.cycles.samples, scene.cycles.seed, scene.render.filepath = spp, seed, str(file)
         start, cpu = time.perf_counter(), time.process_time()
-        with _quiet():
+        with quiet():
             self._library.ops.render.render(scene=scene.name, write_still=True)
         pixels = read_image(file)
         return Picture(spp, time.perf_counter() - start, time.process_time() - cpu, pixels)
 
     @cached_property
     def _scene(self) -> Any:
-        return blender_scene(self._library.data, self._content, Path(self._folder.name), self._bsdfs)
+        return self._make(Path(self._folder.name))
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
-    """Blender tells standard output of every file that it saves."""
+def quiet() -> Iterator[None]:
+    """Blender and its Python add-ons tell standard output of every file that they save."""
     sys.stdout.flush()
     kept = os.dup(1)
     with open(os.devnull, "w") as nothing:
@@ -65,5 +64,6 @@ def _quiet() -> Iterator[None]:
     try:
         yield
     finally:
+        sys.stdout.flush()
         os.dup2(kept, 1)
         os.close(kept)

@@ -19,7 +19,7 @@ from ..rendering.features import biased_by
 from ..scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ..scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from ..scene.instancing import unfolded
-from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
+from ..scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from ..scene.textures import untextured
 from .shapes import icosphere
 
@@ -59,23 +59,23 @@ def check_scene(scene: Scene) -> None:
 def blender_scene(data: Any, scene: Scene, folder: Path, bsdfs: Mapping[type[Material], Bsdf] | None = None) -> Any:
     """A scene of `data` (bpy.data); pictures that Blender reads are written to `folder`. bsdfs: in place of BSDFS."""
     made = data.scenes.new(scene.name)
-    _set_up(made, scene)
+    set_up(made, scene.render)
     bsdfs = bsdfs or BSDFS
     for mesh in unfolded(scene).meshes:
-        _place(data, made, _mesh(data, mesh.vertices, mesh.faces, mesh.normals, _material(data, mesh.material, bsdfs)))
+        place(data, made, _mesh(data, mesh.vertices, mesh.faces, mesh.normals, _material(data, mesh.material, bsdfs)))
     for sphere in scene.spheres:
-        _place(data, made, _mesh(data, *sphere_triangles(sphere), _material(data, sphere.material, bsdfs)))
+        place(data, made, _mesh(data, *sphere_triangles(sphere), _material(data, sphere.material, bsdfs)))
     for light in scene.lights:
-        _place(data, made, *_light(data, light))
-    made.camera = _place(data, made, *_camera(data, scene.camera))
-    made.world = _world(data, scene.environment, folder)
+        place(data, made, *_light(data, light))
+    made.camera = place(data, made, *_camera(data, scene.camera))
+    made.world = world(data, scene.environment, folder)
     return made
 
 
-def _set_up(made: Any, scene: Scene) -> None:
+def set_up(made: Any, settings: RenderSettings) -> None:
     """No clamping, no denoising, no filter but a pixel's own square; bounces are path edges but the first two."""
-    render, cycles, (width, height) = made.render, made.cycles, scene.render.size
-    depth = scene.render.max_depth if scene.render.integrator == "path" else 2
+    render, cycles, (width, height) = made.render, made.cycles, settings.size
+    depth = settings.max_depth if settings.integrator == "path" else 2
     render.engine, render.use_persistent_data = "CYCLES", True
     render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
     cycles.device, cycles.pixel_filter_type, cycles.filter_width = "CPU", "BOX", 1.0
@@ -205,7 +205,8 @@ def _camera(data: Any, camera: Camera) -> tuple[Any, NDArray[np.float64]]:
     return made, frame_of_axes(np.array([right, np.cross(back, right), back]), camera.position)
 
 
-def _world(data: Any, environment: Environment, folder: Path) -> Any:
+def world(data: Any, environment: Environment, folder: Path) -> Any:
+    """A world of Blender; the image of the environment, if it has one, is written to `folder`."""
     made = data.worlds.new("world")
     nodes = Nodes(made)
     color: Any = (*environment.color, 1)
@@ -221,7 +222,7 @@ def _world(data: Any, environment: Environment, folder: Path) -> Any:
     return made
 
 
-def _place(data: Any, made: Any, content: Any, frame: NDArray[np.float64] | None = None) -> Any:
+def place(data: Any, made: Any, content: Any, frame: NDArray[np.float64] | None = None) -> Any:
     """Into the scene; frame: (4, 4), to the world."""
     placed = data.objects.new(content.name, content)
     made.collection.objects.link(placed)

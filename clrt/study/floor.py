@@ -133,13 +133,13 @@ def _mitsuba(module: Any) -> dict[str, Judge]:
 
 def _cycles(module: Any) -> dict[str, Judge]:
     """Blender's Principled BSDF with its defaults, but white, of that roughness."""
-    from .cycles_scene import BSDFS, Nodes
+    from .cycles_scene import BSDFS, Nodes, blender_scene
 
     def principled(nodes: Nodes, material: MetallicRoughness) -> Any:
         return nodes("BsdfPrincipled", {"Base Color": (*WHITE, 1), "Roughness": material.roughness, "IOR": Plastic.IOR})
 
-    library = import_module("bpy")
-    return {"Cycles": lambda scene: module.Cycles(library, scene, BSDFS | {MetallicRoughness: principled})}
+    library, bsdfs = import_module("bpy"), BSDFS | {MetallicRoughness: principled}
+    return {"Cycles": lambda scene: module.Cycles(library, partial(blender_scene, library.data, scene, bsdfs=bsdfs))}
 
 
 #: By what pip calls them: their modules and the columns that these make.

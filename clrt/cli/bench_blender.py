@@ -1,0 +1,48 @@
+"""`clrt bench blender`: scenes made in Blender, rendered by clrt and by Cycles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command("blender")
+@click.argument("scenes", nargs=-1, metavar="[SCENE]...")
+@click.option("--material", "materials", multiple=True, metavar="NAME",
+              help="Only this material: matte, bumps, metal, glass, plastic, all; repeatable.")
+@click.option("--spp", type=click.IntRange(min=1), default=64, show_default=True, help="Samples per pixel.")
+@click.option("--seeds", type=click.IntRange(min=2), default=4, show_default=True, help="Images of each renderer.")
+@click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
+              help="Write clrt's image and Cycles', side by side, there as PNG.")
+@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+def blender_command(scenes: tuple[str, ...], materials: tuple[str, ...], spp: int, seeds: int, pictures: Path | None,
+                    device: str | None, json_file: Path | None) -> None:
+    """Build scenes in Blender (pip install bpy), export them as glTF, and compare clrt's images with Cycles'.
+
+    SCENE is a kind of light: spot, area, sun, delta_sun, point, emission, HDRI, or together; all without one. Values
+    are mean radiances of the floor, Suzanne, the ball and the cube in clrt over those in Cycles, with their standard
+    errors.
+    """
+    from ..output.files import check_target
+    from ..output.image import save_side_by_side
+    from ..output.report import write_report
+    from ..study.blender import judge
+    from ..study.blender_scenes import COLORS
+
+    if json_file is not None:
+        check_target(json_file)
+    rows = []
+    found = judge(scenes, materials, spp, seeds, device)
+    click.echo(f"{'scene':11}{'material':9}" + "".join(f"{name:>15}" for name in COLORS))
+    for judged in found:
+        values = (f"{judged.ratios[name]:.4f}±{judged.errors[name]:.4f}" for name in COLORS)
+        click.echo(f"{judged.scene:11}{judged.material:9}" + "".join(f"{value:>15}" for value in values))
+        rows.append({"scene": judged.scene, "material": judged.material, "ratios": judged.ratios,
+                     "errors": judged.errors})
+        if pictures is not None:
+            save_side_by_side(pictures / f"{judged.scene}_{judged.material}.png", judged.images.values())
+    if json_file is not None:
+        write_report(json_file, {"spp": spp, "seeds": seeds, "rows": rows})
+        click.echo(str(json_file))

@@ -1,0 +1,72 @@
+"""clrt and Cycles on scenes made in Blender (`blender_scenes`): mean radiances compared object by object."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..api import render
+from ..device.discover import choose
+from ..errors import UsageError
+from ..scene.model import FloatArray
+from .agreement import mean_ratio
+from .blender_scenes import COLORS, MATERIALS, SCENES, build, exported
+from .cycles_renderer import Cycles
+
+
+class Judged(NamedTuple):
+    """ratios: mean radiance in clrt over that in Cycles, by object; errors: their standard errors; images: by renderer,
+    (h, w, 3) float32, linear Rec. 709, means over the seeds."""
+
+    scene: str
+    material: str
+    ratios: dict[str, float]
+    errors: dict[str, float]
+    images: dict[str, FloatArray]
+
+
+def judge(scenes: Collection[str], materials: Collection[str], spp: int, seeds: int,
+          device: str | int | None = None) -> Iterator[Judged]:
+    """Each of `scenes` with each of `materials` (none: all), rendered by both with seeds from 1 to `seeds` (>= 2).
+
+    UsageError for names that are not in SCENES or MATERIALS, and where Blender is not installed.
+    """
+    for chosen, known in ((scenes, SCENES), (materials, MATERIALS)):
+        if unknown := [name for name in chosen if name not in known]:
+            raise UsageError(f"{unknown[0]}: is none of {', '.join(known)}")
+    try:
+        library = import_module("bpy")
+    except ImportError:
+        raise UsageError("Blender is not installed; run pip install bpy, with Python 3.11") from None
+    number = choose(device)[0].index
+    return (_judged(library, scene, material, spp, range(1, seeds + 1), number)
+            for scene in scenes or SCENES for material in materials or MATERIALS)
+
+
+def _judged(library: Any, scene: str, material: str, spp: int, seeds: range, device: int) -> Judged:
+    with TemporaryDirectory() as folder:
+        made = build(library, scene, material, Path(folder))
+        content = exported(library, made, Path(folder))
+        cycles = Cycles(library, lambda _: made)
+        theirs = np.array([cycles(spp, seed).pixels for seed in seeds])
+    found = [render(content, spp=spp, seed=seed, device=device, aovs=["object"]) for seed in seeds]
+    ours = np.array([image.pixels for image in found])
+    names = np.array([mesh.material_name for mesh in content.meshes] + [""])[found[0].aovs["object"]]
+    ratios, errors = compared(ours, theirs, {name: names == name for name in COLORS})
+    return Judged(scene, material, ratios, errors, {"clrt": ours.mean(0), "Cycles": theirs.mean(0)})
+
+
+def compared(ours: FloatArray, theirs: FloatArray,
+             regions: Mapping[str, NDArray[np.bool_]]) -> tuple[dict[str, float], dict[str, float]]:
+    """The ratios of means over the pixels (h, w) of each region and all channels, and their standard errors, from
+    images (seeds, h, w, 3)."""
+    means = [np.column_stack([images[:, where].mean((1, 2), dtype=np.float64) for where in regions.values()])
+             for images in (ours, theirs)]
+    ratios, errors = mean_ratio(*means)
+    return dict(zip(regions, ratios.tolist())), dict(zip(regions, errors.tolist()))
