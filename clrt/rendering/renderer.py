@@ -9,7 +9,6 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from threading import Event
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from ..errors import DeviceError
 from ..float_errors import with_default_errors
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validate import check_is_scene, validate
+from ..threads import Event
 from .accumulation import Accumulation
 from .adaptive import FLOOR_SPP, MOST_TIMES_PLANNED
 from .aovs import check_light, chosen_aovs, film_aovs, seen_first
