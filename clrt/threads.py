@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import os
+import sys
 import time
 from _thread import get_ident, start_new_thread
 from collections.abc import Callable, Iterable
@@ -90,9 +91,11 @@ def beside(work: Callable[[], T], *, daemon: bool = False) -> Callable[[], T]:
             ended.notify()
 
     def result() -> T:
-        ended.wait_for(lambda: bool(results or errors))
+        ended.wait_for(lambda: bool(results or errors) or sys.is_finalizing())
         if errors:
             raise errors[0]
+        if not results:
+            raise RuntimeError("Python has ended all other threads")
         return results[0]
 
     start_new_thread(run, ())

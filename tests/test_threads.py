@@ -227,3 +227,16 @@ time.sleep(0.3)
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=LONG)
     assert (done.returncode, done.stdout, done.stderr) == (0, "" if daemon else "done\n", "")
+
+
+def test_a_process_that_is_taken_apart_waits_for_no_thread() -> None:
+    """None runs any more then: its result is an error."""
+    program = """
+from clrt.threads import beside
+class Last:
+    def __del__(self, beside=beside):
+        beside(lambda: 7)()
+last = Last()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=LONG)
+    assert done.returncode == 0 and "RuntimeError" in done.stderr
