@@ -6,13 +6,14 @@ which it could look.
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-#: Seconds between two looks, and how many of them count at most: a busy machine may delay a look.
-BEAT, LONGEST = 0.1, 1.0
+from .threads import BEAT, Event, beside
+
+#: Seconds between two looks that count at most: a busy machine may delay a look.
+LONGEST = 1.0
 
 
 class AwakeClock:
@@ -40,20 +41,20 @@ class AwakeClock:
 @contextmanager
 def watched_clock(seconds: float = 0.0) -> Iterator[AwakeClock]:
     """A clock that a thread looks at, so that nobody else has to."""
-    clock, over = AwakeClock(seconds), threading.Event()
+    clock, over = AwakeClock(seconds), Event()
 
     def watch() -> None:
         while not over.wait(BEAT):
             clock.look()
 
-    threading.Thread(target=watch, daemon=True, name="clrt clock").start()
+    beside(watch, daemon=True)
     try:
         yield clock
     finally:
         over.set()
 
 
-def wait_awake(event: threading.Event, seconds: float) -> bool:
+def wait_awake(event: Event, seconds: float) -> bool:
     """Whether the event is set within so many seconds; waits for that."""
     clock = AwakeClock()
     while not event.wait(min(BEAT, seconds)):

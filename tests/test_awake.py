@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import threading
 import time
 
 import numpy as np
 import pytest
 
-from clrt.awake import BEAT, LONGEST, AwakeClock, wait_awake, watched_clock
+from clrt.awake import LONGEST, AwakeClock, wait_awake, watched_clock
+from clrt.threads import BEAT, Event
 
 RNG = np.random.default_rng(5)
 
@@ -37,7 +37,7 @@ def test_a_long_time_between_looks_is_none(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_waiting_leaves_a_suspension_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """An hour that passes in one of the looks is not waited for; what is set then is found."""
-    system, event, looks = Time(monkeypatch), threading.Event(), list[float]()
+    system, event, looks = Time(monkeypatch), Event(), list[float]()
 
     def wait(seconds: float) -> bool:
         looks.append(seconds)

@@ -75,8 +75,10 @@ def asked(call: Callable[..., Any], good: dict[str, Any], argument: str, value: 
 
 INTERRUPTED = """
 import signal, sys, threading, clrt
+def compiles(frame):
+    return frame is not None and (frame.f_code.co_name == "quietly_built" or compiles(frame.f_back))
 def interrupt():
-    while not any(thread.name == "clrt compiles" for thread in threading.enumerate()):
+    while not any(map(compiles, list(sys._current_frames().values()))):
         pass
     signal.raise_signal(signal.SIGINT)
 threading.Thread(target=interrupt, daemon=True).start()

@@ -8,15 +8,15 @@ import tempfile
 from collections.abc import Callable, Iterator
 from datetime import datetime, timezone
 from queue import Empty, SimpleQueue
-from threading import Thread
 from typing import IO, Any
 
-from ..awake import BEAT, AwakeClock
+from ..awake import AwakeClock
 from ..device.child import end_child, last_line, start_child, told_end
 from ..device.describe import DeviceInfo
 from ..device.sources import kernel_digest
 from ..device.verdicts import Verdict
 from ..errors import DeviceError
+from ..threads import BEAT, beside
 
 #: Seconds that any device has enough of, as long as it answers: one that ran out of fewer has not failed.
 LIMIT = 300.0
@@ -56,13 +56,15 @@ def _told(child: subprocess.Popen[str], clock: AwakeClock, limit: float) -> Iter
     """What the child tells until it ends; raises Empty at the limit. Nothing here waits for a process that hangs."""
     lines: SimpleQueue[str] = SimpleQueue()
 
-    def listen(output: IO[str]) -> None:
+    assert child.stdout is not None
+    output: IO[str] = child.stdout
+
+    def listen() -> None:
         for line in output:
             lines.put(line)
         lines.put("")
 
-    assert child.stdout is not None
-    Thread(target=listen, args=(child.stdout,), daemon=True).start()
+    beside(listen, daemon=True)
     while clock.look() < limit:
         try:
             line = lines.get(timeout=min(BEAT, limit))

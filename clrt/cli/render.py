@@ -7,7 +7,6 @@ import gc
 import logging
 import sys
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import DeviceError, UsageError
+from ..threads import beside
 from . import PROGRAM
 from .farm import cluster_for, farm_options, is_huge, make_renderer, render_frames, render_huge
 from .frames import Sequence, frame_options, make_sequence
@@ -98,9 +98,9 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     from ..scene.paths import files_read
 
     check_scene(scene)
-    beside = _chosen_aovs(aovs) if aovs else ()
+    layers = _chosen_aovs(aovs) if aovs else ()
     named = (scene,) if reference is None else (scene, reference)
-    results = Outputs(named, outputs or (Path(f"{scene.stem}.png"),), beside, denoise, view, exposure, report, plot)
+    results = Outputs(named, outputs or (Path(f"{scene.stem}.png"),), layers, denoise, view, exposure, report, plot)
     sequence = make_sequence(results, frames, resume, {"checkpoint": checkpoint, "reference": reference, "plot": plot}
                              ) if frames or turntable else None
     if sequence is None:
@@ -120,13 +120,13 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         "size": size, "max_depth": depth, "seed": seed, "device": devices or None,
         "integrator": integrator, "shadows": shadows, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
         "checkpoint": None if print_kernel else checkpoint, "resume": resume and not (print_kernel or sequence),
-        "checkpoint_seconds": checkpoint_every, "error_percentile": error_percentile, "aovs": beside,
+        "checkpoint_seconds": checkpoint_every, "error_percentile": error_percentile, "aovs": layers,
         "first_hits": denoise, **others}
     if print_kernel:
         scheduler = local_cluster = None
     with (make_progress(progress_kind, quiet) as progress,
-          cluster_for(scheduler, local_cluster, progress) as cluster, ThreadPoolExecutor(1) as meanwhile):
-        opening = None if cluster else meanwhile.submit(_open, options["device"])
+          cluster_for(scheduler, local_cluster, progress) as cluster):
+        opening = None if cluster else beside(lambda: _open(devices or None))
         progress.phase("load")
         with files_read() as inputs:
             content = load(scene, camera)
@@ -149,7 +149,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
                 sys.exit(130)
             return
         if opening is not None:
-            options["device"] = opening.result()
+            options["device"] = opening()
         renderer = make_renderer(cluster, content, spp=planned, on_phase=progress.phase, **options)
         if print_kernel:
             click.echo(renderer.compiled.source)

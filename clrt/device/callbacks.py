@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import atexit
-import threading
 import time
 from collections.abc import Callable
 
 import pyopencl as cl
 
+from ..threads import Event
+
 #: Those that are still to come; and whether no more should.
 _expected: set[object] = set()
-_python_ends = threading.Event()
+_python_ends = Event()
 
 
 def when_complete(event: cl.Event, function: Callable[[], object]) -> None:

@@ -11,10 +11,11 @@ from __future__ import annotations
 import atexit
 import ctypes
 from dataclasses import dataclass, field
-from threading import Event
 
 import pyopencl as cl
 from pyopencl import Context
+
+from ..threads import Event
 
 MOST_COMPILED = 40
 

@@ -7,11 +7,11 @@ flight, and their events are polled. One that has not ended after `patience` has
 
 from __future__ import annotations
 
-import threading
 import time
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from queue import Empty, SimpleQueue
 
 import pyopencl as cl
 
@@ -184,10 +184,10 @@ def wait_for(event: cl.Event) -> None:
 
 
 def _wait_long(event: cl.Event, wait: Wait) -> None:
-    ended, pause = threading.Event(), SOON
+    ended, pause = SimpleQueue[None](), SOON
     with calling():
-        when_complete(event, ended.set)
+        when_complete(event, lambda: ended.put(None))
     while not wait.is_over(event):
-        ended.wait(pause)
-        ended.clear()
+        with suppress(Empty):
+            ended.get(timeout=pause)
         pause = min(2 * pause, LONGEST_LOOK)

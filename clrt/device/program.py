@@ -17,11 +17,11 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources.abc import Traversable
-from threading import Event
 
 import pyopencl as cl
 
 from ..errors import KernelError
+from ..threads import Event
 from .aside import LARGE, compile_aside, quietly_built
 from .background import LIMIT, in_background
 from .bitcode import find_bitcode, name_kernels, takes_bitcode

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import logging
-import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
+from threading import RLock
 from types import TracebackType
 from typing import Any
 
@@ -22,6 +22,7 @@ from ..rendering.machine import tree_report
 from ..rendering.renderer import Renderer, State
 from ..rendering.report import render_report
 from ..scene.model import Scene
+from ..threads import Condition, beside
 from .history import History
 from .live_renderer import Asked, LiveRenderer, Superseded
 from .picks import Picks, Thing
@@ -51,12 +52,11 @@ class Live:
         self._still: tuple[Renderer, State] | None = None
         self._times: deque[float] = deque(maxlen=64)
         self._history, self._picks = History(), Picks()
-        self._changed = threading.Condition(threading.RLock())
+        self._lock, self._changed = RLock(), Condition()
         self._closed = False
         self._unseen = True     # no picture of what is being rendered was published
         self._renderer = LiveRenderer(self._begin)
-        self._thread = threading.Thread(target=self._work, name="clrt live", daemon=True)
-        self._thread.start()
+        self._wait_for_end = beside(self._work, daemon=True)
 
     @property
     def scene(self) -> Scene:
@@ -80,7 +80,7 @@ class Live:
         as the wanted frame rate takes, until none has come for SETTLED seconds. They are one step of the history.
         step: whether it can be undone; walks had better not.
         """
-        with self._changed:
+        with self._lock:
             if step:
                 self._history.record(self.scene, scene, moving)
             self._ask(scene=scene, moving=moving)
@@ -91,13 +91,13 @@ class Live:
 
     def undo(self) -> None:
         """Takes the last step back, if there is one."""
-        with self._changed:
+        with self._lock:
             if self._history.can_undo:
                 self._ask(scene=self._history.undo(self.scene), moving=False)
 
     def redo(self) -> None:
         """Takes the step again that was taken back last, if there is one."""
-        with self._changed:
+        with self._lock:
             if self._history.can_redo:
                 self._ask(scene=self._history.redo(self.scene), moving=False)
 
@@ -117,34 +117,40 @@ class Live:
 
     def wait(self, until: Callable[[Snapshot], bool], seconds: float | None = None) -> Snapshot:
         """The first snapshot of which that holds, or the one after so many seconds."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._closed or until(self._snapshot), seconds)
-            return self._snapshot
+        snapshot = self._snapshot
+
+        def holds() -> bool:
+            nonlocal snapshot
+            snapshot = self._snapshot
+            return self._closed or until(snapshot)
+
+        self._changed.wait_for(holds, seconds)
+        return snapshot
 
     def pick(self, x: float, y: float) -> Future[Thing | None]:
         """What is seen first at a place of the picture, or None for the sky; (0, 0) is its upper left corner, (1, 1)
         the lower right. It is an object of the scene that was shown when that was found out. Raises what renders do."""
-        with self._changed:
+        with self._lock:
             found = self._picks.ask(x, y)
             if self._closed:
                 self._picks.cancel()
-            self._changed.notify_all()
+            self._changed.notify()
         return found
 
     def image(self) -> Image:
         """The newest picture, to be saved; with its whole report if it is of the whole size."""
-        with self._changed:
+        with self._lock:
             still, snapshot = self._still, self._snapshot
         report = render_report(*still) if still else {"integrator": snapshot.scene.render.integrator}
         return Image(snapshot.shown, report, None if snapshot.denoised is None else snapshot.pixels)
 
     def close(self) -> None:
         """Ends the work and waits for that."""
-        with self._changed:
+        with self._lock:
             self._closed = True
             self._renderer.abandon()
-            self._changed.notify_all()
-        self._thread.join()
+            self._changed.notify()
+        self._wait_for_end()
         self._picks.cancel()
 
     def __enter__(self) -> Live:
@@ -155,11 +161,11 @@ class Live:
         self.close()
 
     def _ask(self, **changes: Any) -> None:
-        with self._changed:
+        with self._lock:
             self._asked = self._asked._replace(number=self._asked.number + 1, **changes)
             if not (self._unseen and self._asked.moving):
                 self._renderer.abandon()
-            self._changed.notify_all()
+            self._changed.notify()
 
     def _work(self) -> None:
         """The thread: shows what was asked for last, until that is closed."""
@@ -181,8 +187,8 @@ class Live:
 
     def _next(self, last: Asked | None) -> Asked | None:
         """What to show, once it is not the last, or the last where something is asked of it; None in the end."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._closed or self._picks or self._asked is not last)
+        self._changed.wait_for(lambda: self._closed or bool(self._picks) or self._asked is not last)
+        with self._lock:    # else what was asked for just now could be abandoned with the last
             return None if self._closed else self._asked
 
     def _show(self, asked: Asked) -> None:
@@ -193,8 +199,7 @@ class Live:
             self._render(asked, quick, asked.settings.samples)
             if asked.moving:
                 self._publish(phase="rest")
-                with self._changed:
-                    self._changed.wait_for(lambda: self._is_superseded(asked), SETTLED)
+                self._changed.wait_for(lambda: self._is_superseded(asked), SETTLED)
         self._render(asked, asked.size, asked.scene.render.spp)
         self._publish(phase="rest")
 
@@ -244,12 +249,12 @@ class Live:
             "rays_per_second": state.film.rays / max(state.seconds, 1e-9), "device": name_of(renderer.devices),
             "device_bytes": renderer.session.device_bytes, "tree": tree_report(renderer.compiled),
             "features": renderer.compiled.features, "programs": self._renderer.programs}
-        with self._changed:
+        with self._lock:
             self._still = (renderer, state) if whole else None
             self._unseen = False
             self._publish(**picture)
 
     def _publish(self, **changes: Any) -> None:
-        with self._changed:
+        with self._lock:
             self._snapshot = replace(self._snapshot, **changes)
-            self._changed.notify_all()
+            self._changed.notify()

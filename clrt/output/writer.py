@@ -7,7 +7,8 @@ import os
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
-from threading import Thread
+
+from ..threads import beside
 
 
 def load_writer() -> None:
@@ -17,7 +18,7 @@ def load_writer() -> None:
     meanwhile waits, holding Python's lock. So do extension modules, and numpy where it finds out whether the memory of
     a large intermediate result may be used again.
     """
-    Thread(target=_load).start()
+    beside(_load)
 
 
 def _load() -> None:

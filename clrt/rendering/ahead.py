@@ -10,7 +10,6 @@ import os
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ from ..device.open import Device
 from ..device.program import compile_ahead, is_kept
 from ..errors import ClrtError
 from ..scene.model import Mesh, Scene
+from ..threads import beside
 from .choices import Choices
 
 #: By how much more memory a scene takes once it is packed, about; and the most that may be in an outline.
@@ -42,8 +42,7 @@ def begin_program(scene: Scene, choices: Choices, device: Device, source: Callab
         if (builder is None or is_kept(device, builder) or PACKED * _bytes(scene) > LARGE
                 or sum(len(mesh.faces) for mesh in outlined.meshes) + spheres > MOST):
             return
-        Thread(target=_compile, args=(device, outlined, replace(choices, layout=layout), source), daemon=True,
-               name="clrt compiles ahead").start()
+        beside(lambda: _compile(device, outlined, replace(choices, layout=layout), source), daemon=True)
 
 
 def _compile(device: Device, outlined: Scene, choices: Choices, source: Callable[[Scene, Choices], str]) -> None:

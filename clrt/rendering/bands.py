@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
 from typing import TypeVar
 
+from ..threads import in_parallel
 from .tiles import TILE
 
 #: Pixels of a band, about: so few that what is made of them is taken from memory that is there. Larger arrays come anew
@@ -29,17 +27,10 @@ def bands_of(size: tuple[int, ...]) -> list[slice]:
 
 def in_bands(size: tuple[int, ...], work: Callable[[slice], T], unwanted: Callable[[], bool] = lambda: False,
              ) -> list[T]:
-    """What `work` returns for the rows of each band of a picture; several run at a time. Unwanted as soon as it is.
-    `work` must not call this itself."""
+    """What `work` returns for the rows of each band of a picture; several run at a time. Unwanted as soon as it is."""
     def wanted(rows: slice) -> T:
         if unwanted():
             raise Unwanted
         return work(rows)
 
-    return list(_pool(os.getpid()).map(wanted, bands_of(size)))
-
-
-@cache
-def _pool(process: int) -> ThreadPoolExecutor:
-    """Of this process: a fork has none of the threads."""
-    return ThreadPoolExecutor(os.cpu_count(), "bands")
+    return in_parallel(wanted, bands_of(size))

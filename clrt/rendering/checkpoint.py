@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
-import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from ..errors import CheckpointError, OutputError, UsageError
 from ..scene.model import Scene
+from ..threads import beside
 from .checkpoint_file import FAMILY, check_replaceable, older, read_checkpoint, write_checkpoint
 from .choices import Choices
 from .identity import differences, facts_of
@@ -34,7 +35,7 @@ class Checkpoints:
         self.path, self._facts, self._device, self._every = path, facts, device, seconds
         self._next = time.perf_counter() + seconds
         self._failed, self._newest_is_whole = False, True
-        self._writer: threading.Thread | None = None
+        self._writing: Callable[[], None] = lambda: None
 
     def warn_of_another(self) -> None:
         """Warns where there is one already, which this render will replace. CheckpointError where it is none."""
@@ -50,13 +51,11 @@ class Checkpoints:
     def begin(self, kept: Kept) -> None:
         """Begins to write one, of which nothing may change until `wait` has returned."""
         self.wait()
-        self._writer = threading.Thread(target=self.write, args=(kept,), daemon=True)
-        self._writer.start()
+        self._writing = beside(lambda: self.write(kept))
 
     def wait(self) -> None:
         """Returns when what `begin` began has ended."""
-        if self._writer is not None:
-            self._writer.join()
+        self._writing()
 
     def write(self, kept: Kept) -> None:
         """Writes one; where that is not possible it warns, once, and what was written before stays."""

@@ -14,8 +14,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from math import prod
 from pathlib import Path
@@ -25,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CheckpointError
+from ..threads import beside
 from .past_cache import write_past_cache
 
 #: How those of any version begin.
@@ -67,8 +67,8 @@ def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, k
     try:
         with open(temporary, "wb", buffering=0) as file:
             pieces: list[bytes | memoryview] = [MAGIC, line, *map(_bytes, arrays.values())]
-            with ThreadPoolExecutor(1) as other:    # both take their time, and neither needs Python's lock
-                write_past_cache(file.fileno(), _followed_by(pieces, other.submit(_digest, pieces)))
+            digest = beside(lambda: _digest(pieces))    # both take their time, and neither needs Python's lock
+            write_past_cache(file.fileno(), _followed_by(pieces, digest))
             os.fsync(file.fileno())
         if keep_older:
             with suppress(FileNotFoundError):
@@ -125,9 +125,9 @@ def _digest(pieces: Iterable[bytes | memoryview]) -> bytes:
     return digest.digest()
 
 
-def _followed_by(pieces: Iterable[bytes | memoryview], last: Future[bytes]) -> Iterator[bytes | memoryview]:
+def _followed_by(pieces: Iterable[bytes | memoryview], last: Callable[[], bytes]) -> Iterator[bytes | memoryview]:
     yield from pieces
-    yield last.result()
+    yield last()
 
 
 def _bytes(array: NDArray[Any]) -> memoryview:

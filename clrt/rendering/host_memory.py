@@ -9,11 +9,12 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
-from threading import Thread
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..threads import beside
 
 #: Copies that are needed again and again: while one is looked at, such as the last state's, the next is made.
 KEPT = 2
@@ -28,8 +29,7 @@ class HostMemory:
         self._kept: list[NDArray[np.uint8]] = []
         #: Of each the array that was made in it last, or None where neither that nor a view of it is left.
         self._users: list[Callable[[], object]] = [lambda: None] * KEPT
-        self._search = Thread(target=self._find)
-        self._search.start()
+        self._search = beside(self._find)
 
     def _find(self) -> None:
         size = int(np.prod(self._shape)) * self._dtype.itemsize
@@ -40,7 +40,7 @@ class HostMemory:
     def array(self) -> NDArray[Any]:
         """An array whose elements are not defined. Its memory is used again when neither it nor a view of it is left.
         """
-        self._search.join()
+        self._search()
         for place, memory in enumerate(self._kept):
             if self._users[place]() is None:
                 # Of memory that is no array's: views then are of the array made here, which stays as long as any.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -19,6 +18,7 @@ from ..scene.instancing import arranged
 from ..scene.materials import Material
 from ..scene.model import Scene
 from ..scene.scaling import Frame, frame_of, in_frame
+from ..threads import beside
 from .carried import Carried
 from .choices import Choices
 from .corners import pack_corners
@@ -121,11 +121,12 @@ class Packed:
 def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: Carried) -> Packed:
     """Packs a valid scene; device: where large trees are built, if given; carried: from the scene before."""
     shapes = Shapes(scene)
-    with ThreadPoolExecutor(1) as beside:  # a sky takes as long as a tree, and neither needs all cores
-        packing = beside.submit(carried.sky, scene.environment)
+    packing = beside(lambda: carried.sky(scene.environment))    # takes as long as a tree; neither needs all cores
+    try:
         tree = shapes.tree(choices, device, carried)
         normals = normal_records(shapes.scene.meshes)
-        sky = packing.result()
+    finally:    # else it could replace the sky of the next scene
+        sky = packing()
     textures = Textures()
     emitters = pack_emitters(shapes.scene, sky, textures)
     materials = pack_materials(shapes.users, textures, scene.render.back_face_culling)

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from threading import Event
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from ..errors import DeviceError
 from ..float_errors import with_default_errors
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validate import check_is_scene, validate
+from ..threads import Event
 from .accumulation import Accumulation
 from .adaptive import most_planned
 from .aovs import Aovs

@@ -27,7 +27,7 @@ class Turns:
     def of(self, steps: Iterator[T]) -> Iterator[T]:
         """The steps, a turn each."""
         while True:
-            with self.one():
+            with self._lock, default_errors():  # not `one`: an exception in contextlib could leave the lock held
                 try:
                     step = next(steps)
                 except StopIteration:

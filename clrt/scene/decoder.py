@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..awake import wait_awake
 from ..errors import SceneError
+from ..threads import Event, beside
 
 #: Seconds that one file may take. The largest picture that is read takes a tenth of it.
 LIMIT = 60.0
@@ -77,14 +78,14 @@ class _Process:
 
     def decode(self, kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
         """See above; raises _Ended where the process ends or must be ended."""
-        ended, late = threading.Event(), threading.Event()
+        ended, late = Event(), Event()
 
         def watch() -> None:
             if not wait_awake(ended, LIMIT):
                 late.set()
                 self._popen.kill()
 
-        threading.Thread(target=watch, daemon=True).start()
+        beside(watch, daemon=True)
         try:
             self._requests.write(json.dumps([kind, str(file.absolute())]).encode() + b"\n")
             self._requests.flush()

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..threads import in_parallel
 from .model import FloatArray, IntArray
 from .transform import unit
 
@@ -67,8 +66,7 @@ def corner_normals(vertices: FloatArray, faces: IntArray) -> NDArray[np.float64]
         part = slice(first, first + PART)
         _weigh(axes.take(faces[part].T, axis=1), weighted[:, part].swapaxes(1, 2))
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(fill, range(0, len(faces), PART)))
+    in_parallel(fill, range(0, len(faces), PART))
     return weighted.reshape(3, -1).T
 
 

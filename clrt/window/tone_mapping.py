@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ from ..errors import ClrtError
 from ..live.snapshot import Snapshot
 from ..output.data import shown_data
 from ..output.view import to_display
+from ..threads import Condition, beside
 
 
 @dataclass(frozen=True)
@@ -37,33 +37,29 @@ class ToneMapper:
 
     def __init__(self) -> None:
         self._asked: tuple[Snapshot, Look] | None = None
-        self._changed, self._closed = threading.Condition(), False
+        self._changed, self._closed = Condition(), False
         self.newest: ToneMapped | None = None
-        self._thread = threading.Thread(target=self._run, daemon=True, name="clrt develops")
-        self._thread.start()
+        self._wait_for_end = beside(self._run, daemon=True)
 
     def ask(self, snapshot: Snapshot, look: Look) -> None:
         """Has a picture tone mapped, if that has not been asked for before."""
-        with self._changed:
-            if self._asked is None or self._asked[0] is not snapshot or self._asked[1] != look:
-                self._asked = snapshot, look
-                self._changed.notify()
+        if self._asked is None or self._asked[0] is not snapshot or self._asked[1] != look:
+            self._asked = snapshot, look
+            self._changed.notify()
 
     def close(self) -> None:
         """Ends the thread."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify()
-        self._thread.join()
+        self._closed = True
+        self._changed.notify()
+        self._wait_for_end()
 
     def _run(self) -> None:
         done = None
         while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._closed or self._asked is not done)
-                if self._closed or self._asked is None:
-                    return
-                done = self._asked
+            self._changed.wait_for(lambda: self._closed or self._asked is not done)
+            done = self._asked
+            if self._closed or done is None:
+                return
             self.newest = tone_mapped(*done)
 
 

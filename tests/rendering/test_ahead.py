@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from clrt.rendering import ahead
 from clrt.rendering.ahead import outline
 from clrt.rendering.choices import Choices
 from clrt.rendering.compile import compile_scene
+from clrt.threads import beside
 
 SCENES = Path(__file__).parents[2] / "scenes"
 MODEL = SCENES / "models" / "dragon.ply"
@@ -70,14 +71,13 @@ def test_without_a_temporary_folder_it_is_compiled_here(device: Device, monkeypa
 @pytest.mark.parametrize("size, begun", [(16, 1), (2048, 0)])
 def test_large_scenes_are_left_alone(device: Device, monkeypatch: pytest.MonkeyPatch, size: int, begun: int) -> None:
     """Here one with a large sky: what it takes would be taken twice."""
-    asked: list[str] = []
+    asked, waits = list[str](), list[Callable[[], None]]()
     monkeypatch.setattr(ahead, "compile_ahead", lambda device, source: asked.append(source))
     monkeypatch.setattr(ahead, "is_kept", lambda device, source: False)
-    monkeypatch.setattr(ahead, "Thread", lambda target, args, **_: threading.Timer(0.0, target, args))
+    monkeypatch.setattr(ahead, "beside", lambda work, **_: waits.append(beside(work)))
     scene = clrt.load(MODEL)
     scene.environment = clrt.Environment(image=np.ones((size, 2 * size, 3), np.float32))
     compiled = compile_scene(scene, Choices(device.lanes, device.layout), device=device, ahead=True)
-    for thread in threading.enumerate():
-        if isinstance(thread, threading.Timer):
-            thread.join()
+    for wait in waits:
+        wait()
     assert asked == [compiled.source] * begun

@@ -1,0 +1,242 @@
+"""Threads that wait for each other: what they return and raise, and that an exception at any line lets others go on."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+import time
+from _thread import get_ident
+from collections.abc import Callable
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clrt import threads
+from clrt.threads import BEAT, Condition, Event, beside, in_parallel
+
+#: Seconds that anything has time for which would else last for ever.
+LONG = 60.0
+
+
+class Interrupted(BaseException):
+    """As if a signal had come."""
+
+
+def interrupted(call: Callable[[], object], last: int) -> bool:
+    """Calls it up to its line of this number, counted over all that it runs in clrt.threads; whether it has as many."""
+    count = 0
+
+    def trace(frame: FrameType, event: str, argument: Any) -> Any:
+        nonlocal count
+        if frame.f_code.co_filename != threads.__file__:
+            return None
+        count += event == "line"
+        if event == "line" and count == last:
+            raise Interrupted
+        return trace
+
+    sys.settrace(trace)
+    try:
+        call()
+    except Interrupted:
+        return True
+    finally:
+        sys.settrace(None)
+    return False
+
+
+def everywhere(prepare: Callable[[], tuple[Callable[[], object], Callable[[], None]]]) -> None:
+    """Interrupts a call at each of its lines, each time one that is prepared anew, and checks what it left."""
+    last = 1
+    while True:
+        call, check = prepare()
+        if not interrupted(call, last):
+            break
+        check()
+        last += 1
+    assert last > 3
+
+
+def test_an_event_interrupted_at_any_line_of_set_wakes_others() -> None:
+    """If it was set: whoever waits, and whoever comes later."""
+    def prepare() -> tuple[Callable[[], object], Callable[[], None]]:
+        event = Event()
+        waits = [beside(lambda: event.wait(LONG)) for _ in range(3)]
+
+        def check() -> None:
+            event.set()
+            start = time.monotonic()
+            assert event.wait(LONG) and all(wait() for wait in waits)
+            assert time.monotonic() - start < LONG / 2
+
+        return event.set, check
+
+    everywhere(prepare)
+
+
+def test_a_wait_interrupted_at_any_line_leaves_the_others() -> None:
+    def prepare() -> tuple[Callable[[], object], Callable[[], None]]:
+        event = Event()
+        other = beside(lambda: event.wait(LONG))
+
+        def check() -> None:
+            event.set()
+            assert event.wait(LONG) and other()
+
+        return lambda: event.wait(1e-3), check
+
+    everywhere(prepare)
+
+
+def test_a_lost_wake_up_costs_a_beat() -> None:
+    """Where the notification never comes, those who wait find out themselves."""
+    happened, changed = list[int](), Condition()
+    wait = beside(lambda: changed.wait_for(lambda: bool(happened), LONG))
+    time.sleep(BEAT)
+    happened.append(1)
+    start = time.monotonic()
+    assert wait()
+    assert time.monotonic() - start < LONG / 2
+
+
+def test_whoever_no_longer_waits_is_forgotten() -> None:
+    condition = Condition()
+    for last in (1, 2, 3, 4, 5, 6):
+        interrupted(lambda: condition.wait_for(lambda: False, 1e-3), last)
+    assert not condition._waiters
+
+
+def test_a_wait_ends_after_its_time() -> None:
+    start = time.monotonic()
+    assert not Event().wait(2.5 * BEAT)
+    assert time.monotonic() - start >= 2.5 * BEAT
+
+
+def test_an_exception_sent_to_a_thread_ends_its_wait() -> None:
+    """As PyThreadState_SetAsyncExc sends it; others that wait for the same go on."""
+    event, ident = Event(), list[int]()
+
+    def wait() -> bool:
+        ident.append(get_ident())
+        return event.wait(LONG)
+
+    other, wanted = beside(lambda: event.wait(LONG)), beside(wait)
+    while not ident:
+        time.sleep(1e-3)
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(ident[0]), ctypes.py_object(Interrupted))
+    with pytest.raises(Interrupted):
+        wanted()
+    event.set()
+    assert other()
+
+
+def test_beside_interrupted_at_any_line_ends() -> None:
+    """Its work is done once or never, and its result can be asked for again."""
+    def prepare() -> tuple[Callable[[], object], Callable[[], None]]:
+        done, results = list[int](), list[Callable[[], None]]()
+
+        def call() -> None:
+            results.append(beside(lambda: done.append(1)))
+            results[0]()
+
+        def check() -> None:
+            if results:
+                results[0]()
+                assert done == [1]
+
+        return call, check
+
+    everywhere(prepare)
+
+
+def test_beside_returns_and_raises_what_its_work_did() -> None:
+    assert beside(lambda: 7)() == 7
+    failed = beside(lambda: 1 // 0)
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            failed()
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 1000])
+def test_results_come_in_order(count: int) -> None:
+    assert in_parallel(lambda number: number**2, range(count)) == [number**2 for number in range(count)]
+
+
+def test_every_item_is_worked_on_once_by_several_threads() -> None:
+    """Two items that wait for each other end only where they run at the same time."""
+    if (os.cpu_count() or 1) < 2:
+        pytest.skip("one core")
+    events = Event(), Event()
+
+    def meet(number: int) -> bool:
+        events[number].set()
+        return events[1 - number].wait(LONG)
+
+    assert in_parallel(meet, (0, 1)) == [True, True]
+
+
+def test_the_first_exception_is_raised_and_no_other_item_begun() -> None:
+    """Of several that fail at random places the first in order, however threads are scheduled."""
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        bad, begun = set(rng.choice(200, 5, replace=False).tolist()), list[int]()
+
+        def work(number: int) -> None:
+            begun.append(number)
+            if number in bad:
+                raise ValueError(number)
+
+        with pytest.raises(ValueError) as raised:
+            in_parallel(work, range(200))
+        assert raised.value.args == (min(bad),)
+        before = len(begun)
+        time.sleep(1e-3)
+        assert len(begun) == before and len(set(begun)) == before
+
+
+def test_in_parallel_interrupted_at_any_line_begins_no_other_item() -> None:
+    def prepare() -> tuple[Callable[[], object], Callable[[], None]]:
+        begun = list[int]()
+
+        def work(number: int) -> None:
+            begun.append(number)
+            time.sleep(1e-3)
+
+        def check() -> None:
+            time.sleep(5e-3)
+            before = len(begun)
+            time.sleep(5e-3)
+            assert len(begun) == before
+
+        return lambda: in_parallel(work, range(8)), check
+
+    everywhere(prepare)
+
+
+@pytest.mark.parametrize("daemon", [False, True])
+def test_a_process_waits_for_threads_that_are_no_daemons(daemon: bool) -> None:
+    program = f"""
+import time
+from clrt.threads import beside
+beside(lambda: (time.sleep(1), print("done", flush=True)), daemon={daemon})
+time.sleep(0.3)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=LONG)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "" if daemon else "done\n", "")
+
+
+def test_a_process_that_is_taken_apart_waits_for_no_thread() -> None:
+    """None runs any more then: its result is an error."""
+    program = """
+from clrt.threads import beside
+class Last:
+    def __del__(self, beside=beside):
+        beside(lambda: 7)()
+last = Last()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=LONG)
+    assert done.returncode == 0 and "RuntimeError" in done.stderr
