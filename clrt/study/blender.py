@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..api import render
 from ..device.discover import choose
 from ..errors import UsageError
-from ..scene.model import FloatArray
+from ..rendering.renderer import Renderer
+from ..scene.model import FloatArray, Scene
 from .agreement import mean_ratio
 from .blender_scenes import COLORS, MATERIALS, SCENES, build, exported
 from .cycles_renderer import Cycles
@@ -55,11 +55,17 @@ def _judged(library: Any, scene: str, material: str, spp: int, seeds: range, dev
         content = exported(library, made, Path(folder))
         cycles = Cycles(library, lambda _: made)
         theirs = np.array([cycles(spp, seed).pixels for seed in seeds])
-    found = [render(content, spp=spp, seed=seed, device=device, aovs=["object"]) for seed in seeds]
-    ours = np.array([image.pixels for image in found])
-    names = np.array([mesh.material_name for mesh in content.meshes] + [""])[found[0].aovs["object"]]
-    ratios, errors = compared(ours, theirs, {name: names == name for name in COLORS})
-    return Judged(scene, material, ratios, errors, {"clrt": ours.mean(0), "Cycles": theirs.mean(0)})
+    ours, objects = zip(*(_rendered(content, spp, seed, device) for seed in seeds))
+    names = np.array([mesh.material_name for mesh in content.meshes] + [""])[objects[0]]
+    ratios, errors = compared(np.array(ours), theirs, {name: names == name for name in COLORS})
+    return Judged(scene, material, ratios, errors, {"clrt": np.mean(ours, axis=0), "Cycles": theirs.mean(0)})
+
+
+def _rendered(scene: Scene, spp: int, seed: int, device: int) -> tuple[NDArray[np.float32], NDArray[np.generic]]:
+    """The pixels, and the numbers of the objects seen first."""
+    renderer = Renderer(scene, spp=spp, seed=seed, device=device, aovs="object")
+    *_, state = renderer.passes(spp=spp)
+    return state.pixels, renderer.aovs(state)["object"]
 
 
 def compared(ours: FloatArray, theirs: FloatArray,
