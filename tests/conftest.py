@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from .this_tree import other_file
+
 if TYPE_CHECKING:
     from clrt.device.open import Device
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Tests of another tree than the one they are in would tell nothing about this one."""
+    if not hasattr(config, "workerinput") and (name := other_file()) is not None:
+        raise pytest.UsageError(f"the installed clrt is not this tree's ({name} differs): "
+                                "run `pip install --editable '.[test]'`")
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
