@@ -11,11 +11,10 @@ import atexit
 import os
 import sys
 import time
-from _thread import get_ident, start_new_thread
+from _thread import allocate_lock, get_ident, start_new_thread
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from math import inf
-from queue import Empty, SimpleQueue
 from typing import TypeVar
 from weakref import ref
 
@@ -27,27 +26,43 @@ BEAT, LAST_WAIT = 0.1, 15.0
 _running: set[tuple[int, int]] = set()
 
 
+class Bell:
+    """Wakes up the one thread that waits for it."""
+
+    def __init__(self) -> None:
+        self._lock = allocate_lock()
+        self._lock.acquire()
+
+    def ring(self) -> None:
+        """Ends the wait, or the next one."""
+        with suppress(RuntimeError):    # it rang already
+            self._lock.release()
+
+    def wait(self, seconds: float) -> None:
+        """Returns when it rings, or after so many seconds; raises nothing, as a queue would, that could hold frames."""
+        self._lock.acquire(timeout=seconds)
+
+
 class Condition:
     """Wakes up threads as something changes that they wait for."""
 
     def __init__(self) -> None:
         #: Of each thread that waits, as long as it does.
-        self._waiters: set[ref[SimpleQueue[None]]] = set()
+        self._waiters: set[ref[Bell]] = set()
 
     def notify(self) -> None:
         """Has all threads that wait look again."""
         for waiter in list(self._waiters):
-            if (queue := waiter()) is not None:
-                queue.put(None)
+            if (bell := waiter()) is not None:
+                bell.ring()
 
     def wait_for(self, holds: Callable[[], bool], seconds: float | None = None) -> bool:
         """Returns true as soon as `holds` does, which is called without any lock, or false after so many seconds."""
-        queue: SimpleQueue[None] = SimpleQueue()
-        self._waiters.add(ref(queue, self._waiters.discard))
+        bell = Bell()
+        self._waiters.add(ref(bell, self._waiters.discard))
         end = inf if seconds is None else time.monotonic() + seconds
         while not (held := holds()) and (left := end - time.monotonic()) > 0:
-            with suppress(Empty):
-                queue.get(timeout=min(BEAT, left))
+            bell.wait(min(BEAT, left))
         return held
 
 

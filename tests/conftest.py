@@ -1,8 +1,10 @@
-"""Fixtures of all rooms: every OpenCL device there is, and a cache of programs that no other run has touched."""
+"""Fixtures of all rooms: every OpenCL device there is, and the tests' own cache of compiled programs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from importlib.util import find_spec
+from shutil import which
 from typing import TYPE_CHECKING
 
 import pytest
@@ -18,6 +20,22 @@ def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput") and (name := other_file()) is not None:
         raise pytest.UsageError(f"the installed clrt is not this tree's ({name} differs): "
                                 "run `pip install --editable '.[test]'`")
+    _keep_programs(config)
+
+
+def _keep_programs(config: pytest.Config) -> None:
+    """Compiled programs are kept in pytest's cache, for all processes of this run and for later ones."""
+    assert config.cache is not None
+    for variable, folder in (("CLRT_CACHE_DIR", "clrt"), ("POCL_CACHE_DIR", "pocl")):
+        os.environ[variable] = str(config.cache.mkdir(f"programs-of-{folder}"))
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """A test is skipped where a package or a program is missing that it needs and that not every machine can have."""
+    for marker in item.iter_markers("needs"):
+        for name in marker.args:
+            if find_spec(name) is None and which(name) is None:
+                pytest.skip(f"needs {name}")
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
@@ -28,14 +46,6 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         found = [info for info, _ in find_devices() if info.usable and info.type != "simulator"]
         metafunc.parametrize("device", [info.index for info in found], indirect=True, scope="session",
                              ids=[f"{info.platform}-{info.name}".replace(" ", "_") for info in found])
-
-
-@pytest.fixture(scope="session", autouse=True)
-def fresh_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Programs are cached in a folder of this run's own."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("CLRT_CACHE_DIR", str(tmp_path_factory.mktemp("programs")))
-        yield
 
 
 @pytest.fixture(scope="session")

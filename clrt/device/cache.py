@@ -46,10 +46,10 @@ def read_file(name: str) -> bytes | None:
         return None
 
 
-def write_file(name: str, content: bytes) -> bool:
+def write_file(name: str, content: bytes, mode: int = 0o600) -> bool:
     """Keeps `content` under `name`; False where that is not possible."""
     try:
-        folder = cache_folder()
+        folder = (cache_folder() / name).parent
         folder.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(dir=folder, prefix="unfinished-")
     except (OSError, RuntimeError):
@@ -57,7 +57,8 @@ def write_file(name: str, content: bytes) -> bool:
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
-        os.replace(temporary, folder / name)
+        os.chmod(temporary, mode)
+        os.replace(temporary, cache_folder() / name)
         return True
     except OSError:
         with suppress(OSError):

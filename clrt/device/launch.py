@@ -10,13 +10,13 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from queue import Empty, SimpleQueue
+from contextlib import contextmanager
 
 import pyopencl as cl
 
 from ..awake import AwakeClock
 from ..errors import DeviceError, HungError
+from ..threads import Bell
 from .callbacks import when_complete
 from .contexts import share_no_more
 from .driver_errors import driver_errors
@@ -184,10 +184,9 @@ def wait_for(event: cl.Event) -> None:
 
 
 def _wait_long(event: cl.Event, wait: Wait) -> None:
-    ended, pause = SimpleQueue[None](), SOON
+    ended, pause = Bell(), SOON
     with calling():
-        when_complete(event, lambda: ended.put(None))
+        when_complete(event, ended.ring)
     while not wait.is_over(event):
-        with suppress(Empty):
-            ended.get(timeout=pause)
+        ended.wait(pause)
         pause = min(2 * pause, LONGEST_LOOK)

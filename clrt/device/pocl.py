@@ -13,8 +13,6 @@ processor of such a library that this machine can run. It touches nothing unless
 from __future__ import annotations
 
 import ctypes
-import os
-import shutil
 import struct
 from collections.abc import Set
 from functools import cache
@@ -33,11 +31,6 @@ PROCESSORS = {
 }
 SEARCHED_BYTES = 1024
 _names: list[ctypes.Array[ctypes.c_char]] = []  # PoCL keeps the pointer, so the strings must live as long as it
-
-
-def lacks_linker(device: cl.Device) -> bool:
-    """Whether PoCL 3, which calls `ld` for each kernel and aborts the process without it, would not find it."""
-    return "PoCL 3." in device.platform.version and shutil.which("ld", path=os.environ.get("PATH", "")) is None
 
 
 @cache

@@ -33,7 +33,8 @@ class Denoiser:
             import pyoidn
         except ImportError as error:
             raise UsageError("denoising needs the package pyoidn, which is not installed: "
-                             "pip install 'clrt[denoise]', or render without denoising") from error
+                             "pip install 'clrt[denoise]' (there is none for Linux on ARM), or render without "
+                             "denoising") from error
         try:
             self._device = pyoidn.Device()
         except OSError as error:

@@ -15,6 +15,7 @@ from clrt.device.pulse import VARIABLE, patience
 from clrt.errors import UsageError
 from clrt.output.images import read_image
 
+from ..c_library import compile_library
 from .test_checkpoints import SCENE, arrays, worker_of
 
 FAULTY = Path(__file__).parents[1] / "device" / "faulty.c"
@@ -25,9 +26,7 @@ ONE, TWO = ("--device", "0"), ("--device", "0", "--device", "0")
 @pytest.fixture(scope="module")
 def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The library of faulty.c."""
-    library = tmp_path_factory.mktemp("faulty") / "libfaulty.so"
-    subprocess.run(["gcc", "-shared", "-fPIC", "-w", "-o", str(library), str(FAULTY), "-ldl"], check=True)
-    return library
+    return compile_library(FAULTY, tmp_path_factory.mktemp("faulty") / "libfaulty.so", "-ldl")
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from ..c_library import compile_library
+
 SOURCE = Path(__file__).with_name("fake_driver.c")
 DEFAULTS = {"PLATFORM": '"Fake"', "NAME": '"Fake GPU"', "UNITS": "100", "COUNT": "1", "TYPE": "4", "REVERSED": "0",
             "UUIDS": "0", "REFUSED": "0", "ON_LOAD": "", "ON_UNLOAD": "", "ON_DEVICES": ""}
@@ -21,8 +23,7 @@ def make_driver(vendors: Path, name: str, **choices: str) -> Path:
     vendors.mkdir(exist_ok=True)
     library = vendors / f"lib{name}.so"
     values = DEFAULTS | {"PLATFORM": f'"{name}"'} | choices
-    subprocess.run(["gcc", "-shared", "-fPIC", "-w", *(f"-D{key}={value}" for key, value in values.items()),
-                    "-o", str(library), str(SOURCE)], check=True)
+    compile_library(SOURCE, library, *(f"-D{key}={value}" for key, value in values.items()))
     (vendors / f"{name}.icd").write_text(f"{library}\n")
     return library
 

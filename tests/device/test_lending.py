@@ -155,6 +155,8 @@ def test_memory_comes_back_by_itself(device: Device, gate: Gate) -> None:
         gate.closed = busy
         running.session.wait()
         next(running.session.render(1))
+        if not busy:
+            running.session.wait()
         assert left(gate.lent)
         del running
         assert bool(left(gate.lent)) == busy

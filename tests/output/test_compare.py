@@ -15,7 +15,7 @@ from clrt.output.compare import compare, compare_files, relmse
 from clrt.output.image import Image
 from clrt.output.images import read_image, write_image
 
-
+needs_flip = pytest.mark.needs("flip_evaluator")
 Floats64 = NDArray[np.float64]
 Color = tuple[float, float, float]
 
@@ -35,6 +35,7 @@ def test_measures_of_two_pixels() -> None:
     assert result["nonfinite"] == result["nonfinite_reference"] == 0
 
 
+@needs_flip
 def test_a_picture_equals_itself() -> None:
     image = np.random.default_rng(0).random((16, 16, 3), dtype=np.float32)
     assert compare(image, image) == {"relmse": 0, "rmse": 0, "mean_ratio": [1, 1, 1], "flip": 0, "max_abs": 0,
@@ -69,6 +70,7 @@ def test_sums_are_float64() -> None:
     assert relmse(image, reference) == pytest.approx(1 / 1.01 / 2048**2, rel=1e-12)
 
 
+@needs_flip
 def test_flip_depends_on_how_much_is_wrong() -> None:
     reference = np.random.default_rng(0).random((32, 32, 3), dtype=np.float32)
     for hdr in (False, True):
@@ -76,6 +78,7 @@ def test_flip_depends_on_how_much_is_wrong() -> None:
         assert 0 < near < far < 1
 
 
+@needs_flip
 def test_ldr_flip_of_black_and_white_is_one() -> None:
     """FLIP scales the largest difference of colours to 1 (Andersson et al. 2020), and black and white come close."""
     white = np.ones((64, 64, 3), np.float32)
@@ -115,6 +118,7 @@ def aces(x: Floats64) -> Floats64:
 COLORS = [(0.2, 0.5, 0.1), (0.21, 0.5, 0.1), (0.9, 0.1, 0.4), (0.02, 0.02, 0.03), (1.0, 1.0, 1.0)]
 
 
+@needs_flip
 @pytest.mark.parametrize("image, reference", [(a, b) for a in COLORS for b in COLORS if a != b], ids=str)
 def test_flip_of_even_pictures_has_a_closed_form(image: Color, reference: Color) -> None:
     """Also of a high range: there is one exposure then, which brings the reference to where aces is 0.85."""
@@ -127,6 +131,7 @@ def test_flip_of_even_pictures_has_a_closed_form(image: Color, reference: Color)
     assert compare(*pictures)["flip"] == pytest.approx(flip_of_colors(*toned), abs=2e-4)
 
 
+@needs_flip
 @pytest.mark.parametrize("first, second, hdr", [("a.png", "b.png", False), ("a.exr", "b.png", True),
                                                 ("a.png", "b.hdr", True)])
 def test_files(tmp_path: Path, first: str, second: str, hdr: bool) -> None:

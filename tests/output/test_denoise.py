@@ -24,6 +24,7 @@ from clrt.scene.model import RenderSettings
 from ..rendering.test_variants import everything
 
 Floats = NDArray[np.float32]
+pytestmark = pytest.mark.needs("pyoidn")
 SCENE = """
 [camera]
 position = [0, 0, 5]

@@ -19,6 +19,7 @@ from clrt.study.fidelity_suite import GENERATOR, golden, orbit_camera, reduced, 
 from clrt.study.render_fidelity import judge, verdict
 from tests.scene.glb import Gltf
 
+pytestmark = pytest.mark.needs("flip_evaluator")
 SIZE = 32
 #: A black wall that fills the image's left half, and the radiance that it emits.
 COLOR = [0.5, 0.25, 0.75]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import random
-import subprocess
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +16,7 @@ from statistics import median
 
 from clrt.output.images import read_image
 
+from ..c_library import compile_library
 from ..cli.test_faults import FAULTY, fault
 from .renders import CORNELL, GALLERY, finish, start
 
@@ -59,8 +59,8 @@ def failing() -> int:
     """How often two devices, of which one is lost or never ends a launch, made the picture of one."""
     moments, options = random.Random(2), (CORNELL, "--size", "256x256", "--spp", "64", "-o")
     with tempfile.TemporaryDirectory() as name:
-        folder, library = Path(name), Path(name) / "libfaulty.so"
-        subprocess.run(["gcc", "-shared", "-fPIC", "-w", "-o", str(library), str(FAULTY), "-ldl"], check=True)
+        folder = Path(name)
+        library = compile_library(FAULTY, folder / "libfaulty.so", "-ldl")
         finish(start(folder, *options, "whole.exr", *RENDERS["one"]))
         whole, same = read_image(folder / "whole.exr").tobytes(), 0
         for number in range(FAILURES):
