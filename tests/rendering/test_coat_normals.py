@@ -23,6 +23,8 @@ from clrt.study.significance import chi2_test, mean_test, rejected
 from .ggx import bump_shadowing, masking
 from .test_textures import plain, quad, seen
 
+pytestmark = pytest.mark.statistics
+
 COLOR = (0.8, 0.5, 0.2)
 TEXELS = {"right": (200, 128, 230), "up": (110, 190, 220), "steep": (220, 110, 200)}
 UP = np.array([0.0, 0.0, 1.0])

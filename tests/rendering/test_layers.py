@@ -17,6 +17,8 @@ from clrt.study.scattering import FLIP, above
 from . import sheen
 from .ggx import masking
 
+pytestmark = pytest.mark.statistics
+
 COLOR = (0.8, 0.5, 0.2)
 WO, WI = above(5000, 1), above(5000, 2)
 H = (WO + WI) / np.linalg.norm(WO + WI, axis=1, keepdims=True)
