@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from clrt.device.open import Device
 from clrt.scene.materials import MetallicRoughness
@@ -14,6 +15,8 @@ from clrt.study.probe import Doubles
 from clrt.study.scattering import ROUNDING, reciprocity
 
 from .layers import Left, taken_from_gloss, under_coat, under_fibres
+
+pytestmark = pytest.mark.statistics
 
 SAMPLES = 1 << 15
 WHITE: Any = (1.0, 1.0, 1.0)
