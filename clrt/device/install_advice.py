@@ -9,7 +9,8 @@ import sys
 DRIVERS = {
     ("linux", "x86_64"): 'install one with `pip install "pyopencl[pocl]"`',
     ("linux", ""): "install one with `apt install pocl-opencl-icd` (Debian, Ubuntu) or your distribution's PoCL",
-    ("win32", "amd64"): "install one with `pip install intel-opencl-rt`",
+    # Without Microsoft's C++ runtime, which not all machines have, Intel's driver fails as it makes a context.
+    ("win32", "amd64"): "install one with `pip install intel-opencl-rt msvc-runtime`",
     # pip's pyopencl for macOS is linked with Apple's framework, which loads no other drivers.
     ("darwin", ""): "pip's pyopencl uses Apple's OpenCL alone; conda-forge's uses PoCL, too: "
                     "`conda install -c conda-forge pyopencl pocl`"}
