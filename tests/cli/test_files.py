@@ -70,6 +70,31 @@ def test_links_to_themselves_are_replaced(folder: Path) -> None:
         assert (folder / arguments[-1]).is_file()
 
 
+@pytest.mark.parametrize(("refusals", "replaced"), [(2, True), (99, False)])
+def test_what_cannot_be_replaced_loses_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch, refusals: int,
+                                               replaced: bool) -> None:
+    """Windows replaces no file that a program has open: it is tried for a while, then the new one stays beside it."""
+    path, system, refused = folder / "a.png", os.replace, list[Path]()
+    path.write_text("old")
+
+    def replace(source: Path, target: Path) -> None:
+        if target == path and len(refused) < refusals:
+            refused.append(source)
+            raise PermissionError(13, "Access is denied")
+        system(source, target)
+
+    monkeypatch.setattr(os, "replace", replace)
+    if replaced:
+        with replacing(path) as temporary:
+            temporary.write_text("new")
+    else:
+        with pytest.raises(OutputError, match="open in another program"), replacing(path) as temporary:
+            temporary.write_text("new")
+    new = [file for file in folder.glob("*a*.png") if file.read_text() == "new"]
+    assert len(new) == 1 and (new[0] == path) == replaced and not list(folder.glob(".clrt*"))
+    assert path.read_text() == ("new" if replaced else "old")
+
+
 @pytest.mark.parametrize("options", [
     ("--report", "ball.toml"), ("--checkpoint", "ball.toml"), ("--checkpoint", "ball"), ("--report", "./ball.toml"),
     ("--report", "w.exr"), ("--plot", "w.exr"), ("-o", "w.exr"), ("--report", "w.json", "--plot", "w.json"),

@@ -46,6 +46,15 @@ def test_commands_need_nothing_that_windows_lacks(folder: Path, call: tuple[str,
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.parametrize("encoding", ["cp1252", "cp1252:surrogateescape"])
+def test_names_that_the_code_page_lacks(folder: Path, encoding: str) -> None:
+    """Of standard output that goes to a file, for which Windows' Python has the second of these."""
+    done = subprocess.run([sys.executable, "-m", "clrt", "render", "scene.toml", *SMALL, "-o", "ü日.png"], cwd=folder,
+                          capture_output=True, env=os.environ | {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"})
+    assert (done.returncode, done.stdout) == (0, b"\xfc\\u65e5.png\n"), done.stderr
+    assert (folder / "ü日.png").exists()
+
+
 @pytest.mark.parametrize("name", ["render", "info", "convert"])
 def test_commands_in_the_c_locale(folder: Path, name: str) -> None:
     """Where Python takes text for ASCII."""
