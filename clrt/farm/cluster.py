@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..device.heap import keep_less
 from ..errors import DeviceError, UsageError
 from .remote import as_it_is
+from .scheduler import check_scheduler
 
 if TYPE_CHECKING:
     from distributed import Client, Future, LocalCluster
@@ -56,12 +57,14 @@ class Cluster:
         from distributed import Client
 
         try:
+            if self._local is None:
+                check_scheduler(self.address, ANSWER)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 return Client(self._local or self.address, timeout=ANSWER, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
             raise DeviceError(f"the scheduler at {self.address} does not answer ({error}); start it with `dask "
-                              "scheduler`, and name the address that it prints") from error
+                              "scheduler`, and name the address that it prints, not its dashboard's") from error
 
     @property
     def alive(self) -> bool:

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from concurrent.futures import CancelledError
 from uuid import uuid4
 
+from ..awake import watched_clock
 from ..errors import ClrtError, DeviceError, HungError, SceneError
 from .cluster import Cluster, Result
 from .members import BadResult, Member, Run, Source, Task
@@ -268,10 +269,10 @@ class Dispatch:
         for task in self.tasks:
             task.runs.clear()
             self._repeat(task)
-        end = time.perf_counter() + GONE
-        while not self.cluster.reconnect():
-            if time.perf_counter() > end:
-                raise DeviceError(f"the scheduler at {self.cluster.address} has not answered for {GONE:g} s")
-            yield
+        with watched_clock() as clock:
+            while not self.cluster.reconnect():
+                if clock.seconds > GONE:
+                    raise DeviceError(f"the scheduler at {self.cluster.address} has not answered for {GONE:g} s")
+                yield
         _log.warning("%s answers again", self.cluster.address)
         self._next_look = 0.0
