@@ -1,8 +1,9 @@
-"""Fixtures of all rooms: every OpenCL device there is, and the tests' own cache of compiled programs."""
+"""Of all tests: which tree they are about, their groups and needs, every OpenCL device there is, and caches."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from importlib.util import find_spec
 from shutil import which
 from typing import TYPE_CHECKING
@@ -14,20 +15,26 @@ from .this_tree import other_file
 if TYPE_CHECKING:
     from clrt.device.open import Device
 
+#: Folder → the group of its tests (see setup.cfg).
+FOLDERS = {"farm": "farm", "oracle": "statistics", "study": "study", "window": "window"}
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Tests of another tree than the one they are in would tell nothing about this one."""
     if not hasattr(config, "workerinput") and (name := other_file()) is not None:
         raise pytest.UsageError(f"the installed clrt is not this tree's ({name} differs): "
                                 "run `pip install --editable '.[test]'`")
-    _keep_programs(config)
-
-
-def _keep_programs(config: pytest.Config) -> None:
-    """Compiled programs are kept in pytest's cache, for all processes of this run and for later ones."""
+    # What PoCL compiles is kept in pytest's cache, for all processes of this run and for later ones.
     assert config.cache is not None
-    for variable, folder in (("CLRT_CACHE_DIR", "clrt"), ("POCL_CACHE_DIR", "pocl")):
-        os.environ[variable] = str(config.cache.mkdir(f"programs-of-{folder}"))
+    os.environ["POCL_CACHE_DIR"] = str(config.cache.mkdir("pocl"))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The tests of these folders are groups as a whole; others have marks of their own."""
+    for item in items:
+        if group := FOLDERS.get(item.path.parent.name):
+            item.add_marker(group)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
@@ -46,6 +53,14 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         found = [info for info, _ in find_devices() if info.usable and info.type != "simulator"]
         metafunc.parametrize("device", [info.index for info in found], indirect=True, scope="session",
                              ids=[f"{info.platform}-{info.name}".replace(" ", "_") for info in found])
+
+
+@pytest.fixture(scope="session", autouse=True)
+def fresh_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What clrt keeps, verdicts on devices among them, is kept in a folder of this process's own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CLRT_CACHE_DIR", str(tmp_path_factory.mktemp("clrt")))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -14,6 +14,8 @@ import pytest
 import clrt
 from clrt.device.open import Device
 
+pytestmark = pytest.mark.statistics
+
 SCENES = Path(__file__).parents[1] / "scenes"
 SIZES = (1e-42, 1e-20, 1.0, 1e20, 1e36)
 OPTIONS: list[dict[str, Any]] = [

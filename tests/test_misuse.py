@@ -21,6 +21,8 @@ from clrt.errors import ClrtError
 from .misuse import outcome
 from .oracle.scenes import todays_seed
 
+pytestmark = pytest.mark.processes
+
 WRONG: tuple[Any, ...] = (None, "x", "", -1, 0, 1.5, 10**20, np.nan, np.inf, [], [[1, 2]], (1,), np.zeros((2, 4)),
                           {"a": 1}, object(), np.array(["a"]), True, b"x", 1j, np.float32(3))
 SCENE = clrt.load(Path(__file__).parents[1] / "scenes" / "cornell.toml")

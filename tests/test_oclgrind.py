@@ -19,6 +19,8 @@ from clrt.device.sources import kernel_folder
 from . import small_work
 from .oclgrind_program import DEVICES
 
+pytestmark = pytest.mark.simulator
+
 OPTIONS = {"OCLGRIND_DATA_RACES": "1", "OCLGRIND_UNINITIALIZED": "1", "OCLGRIND_CHECK_API": "1"}
 #: pyopencl asks devices of all makers what those of one can tell.
 NO_FAULT = """

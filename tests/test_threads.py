@@ -18,6 +18,8 @@ import pytest
 from clrt import threads
 from clrt.threads import BEAT, Condition, Event, beside, in_parallel
 
+pytestmark = pytest.mark.processes
+
 #: Seconds that anything has time for which would else last for ever.
 LONG = 60.0
 

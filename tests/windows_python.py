@@ -1,6 +1,6 @@
-"""`clrt ARGUMENTS` as Windows' Python would meet its own modules: what os and signal lack there is taken away once all
-libraries are loaded, and text that is opened without an encoding is an error. A simulation: drivers, paths and
-processes stay.
+"""`clrt ARGUMENTS` as Windows' Python would meet its own modules: what os, signal and mmap lack there is taken away
+once all libraries are loaded, the process itself is no library for ctypes, and text that is opened without an encoding
+is an error. A simulation: drivers, paths and processes stay.
 
 usage: python -X warn_default_encoding -m tests.windows_python ARGUMENTS
 """
@@ -8,9 +8,11 @@ usage: python -X warn_default_encoding -m tests.windows_python ARGUMENTS
 from __future__ import annotations
 
 import concurrent.futures  # noqa: F401
+import ctypes
 import importlib.metadata
 import importlib.resources  # noqa: F401
 import logging.handlers  # noqa: F401
+import mmap
 import multiprocessing.connection  # noqa: F401
 import os
 import shutil  # noqa: F401
@@ -19,6 +21,7 @@ import subprocess  # noqa: F401
 import sys
 import tempfile  # noqa: F401
 import warnings
+from typing import Any
 
 import click  # noqa: F401
 import numpy  # noqa: F401
@@ -34,7 +37,8 @@ LACKS = {
     os: "chown fchmod fork forkpty getegid geteuid getgid getuid killpg mkfifo mknod nice O_DIRECT posix_fadvise pread "
         "pwrite register_at_fork sched_getaffinity sched_setaffinity setsid statvfs uname",
     signal: "SIGALRM SIGBUS SIGCHLD SIGCONT SIGHUP SIGPIPE SIGQUIT SIGSTOP SIGTSTP SIGUSR1 SIGUSR2 SIG_BLOCK "
-            "SIG_SETMASK SIG_UNBLOCK alarm pthread_kill pthread_sigmask setitimer sigtimedwait sigwait"}
+            "SIG_SETMASK SIG_UNBLOCK alarm pthread_kill pthread_sigmask setitimer sigtimedwait sigwait",
+    mmap: "MADV_HUGEPAGE"}
 MODULES = ("fcntl", "grp", "pwd", "resource", "termios")
 
 
@@ -46,6 +50,16 @@ def take_away() -> None:
                 delattr(module, name)
     for name in MODULES:
         sys.modules[name] = None    # type: ignore[assignment]
+    ctypes.CDLL = _Library    # type: ignore[misc]
+
+
+class _Library(ctypes.CDLL):
+    """A library, which has a name."""
+
+    def __init__(self, name: str | None, *arguments: Any, **options: Any) -> None:
+        if name is None:
+            raise TypeError("LoadLibrary() argument 1 must be str, not None")
+        super().__init__(name, *arguments, **options)
 
 
 if __name__ == "__main__":

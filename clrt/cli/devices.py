@@ -33,7 +33,8 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     if they are named. A device that fails its check is used only if it is named, until its driver or clrt changes or
     it passes.
     """
-    from ..device.discover import NOTHING, as_dict, find_devices, select
+    from ..device.discover import as_dict, find_devices, select
+    from ..device.install_advice import no_device
     from ..device.preference import preferred_device
 
     preference = preferred_device()
@@ -50,7 +51,7 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     else:
         click.echo("\n".join(line for info in found for line in _lines(info)), nl=bool(found))
     if not found:
-        click.echo(NOTHING, err=True)
+        click.echo(no_device(), err=True)
     if preference:
         click.echo(f"{preference.origin} names {preference.selector!r}: device {select()[0].index} is used where none "
                    "is named", err=True)

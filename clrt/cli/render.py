@@ -81,10 +81,10 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             adaptive: bool | None, reference: Path | None, report: Path | None, plot: Path | None,
             aovs: tuple[str, ...], denoise: bool, checkpoint: Path | None, checkpoint_every: float, resume: bool,
             view: str, exposure: float, progress_kind: str | None, force: bool, print_kernel: bool,
-            quiet: bool,
-            frames: str | None, turntable: int | None, fps: float | None, scheduler: str | None,
+            quiet: bool, frames: str | None, turntable: int | None, fps: float | None, scheduler: str | None,
             local_cluster: int | None, **others: Any) -> None:
-    """Render SCENE, a .toml scene or a bare model, until the first of --spp, --time and --error is reached."""
+    """Render SCENE, a .toml scene, a bare model, or - for a .toml scene on standard input, until the first of --spp,
+    --time and --error is reached."""
     def advice() -> str:
         kept = checkpoint is not None and checkpoint.exists()
         return f"; {checkpoint} holds what was rendered before, and --resume goes on from it" if kept else ""
@@ -96,14 +96,14 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
 
     load_writer()
     from ..rendering.stops import check_stops, planned_spp
-    from ..scene.file import check_scene, load
+    from ..scene.file import STDIN, check_scene, load
     from ..scene.paths import files_read
 
     check_scene(scene)
     layers = _chosen_aovs(aovs) if aovs else ()
     named = (scene,) if reference is None else (scene, reference)
-    results = Outputs(named, outputs or (Path(f"{scene.stem}.png"),), layers, denoise, view, exposure, report, plot,
-                      force)
+    usual = Path("scene.png" if scene == STDIN else f"{scene.stem}.png")
+    results = Outputs(named, outputs or (usual,), layers, denoise, view, exposure, report, plot, force)
     sequence = make_sequence(results, frames, resume, {"checkpoint": checkpoint, "reference": reference, "plot": plot}
                              ) if frames or turntable else None
     if sequence is None:

@@ -2,30 +2,59 @@
 
 from __future__ import annotations
 
+import codecs
 import errno
 import io
 import os
 import sys
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 
-class _Patient(io.FileIO):
-    """A file whose first failure is kept, and which takes and forgets all that follows."""
+#: The name of an error handler of encodings.
+ESCAPED = "clrt.escaped"
 
-    failure: OSError | None = None
 
-    def write(self, data: ReadableBuffer, /) -> int:
-        """See io.FileIO; raises nothing."""
+class _Patient(io.RawIOBase):
+    """What is beneath a stream; its first failure is kept, and it takes and forgets all that follows."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.failure: OSError | None = None
+        self._stream = stream   # else garbage collection would close the file
+        self._raw: Any = getattr(stream.buffer, "raw", stream.buffer)
+
+    def write(self, data: ReadableBuffer, /) -> int | None:
+        """See io.RawIOBase; raises nothing."""
         if self.failure is None:
             try:
-                return super().write(data)
+                written: int | None = self._raw.write(data)
+                return written
             except OSError as error:
                 self.failure = error
         return memoryview(data).nbytes
+
+    def writable(self) -> bool:
+        """Yes."""
+        return True
+
+    def fileno(self) -> int:
+        """Of the file beneath."""
+        return int(self._raw.fileno())
+
+    def isatty(self) -> bool:
+        """Of the file beneath."""
+        return bool(self._raw.isatty())
+
+
+def _escaped(error: UnicodeError) -> tuple[str | bytes, int]:
+    """Bytes of file names that Python could not decode are themselves; what the encoding lacks is as in "\\u65e5"."""
+    try:
+        return codecs.lookup_error("surrogateescape")(error)
+    except UnicodeError:
+        return codecs.backslashreplace_errors(error)
 
 
 def open_missing() -> None:
@@ -33,7 +62,7 @@ def open_missing() -> None:
     opened would be, and get what is printed."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.open(os.devnull, os.O_WRONLY), "w", closefd=False))
+            setattr(sys, name, open(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8", closefd=False))
 
 
 def tell(line: str) -> None:
@@ -43,10 +72,14 @@ def tell(line: str) -> None:
 
 
 def patient_stdout() -> _Patient:
-    """Has standard output raise no errors any more; returns what keeps the first."""
+    """Has standard output raise no errors any more; returns what keeps the first.
+
+    What its encoding lacks is written as an escape. A console of Windows stays one, which takes any text.
+    """
     sys.stdout.flush()
-    patient = _Patient(sys.stdout.fileno(), "w", closefd=False)
-    sys.stdout = io.TextIOWrapper(io.BufferedWriter(patient), sys.stdout.encoding, sys.stdout.errors,
+    codecs.register_error(ESCAPED, _escaped)
+    patient = _Patient(sys.stdout)
+    sys.stdout = io.TextIOWrapper(io.BufferedWriter(patient), sys.stdout.encoding, ESCAPED,
                                   line_buffering=sys.stdout.isatty())
     return patient
 

@@ -93,13 +93,12 @@ def _environment(environment: dict[str, str]) -> dict[str, str]:
 
 
 def _drivers() -> list[dict[str, str]]:
-    """Each driver that was found, and what a probe of it found wrong."""
+    """Each driver that was found, and what a probe of it found wrong; on other systems than Linux, where none is
+    probed, those that were left out."""
     from .drivers import installed_drivers
-    from .platforms import faults_of
+    from .platforms import faults_of, load_platforms
 
-    if sys.platform != "linux":
-        return []
-    faults = faults_of(installed_drivers(), again=True)
+    faults = faults_of(installed_drivers(), again=True) if sys.platform == "linux" else load_platforms()[1]
     return [{"library": driver.library, "named by": driver.source, "fault": fault or "none"}
             for driver, fault in faults.items()]
 

@@ -16,6 +16,7 @@ import pyopencl as cl
 from ..errors import DeviceError
 from .describe import DeviceInfo, describe, describe_empty, describe_faulty, size_of, with_own_id
 from .fork import check_process
+from .install_advice import no_device
 from .loader import devices_of
 from .platforms import load_platforms
 from .preference import Preference, preferred_device
@@ -23,7 +24,6 @@ from .speeds import kept_speed
 from .verdicts import kept_verdict
 
 log = logging.getLogger(__name__)
-NOTHING = 'no OpenCL device: install one with `pip install "pyopencl[pocl]"` or a GPU driver'
 ORDER = ("gpu", "accelerator", "cpu", "simulator", "none")
 Found = list[tuple[DeviceInfo, cl.Device | None]]
 
@@ -76,7 +76,7 @@ def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
     """
     found, origin = find_devices(), ""
     if not found:
-        raise DeviceError(NOTHING)
+        raise DeviceError(no_device())
     if selector is None:
         selector, origin = preferred_device() or (None, "")
     asked = f"{selector!r}" + (f" ({origin})" if origin else "")

@@ -10,7 +10,8 @@ import ctypes
 import struct
 
 import pyopencl as cl
-from pyopencl import _cl
+
+from .loader import library
 
 UUID_KHR, PCI_BUS_INFO_KHR = 0x106A, 0x410F
 PCI_BUS_ID_NV, PCI_SLOT_ID_NV, PCI_DOMAIN_ID_NV = 0x4008, 0x4009, 0x400A
@@ -45,8 +46,7 @@ def _pci(device: cl.Device, extensions: list[str]) -> tuple[int, ...]:
 
 def _told(device: cl.Device, query: int, size: int) -> bytes:
     """What the driver answers; nothing where it refuses or the size is another."""
-    loader = ctypes.CDLL(_cl.__file__)  # finds the functions of the loader that pyopencl is linked with
     answer, length = ctypes.create_string_buffer(size), ctypes.c_size_t()
-    error = loader.clGetDeviceInfo(ctypes.c_void_p(device.int_ptr), ctypes.c_uint(query), ctypes.c_size_t(size), answer,
-                                   ctypes.byref(length))
+    error = library().clGetDeviceInfo(ctypes.c_void_p(device.int_ptr), ctypes.c_uint(query), ctypes.c_size_t(size),
+                                      answer, ctypes.byref(length))
     return answer.raw if not error and length.value == size else b""

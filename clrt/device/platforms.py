@@ -19,7 +19,8 @@ import pyopencl as cl
 
 from . import cache
 from .drivers import Driver, installed_drivers
-from .loader import load
+from .loader import load, load_all
+from .windows_drivers import is_loaded, not_loaded, pip_drivers
 
 log = logging.getLogger(__name__)
 #: How the names of the files end that keep what probes found.
@@ -44,7 +45,9 @@ def load_platforms(again: bool = False) -> tuple[list[cl.Platform], Faults]:
             log.debug("loading the OpenCL drivers %s", ", ".join(good) or "none")
             _loaded = load(good), {driver: fault for driver, fault in faults.items() if fault}
         else:
-            _loaded = load(None), {}
+            added = pip_drivers()
+            platforms = load_all([driver.library for driver in added])
+            _loaded = platforms, {driver: not_loaded(driver) for driver in added if not is_loaded(driver)}
     return _loaded
 
 

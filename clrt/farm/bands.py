@@ -11,6 +11,7 @@ import hashlib
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
+from io import FileIO
 from pathlib import Path
 from typing import Any
 
@@ -67,8 +68,8 @@ class Banded:
         bands = self._bands()
         manifest = Manifest(self.path, self._facts(), resume)
         try:
-            flags = os.O_RDWR | os.O_CREAT | (0 if manifest.done else os.O_TRUNC)
-            file = os.open(self.rows_path, flags, 0o600)
+            flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0) | (0 if manifest.done else os.O_TRUNC)
+            file = open(os.open(self.rows_path, flags, 0o600), "r+b", buffering=0)
         except OSError as error:
             raise OutputError(f"{self.rows_path}: cannot be written ({error.strerror})") from error
         try:
@@ -82,7 +83,7 @@ class Banded:
                     self._keep(file, manifest, bands[result[0]], *result)
                 yield len(self.reports), len(bands)
         finally:
-            os.close(file)
+            file.close()
             manifest.close()
 
     def save(self, path: Path, view: str, exposure: float, metadata: dict[str, str]) -> Path:
@@ -142,13 +143,14 @@ class Banded:
         first, end = band[0] * TILE, min(band[1] * TILE, height)
         return first * width * BYTES, (end - first) * width * BYTES
 
-    def _keep(self, file: int, manifest: Manifest, band: tuple[int, int], name: str, result: dict[str, Any]) -> None:
+    def _keep(self, file: FileIO, manifest: Manifest, band: tuple[int, int], name: str, result: dict[str, Any]) -> None:
         at, _ = self._span(band)
         content = np.ascontiguousarray(result["pixels"], np.float32).tobytes()
         try:
-            if os.pwrite(file, content, at) != len(content):
+            file.seek(at)
+            if file.write(content) != len(content):
                 raise OSError(0, "the disk is full")
-            os.fsync(file)
+            os.fsync(file.fileno())
         except OSError as error:
             raise OutputError(f"{self.rows_path}: cannot be written ({error.strerror})") from error
         report = {key: value for key, value in result["report"].items() if key != "history"}
@@ -156,10 +158,11 @@ class Banded:
         manifest.add(name, {"sha256": hashlib.sha256(content).hexdigest(), "report": report})
         self.reports[name] = report
 
-    def _is_there(self, file: int, band: tuple[int, int], about: dict[str, Any]) -> bool:
+    def _is_there(self, file: FileIO, band: tuple[int, int], about: dict[str, Any]) -> bool:
         """Whether the file has what the manifest says."""
         at, count = self._span(band)
-        return hashlib.sha256(os.pread(file, count, at)).hexdigest() == about.get("sha256")
+        file.seek(at)
+        return hashlib.sha256(file.read(count) or b"").hexdigest() == about.get("sha256")
 
     def _pieces(self) -> Iterator[NDArray[np.float32]]:
         width, _ = self.size

@@ -72,7 +72,10 @@ class Processes:
                  trace: TracebackType | None) -> None:
         for process in [*self.workers, self.scheduler]:
             with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+                if sys.platform == "win32":
+                    process.kill()
+                else:
+                    os.killpg(process.pid, signal.SIGKILL)
             process.wait()
 
 

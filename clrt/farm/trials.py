@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import random
-import resource
-import sys
 import tempfile
 import time
 from collections import deque
@@ -20,6 +18,7 @@ import numpy as np
 from ..rendering.renderer import Renderer, State
 from ..scene.animation import frames, turntable
 from ..scene.model import RenderSettings, Scene
+from ..study.fresh import peak_bytes
 from .bands import Banded
 from .cluster import connect, local_cluster
 from .orders import PictureOrder
@@ -141,11 +140,6 @@ def huge(scene: Scene, size: tuple[int, int], spp: int, workers: int, path: Path
         return {"trial": "huge", "size": f"{size[0]}x{size[1]}", "spp": spp, "workers": workers, "seconds": rendered,
                 "writing_seconds": time.perf_counter() - start - rendered, "file_bytes": path.stat().st_size,
                 "samples": banded.summary()["samples"], "client_bytes": peak_bytes()}
-
-
-def peak_bytes() -> int:
-    """The most memory that this process had so far."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
 
 
 def sized(scene: Scene, size: tuple[int, int]) -> Scene:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import os
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import OutputError
 from ..file_mode import keep_mode
+
+#: Seconds after each attempt to replace a file that another program has open.
+PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
 
 
 def check_target(path: Path) -> None:
@@ -49,9 +53,10 @@ def check_unprotected(path: Path, force: bool) -> None:
 def replacing(path: Path) -> Iterator[Path]:
     """Lend a path beside `path`, with its extension, to write to; then move that file onto `path` in one step.
 
-    If the block fails, `path` is as it was and nothing is left beside it; an OSError comes out as OutputError. The file
-    keeps the mode of the one that it replaces, and its owner and group where the user may set them.
-    A link stays a link: the file it points to is replaced. What is no regular file never is: OutputError.
+    If the block fails, `path` is as it was and nothing is left beside it; an OSError comes out as OutputError.
+    A link stays a link: the file it points to is replaced, and who may do what with that stays as it was. What is no
+    regular file never is: OutputError.
+    Where the old file cannot be replaced, the new one stays beside it, and the OutputError names it.
     """
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".clrt-{os.urandom(8).hex()}{path.suffix.lower()}")
@@ -59,9 +64,25 @@ def replacing(path: Path) -> Iterator[Path]:
         yield temporary
         _check_kind(target)
         keep_mode(target, temporary)
-        os.replace(temporary, target)
+        _move(temporary, target)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); "
                           "free some space there or choose another path") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _move(new: Path, target: Path) -> None:
+    """Moves a file onto another, which Windows refuses while a program has that open: a viewer, or a virus scanner for
+    a moment."""
+    for pause in PAUSES:
+        try:
+            os.replace(new, target)
+            return
+        except PermissionError as error:
+            problem = error
+            time.sleep(pause)
+    kept = target.with_name(f"{target.stem}-{os.urandom(4).hex()}{target.suffix}")
+    os.replace(new, kept)
+    raise OutputError(f"{target}: cannot be replaced ({problem.strerror}); is it open in another program, or "
+                      f"read-only? The new file is {kept.name} beside it") from problem

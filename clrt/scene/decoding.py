@@ -11,6 +11,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -110,13 +111,14 @@ def _answer(replies: Any, kind: str, file: str) -> None:
 
 
 def _limit() -> None:
-    """Bounds memory, and leaves no core dumps behind."""
+    """Bounds memory, where the system can, and leaves no core dumps behind."""
     if sys.platform != "win32":
         import resource
 
         for kind, most in ((resource.RLIMIT_AS, MOST_MEMORY), (resource.RLIMIT_CORE, 0)):
             hard = resource.getrlimit(kind)[1]
-            resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+            with suppress(ValueError):  # some systems refuse a limit
+                resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 import tomllib
 from os import PathLike
 from pathlib import Path
@@ -19,10 +20,13 @@ from .validate import scene_problems
 
 
 log = logging.getLogger(__name__)
+#: A TOML scene on standard input, which names files from the working folder.
+STDIN = Path("-")
 
 
 def load(path: str | Path, camera: str | None = None) -> Scene:
-    """The scene in a .toml or Mitsuba's .xml file, or a model file's meshes under a sky and a sun before a camera.
+    """The scene in a .toml or Mitsuba's .xml file, or a model file's meshes under a sky and a sun before a camera; that
+    on standard input for "-".
 
     A glTF model's own first camera and lights are used if it has any. camera: the name of one in a model file instead.
     Raises one SceneError with all mistakes in the file, each as "FILE: object: value is wrong; remedy".
@@ -31,7 +35,8 @@ def load(path: str | Path, camera: str | None = None) -> Scene:
         raise SceneError(f"{path!r} is no path of a scene; name a file, such as \"scene.toml\"")
     path = Path(path)
     check_scene(path)
-    scene, problems = _READERS.get(path.suffix.lower(), _load_model)(path)
+    reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower(), _load_model)
+    scene, problems = reader(path)
     if camera is not None:
         scene.camera = scene.cameras.get(camera, scene.camera)
         problems += camera_problems(camera, scene.cameras, "--camera")
@@ -42,7 +47,9 @@ def load(path: str | Path, camera: str | None = None) -> Scene:
 
 
 def check_scene(path: Path) -> None:
-    """Raise SceneError unless there is a file at `path`, with the name of a scene or a model."""
+    """Raise SceneError unless there is a file at `path`, with the name of a scene or a model, or it is STDIN."""
+    if path == STDIN:
+        return
     is_model = path.suffix.lower() in SUFFIXES
     check_file(path, "model" if is_model else "scene")
     if not is_model and path.suffix.lower() not in _READERS:
@@ -61,7 +68,8 @@ def _load_model(path: Path) -> tuple[Scene, list[str]]:
 def _load_toml(path: Path) -> tuple[Scene, list[str]]:
     """The scene, and what is wrong with its file."""
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = sys.stdin.buffer.read() if path == STDIN else path.read_bytes()
+        document = tomllib.loads(content.decode())
     except (ValueError, RecursionError) as error:  # also of text that is no UTF-8, and of numbers of 4300 digits
         raise SceneError(f"{path}: is not valid TOML: {error}") from None
     reader = SceneReader(path, document)

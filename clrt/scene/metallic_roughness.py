@@ -113,8 +113,12 @@ class MetallicRoughness(Material):
         # A body under the albedo coupling has all that the gloss does not reflect, so a metal alone loses light.
         further &= metallic != 0 or self.coupled_by != "albedo" or layers["THROUGH"]
         fitted = further or (metallic != 1 and self.coupled_by == "albedo")
+        # A coat's own albedo is that of the height-correlated form.
+        forms = {self.smith} if fitted else set()
+        forms |= {"height_correlated"} if layers["CLEARCOAT"] else set()
         has = {f"SMITH_{self.smith.upper()}": True, f"COUPLING_{self.coupled_by.upper()}": metallic != 1,
-               "MULTIPLE_SCATTERING": further, "GGX_ALBEDO": fitted, f"ALBEDO_{self.smith.upper()}": fitted, **layers,
+               "MULTIPLE_SCATTERING": further, "GGX_ALBEDO": bool(forms), **layers,
+               **{f"ALBEDO_{form.upper()}": True for form in forms},
                "COAT_NORMALS": layers["CLEARCOAT"] and self.bent_by is not None,
                "LAYERS": any(layers.values()), "SPECULAR": self.specular != 1 or self.specular_color != (1, 1, 1),
                "TRANSMISSION": layers["THROUGH"], "TRANSMISSION_LOBES": layers["THROUGH"]}

@@ -2,15 +2,21 @@
 //   CLEARCOAT  a clear film over all, F0 = 0.04: factor `clearcoat`, GGX of its own roughness
 //   SHEEN      fibres over the rest: sheen_color·D(h)·V (sheen.cl)
 //   THROUGH    the part `transmission` of the body is a thin sheet, which passes light on through microfacets, not bent:
-//              color·(1 − F(wo·h))·G·D/(4·cos wo·cos wi), wi mirrored to wo's side
+//              color·(1 − F(wo·h))·G·D/(4·cos wo·cos wi), wi mirrored to wo's side, F of what is no metal
 //
 // COAT_NORMALS: wo and wi are in the frame of the unbent normal. The coat, and what lies below it, each reflect in a frame around
 // a normal of their own: nothing to below its horizon. Gloss that is sent below that of the unbent one is mirrored there, as at
 // the geometric surface (horizon.cl).
 //
-// What a coat reflects by F(cos) it takes from what lies below twice, at wo and at wi, and fibres leave 1 − max(sheen_color)·E
-// of the larger E of both: so all is reciprocal and no light is made. glTF takes a coat's share at wo alone. E, the fibres'
-// albedo by V, exceeds 1 at grazing angles where they are smooth; there their f is divided by it at each angle.
+// A coat leaves T(c) = 1 − clearcoat·E(c) of light from an angle, with the albedo E of its single bounce (ggx_albedo.cl); what
+// that loses goes below. Fibres leave 1 − max(sheen_color)·E, E theirs (sheen.cl), at most 1. Of the product T of both
+//   gloss, fibres, and what passes through microfacets have min(T(wo), T(wi)): T of one angle where they are smooth
+//   diffuse lobes, r(wo)·r(wi)/(pi·mean r), have T(wo)·T(wi)/T', T' = mean r·T/mean r: T, exactly, in a white furnace
+// Both are reciprocal and make no light. What min takes from rough gloss is lost: under a coat at most 0.02 of white plastic of
+// index 1.5, 0.054 of white metal.
+// glTF takes a coat's share at wo alone. The fibres' f is divided by the larger E of wo and wi where that exceeds 1.
+//
+// What a single bounce loses of the light that passes is passed on by Kulla and Conty's lobe, if MULTIPLE_SCATTERING.
 #if COAT_NORMALS
 #define IN_BASE(m, w) to_local((m)->base_frame, w)
 #define IN_COAT(m, w) to_local((m)->coat_frame, w)
@@ -24,35 +30,15 @@
 #endif
 
 #if CLEARCOAT
+// What a film of strength 1 reflects of light from an angle in a single bounce. What it loses lies below it.
+static inline real coat_albedo(const struct metallic_roughness *m, real cos_theta) {
+    Bounce bounce = ggx_bounce(&m->coat_bounces, maximum(cos_theta, ZERO));
+    return 0.04f * bounce.by_f0 + bounce.by_f90;
+}
+
 static inline real coat_fresnel(const struct metallic_roughness *m, real cos_theta) {
     real c = 1.0f - minimum(absolute(cos_theta), ONE), c2 = c * c;
     return m->coat * (0.04f + 0.96f * c2 * c2 * c);
-}
-#endif
-
-#if SHEEN
-static inline real3 sheen_value(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    real d = fibres_d(&m->fibres, normalize3(add(wo, wi)).z);
-    real bounds = maximum(fibres_albedo(&m->fibres, wo.z), ONE) * maximum(fibres_albedo(&m->fibres, wi.z), ONE);
-    return scale(m->sheen, IF_ABOVE(wo, wi, d * wi.z / (4.0f * (wo.z + wi.z - wo.z * wi.z) * bounds)));
-}
-#endif
-
-// What the layers above leave to the fibres and the body, and to the body alone.
-static inline real under_coat(const struct metallic_roughness *m, real3 wo, real3 wi) {
-#if CLEARCOAT
-    return (1.0f - coat_fresnel(m, wo.z)) * (1.0f - coat_fresnel(m, wi.z));
-#else
-    return ONE;
-#endif
-}
-
-static inline real under_sheen(const struct metallic_roughness *m, real3 wo, real3 wi) {
-#if SHEEN
-    return 1.0f - largest(m->sheen) * minimum(maximum(fibres_albedo(&m->fibres, wo.z), fibres_albedo(&m->fibres, wi.z)), ONE);
-#else
-    return ONE;
-#endif
 }
 
 // G1·D/(4·cos wo), the density of reflecting by a normal visible from wo; *hidden: G2/G1.
@@ -61,32 +47,105 @@ static inline real reflected_density(real3 wo, real3 wi, real alpha, real *hidde
     *hidden = (1.0f + lambda_o) / (1.0f + lambda_o + ggx_lambda(wi, alpha));
     return ggx_d(normalize3(add(wo, wi)), alpha) / (4.0f * wo.z * (1.0f + lambda_o));
 }
+#endif
 
-// The probabilities of the lobes: about their shares of the light that leaves.
-typedef struct { real coat, sheen, through, base; } LayerShares;
+#if SHEEN
+static inline real3 sheen_value(const struct metallic_roughness *m, real3 wo, real3 wi) {
+    real d = fibres_d(&m->fibres, normalize3(add(wo, wi)).z);
+    real bound = maximum(maximum(fibres_albedo(&m->fibres, wo.z), fibres_albedo(&m->fibres, wi.z)), ONE);
+    return scale(m->sheen, IF_ABOVE(wo, wi, d * wi.z / (4.0f * (wo.z + wi.z - wo.z * wi.z) * bound)));
+}
+#endif
 
-static inline LayerShares layer_shares(const struct metallic_roughness *m, real3 base_o, real3 coat_o) {
-    LayerShares share = {ZERO, ZERO, ZERO, ONE};
-    real left = ONE;
+// Which lanes have a film, and fibres. Few surfaces of a scene do, so nothing is computed where no lane has any.
+static inline ireal has_film(const struct metallic_roughness *m) {
 #if CLEARCOAT
-    share.coat = coat_fresnel(m, coat_o.z);
-    left -= share.coat;
+    return m->coat > 0.0f;
+#else
+    return NO_LANES;
+#endif
+}
+
+static inline ireal has_fibres(const struct metallic_roughness *m) {
+#if SHEEN
+    return largest(m->sheen) > 0.0f;
+#else
+    return NO_LANES;
+#endif
+}
+
+// What layers leave of light from a direction: the film to all below it, and it and the fibres to the body.
+typedef struct { real film, body; } Left;
+
+static inline Left left_at(const struct metallic_roughness *m, real base_cos, real coat_cos) {
+    Left left = {ONE, ONE};
+#if CLEARCOAT
+    if (ANY(has_film(m))) left.film -= m->coat * coat_albedo(m, coat_cos);
+    left.body = left.film;
 #endif
 #if SHEEN
-    real albedo = minimum(fibres_albedo(&m->fibres, base_o.z), ONE);
-    share.sheen = left * luminance(m->sheen) * albedo;
-    left *= 1.0f - largest(m->sheen) * albedo;
+    if (ANY(has_fibres(m))) left.body *= 1.0f - largest(m->sheen) * minimum(fibres_albedo(&m->fibres, base_cos), ONE);
+#endif
+    return left;
+}
+
+#define SCATTERS (THROUGH && MULTIPLE_SCATTERING)
+
+// 1/T', by Gauss and Legendre's rule in √cos. For all diffuse lobes and colours it is that of their sum.
+constant float MEAN_ROOT[5] = {0.04691008f, 0.23076534f, 0.5f, 0.76923466f, 0.95308992f};
+constant float MEAN_WEIGHT[5] = {0.11846344f, 0.23931434f, 0.28444444f, 0.23931434f, 0.11846344f};
+
+static inline real diffuse_scale(const struct metallic_roughness *m) {
+    if (!ANY(has_film(m) | has_fibres(m))) return ONE;
+    real all = ZERO, left = ZERO;
+    for (int k = 0; k < 5; ++k) {
+        real root = (real)(MEAN_ROOT[k]), cosine = root * root, weight = MEAN_WEIGHT[k] * cosine * root;
+#if COUPLING_ALBEDO
+        Bounce bounce = ggx_bounce(&m->bounces, cosine);
+        real3 seen = left_albedo(m, bounce);
+#if SCATTERS
+        seen = mad3(m->scattered, bounce.lost, seen);
+#endif
+        weight *= BY_ALBEDO(m) ? luminance(seen) : ONE;
+#endif
+        all += weight;
+        left += weight * left_at(m, cosine, cosine).body;
+    }
+    return left > 0.0f ? all / left : ONE;
+}
+
+#if THROUGH
+// What microfacets pass on in a single bounce.
+static inline real3 passed_on(const struct metallic_roughness *m, real cos_h) {
+    return mul(sub(splat(ONE), fresnel_to(m->body_f0, m->body_f90, cos_h)), m->through);
+}
+#endif
+
+// The probabilities of the lobes: about their shares of the light that leaves.
+typedef struct { real coat, sheen, scattered, through, base; Left left; } LayerShares;     // left: at wo
+
+static inline LayerShares layer_shares(const struct metallic_roughness *m, real3 base_o, real3 coat_o) {
+    LayerShares share = {ZERO, ZERO, ZERO, ZERO, ONE, left_at(m, base_o.z, coat_o.z)};
+    real left = share.left.body;
+#if CLEARCOAT
+    share.coat = 1.0f - share.left.film;
+#endif
+#if SHEEN
+    share.sheen = share.left.film * luminance(m->sheen) * minimum(fibres_albedo(&m->fibres, base_o.z), ONE);
 #endif
     real3 f = base_fresnel(m, base_o.z);
     share.base = left * (luminance(f) + luminance(mul(sub(splat(ONE), f), m->albedo)));
 #if THROUGH
-    share.through = left * luminance(mul(sub(splat(ONE), f), m->through));
+    share.through = left * luminance(passed_on(m, base_o.z));
 #endif
-    real sum = share.coat + share.sheen + share.through + share.base;
+#if SCATTERS
+    share.scattered = left * luminance(m->scattered) * m->lost_o * m->bounces.mean.lost;
+#endif
+    real sum = share.coat + share.sheen + share.scattered + share.through + share.base;
     ireal some = sum > 0.0f;
     real inverse = some ? 1.0f / sum : ZERO;
-    return (LayerShares){share.coat * inverse, share.sheen * inverse, share.through * inverse,
-                         some ? share.base * inverse : ONE};
+    return (LayerShares){share.coat * inverse, share.sheen * inverse, share.scattered * inverse,
+                         share.through * inverse, some ? share.base * inverse : ONE, share.left};
 }
 
 #if THROUGH
@@ -96,16 +155,14 @@ static inline ireal metallic_roughness_transmits(const struct metallic_roughness
 // What each lobe reflects, and what passes on.
 static inline BsdfValue layers_reflected(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), coat_o = IN_COAT(m, wo), coat_i = IN_COAT(m, wi);
-    real fibres = under_sheen(m, base_o, base_i), film = under_coat(m, coat_o, coat_i);
-    BsdfValue at = base_eval(m, base_o, base_i);
-    at.matte = scale(at.matte, fibres * film);
-    at.value = scale(at.value, fibres);
+    Left left = left_at(m, base_i.z, coat_i.z);
+    BsdfValue at = weighed_lobes(m, base_o, base_i, minimum(share.left.body, left.body),
+                                 share.left.body * left.body * m->diffuse_scale);
     at.pdf *= share.base;
 #if SHEEN
-    at.value = add(at.value, sheen_value(m, base_o, base_i));
+    at.value = mad3(sheen_value(m, base_o, base_i), minimum(share.left.film, left.film), at.value);
     at.pdf += IF_ABOVE(base_o, base_i, share.sheen * (0.5f / PI));
 #endif
-    at.value = scale(at.value, film);
 #if CLEARCOAT
     real hidden, density = reflected_density(coat_o, coat_i, m->coat_alpha, &hidden);
     real coat = coat_fresnel(m, 0.5f * length3(add(wo, wi))) * density * hidden;
@@ -118,11 +175,20 @@ static inline BsdfValue layers_reflected(const struct metallic_roughness *m, Lay
 #if THROUGH
 static inline BsdfValue layers_transmitted(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), mirrored = vector(base_i.x, base_i.y, -base_i.z);
-    real seen, density = reflected_density(base_o, mirrored, m->alpha, &seen);
-    real3 on = mul(sub(splat(ONE), base_fresnel(m, 0.5f * length3(add(base_o, mirrored)))), m->through);
-    seen *= density * under_coat(m, IN_COAT(m, wo), IN_COAT(m, wi)) * under_sheen(m, base_o, base_i);
-    return (BsdfValue){scale(on, IF_ABOVE(base_o, mirrored, seen)), splat(ZERO),
-                       IF_ABOVE(base_o, mirrored, share.through * density)};
+    real3 sum = add(base_o, mirrored);
+    real facets = ggx_d(normalize3(sum), m->alpha) / (4.0f * base_o.z);
+    real3 on = passed_on(m, 0.5f * length3(sum));
+    Left left = left_at(m, mirrored.z, -IN_COAT(m, wi).z);
+    real seen = facets * smith_shadowing(base_o, mirrored, m->alpha, m->smith);
+    real3 value = scale(on, seen * minimum(share.left.body, left.body));
+    real pdf = share.through * facets / (1.0f + ggx_lambda(base_o, m->alpha));
+#if SCATTERS
+    real lost = m->lost_o * ggx_bounce(&m->bounces, mirrored.z).lost * mirrored.z * (1.0f / PI);
+    value = mad3(m->scattered, lost * share.left.body * left.body * m->diffuse_scale, value);
+    pdf += share.scattered * multiple_pdf(m, mirrored.z);
+#endif
+    ireal above = (base_o.z > 0.0f) & (mirrored.z > 0.0f);
+    return choose_value(above, (BsdfValue){value, splat(ZERO), pdf}, no_value());
 }
 #endif
 
@@ -152,18 +218,16 @@ static inline BsdfValue metallic_roughness_eval(const struct metallic_roughness 
 }
 
 static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m) {
-    real3 albedo = base_albedo(m), straight = vector(ZERO, ZERO, ONE);
+    real3 albedo = base_albedo(m);
 #if THROUGH
-    albedo = add(albedo, mul(sub(splat(ONE), base_fresnel(m, ONE)), m->through));
+    albedo = add(albedo, passed_on(m, ONE));
 #endif
-    albedo = scale(albedo, under_sheen(m, straight, straight));
+    Left left = left_at(m, ONE, ONE);
+    albedo = scale(albedo, left.body);
 #if SHEEN
-    albedo = mad3(m->sheen, fibres_albedo(&m->fibres, ONE), albedo);
+    albedo = mad3(m->sheen, left.film * fibres_albedo(&m->fibres, ONE), albedo);
 #endif
-    albedo = scale(albedo, under_coat(m, straight, straight));
-#if CLEARCOAT
-    albedo = add(albedo, splat(coat_fresnel(m, ONE)));
-#endif
+    albedo = add(albedo, splat(1.0f - left.film));
     return albedo;
 }
 
@@ -178,6 +242,11 @@ static inline BsdfSample metallic_roughness_sample(const struct metallic_roughne
     real3 h = sample_visible_normal(base_o, m->alpha, u);
     real3 mirrored = sub(scale(h, 2.0f * dot3(base_o, h)), base_o);
     through = !is_base & (lobe >= below - share.through);
+#if SCATTERS
+    ireal scattered = !is_base & !through & (lobe >= share.coat + share.sheen);
+    mirrored = choose(scattered, sample_multiple(m, u), mirrored);
+    through = through | scattered;
+#endif
     sample.wi = choose(through, vector(mirrored.x, mirrored.y, -mirrored.z), sample.wi);
 #endif
 #if SHEEN

@@ -47,7 +47,10 @@ struct metallic_roughness {
     ireal smith, coupling;
     LobeShares shares;
 #if COUPLING_ALBEDO
-    real3 body_f0, left_o;      // of what is no metal; r(wo)/mean r
+    real3 left_o;               // r(wo)/mean r
+#endif
+#if COUPLING_ALBEDO || THROUGH
+    real3 body_f0;              // of what is no metal
     real body_f90;
 #endif
 #if MULTIPLE_SCATTERING
@@ -62,6 +65,10 @@ struct metallic_roughness {
 #endif
 #if CLEARCOAT
     real coat, coat_alpha;
+    GgxAlbedo coat_bounces;
+#endif
+#if LAYERS
+    real diffuse_scale;
 #endif
 #if COAT_NORMALS
     Frame base_frame, coat_frame;   // in that of the unbent normal
@@ -71,7 +78,7 @@ struct metallic_roughness {
     Fibres fibres;
 #endif
 #if THROUGH
-    real3 through;
+    real3 through, scattered;   // by a single bounce, and by more of them
 #endif
 };
 
@@ -109,10 +116,14 @@ static inline real multiple_pdf(const struct metallic_roughness *m, real cos_the
 #define F90(m) ONE
 #endif
 
-// Schlick's F, which ends at F90.
-static inline real3 base_fresnel(const struct metallic_roughness *m, real cos_theta) {
+// Schlick's F.
+static inline real3 fresnel_to(real3 f0, real f90, real cos_theta) {
     real c = maximum(1.0f - cos_theta, ZERO), c2 = c * c;
-    return mad3(sub(splat(F90(m)), m->f0), c2 * c2 * c, m->f0);
+    return mad3(sub(splat(f90), f0), c2 * c2 * c, f0);
+}
+
+static inline real3 base_fresnel(const struct metallic_roughness *m, real cos_theta) {
+    return fresnel_to(m->f0, F90(m), cos_theta);
 }
 
 // 1 − F, with 1 − (1 − c)^5 multiplied out so that it keeps its digits at grazing angles.
@@ -120,6 +131,10 @@ static inline real3 transmitted(const struct metallic_roughness *m, real c) {
     real rest = c * (5.0f - c * (10.0f - c * (10.0f - c * (5.0f - c))));
     return mad3(sub(splat(F90(m)), m->f0), rest, splat(1.0f - F90(m)));
 }
+
+#if LAYERS
+static inline real diffuse_scale(const struct metallic_roughness *m);
+#endif
 
 static inline real inverse_or_zero(real x) { return x > 0.0f ? 1.0f / x : ZERO; }
 
@@ -147,6 +162,7 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
 #if CLEARCOAT
     m.coat = PARAMETER(metallic_roughness, clearcoat);
     m.coat_alpha = maximum(square(PARAMETER(metallic_roughness, clearcoat_roughness)), (real)(ALPHA_MIN));
+    if (ANY(m.coat > 0.0f)) m.coat_bounces = height_correlated_albedo(m.coat_alpha);
 #endif
 #if COAT_NORMALS
     Frame frame = frame_around(surface->unbent);
@@ -160,6 +176,7 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
 #if THROUGH
     real transmission = PARAMETER(metallic_roughness, transmission);
     m.through = scale(m.albedo, transmission);
+    m.scattered = scale(m.through, PARAMETER(metallic_roughness, multiple));
     m.albedo = scale(m.albedo, 1.0f - transmission);
 #endif
 #if GGX_ALBEDO
@@ -186,14 +203,19 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     m.lost_o = bounce_o.lost * inverse_or_zero(lost);     // the program has no fits of forms whose materials need none
     multiple_o = luminance(m.multiple) * bounce_o.lost;
 #endif
-#if COUPLING_ALBEDO
+#if COUPLING_ALBEDO || THROUGH
     m.body_f0 = specular;
     m.body_f90 = f90;
+#endif
+#if COUPLING_ALBEDO
     real3 mean = left_albedo(&m, m.bounces.mean), left = left_albedo(&m, bounce_o);
     m.left_o = vector(left.x * inverse_or_zero(mean.x), left.y * inverse_or_zero(mean.y), left.z * inverse_or_zero(mean.z));
     diffuse_o = BY_ALBEDO(&m) ? luminance(body_left(&m, bounce_o)) : diffuse_o;
 #endif
     m.shares = lobe_shares(specular_o, multiple_o, diffuse_o);
+#if LAYERS
+    m.diffuse_scale = diffuse_scale(&m);
+#endif
     return m;
 }
 
@@ -230,14 +252,21 @@ static inline BsdfValue diffuse_lobes(const struct metallic_roughness *m, real3 
     return (BsdfValue){scale(both, cosine), scale(body, cosine), pdf};
 }
 
-static inline BsdfValue BASE(eval)(const struct metallic_roughness *m, real3 wo, real3 wi) {
+// gloss, diffuse: factors of the lobes.
+static inline BsdfValue weighed_lobes(const struct metallic_roughness *m, real3 wo, real3 wi, real gloss, real diffuse) {
     real3 sum = add(wo, wi);
     real length = length3(sum), cos_h = 0.5f * length;     // wi·h = wo·h, which as products differ near wi = −wo
     real facets = ggx_d(scale(sum, 1.0f / length), m->alpha) / (4.0f * wo.z);
     BsdfValue at = diffuse_lobes(m, wo, wi, cos_h);
-    at.value = mad3(base_fresnel(m, cos_h), facets * smith_shadowing(wo, wi, m->alpha, m->smith), at.value);
+    at.matte = scale(at.matte, diffuse);
+    at.value = mad3(base_fresnel(m, cos_h), gloss * facets * smith_shadowing(wo, wi, m->alpha, m->smith),
+                    scale(at.value, diffuse));
     at.pdf += m->shares.specular * facets / (1.0f + ggx_lambda(wo, m->alpha));
     return choose_value((wo.z > 0.0f) & (wi.z > 0.0f), at, no_value());
+}
+
+static inline BsdfValue BASE(eval)(const struct metallic_roughness *m, real3 wo, real3 wi) {
+    return weighed_lobes(m, wo, wi, ONE, ONE);
 }
 
 // As if no light were lost between microfacets, without fits of their albedos: f0, and what goes through the surface

@@ -19,6 +19,8 @@ from clrt.errors import SceneError
 from clrt.study import combinations, identities
 from clrt.study.rays import load_rays
 
+pytestmark = pytest.mark.study
+
 CORNER = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
 

@@ -23,6 +23,8 @@ from clrt.errors import DeviceError
 
 from ..check.sabotage import sabotaged
 
+pytestmark = pytest.mark.processes
+
 Broken = tuple[str, ...]
 #: Of kernels/check/floats.cl, whose part of the check is the first.
 IN_FLOATS = r"kernel void floats\(.*\{"

@@ -14,6 +14,8 @@ import pytest
 
 from clrt.device.diagnosis import diagnosis, without_names
 
+pytestmark = pytest.mark.processes
+
 PARTS = ["made", "system", "versions", "environment", "drivers", "devices", "cache", "logs"]
 SECRET = "hunter2"
 

@@ -18,6 +18,8 @@ from clrt.output.images import read_image
 from ..c_library import compile_library
 from .test_checkpoints import SCENE, arrays, worker_of
 
+pytestmark = [pytest.mark.processes, pytest.mark.needs("gcc")]
+
 FAULTY = Path(__file__).parents[1] / "device" / "faulty.c"
 RENDER = ("render", "ball.toml", "--spp", "1024", "--checkpoint", "a.ck", "--checkpoint-every", "0", "-o", "a.exr")
 ONE, TWO = ("--device", "0"), ("--device", "0", "--device", "0")

@@ -70,6 +70,49 @@ def test_links_to_themselves_are_replaced(folder: Path) -> None:
         assert (folder / arguments[-1]).is_file()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="permissions are those of POSIX")
+def test_permissions_stay_as_they_were(folder: Path) -> None:
+    """Of files that images replace, directly and through links, whatever new files would have."""
+    rng = np.random.default_rng(3)
+    for number in range(20):
+        mode, umask = int(rng.integers(0o1000)), int(rng.integers(0o100))
+        target, named = folder / f"{number}.png", folder / f"link-{number}.png"
+        target.write_text("old")
+        target.chmod(mode)
+        named.symlink_to(target)
+        before = os.umask(umask)
+        try:
+            write_image(named if number % 2 else target, np.zeros((2, 2, 3), np.float32))
+        finally:
+            os.umask(before)
+        assert stat.S_IMODE(target.stat().st_mode) == mode and target.stat().st_size > 3
+
+
+@pytest.mark.parametrize(("refusals", "replaced"), [(2, True), (99, False)])
+def test_what_cannot_be_replaced_loses_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch, refusals: int,
+                                               replaced: bool) -> None:
+    """Windows replaces no file that a program has open: it is tried for a while, then the new one stays beside it."""
+    path, system, refused = folder / "a.png", os.replace, list[Path]()
+    path.write_text("old")
+
+    def replace(source: Path, target: Path) -> None:
+        if target == path and len(refused) < refusals:
+            refused.append(source)
+            raise PermissionError(13, "Access is denied")
+        system(source, target)
+
+    monkeypatch.setattr(os, "replace", replace)
+    if replaced:
+        with replacing(path) as temporary:
+            temporary.write_text("new")
+    else:
+        with pytest.raises(OutputError, match="open in another program"), replacing(path) as temporary:
+            temporary.write_text("new")
+    new = [file for file in folder.glob("*a*.png") if file.read_text() == "new"]
+    assert len(new) == 1 and (new[0] == path) == replaced and not list(folder.glob(".clrt*"))
+    assert path.read_text() == ("new" if replaced else "old")
+
+
 @pytest.mark.parametrize("options", [
     ("--report", "ball.toml"), ("--checkpoint", "ball.toml"), ("--checkpoint", "ball"), ("--report", "./ball.toml"),
     ("--report", "w.exr"), ("--plot", "w.exr"), ("-o", "w.exr"), ("--report", "w.json", "--plot", "w.json"),

@@ -21,6 +21,8 @@ from clrt.output.images import read_image
 
 from .test_checkpoints import SCENE, worker_of
 
+pytestmark = pytest.mark.processes
+
 RENDER = (sys.executable, "-P", "-m", "clrt", "render", "ball.toml", "-o", "a.exr")
 
 

@@ -6,9 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from clrt.output.images import read_image
+from clrt.output.images import read_image, write_image
 
 from .test_commands import SCENE
 
@@ -61,3 +62,24 @@ def test_an_interrupt_before_it_has_begun(folder: Path) -> None:
     (folder / "click.py").write_text("raise KeyboardInterrupt")
     result = shell("cache", "", folder)
     assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
+
+
+@pytest.mark.parametrize("change", ["", "\r\n", "# ü\n"])
+def test_a_scene_from_standard_input(folder: Path, change: str) -> None:
+    """Its files are named from the working folder."""
+    write_image(folder / "map.png", np.full((2, 2, 3), 0.5, np.float32))
+    text = SCENE.replace("[0.8, 0.1, 0.1]", '{image = "map.png"}') + change
+    (folder / "painted.toml").write_text(text, encoding="utf-8", newline="")
+    for arguments, given in (("render painted.toml -q -o a.exr", ""), ("render - -q -o b.exr", "< painted.toml"),
+                             ("render - -q", "< painted.toml"), ("info -", "< painted.toml"),
+                             ("debug - --pixel 3,3", "< painted.toml")):
+        result = shell(arguments, given, folder)
+        assert result.returncode == 0, result.stderr
+    assert np.array_equal(read_image(folder / "a.exr"), read_image(folder / "b.exr"))
+    assert (folder / "scene.png").is_file()
+
+
+def test_a_mistake_in_standard_input(folder: Path) -> None:
+    (folder / "wrong.toml").write_text(SCENE.replace("[[sphere]]", "[[spheer]]"))
+    result = shell("render -", "< wrong.toml", folder)
+    assert result.returncode == 3 and "\nerror: -: key \"spheer\"" in result.stderr, result.stderr

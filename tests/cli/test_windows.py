@@ -42,8 +42,17 @@ def test_every_command_is_called() -> None:
 def test_commands_need_nothing_that_windows_lacks(folder: Path, call: tuple[str, ...]) -> None:
     program = [sys.executable, "-X", "warn_default_encoding", str(HOUSE / "tests" / "windows_python.py")]
     done = subprocess.run([*program, *call], cwd=folder, capture_output=True, text=True, encoding="utf-8",
-                          env=os.environ | {"PYTHONUTF8": "0"})
+                          env=os.environ | {"PYTHONUTF8": "0", "CLRT_CACHE_DIR": str(folder)})
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("encoding", ["cp1252", "cp1252:surrogateescape"])
+def test_names_that_the_code_page_lacks(folder: Path, encoding: str) -> None:
+    """Of standard output that goes to a file, for which Windows' Python has the second of these."""
+    done = subprocess.run([sys.executable, "-m", "clrt", "render", "scene.toml", *SMALL, "-o", "ü日.png"], cwd=folder,
+                          capture_output=True, env=os.environ | {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"})
+    assert (done.returncode, done.stdout) == (0, b"\xfc\\u65e5.png\n"), done.stderr
+    assert (folder / "ü日.png").exists()
 
 
 @pytest.mark.parametrize("name", ["render", "info", "convert"])

@@ -17,6 +17,8 @@ from clrt.errors import KernelError
 
 from .test_shared_cache import surroundings
 
+pytestmark = pytest.mark.processes
+
 #: Builds a program of half the renderer for so much data, and tells the peak of memory and how many kernels it has.
 BUILD = """
 import json, sys

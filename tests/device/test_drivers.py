@@ -19,6 +19,8 @@ from clrt.output.images import read_image
 
 from .fake_drivers import FAULTS, environment, listed, loads, make_driver, run
 
+pytestmark = [pytest.mark.processes, pytest.mark.needs("gcc")]
+
 SCENE = "[render]\nsize = [4, 4]\nspp = 1\n[[sphere]]\n"
 
 

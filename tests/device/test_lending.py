@@ -22,6 +22,8 @@ import clrt
 from clrt.device import arrays, lending
 from clrt.device.open import Device
 
+pytestmark = pytest.mark.processes
+
 RNG = np.random.default_rng(5)
 RAYS = RNG.normal(size=(2, 500, 3)).astype(np.float32)
 MESH = RNG.random((50, 3)).astype(np.float32), RNG.integers(0, 50, (100, 3), dtype=np.int32)

@@ -14,6 +14,8 @@ from clrt.output.images import read_image
 
 from .test_shared_cache import RENDER, SCENE, surroundings
 
+pytestmark = pytest.mark.processes
+
 GARBAGE = bytes(range(256)) * 4
 
 

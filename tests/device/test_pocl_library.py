@@ -10,6 +10,8 @@ import pytest
 
 from .test_shared_cache import RENDER, SCENE, surroundings
 
+pytestmark = pytest.mark.processes
+
 #: Triangles that are met sixteen at a time, twice what processors with AVX2 take.
 TRIANGLE = "[[mesh]]\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\nfaces = [[0, 1, 2]]\n"
 

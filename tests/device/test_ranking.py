@@ -10,6 +10,8 @@ import pytest
 
 from .fake_drivers import listed, make_driver, run
 
+pytestmark = pytest.mark.needs("gcc")
+
 #: Keeps a speed for devices by their names, and prints what there is then.
 MEASURED = """
 import clrt, json, sys

@@ -17,6 +17,8 @@ from clrt.device import background, cache
 from clrt.errors import KernelError
 from clrt.output.images import read_image
 
+pytestmark = pytest.mark.processes
+
 SCENE = "[render]\nsize = [16, 8]\nspp = 2\n[environment]\ncolor = [1, 1, 1]\n[[sphere]]\n"
 RENDER = (sys.executable, "-P", "-m", "clrt", "render", "scene.toml", "-q", "-o")
 DROP_CAPABILITY, CAPABILITIES = 24, 64     # of prctl

@@ -47,6 +47,7 @@ def test_whatever_the_file_holds(info: DeviceInfo, tmp_path: Path, bench: object
     assert kept_speed(info) is None
 
 
+@pytest.mark.needs("gcc")
 def test_measuring(tmp_path: Path) -> None:
     """The best device is measured, and the next list is by its speed; one that cannot compute is told, with code 4."""
     make_driver(tmp_path / "vendors", "fake", TYPE="2", UNITS="1")

@@ -18,6 +18,8 @@ from clrt.scene.model import Scene
 
 from .test_noise import outdoors, room
 
+pytestmark = pytest.mark.statistics
+
 SIZE = (61, 44)
 
 

@@ -18,6 +18,8 @@ from tests.oracle.scenes import todays_seed
 
 from .ggx import cook_torrance
 
+pytestmark = pytest.mark.statistics
+
 SAMPLES = 1 << 15
 #: Features of materials that have another formula.
 OTHERWISE = {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR"}

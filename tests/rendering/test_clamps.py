@@ -22,6 +22,8 @@ from .pictures import film
 from .test_noise import room
 from .test_variants import everything
 
+pytestmark = pytest.mark.statistics
+
 SKY = np.array([1.0, 2.0, 4.0])
 
 

@@ -15,6 +15,8 @@ from clrt.study.scattering import above
 
 from .ggx import masking
 
+pytestmark = pytest.mark.statistics
+
 
 def fresnel(cos_o: Doubles, n: complex) -> Doubles:
     """Reflectance of unpolarised light by the complex cosine of what is refracted (Born and Wolf, 1.5.2 and 14.2)."""

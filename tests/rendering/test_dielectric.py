@@ -15,6 +15,8 @@ from clrt.study.probe import Doubles
 
 from .pictures import film, quad
 
+pytestmark = pytest.mark.statistics
+
 SKY = Environment(color=(1.0, 1.0, 1.0))
 
 

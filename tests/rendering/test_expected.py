@@ -7,6 +7,8 @@ import pytest
 
 from clrt.rendering.expected import REACH, SINGLE_MOST, Doubles, expected
 
+pytestmark = pytest.mark.statistics
+
 INNER = (slice(REACH, -REACH),) * 2
 #: Of sums in single precision over a window.
 PRECISION = 1e-5

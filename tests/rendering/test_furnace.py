@@ -23,6 +23,8 @@ from clrt.study.scattering import ROUNDING, above, reciprocity
 from . import ggx
 from .pictures import film
 
+pytestmark = pytest.mark.statistics
+
 Doubles = NDArray[np.float64]
 SAMPLES = 1 << 14
 WHITE = (1.0, 1.0, 1.0)

@@ -16,6 +16,8 @@ from clrt.study.furnace import SMITHS
 
 from . import ggx
 
+pytestmark = pytest.mark.statistics
+
 Doubles = NDArray[np.float64]
 ROUGHNESSES = np.append(np.linspace(0.02, 1, 30), 0.01)
 COSINES = np.geomspace(1e-5, 1, 300)

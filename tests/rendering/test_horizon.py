@@ -24,6 +24,8 @@ from clrt.study.significance import chi2_test, mean_test, rejected
 from .ggx import bump_shadowing
 from .pictures import film, quad
 
+pytestmark = pytest.mark.statistics
+
 WHITE, COLOR = (1.0, 1.0, 1.0), (0.9, 0.5, 0.2)
 GLOSSY: list[Material] = [
     MetallicRoughness(color=COLOR, metallic=1.0, roughness=0.4),

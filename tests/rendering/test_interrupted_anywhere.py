@@ -18,6 +18,8 @@ from clrt.rendering.renderer import Renderer
 
 from .test_noise import room
 
+pytestmark = pytest.mark.processes
+
 SIZE, SPP = (40, 24), 12
 #: Places that are tried of each call, spread at random over all lines that it runs.
 PLACES = 40

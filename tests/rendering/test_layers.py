@@ -16,6 +16,9 @@ from clrt.study.scattering import FLIP, above
 
 from . import sheen
 from .ggx import masking
+from .layers import Left, diffuse, left_to_diffuse, lost, mean, under_coat, under_fibres
+
+pytestmark = pytest.mark.statistics
 
 COLOR = (0.8, 0.5, 0.2)
 WO, WI = above(5000, 1), above(5000, 2)
@@ -47,28 +50,38 @@ def check(found: Doubles, expected: Doubles) -> None:
     assert np.all(np.abs(found - expected) <= roundings * np.abs(expected) + 2e-5)
 
 
-def test_coat_lies_over_what_was_there(device: Device) -> None:
-    """coat·F·D·G/(4 cos wo) + (1 − coat·F(wo))(1 − coat·F(wi))·f."""
-    bare, coated = MetallicRoughness(color=COLOR, roughness=0.7, metallic=0.5), MetallicRoughness(
-        color=COLOR, roughness=0.7, metallic=0.5, clearcoat=0.8, clearcoat_roughness=0.5)
+def beneath(bare: Doubles, left: Left, metallic: float, roughness: float, some: slice = slice(None)) -> Doubles:
+    """(n, 3) from f·cos without layers: its gloss by the lesser of what is left, the rest by the product."""
+    f0, cos_h = 0.04 + metallic * (np.array(COLOR) - 0.04), COS_H[some, None]
+    gloss = (f0 + (1 - f0) * (1 - cos_h)**5) * ggx(roughness**2)[some, None]
+    gloss_left = np.minimum(left(COS_O[some]), left(COS_I[some]))
+    rest = left_to_diffuse(left, diffuse(COLOR, metallic, roughness))
+    return np.asarray(gloss_left[:, None] * gloss + (rest(COS_O[some]) * rest(COS_I[some]))[:, None] * (bare - gloss))
+
+
+@pytest.mark.parametrize("metallic", [0.0, 0.5, 1.0])
+def test_coat_lies_over_what_was_there(device: Device, metallic: float) -> None:
+    """coat·F·D·G/(4 cos wo), and of the rest what the coat's albedo leaves."""
+    bare, coated = MetallicRoughness(color=COLOR, roughness=0.7, metallic=metallic), MetallicRoughness(
+        color=COLOR, roughness=0.7, metallic=metallic, clearcoat=0.8, clearcoat_roughness=0.5)
     both = shown(device, bare, coated)
-    left = (1 - 0.8 * schlick(0.04, COS_O)) * (1 - 0.8 * schlick(0.04, COS_I))
-    expected = left[:, None] * both.value(0, WO, WI)[0] + (0.8 * schlick(0.04, COS_H) * ggx(0.25))[:, None]
-    check(both.value(1, WO, WI)[0], expected)
+    film = (0.8 * schlick(0.04, COS_H) * ggx(0.25))[:, None]
+    expected = film + beneath(both.value(0, WO, WI)[0], under_coat(0.8, 0.5), metallic, 0.7)
+    np.testing.assert_allclose(both.value(1, WO, WI)[0], expected, rtol=2e-3, atol=1e-4)
 
 
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
 def test_sheen_is_charlies(device: Device, roughness: float) -> None:
-    """color·(2 + n)·sin^n/(2 pi)·cos wi/(4 (o + i − o·i)), over E where that exceeds 1; 1 − max·E of the rest."""
+    """color·(2 + n)·sin^n/(2 pi)·cos wi/(4 (o + i − o·i)), over the larger E if it exceeds 1; 1 − max·E of the rest."""
     bare = MetallicRoughness(color=COLOR)
     woolly = MetallicRoughness(color=COLOR, sheen_color=(0.9, 0.6, 0.3), sheen_roughness=roughness)
     both, n, some = shown(device, bare, woolly), roughness**-2, slice(1000)
     wo, wi, cos_o, cos_i = WO[some], WI[some], COS_O[some], COS_I[some]
     e_o, e_i = (sheen.albedo(cosine, n) for cosine in (cos_o, cos_i))
     d = (2 + n) / (2 * np.pi) * (1 - H[some, 2]**2)**(n / 2)
-    fibres = d * cos_i / (4 * (cos_o + cos_i - cos_o * cos_i)) / np.maximum(e_o, 1) / np.maximum(e_i, 1)
-    left = 1 - 0.9 * np.minimum(np.maximum(e_o, e_i), 1)
-    expected = fibres[:, None] * (0.9, 0.6, 0.3) + left[:, None] * both.value(0, wo, wi)[0]
+    fibres = d * cos_i / (4 * (cos_o + cos_i - cos_o * cos_i)) / np.maximum(np.maximum(e_o, e_i), 1)
+    below = beneath(both.value(0, wo, wi)[0], under_fibres(0.9, roughness), 0.0, 0.5, some)
+    expected = fibres[:, None] * (0.9, 0.6, 0.3) + below
     np.testing.assert_allclose(both.value(1, wo, wi)[0], expected, rtol=3e-3, atol=3e-3)
 
 
@@ -85,20 +98,29 @@ def test_fibres_reflect_what_was_fitted(device: Device, roughness: float) -> Non
         h = (wo + wi) / np.linalg.norm(wo + wi, axis=-1, keepdims=True)
         n = roughness**-2
         f = (2 + n) / (2 * np.pi) * (1 - h[..., 2]**2)**(n / 2) / (4 * (cosine + z - cosine * z))
-        bound = np.maximum(sheen.albedo(z[:, 0], n), 1)[:, None] * max(float(sheen.albedo(np.array([cosine]), n)[0]), 1)
+        bound = np.maximum(sheen.albedo(z[:, 0], n), max(float(sheen.albedo(np.array([cosine]), n)[0]), 1))[:, None]
         assert found == pytest.approx(float((f * z / bound).mean() * 2 * np.pi), abs=6e-3)
 
 
 def test_transmission_passes_the_bodys_part_straight_on(device: Device) -> None:
-    """(1 − F(wo·h))·color·transmission·D·G/(4 cos wo) below; above the body has the rest."""
+    """(1 − F(wo·h))·color·transmission·D·G/(4 cos wo) below, and what that loses; above the body has the rest."""
     solid, sheet = MetallicRoughness(color=COLOR, roughness=0.6), MetallicRoughness(
         color=COLOR, roughness=0.6, transmission=0.7)
     both = shown(device, solid, sheet, MetallicRoughness(color=(0.0,) * 3, roughness=0.6))
-    below = ((1 - schlick(0.04, COS_H)) * ggx(0.36))[:, None] * np.multiply(COLOR, 0.7)
-    check(both.value(1, WO, WI * FLIP)[0], below)
+    scattered = lost(COS_O, 0.6) * lost(COS_I, 0.6) * COS_I / (np.pi * mean(lambda c: lost(c, 0.6)))
+    below = ((1 - schlick(0.04, COS_H)) * ggx(0.36) + scattered)[:, None] * np.multiply(COLOR, 0.7)
+    np.testing.assert_allclose(both.value(1, WO, WI * FLIP)[0], below, rtol=5e-4, atol=2e-4)
     upper = [both.value(which, WO, WI)[0] for which in (0, 1, 2)]
     check(upper[1], 0.3 * upper[0] + 0.7 * upper[2])
     assert not both.value(0, WO, WI * FLIP)[0].any()
+
+
+def test_metal_passes_no_light_and_takes_none_from_what_does(device: Device) -> None:
+    """Half metal is half of each: light passes by the Fresnel term of what is no metal."""
+    sheet, half = MetallicRoughness(color=COLOR, roughness=0.6, transmission=0.7), MetallicRoughness(
+        color=COLOR, roughness=0.6, transmission=0.7, metallic=0.5)
+    both = shown(device, sheet, half)
+    check(both.value(1, WO, WI * FLIP)[0], 0.5 * both.value(0, WO, WI * FLIP)[0])
 
 
 def test_specular_scales_f0_and_where_it_ends(device: Device) -> None:

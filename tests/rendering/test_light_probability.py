@@ -14,6 +14,8 @@ from clrt.study.bsdfs import variants
 
 from .pictures import quad
 
+pytestmark = pytest.mark.statistics
+
 LIGHTS: list[Light] = [
     DirectionalLight(direction=(0, -1, 0), irradiance=(1, 2, 3)),
     DirectionalLight(direction=(0, -1, -1), irradiance=(1, 1, 1), angle_degrees=10.0),

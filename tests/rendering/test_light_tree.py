@@ -20,6 +20,8 @@ from clrt.study.significance import chi2_test, sidak
 from .lamps import lamps, point_lights, with_infinite
 from .test_lights import points_and_normals
 
+pytestmark = pytest.mark.statistics
+
 Doubles = NDArray[np.float64]
 COUNT, FAMILY = 1 << 17, 1e-3
 UP = np.array([0.0, 1.0, 0.0])

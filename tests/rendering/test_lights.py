@@ -16,6 +16,8 @@ from clrt.scene.model import Mesh, Scene, Sphere
 from clrt.study.significance import mean_test, sidak
 from clrt.study.probe import Probe
 
+pytestmark = pytest.mark.statistics
+
 
 Doubles = NDArray[np.float64]
 COUNT, FAMILY = 1 << 18, 1e-3

@@ -19,6 +19,8 @@ from .lamps import lamps, with_infinite
 from .pictures import film, quad
 from .test_lights import points_and_normals
 
+pytestmark = pytest.mark.statistics
+
 Doubles = NDArray[np.float64]
 FAMILY = 1e-3
 UP = np.array([0.0, 1.0, 0.0])

@@ -20,6 +20,8 @@ from clrt.scene.model import Camera, Environment, RenderSettings, Sampler, Scene
 
 from .pictures import box, quad
 
+pytestmark = pytest.mark.statistics
+
 FLOOR = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse(color=(0.6, 0.5, 0.4)))
 BALLS = [Sphere(center=(0.0, 1.0, 0.0), material=Diffuse(color=(0.7, 0.2, 0.2))),
          Sphere(center=(-2.0, 0.7, 1.0), radius=0.7, material=MetallicRoughness(metallic=1.0, roughness=0.3))]

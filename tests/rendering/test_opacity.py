@@ -17,6 +17,8 @@ from clrt.scene.model import Camera, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.textures import Picture, Texture
 from clrt.study.significance import chi2_test
 
+pytestmark = pytest.mark.statistics
+
 QUAD = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
 FACES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 UV = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)

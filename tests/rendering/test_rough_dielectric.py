@@ -22,6 +22,8 @@ from .ggx import masking
 from .pictures import film, quad
 from .test_dielectric import fresnel
 
+pytestmark = pytest.mark.statistics
+
 COLOR = (0.9, 0.5, 1.0)
 WHITE = Environment(color=(1.0, 1.0, 1.0))
 #: Looks down on the origin, from 4 above.

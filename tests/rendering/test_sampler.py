@@ -17,6 +17,8 @@ from clrt.study.significance import FAMILY, chi2_test, mean_test, rejected
 
 from .pictures import film, quad
 
+pytestmark = pytest.mark.statistics
+
 SAMPLERS: tuple[Sampler, ...] = ("sobol", "stratified", "independent")
 
 

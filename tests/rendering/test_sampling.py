@@ -12,6 +12,8 @@ from clrt.study.samplers import AREA, DENSITY
 from clrt.study.significance import rejected
 from clrt.study.warps import HEIGHTS, visible_normals, warp_density_errors, warp_p_values, warp_probe
 
+pytestmark = pytest.mark.statistics
+
 SAMPLES = 1 << 16
 #: Text of the kernels and what makes it wrong by little.
 WRONG_WARPS = {

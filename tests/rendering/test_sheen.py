@@ -18,6 +18,8 @@ from clrt.scene.textures import Picture, Texture
 from .sheen import albedo, interpolated
 from .test_textures import quad, seen
 
+pytestmark = pytest.mark.statistics
+
 BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 

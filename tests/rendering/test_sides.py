@@ -19,6 +19,8 @@ from .pictures import film
 from .test_lights import (COUNT, FAMILY, LAMP, POINTS, RADIANCE, assert_mean, irradiances, rectangle,
                           rectangle_irradiance)
 
+pytestmark = pytest.mark.statistics
+
 BOTH = replace(LAMP, double_sided=True)
 SIDE = (-1.0, 0.7, -0.4, 1.5)
 BLACK = (0.0, 0.0, 0.0)

@@ -13,6 +13,8 @@ from clrt.study.probe import Probe
 
 from . import skies
 
+pytestmark = pytest.mark.statistics
+
 Doubles = NDArray[np.float64]
 COUNT, FAMILY = 1 << 19, 1e-3
 HEIGHT, WIDTH = 16, 32

@@ -17,6 +17,8 @@ from clrt.study.bsdfs import variants
 from .lamps import directions
 from .pictures import film
 
+pytestmark = pytest.mark.statistics
+
 Doubles = NDArray[np.float64]
 ALBEDO, COUNT, KINDS = 0.5, 24, ("flat", "curved", "instance")
 QUAD = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)

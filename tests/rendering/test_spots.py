@@ -20,6 +20,8 @@ from .pictures import film, pixel_means, pixel_points, quad
 from .test_light_tree import probabilities
 from .test_lights import irradiances, points_and_normals
 
+pytestmark = pytest.mark.statistics
+
 Doubles = NDArray[np.float64]
 UP = np.array([0.0, 1.0, 0.0])
 

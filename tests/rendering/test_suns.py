@@ -18,6 +18,8 @@ from clrt.study.significance import mean_test, sidak
 from .ggx import cook_torrance
 from .pictures import film, pixel_means, pixel_points, quad
 
+pytestmark = pytest.mark.statistics
+
 Doubles = NDArray[np.float64]
 COUNT, FAMILY = 1 << 16, 1e-3
 RED, BLACK = (0.8, 0.5, 0.2), (0.0, 0.0, 0.0)

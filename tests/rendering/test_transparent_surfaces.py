@@ -18,6 +18,8 @@ from clrt.scene.model import Camera, Instance, Integrator, Mesh, RenderSettings,
 
 from .pictures import film
 
+pytestmark = pytest.mark.statistics
+
 Doubles = NDArray[np.float64]
 QUAD = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
 FACES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)

@@ -13,6 +13,8 @@ from clrt.scene.materials import Diffuse
 from clrt.scene.model import Mesh, Scene
 from clrt.study.probe import choices
 
+pytestmark = pytest.mark.statistics
+
 LAMP = Diffuse(emission=(1.0, 1.0, 1.0))
 
 

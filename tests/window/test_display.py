@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import socket
 
+import pytest
 
+
+@pytest.mark.needs("Xvfb")
 def test_a_display_answers(display: str) -> None:
     """X servers listen at a socket that has the number of their display in its name."""
     with socket.socket(socket.AF_UNIX) as client:
