@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import os
-import stat
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import OutputError
@@ -49,8 +47,7 @@ def replacing(path: Path) -> Iterator[Path]:
     """Lend a path beside `path`, with its extension, to write to; then move that file onto `path` in one step.
 
     If the block fails, `path` is as it was and nothing is left beside it; an OSError comes out as OutputError.
-    A link stays a link: the file it points to is replaced, and who may do what with that stays as it was. What is no
-    regular file never is: OutputError.
+    A link stays a link: the file it points to is replaced. What is no regular file never is: OutputError.
     Where the old file cannot be replaced, the new one stays beside it, and the OutputError names it.
     """
     target = Path(os.path.realpath(path))
@@ -58,22 +55,12 @@ def replacing(path: Path) -> Iterator[Path]:
     try:
         yield temporary
         _check_kind(target)
-        _take_over(temporary, target)
         _move(temporary, target)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); "
                           "free some space there or choose another path") from error
     finally:
         temporary.unlink(missing_ok=True)
-
-
-def _take_over(new: Path, old: Path) -> None:
-    """Gives a file the owner and the permissions of the one that it replaces, as far as they may be given."""
-    with suppress(OSError):
-        was, now = old.stat(), new.stat()
-        if sys.platform != "win32" and (was.st_uid, was.st_gid) != (now.st_uid, now.st_gid):
-            os.chown(new, was.st_uid, was.st_gid)
-        os.chmod(new, stat.S_IMODE(was.st_mode))
 
 
 def _move(new: Path, target: Path) -> None:
