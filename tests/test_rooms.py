@@ -15,7 +15,7 @@ KERNELS = sorted((HOUSE / "kernels").rglob("*.cl"))
 LONGEST = 300
 
 #: In order: a room imports only from itself and those before it. `clrt` itself is the public names alone.
-ROOMS = ["errors", "threads", "awake", "float_errors", "scene", "device", "accel", "tree_query", "query", "instances",
+ROOMS = ["errors", "threads", "awake", "float_errors", "file_mode", "scene", "device", "accel", "tree_query", "query", "instances",
          "trimesh", "rendering", "check", "output", "study", "debug", "api", "live", "window", "farm", "clrt", "cli",
          "__main__"]
 KNOW_OPENCL = {"device", "accel", "tree_query", "rendering"}

@@ -13,7 +13,7 @@ from ..errors import UsageError
 @click.argument("model", type=click.Path(path_type=Path))
 @click.argument("scene", type=click.Path(path_type=Path), metavar="SCENE.toml")
 @click.option("--camera", metavar="NAME", help="The camera in the model file to begin with; see `clrt info`.")
-@click.option("--force", is_flag=True, help="Replace SCENE.toml if there is one.")
+@click.option("--force", is_flag=True, help="Replace files that are there, also read-only ones.")
 def command(model: Path, scene: Path, camera: str | None, force: bool) -> None:
     """Write SCENE.toml, which shows MODEL as `clrt render MODEL` does: camera, sky, lights and materials to change."""
     from ..output.files import check_target
@@ -28,5 +28,5 @@ def command(model: Path, scene: Path, camera: str | None, force: bool) -> None:
     if scene.exists() and not force:
         raise UsageError(f"{scene}: exists already; name another file, or replace it with --force")
     check_target(scene)
-    save_scene(started(load(model, camera)), scene)
+    save_scene(started(load(model, camera)), scene, force=force)
     click.echo(str(scene))

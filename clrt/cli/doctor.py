@@ -19,7 +19,8 @@ FORMS = (".txt", ".json", ".zip")
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), metavar="FILE",
               help="Write it there: .txt, .json or .zip, which has both and the logs.")
-def command(as_json: bool, output: Path | None) -> None:
+@click.option("--force", is_flag=True, help="Replace a file that is read-only.")
+def command(as_json: bool, output: Path | None, force: bool) -> None:
     """Report versions, drivers, devices, their checks, the cache and the last logs.
 
     Homes, user and machine are not named. Paths elsewhere are, so look through it before you publish it. Run
@@ -30,9 +31,10 @@ def command(as_json: bool, output: Path | None) -> None:
     from ..device.diagnosis import diagnosis
 
     if output is not None:
-        from ..output.files import check_target
+        from ..output.files import check_target, check_unprotected
 
         check_target(output)
+        check_unprotected(output, force)
     found = diagnosis()
     if output is not None:
         _write(output, found)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 #: Fields of Outputs that say nothing of what is in a picture.
-FILES = {"inputs", "pictures", "report", "plot", "header", "spool", "_errors"}
+FILES = {"inputs", "pictures", "report", "plot", "force", "header", "spool", "_errors"}
 
 
 class Numbers(click.ParamType[str]):
@@ -65,6 +65,7 @@ class Sequence:
     def scene(self, scene: Scene, size: tuple[int, int] | None, turntable: int | None, fps: float | None) -> Scene:
         """The scene as its first frame shows it. Finds out before the render whether there are such frames, and whether
         what is asked of them can be written."""
+        from ..output.files import check_unprotected
         from ..output.video import check_video
         from ..scene.animation import Animation, frames, turntable as turned
 
@@ -76,6 +77,7 @@ class Sequence:
         self._fps = scene.animation.fps if scene.animation else 0.0
         for video in self.videos:
             check_video(video, size or scene.render.size, self._fps)
+            check_unprotected(video, self.outputs.force)
         self._of(0).check()
         return replace(scene, camera=next(iter(self._stills.values())), animation=None)
 
@@ -114,6 +116,7 @@ class Sequence:
             done = self.resume and all(metadata_of(path, "clrt:frame_hash") == digest
                                        for path in (*outputs.pictures, *outputs.raws))
             if not (done and all(path.is_file() for path in (*outputs.beside, outputs.report) if path)):
+                outputs.check_unprotected()
                 yield outputs, camera
 
     def join(self) -> None:

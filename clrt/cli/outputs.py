@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 @dataclass
 class Outputs:
     """inputs: the scene, and the reference if any; pictures: of the end result, with its aovs; denoise: whether
-    the raw ones are kept beside them; view, exposure: of .png pictures; header: what is written there beside the
+    the raw ones are kept beside them; view, exposure: of .png pictures; force: whether read-only
+    files are replaced; header: what is written there beside the
     report; spool: one of the pictures that is there for a video only: it is not told of, and nothing is kept beside it.
     One that cannot be written keeps none of the others from being written."""
 
@@ -35,6 +36,7 @@ class Outputs:
     exposure: float
     report: Path | None
     plot: Path | None
+    force: bool = False
     header: dict[str, Any] = field(default_factory=dict)
     spool: Path | None = None
     _errors: list[OutputError] = field(default_factory=list)
@@ -77,6 +79,15 @@ class Outputs:
                 check_target(other)
         if self.plot is not None:
             check_plot(self.plot)
+
+    def check_unprotected(self, checkpoint: Path | None = None) -> None:
+        """Finds out whether results would replace read-only files."""
+        from ..output.files import check_unprotected
+
+        older = checkpoint and Path(f"{checkpoint}~")
+        for path in (*self._kept, *self.raws, *self.beside, self.report, self.plot, checkpoint, older):
+            if path is not None:
+                check_unprotected(path, self.force)
 
     def check_apart(self, inputs: Iterable[Path], checkpoint: Path | None = None) -> None:
         """Finds out whether results are written over files of the scene, or over each other."""

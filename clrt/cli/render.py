@@ -67,6 +67,7 @@ RIGHT = 1.2
               help="View transform of .png pictures: srgb, agx, pbr_neutral, reinhard, raw, aces, ocio:VIEW.")
 @click.option("--exposure", default=0.0, metavar="EV", help="Exposure of .png pictures, in stops.")
 @click.option("--progress", "progress_kind", type=click.Choice(["bar", "plain", "json"]), help="Progress on stderr.")
+@click.option("--force", is_flag=True, help="Replace files that are read-only.")
 @click.option("--print-kernel", is_flag=True, help="Print the program that would run, and stop.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no warnings.")
 @frame_options
@@ -79,8 +80,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             integrator: str | None, shadows: bool | None, sampler: str | None, pixel_filter: str | None,
             adaptive: bool | None, reference: Path | None, report: Path | None, plot: Path | None,
             aovs: tuple[str, ...], denoise: bool, checkpoint: Path | None, checkpoint_every: float, resume: bool,
-            view: str, exposure: float, progress_kind: str | None, print_kernel: bool, quiet: bool,
-            frames: str | None, turntable: int | None, fps: float | None, scheduler: str | None,
+            view: str, exposure: float, progress_kind: str | None, force: bool, print_kernel: bool,
+            quiet: bool, frames: str | None, turntable: int | None, fps: float | None, scheduler: str | None,
             local_cluster: int | None, **others: Any) -> None:
     """Render SCENE, a .toml scene, a bare model, or - for a .toml scene on standard input, until the first of --spp,
     --time and --error is reached."""
@@ -102,7 +103,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     layers = _chosen_aovs(aovs) if aovs else ()
     named = (scene,) if reference is None else (scene, reference)
     usual = Path("scene.png" if scene == STDIN else f"{scene.stem}.png")
-    results = Outputs(named, outputs or (usual,), layers, denoise, view, exposure, report, plot)
+    results = Outputs(named, outputs or (usual,), layers, denoise, view, exposure, report, plot, force)
     sequence = make_sequence(results, frames, resume, {"checkpoint": checkpoint, "reference": reference, "plot": plot}
                              ) if frames or turntable else None
     if sequence is None:
@@ -111,6 +112,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         if resume and checkpoint is None:
             raise UsageError("--resume goes on from a checkpoint; name its file with --checkpoint")
         results.check(checkpoint)
+        results.check_unprotected(checkpoint)
     check_stops(spp, seconds, error)
     if error_percentile is not None and error is None:
         raise UsageError("--error-percentile says of how much of the picture --error is asked; name that, too")

@@ -235,4 +235,5 @@ def _check_dask() -> None:
         raise UsageError("a farm needs Dask: pip install 'clrt[farm]'") from None
     # Else each connection keeps its last thousand messages, with all that was in them.
     dask.config.set({"distributed.admin.low-level-log-length": LOG_LENGTH})
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client"):    # Dask gives the latter a level of its own
+        logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import OutputError
+from ..file_mode import keep_mode
 
 #: Seconds after each attempt to replace a file that another program has open.
 PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
@@ -42,11 +43,18 @@ def _check_kind(path: Path) -> None:
         raise OutputError(f"{path}: is a device, a pipe or a socket, which is not replaced; name a regular file")
 
 
+def check_unprotected(path: Path, force: bool) -> None:
+    """Raise OutputError where there is a read-only file at `path`, unless `force`; its mode decides, also for root."""
+    if not force and path.is_file() and not path.stat().st_mode & 0o222:
+        raise OutputError(f"{path}: is read-only; name another file, or replace it with --force")
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Lend a path beside `path`, with its extension, to write to; then move that file onto `path` in one step.
 
-    If the block fails, `path` is as it was and nothing is left beside it; an OSError comes out as OutputError.
+    If the block fails, `path` is as it was and nothing is left beside it; an OSError comes out as OutputError. The file
+    keeps the mode of the one that it replaces, and its owner and group where the user may set them.
     A link stays a link: the file it points to is replaced. What is no regular file never is: OutputError.
     Where the old file cannot be replaced, the new one stays beside it, and the OutputError names it.
     """
@@ -55,6 +63,7 @@ def replacing(path: Path) -> Iterator[Path]:
     try:
         yield temporary
         _check_kind(target)
+        keep_mode(target, temporary)
         _move(temporary, target)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); "

@@ -7,14 +7,14 @@ from pathlib import Path
 from ..errors import OutputError
 from ..scene.model import Scene
 from ..scene.writing import scene_files
-from .files import check_target, replacing
+from .files import check_target, check_unprotected, replacing
 from .images import write_image, write_texels
 
 
-def save_scene(scene: Scene, path: str | Path) -> list[Path]:
+def save_scene(scene: Scene, path: str | Path, *, force: bool = True) -> list[Path]:
     """Writes the scene file `path`, last, and what it needs beside it (scene.writing); returns all these files.
 
-    Raises OutputError where one cannot be written.
+    Raises OutputError where one cannot be written, or is read-only, unless `force`.
     """
     path = Path(path)
     if path.suffix.lower() != ".toml":
@@ -29,6 +29,8 @@ def save_scene(scene: Scene, path: str | Path) -> list[Path]:
     written = [path.with_name(name) for name in (*files.models, *files.texels, *files.pixels)]
     for other in written:
         check_target(other)
+    for each in (*written, path):
+        check_unprotected(each, force)
     for name, content in files.models.items():
         _write(path.with_name(name), content)
     for name, texels in files.texels.items():

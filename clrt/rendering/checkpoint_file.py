@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CheckpointError
+from ..file_mode import keep_mode
 from ..threads import beside
 from .past_cache import write_past_cache
 
@@ -58,7 +59,8 @@ def check_replaceable(path: Path, beginning: bytes) -> None:
 def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, keep_older: bool = True) -> None:
     """Writes to `path`, on disk when it returns; what was there becomes the older generation unless told otherwise.
 
-    A link stays a link. OSError where it fails: then no generation is lost, and nothing is left beside them.
+    A link stays a link, and the file that is replaced leaves its mode. OSError where it fails: then no generation is
+    lost, and nothing is left beside them.
     """
     target = Path(os.path.realpath(path))
     temporary = Path(f"{target}.new")
@@ -70,6 +72,7 @@ def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, k
             digest = beside(lambda: _digest(pieces))    # both take their time, and neither needs Python's lock
             write_past_cache(file.fileno(), _followed_by(pieces, digest))
             os.fsync(file.fileno())
+        keep_mode(target, temporary)
         if keep_older:
             with suppress(FileNotFoundError):
                 os.replace(target, older(target))
