@@ -53,9 +53,9 @@ def check_unprotected(path: Path, force: bool) -> None:
 def replacing(path: Path) -> Iterator[Path]:
     """Lend a path beside `path`, with its extension, to write to; then move that file onto `path` in one step.
 
-    If the block fails, `path` is as it was and nothing is left beside it; an OSError comes out as OutputError.
-    A link stays a link: the file it points to is replaced, and who may do what with that stays as it was. What is no
-    regular file never is: OutputError.
+    If the block fails, `path` is as it was and nothing is left beside it; an OSError comes out as OutputError. The file
+    keeps the mode of the one that it replaces, and its owner and group where the user may set them.
+    A link stays a link: the file it points to is replaced. What is no regular file never is: OutputError.
     Where the old file cannot be replaced, the new one stays beside it, and the OutputError names it.
     """
     target = Path(os.path.realpath(path))

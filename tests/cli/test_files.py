@@ -70,24 +70,6 @@ def test_links_to_themselves_are_replaced(folder: Path) -> None:
         assert (folder / arguments[-1]).is_file()
 
 
-@pytest.mark.skipif(os.name != "posix", reason="permissions are those of POSIX")
-def test_permissions_stay_as_they_were(folder: Path) -> None:
-    """Of files that images replace, directly and through links, whatever new files would have."""
-    rng = np.random.default_rng(3)
-    for number in range(20):
-        mode, umask = int(rng.integers(0o1000)), int(rng.integers(0o100))
-        target, named = folder / f"{number}.png", folder / f"link-{number}.png"
-        target.write_text("old")
-        target.chmod(mode)
-        named.symlink_to(target)
-        before = os.umask(umask)
-        try:
-            write_image(named if number % 2 else target, np.zeros((2, 2, 3), np.float32))
-        finally:
-            os.umask(before)
-        assert stat.S_IMODE(target.stat().st_mode) == mode and target.stat().st_size > 3
-
-
 @pytest.mark.parametrize(("refusals", "replaced"), [(2, True), (99, False)])
 def test_what_cannot_be_replaced_loses_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch, refusals: int,
                                                replaced: bool) -> None:
