@@ -51,6 +51,21 @@ def test_modes_are_kept(tmp_path: Path, checkpoint: bool) -> None:
         assert mode(path) == (0o666 & ~mask if each is None else each) and link.is_symlink()
 
 
+def test_file_systems_without_modes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some refuse to set any: the file is written all the same."""
+    path = tmp_path / "a.txt"
+    path.touch()
+
+    def refuse(*arguments: object, **options: object) -> None:
+        raise OSError(95, "Operation not supported")
+
+    monkeypatch.setattr(os, "chown", refuse)
+    monkeypatch.setattr(os, "chmod", refuse)
+    with replacing(path) as temporary:
+        temporary.write_text("new")
+    assert path.read_text() == "new"
+
+
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root may give files away")
 def test_owners_are_kept(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
