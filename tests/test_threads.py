@@ -9,8 +9,6 @@ import sys
 import time
 from _thread import get_ident
 from collections.abc import Callable
-from types import FrameType
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,37 +16,12 @@ import pytest
 from clrt import threads
 from clrt.threads import BEAT, Condition, Event, beside, in_parallel
 
+from .interrupted import Interrupted, run
+
 pytestmark = pytest.mark.processes
 
 #: Seconds that anything has time for which would else last for ever.
 LONG = 60.0
-
-
-class Interrupted(BaseException):
-    """As if a signal had come."""
-
-
-def interrupted(call: Callable[[], object], last: int) -> bool:
-    """Calls it up to its line of this number, counted over all that it runs in clrt.threads; whether it has as many."""
-    count = 0
-
-    def trace(frame: FrameType, event: str, argument: Any) -> Any:
-        nonlocal count
-        if frame.f_code.co_filename != threads.__file__:
-            return None
-        count += event == "line"
-        if event == "line" and count == last:
-            raise Interrupted
-        return trace
-
-    sys.settrace(trace)
-    try:
-        call()
-    except Interrupted:
-        return True
-    finally:
-        sys.settrace(None)
-    return False
 
 
 def everywhere(prepare: Callable[[], tuple[Callable[[], object], Callable[[], None]]]) -> None:
@@ -56,7 +29,7 @@ def everywhere(prepare: Callable[[], tuple[Callable[[], object], Callable[[], No
     last = 1
     while True:
         call, check = prepare()
-        if not interrupted(call, last):
+        if run(call, (threads.__file__,), last) < last:
             break
         check()
         last += 1
@@ -108,7 +81,7 @@ def test_a_lost_wake_up_costs_a_beat() -> None:
 def test_whoever_no_longer_waits_is_forgotten() -> None:
     condition = Condition()
     for last in (1, 2, 3, 4, 5, 6):
-        interrupted(lambda: condition.wait_for(lambda: False, 1e-3), last)
+        run(lambda: condition.wait_for(lambda: False, 1e-3), (threads.__file__,), last)
     assert not condition._waiters
 
 
@@ -168,10 +141,9 @@ def test_results_come_in_order(count: int) -> None:
     assert in_parallel(lambda number: number**2, range(count)) == [number**2 for number in range(count)]
 
 
-def test_every_item_is_worked_on_once_by_several_threads() -> None:
-    """Two items that wait for each other end only where they run at the same time."""
-    if (os.cpu_count() or 1) < 2:
-        pytest.skip("one core")
+def test_every_item_is_worked_on_once_by_several_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two items that wait for each other end only where they run at the same time, for which one core is enough."""
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
     events = Event(), Event()
 
     def meet(number: int) -> bool:

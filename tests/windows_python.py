@@ -1,6 +1,6 @@
 """`clrt ARGUMENTS` as Windows' Python would meet its own modules: what os, signal and mmap lack there is taken away
-once all libraries are loaded, the process itself is no library for ctypes, and text that is opened without an encoding
-is an error. A simulation: drivers, paths and processes stay.
+once all libraries are loaded, ctypes cannot load the process itself, and text that is opened without an encoding is an
+error. A simulation: drivers, paths and processes stay.
 
 usage: python -X warn_default_encoding -m tests.windows_python ARGUMENTS
 """

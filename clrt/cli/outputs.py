@@ -23,10 +23,9 @@ if TYPE_CHECKING:
 @dataclass
 class Outputs:
     """inputs: the scene, and the reference if any; pictures: of the end result, with its aovs; denoise: whether
-    the raw ones are kept beside them; view, exposure: of .png pictures; force: whether read-only
-    files are replaced; header: what is written there beside the
-    report; spool: one of the pictures that is there for a video only: it is not told of, and nothing is kept beside it.
-    One that cannot be written keeps none of the others from being written."""
+    the raw ones are kept beside them; view, exposure: of .png pictures; force: whether read-only files are replaced;
+    header: what is written there beside the report; spool: one of the pictures that is there for a video only: it is
+    not told of, and nothing is kept beside it. One that cannot be written keeps no other from being written."""
 
     inputs: tuple[Path, ...]
     pictures: tuple[Path, ...]

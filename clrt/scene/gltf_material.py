@@ -23,7 +23,7 @@ log = logging.getLogger(__name__)
 
 WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 NEAREST = 9728
-#: Of what is no metal; glTF's 0 stands for infinity.
+#: Of the dielectric part; glTF's 0 stands for infinity.
 MOST_IOR = 4.0
 #: Opacity 1 would ignore the alpha of vertex colours.
 BELOW_ONE = 1 - 2.0**-24

@@ -37,10 +37,10 @@ class MetallicRoughness(Material):
     reflects all light, and coloured metal grows deeper in color. Left out, both are what keeps energy with the
     height-correlated term, and with the other forms what the theses have: "fresnel", without multiple scattering.
 
-    The rest are glTF's extensions by their names. `ior`, `specular` and `specular_color`: F0 of what is no metal,
+    The rest are glTF's extensions by their names. `ior`, `specular` and `specular_color`: F0 of the dielectric part,
     ((ior − 1)/(ior + 1))²·specular·specular_color, and F at grazing angles, `specular`. `clearcoat`: a clear film,
-    bent by `clearcoat_normal_map` alone. `sheen_color`: fibres. `transmission`: the part of what is no metal that is a
-    sheet which light passes.
+    bent by `clearcoat_normal_map` alone. `sheen_color`: fibres. `transmission`: how much of the dielectric part
+    is a sheet which light passes.
     """
 
     kernel: ClassVar[str] = "metallic_roughness"

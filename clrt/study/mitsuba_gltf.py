@@ -34,7 +34,7 @@ def albedo_grid(smith: Smith) -> Doubles:
 def register(mi: Any) -> None:
     """Makes the plugin "gltf" known to `mi`, the module of Mitsuba with its variant chosen.
 
-    color, metallic, roughness: colours or textures; f0: of what is no metal; smith, coupling: see
+    color, metallic, roughness: colours or textures; f0: of the dielectric part; smith, coupling: see
     `MetallicRoughness`; multiple: whether light bounces on between microfacets; bumps: within a normal map, whose bumps
     shadow what is matte. There the unbent normal is taken for the geometric one, which it is on flat meshes.
     """

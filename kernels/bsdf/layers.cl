@@ -2,7 +2,7 @@
 //   CLEARCOAT  a clear film over all, F0 = 0.04: factor `clearcoat`, GGX of its own roughness
 //   SHEEN      fibres over the rest: sheen_color·D(h)·V (sheen.cl)
 //   THROUGH    the part `transmission` of the body is a thin sheet, which passes light on through microfacets, not bent:
-//              color·(1 − F(wo·h))·G·D/(4·cos wo·cos wi), wi mirrored to wo's side, F of what is no metal
+//              color·(1 − F(wo·h))·G·D/(4·cos wo·cos wi), wi mirrored to wo's side, F of the dielectric part
 //
 // COAT_NORMALS: wo and wi are in the frame of the unbent normal. The coat, and what lies below it, each reflect in a frame around
 // a normal of their own: nothing to below its horizon. Gloss that is sent below that of the unbent one is mirrored there, as at

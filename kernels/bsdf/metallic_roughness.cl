@@ -15,7 +15,7 @@
 // a lobe of its own is drawn with about that density. With COUPLING_ALBEDO this and the body are one lobe,
 //   r(wi)·r(wo)/(pi·mean r), r(c) = albedo·(1 − E(c)) + multiple·lost(c)
 //
-// SPECULAR: f0 of what is no metal times specular·specular_color, and F ends at `specular` (glTF's KHR_materials_specular).
+// SPECULAR: f0 of the dielectric part times specular·specular_color, and F ends at `specular` (glTF's KHR_materials_specular).
 // LAYERS: what lies on it and passes through it (layers.cl).
 #include "bsdf/ggx.cl"
 #include "bsdf/smith.cl"
@@ -50,7 +50,7 @@ struct metallic_roughness {
     real3 left_o;               // r(wo)/mean r
 #endif
 #if COUPLING_ALBEDO || THROUGH
-    real3 body_f0;              // of what is no metal
+    real3 body_f0;              // of the dielectric part
     real body_f90;
 #endif
 #if MULTIPLE_SCATTERING

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -16,6 +14,7 @@ import clrt
 from clrt.device.open import Device
 from clrt.rendering.renderer import Renderer
 
+from .. import interrupted
 from .test_noise import room
 
 pytestmark = pytest.mark.processes
@@ -27,31 +26,9 @@ PLACES = 40
 FOLDERS = tuple(str(Path(clrt.__file__).parent / name) for name in ("rendering", "query.py", "tree_query.py", "accel"))
 
 
-class Interrupted(Exception):
-    """As if a signal had come."""
-
-
 def run(call: Callable[[], object], last: int = -1) -> int:
-    """Calls it up to its line of this number, counted over all that it runs in FOLDERS; how many there were."""
-    count = 0
-
-    def trace(frame: FrameType, event: str, argument: Any) -> Any:
-        nonlocal count
-        if not frame.f_code.co_filename.startswith(FOLDERS):
-            return None
-        count += event == "line"
-        if count == last:
-            raise Interrupted
-        return trace
-
-    sys.settrace(trace)
-    try:
-        call()
-    except Interrupted:
-        pass
-    finally:
-        sys.settrace(None)
-    return count
+    """See `interrupted.run`, of FOLDERS."""
+    return interrupted.run(call, FOLDERS, last)
 
 
 def places(lines: int) -> Iterator[int]:

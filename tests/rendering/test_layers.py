@@ -116,7 +116,7 @@ def test_transmission_passes_the_bodys_part_straight_on(device: Device) -> None:
 
 
 def test_metal_passes_no_light_and_takes_none_from_what_does(device: Device) -> None:
-    """Half metal is half of each: light passes by the Fresnel term of what is no metal."""
+    """Half metal is half of each: light passes by the Fresnel term of the dielectric part."""
     sheet, half = MetallicRoughness(color=COLOR, roughness=0.6, transmission=0.7), MetallicRoughness(
         color=COLOR, roughness=0.6, transmission=0.7, metallic=0.5)
     both = shown(device, sheet, half)
