@@ -24,7 +24,7 @@ Doubles = NDArray[np.float64]
 Roughnesses = tuple[float, ...]
 
 #: Steps of a table's angles, even in √cos.
-STEPS = 64
+STEPS = 96
 #: Of an entry: what a film, fibres, and their product take, of f0 and of f90 each; what the film takes from fibres; and
 #: what fibres reflect, over the smaller of their unbounded albedo and 1.
 ENTRY = 8
@@ -34,7 +34,7 @@ GRID: Roughnesses = tuple((np.linspace(0, 1, ROWS)**2).tolist())
 #: Smoother fibres would shine at the horizon alone (kernels/bsdf/sheen.cl).
 SMOOTHEST = 0.1
 #: √cos where albedos are known, linear in between.
-ROOTS = np.linspace(0, 1, 129)
+ROOTS = np.linspace(0, 1, 193)
 NEAREST = 1e-3    # the least √cos of an integral
 LATTICE = (2584, 1597)
 
@@ -46,7 +46,8 @@ def rows(roughness: float | Texture) -> Roughnesses:
 
 @lru_cache(128)
 def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses) -> tuple[float, ...]:
-    """STEPS + 1 entries for each roughness of the base, of the film (none: (0,)), and of the fibres (none: (1,))."""
+    """For each roughness of the base, of the film (none: (0,)), and of the fibres (none: (1,)) the mean entry over
+    the hemisphere, weighted by the cosine, and those of STEPS + 1 angles."""
     films = np.array([film_albedo(ROOTS, r) for r in film])
     threads = [Fibres(r) for r in fibres]
     bounded = np.array([each.reflected for each in threads])
@@ -60,7 +61,17 @@ def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses) -> tuple[f
         for index, each in enumerate(threads):
             row[:, index, :, 6] = films @ each.taken.T
             row[:, index, :, 7] = each.part
+    # Within alpha of the horizon a film leaves more, not less, as its single bounces lose light.
+    table = np.maximum(table, 0)
+    table = np.concatenate([_means() @ table, table], axis=-2)
     return tuple(table.astype(np.float32).ravel().tolist())
+
+
+def _means() -> Doubles:
+    """(1, STEPS + 1): what makes ∫ f·2c dc, c the cosine, of f at the angles of a table."""
+    roots = (np.arange(16 * STEPS) + 0.5) / (16 * STEPS)
+    steps = np.linspace(0, 1, STEPS + 1)
+    return np.array([[np.mean(4 * roots**3 * np.interp(roots, steps, one)) for one in np.eye(STEPS + 1)]])
 
 
 def film_albedo(roots: Doubles, roughness: float) -> Doubles:

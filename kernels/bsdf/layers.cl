@@ -51,23 +51,6 @@ static inline real reflected_density(real3 wo, real3 wi, real alpha, real *hidde
 }
 #endif
 
-// Which lanes have a film, and fibres. Few surfaces of a scene do, so nothing is computed where no lane has any.
-static inline ireal has_film(const struct metallic_roughness *m) {
-#if CLEARCOAT
-    return m->coat > 0.0f;
-#else
-    return NO_LANES;
-#endif
-}
-
-static inline ireal has_fibres(const struct metallic_roughness *m) {
-#if SHEEN
-    return largest(m->sheen) > 0.0f;
-#else
-    return NO_LANES;
-#endif
-}
-
 #if SHEEN
 static inline real3 sheen_value(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real d = fibres_d(&m->fibres, normalize3(add(wo, wi)).z);
@@ -78,27 +61,49 @@ static inline real3 sheen_value(const struct metallic_roughness *m, real3 wo, re
 
 #include LAYER_ENERGY_FILE
 
+static inline real film_strength(const struct metallic_roughness *m) {
+#if CLEARCOAT
+    return m->coat;
+#else
+    return ZERO;
+#endif
+}
+
+static inline real fibres_strength(const struct metallic_roughness *m) {
+#if SHEEN
+    return largest(m->sheen);
+#else
+    return ZERO;
+#endif
+}
+
+// Few surfaces of a scene have layers, so nothing is computed where no lane has any.
+static inline ireal has_layers(const struct metallic_roughness *m) {
+    return (film_strength(m) > 0.0f) | (fibres_strength(m) > 0.0f);
+}
+
+#if LAYER_ENERGY
+static inline void take(const struct metallic_roughness *m, LayerEntry entry, Left *left) {
+    real film = film_strength(m), fibres = fibres_strength(m), both = film * fibres;
+    left->taken_f0 = maximum(film * entry.part[0] + fibres * entry.part[2] - both * entry.part[4], ZERO);
+    left->taken_f90 = maximum(film * entry.part[1] + fibres * entry.part[3] - both * entry.part[5], ZERO);
+    left->taken_fibres = film * entry.part[6];
+}
+#endif
+
 static inline Left left_at(const struct metallic_roughness *m, real base_cos, real coat_cos) {
     Left left = {ONE, ONE, ZERO, ZERO, ZERO, ZERO};
 #if LAYER_ENERGY
-    if (!ANY(has_film(m) | has_fibres(m))) return left;
-    LayerEntry entry = entry_at(m, base_cos);
-    real film = ZERO, fibres = ZERO;
+    if (!ANY(has_layers(m))) return left;
+    LayerEntry entry = entry_at(m, layer_place(base_cos));
+    take(m, entry, &left);
 #if CLEARCOAT
-    if (ANY(has_film(m))) {
-        film = m->coat;
-        left.film -= film * coat_albedo(m, coat_cos);
-    }
+    if (ANY(m->coat > 0.0f)) left.film -= m->coat * coat_albedo(m, coat_cos);
 #endif
 #if SHEEN
-    fibres = largest(m->sheen);
     left.fibres = entry.part[7] * minimum(fibres_albedo(&m->fibres, base_cos), ONE);
 #endif
-    real both = film * fibres;
-    left.body = left.film * (1.0f - fibres * left.fibres);
-    left.taken_f0 = film * entry.part[0] + fibres * entry.part[2] - both * entry.part[4];
-    left.taken_f90 = film * entry.part[1] + fibres * entry.part[3] - both * entry.part[5];
-    left.taken_fibres = film * entry.part[6];
+    left.body = left.film * (1.0f - fibres_strength(m) * left.fibres);
 #endif
     return left;
 }
@@ -137,11 +142,17 @@ typedef struct {
 } Means;
 
 // What layers add to them, by Gauss and Legendre's rule in √cos.
-constant float MEAN_ROOT[5] = {0.04691008f, 0.23076534f, 0.5f, 0.76923466f, 0.95308992f};
-constant float MEAN_WEIGHT[5] = {0.11846344f, 0.23931434f, 0.28444444f, 0.23931434f, 0.11846344f};
+#define MEAN_NODES 6
+constant float MEAN_ROOT[MEAN_NODES] = {0.03376524f, 0.1693953f, 0.3806904f, 0.6193096f, 0.8306047f, 0.9662348f};
+constant float MEAN_WEIGHT[MEAN_NODES] = {0.08566225f, 0.1803808f, 0.233957f, 0.233957f, 0.1803808f, 0.08566225f};
 
 static inline void add_layers(const struct metallic_roughness *m, Means *mean) {
-    for (int k = 0; k < 5; ++k) {
+#if COUPLING_ALBEDO && LAYER_ENERGY
+    Left taken_on_average;
+    take(m, entry_at(m, LAYER_MEAN), &taken_on_average);
+    mean->left = add(mean->left, taken(m, taken_on_average));
+#endif
+    for (int k = 0; k < MEAN_NODES; ++k) {
         real root = (real)(MEAN_ROOT[k]), cosine = root * root, weight = 4.0f * MEAN_WEIGHT[k] * cosine * root;
         Left left = left_at(m, cosine, cosine);
         real less = weight * (left.body - 1.0f);
@@ -149,7 +160,7 @@ static inline void add_layers(const struct metallic_roughness *m, Means *mean) {
         Bounce bounce = ggx_bounce(&m->bounces, cosine);
 #endif
 #if COUPLING_ALBEDO
-        mean->left = mad3(left_albedo(m, bounce), less, mad3(taken(m, left), weight, mean->left));
+        mean->left = mad3(left_albedo(m, bounce), less, mean->left);
 #endif
 #if SCATTERS
         mean->lost += bounce.lost * less;
@@ -170,7 +181,7 @@ static inline void lay_over(struct metallic_roughness *m, const Surface *surface
 #if SCATTERS
     mean.lost = m->bounces.mean.lost;
 #endif
-    if (ANY(has_film(m) | has_fibres(m))) add_layers(m, &mean);
+    if (ANY(has_layers(m))) add_layers(m, &mean);
 #if OTHER_COUPLINGS
     m->diffuse_scale = inverse_or_zero(mean.other);
 #endif
