@@ -1,11 +1,11 @@
 """What a film and fibres take from the gloss below them beyond their own share, as a table that a kernel looks up.
 
-Of light from an angle of cosine c a layer leaves T(c) to what lies below. Gloss is weighed by min(T(wo), T(wi)), which is
-reciprocal, and right where it is smooth. Of rough gloss it takes more than the layers reflect (kernels/bsdf/layers.cl
-gives that back):
+Of light from an angle of cosine c a layer leaves T(c) to what lies below. Gloss is weighed by min(T(wo), T(wi)), which
+is reciprocal, and right where it is smooth. Of rough gloss it takes more than the layers reflect, which
+kernels/bsdf/layers.cl gives back:
   taken(co) = ∫ gloss(wo, wi)·(T(co) − T(ci)) dwi  over the wi nearer the horizon, ci < co
-With T = (1 − film·E_film)·(1 − fibres·E_fibres) this is a sum over film, fibres and their product, each times the integral
-with its albedo E, for which T falls where E grows. The film takes from the fibres' light in the same way.
+With T = (1 − film·E_film)·(1 − fibres·E_fibres) this is a sum over film, fibres and their product, each times the
+integral with its albedo E, for which T falls where E grows. The film takes from the fibres' light in the same way.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def _means() -> Doubles:
 def film_albedo(roots: Doubles, roughness: float) -> Doubles:
     """(n,) what a film of F0 0.04 reflects in a single bounce, at √cos (n,)."""
     whole, grazing = albedos(np.maximum(roots, NEAREST)**2, max(roughness**2, ALPHA_MIN), "height_correlated")
-    return 0.04 * (whole - grazing) + grazing
+    return np.asarray(0.04 * (whole - grazing) + grazing)
 
 
 def taken_from_gloss(roughness: float) -> tuple[Doubles, Doubles]:
@@ -93,7 +93,7 @@ def _below(cosines: Doubles, others: Doubles, weights: Doubles) -> Doubles:
     """(n, len(ROOTS)): Σ weights·(E(others) − E(cosines)) over the others (n, m) below each of the cosines (n,)."""
     weights = np.where((others > 0) & (others < cosines[:, None]), weights, 0)
     matrix = -weights.sum(axis=1, keepdims=True) * _at(cosines[:, None], np.ones((len(cosines), 1)))
-    return matrix + _at(np.clip(others, 0, 1), weights)
+    return np.asarray(matrix + _at(np.clip(others, 0, 1), weights))
 
 
 def _at(cosines: Doubles, weights: Doubles) -> Doubles:
@@ -110,8 +110,8 @@ def _at(cosines: Doubles, weights: Doubles) -> Doubles:
 class Fibres:
     """White ones of one roughness.
 
-    reflected: (len(ROOTS),) what they reflect, bounded; part: (STEPS + 1,) that over the smaller of their unbounded albedo
-    and 1; taken: (STEPS + 1, len(ROOTS)), what a film takes from it per albedo of the film at ROOTS.
+    reflected: (len(ROOTS),) what they reflect, bounded; part: (STEPS + 1,) that over the smaller of their unbounded
+    albedo and 1; taken: (STEPS + 1, len(ROOTS)), what a film takes from it per albedo of the film at ROOTS.
     """
 
     def __init__(self, roughness: float) -> None:

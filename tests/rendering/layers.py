@@ -83,7 +83,7 @@ class Below:
         return np.column_stack([np.interp(np.sqrt(cosines), self.steps, each) for each in self.taken_at.T])
 
     def value(self, gloss: Doubles, cos_o: Doubles, cos_i: Doubles, left_o: Doubles, left_i: Doubles) -> Doubles:
-        """(n, 3) f·cos wi, with the gloss without layers (n, 3), and of wo and wi the cosines and what T is there (n,)."""
+        """(n, 3) f·cos wi, with the gloss without layers (n, 3), and of wo and wi the cosines and T there (n,)."""
         each = [left[:, None] * self.r(cosines) + self.taken(cosines)
                 for left, cosines in ((left_o, cos_o), (left_i, cos_i))]
         diffuse = each[0] * each[1] * cos_i[:, None] / (np.pi * self.mean)

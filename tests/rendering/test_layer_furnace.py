@@ -56,13 +56,13 @@ def test_roughnesses_of_textures_lose_little(device: Device) -> None:
     """Of which the tables have rows: linear between them."""
     rng = np.random.default_rng(5)
 
-    def textured(roughness: float) -> Texture:
+    def textured(roughness: float | Texture) -> Texture:
+        assert isinstance(roughness, float)
         return Texture(picture=Picture(np.full((1, 1, 4), round(255 * roughness), np.uint8)), channel="alpha",
                        filter="nearest")
 
-    layers = [drawn(rng) for _ in range(24)]
-    mapped = [replace(m, roughness=textured(float(m.roughness)), sheen_roughness=textured(float(m.sheen_roughness)),
-                      clearcoat_roughness=textured(float(m.clearcoat_roughness))) for m in layers]
+    mapped = [replace(m, roughness=textured(m.roughness), sheen_roughness=textured(m.sheen_roughness),
+                      clearcoat_roughness=textured(m.clearcoat_roughness)) for m in (drawn(rng) for _ in range(24))]
     part = found(device, mapped, np.array([1.0, 0.7, 0.4, 0.2, 0.05]))
     assert np.abs(part - 1).max() < 0.02 and np.abs(part - 1).mean() < 2e-3
 
