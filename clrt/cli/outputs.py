@@ -115,12 +115,11 @@ class Outputs:
 
     def save_rows(self, banded: Banded) -> None:
         """Writes pictures and report of a picture that is kept in bands; OutputError at the end."""
-        from ..output.report import write_report
+        from ..output.report import header_of, write_report
 
         told = {**banded.summary(), "total_seconds": time.perf_counter() - STARTED}
-        about = {f"clrt:{key}": str(value) for key, value in told.items() if isinstance(value, (str, int, float))}
         for path in self.pictures:
-            self._write(lambda: banded.save(path, self.view, self.exposure, about))
+            self._write(lambda: banded.save(path, self.view, self.exposure, header_of(told)))
         if (report := self.report) is not None:
             self._write(lambda: write_report(report, told))
         if self._errors:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import sys
 from contextlib import suppress
@@ -89,7 +88,7 @@ class JsonProgress(Progress):
 
     def warning(self, message: str) -> None:
         """Something was logged."""
-        tell(json.dumps({"phase": self._phase, "warning": message}))
+        _tell_json({"phase": self._phase, "warning": message})
 
     def __enter__(self) -> Progress:
         logging.getLogger().addHandler(self._log)
@@ -101,11 +100,11 @@ class JsonProgress(Progress):
 
     def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
         self._phase = name
-        tell(json.dumps({"phase": name, **({"device": device, "device_bytes": device_bytes} if device else {})}))
+        _tell_json({"phase": name, **({"device": device, "device_bytes": device_bytes} if device else {})})
 
     def frame(self, number: int, done: int, count: int) -> None:
         super().frame(number, done, count)
-        tell(json.dumps({"phase": "frame", "frame": number, "done": done, "frames": count}))
+        _tell_json({"phase": "frame", "frame": number, "done": done, "frames": count})
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)
@@ -114,12 +113,18 @@ class JsonProgress(Progress):
                                   "seconds_left": left}
         if self._workers:
             values["workers"] = self._workers
-        tell(json.dumps(values))
+        _tell_json(values)
 
     def bands(self, done: int, count: int) -> None:
         if done != self._bands:
-            tell(json.dumps({"phase": "render", "bands": done, "of": count}))
+            _tell_json({"phase": "render", "bands": done, "of": count})
         self._bands = done
+
+
+def _tell_json(values: dict[str, Any]) -> None:
+    from ..output.json_text import json_text     # with numpy, which is loaded beside other things
+
+    tell(json_text(values))
 
 
 class JsonLog(logging.Handler):

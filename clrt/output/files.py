@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import OutputError
+from ..file_names import utf8_path
 from ..file_mode import keep_mode
 
 #: Seconds after each attempt to replace a file that another program has open.
@@ -61,7 +62,8 @@ def replacing(path: Path) -> Iterator[Path]:
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".clrt-{os.urandom(8).hex()}{path.suffix.lower()}")
     try:
-        yield temporary
+        with utf8_path(target.parent) as folder:
+            yield folder / temporary.name
         _check_kind(target)
         keep_mode(target, temporary)
         _move(temporary, target)
