@@ -6,10 +6,10 @@ import os
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import OutputError
+from ..errors import KeptBesideError, OutputError
 from ..file_names import utf8_path
 from ..file_mode import keep_mode
 
@@ -71,7 +71,8 @@ def replacing(path: Path) -> Iterator[Path]:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); "
                           "free some space there or choose another path") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):     # it was moved, or its folder is gone or read-only by now
+            temporary.unlink()
 
 
 def _move(new: Path, target: Path) -> None:
@@ -86,5 +87,5 @@ def _move(new: Path, target: Path) -> None:
             time.sleep(pause)
     kept = target.with_name(f"{target.stem}-{os.urandom(4).hex()}{target.suffix}")
     os.replace(new, kept)
-    raise OutputError(f"{target}: cannot be replaced ({problem.strerror}); is it open in another program, or "
-                      f"read-only? The new file is {kept.name} beside it") from problem
+    raise KeptBesideError(f"{target}: cannot be replaced ({problem.strerror}); is it open in another program, or "
+                          f"read-only? The new file is {kept.name} beside it") from problem

@@ -17,6 +17,7 @@ from ..scene.pictures import read_picture
 from .files import check_target, replacing
 from .layers import Pictures, drawn, files_beside, layered
 from .view import check_view, to_display
+from .whole import check_whole
 
 FloatArray = NDArray[np.float32]
 
@@ -142,3 +143,4 @@ def _write_file(path: Path, samples: NDArray[Any], attributes: Mapping[str, str 
     complaint = (output or oiio).geterror()
     if complaint or not done:
         raise OSError(complaint.splitlines()[0] if complaint else "the writer gave no reason")
+    check_whole(path)
