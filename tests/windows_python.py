@@ -29,8 +29,6 @@ import OpenImageIO  # noqa: F401
 import platformdirs  # noqa: F401
 import pydantic  # noqa: F401
 import pyopencl.array  # noqa: F401
-import rich.console  # noqa: F401
-import rich.progress  # noqa: F401
 
 #: Of those that the standard library documents as available on Unix alone; subprocess needs some others here.
 LACKS = {

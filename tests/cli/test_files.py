@@ -1,4 +1,4 @@
-"""What the command line never writes over: devices, pipes but for images, its inputs, its other outputs, and others' files."""
+"""What the command line never writes over: devices, its inputs, other outputs, others' files; pipes but for images."""
 
 from __future__ import annotations
 
