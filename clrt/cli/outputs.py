@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import KeptBesideError, OutputError, UsageError
+from ..errors import OutputError, UsageError
 from . import STARTED
-from .fallback import write_elsewhere
+from .fallback import kept_elsewhere
 from .pipes import STDOUT, Pipe
 
 if TYPE_CHECKING:
@@ -171,7 +171,7 @@ class Outputs:
         try:
             write(path)
         except OutputError as error:
-            self._fail(error, path, write)
+            self._errors.append(kept_elsewhere(error, path, write))
             return False
         if tell:
             self._tell(path)
@@ -181,13 +181,7 @@ class Outputs:
         try:
             pipe.write(write)
         except OutputError as error:
-            self._fail(error, Path(f"image{pipe.suffix}"), write)
-
-    def _fail(self, error: OutputError, path: Path, write: Callable[[Path], object]) -> None:
-        """Notes an error, and writes what was to be at `path` elsewhere, unless it is beside it already."""
-        if not isinstance(error, KeptBesideError) and (kept := write_elsewhere(path, write)):
-            error = OutputError(f"{error}; it was written to {kept}")
-        self._errors.append(error)
+            self._errors.append(kept_elsewhere(error, Path(f"image{pipe.suffix}"), write))
 
     def _tell(self, path: Path) -> None:
         """Prints where a result is, unless standard output has the picture."""

@@ -32,9 +32,9 @@ def check_target(path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Makes a folder, unless it is there; raises OutputError."""
+    """Makes a folder and those that it is in, unless they are there; raises OutputError."""
     try:
-        path.mkdir(exist_ok=True)
+        path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{path}: cannot be made ({error.strerror}); choose another path") from error
 
@@ -47,7 +47,7 @@ def _check_kind(path: Path) -> None:
 def check_unprotected(path: Path, force: bool) -> None:
     """Raise OutputError where there is a read-only file at `path`, unless `force`; its mode decides, also for root."""
     if not force and path.is_file() and not path.stat().st_mode & 0o222:
-        raise OutputError(f"{path}: is read-only; name another file, or replace it with --force")
+        raise OutputError(f"{path}: is read-only; name another file, make it writable, or replace it with --force")
 
 
 @contextmanager
