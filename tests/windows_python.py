@@ -1,6 +1,6 @@
 """`clrt ARGUMENTS` as Windows' Python would meet its own modules: what os, signal and mmap lack there is taken away
-once all libraries are loaded, ctypes cannot load the process itself, and text that is opened without an encoding is an
-error. A simulation: drivers, paths and processes stay.
+once all libraries are loaded, Ctrl-Break has its signal, ctypes cannot load the process itself, and text that is opened
+without an encoding is an error. A simulation: drivers, paths and processes stay.
 
 usage: python -X warn_default_encoding -m tests.windows_python ARGUMENTS
 """
@@ -41,7 +41,8 @@ MODULES = ("fcntl", "grp", "pwd", "resource", "termios")
 
 
 def take_away() -> None:
-    """What is not there on Windows."""
+    """What is not there on Windows; Ctrl-Break's signal, which is there alone, is SIGUSR2."""
+    setattr(signal, "SIGBREAK", signal.SIGUSR2)
     for module, names in LACKS.items():
         for name in names.split():
             if hasattr(module, name):
