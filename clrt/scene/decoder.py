@@ -37,13 +37,17 @@ def decode(kind: str, source: Path | bytes, suffix: str = "") -> tuple[Arrays, d
 
     kind: a function of scene.decoding. Raises SceneError with its message, or with how the process ended.
     """
-    if isinstance(source, Path):
-        with utf8_path(source.absolute()) as path:
-            return _decoded(kind, path)
-    with tempfile.TemporaryDirectory(prefix="clrt-") as folder:
-        file = Path(folder) / f"embedded{suffix}"
-        file.write_bytes(source)
-        return decode(kind, file)
+    try:
+        if isinstance(source, Path):
+            with utf8_path(source.absolute()) as path:
+                return _decoded(kind, path)
+        with tempfile.TemporaryDirectory(prefix="clrt-") as folder:
+            file = Path(folder) / f"embedded{suffix}"
+            file.write_bytes(source)
+            return decode(kind, file)
+    except OSError as error:
+        raise SceneError("the system refuses its decoder a process or a temporary file "
+                         f"({error.strerror or error})") from error
 
 
 def _decoded(kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
