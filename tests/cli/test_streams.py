@@ -60,7 +60,7 @@ def test_results_that_cannot_be_printed(folder: Path, arguments: str) -> None:
 @pytest.mark.parametrize("arguments", ["devices", "info ball.toml", "doctor", "cache", "render ball.toml -q",
                                        "debug ball.toml --pixel 1,1"])
 def test_no_file_can_be_written(folder: Path, arguments: str) -> None:
-    """Nor a temporary one: an error that says so, of the loader or of the drivers that are left out, if one is needed."""
+    """Nor a temporary one: one error where one is needed, of the loader, or for want of a driver."""
     (folder / "limited.sh").write_text(f"ulimit -f 0\nexec {sys.executable} -m clrt {arguments}\n")
     result = subprocess.run(["bash", "limited.sh"], cwd=folder, capture_output=True, text=True)
     assert result.returncode in {0, 4} and "Traceback" not in result.stderr
