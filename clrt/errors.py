@@ -9,6 +9,7 @@
     │   └── HungError    it does not answer any more                  exit code 4
     ├── KernelError   the device's compiler refused the program       exit code 5
     └── OutputError   a picture or report could not be written        exit code 6
+        └── KeptBesideError  it is beside the file to be replaced     exit code 6
 
 Everything public raises only these for users' mistakes; any other exception is a defect of clrt.
 """
@@ -70,6 +71,10 @@ class OutputError(ClrtError):
     """A result cannot be written."""
 
     exit_code = 6
+
+
+class KeptBesideError(OutputError):
+    """A result cannot replace a file, and is beside it under another name."""
 
 
 def check_choice(name: str, value: object, known: Iterable[object]) -> None:

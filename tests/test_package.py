@@ -35,7 +35,7 @@ def test_version_is_the_package_s() -> None:
     assert clrt.__version__ == setup["metadata"]["version"]
 
 
-HEAVY = "print(*sorted({'numpy', 'pyopencl', 'pydantic', 'trimesh', 'rich'} & set(sys.modules)))"
+HEAVY = "print(*sorted({'numpy', 'pyopencl', 'pydantic', 'trimesh'} & set(sys.modules)))"
 
 
 def test_import_loads_nothing_heavy() -> None:

@@ -1,6 +1,6 @@
 """`clrt ARGUMENTS` as Windows' Python would meet its own modules: what os, signal and mmap lack there is taken away
-once all libraries are loaded, ctypes cannot load the process itself, and text that is opened without an encoding is an
-error. A simulation: drivers, paths and processes stay.
+once all libraries are loaded, Ctrl-Break has its signal, ctypes cannot load the process itself, and text that is opened
+without an encoding is an error. A simulation: drivers, paths and processes stay.
 
 usage: python -X warn_default_encoding -m tests.windows_python ARGUMENTS
 """
@@ -29,8 +29,6 @@ import OpenImageIO  # noqa: F401
 import platformdirs  # noqa: F401
 import pydantic  # noqa: F401
 import pyopencl.array  # noqa: F401
-import rich.console  # noqa: F401
-import rich.progress  # noqa: F401
 
 #: Of those that the standard library documents as available on Unix alone; subprocess needs some others here.
 LACKS = {
@@ -43,7 +41,8 @@ MODULES = ("fcntl", "grp", "pwd", "resource", "termios")
 
 
 def take_away() -> None:
-    """What is not there on Windows."""
+    """What is not there on Windows; Ctrl-Break's signal, which is there alone, is SIGUSR2."""
+    setattr(signal, "SIGBREAK", signal.SIGUSR2)
     for module, names in LACKS.items():
         for name in names.split():
             if hasattr(module, name):

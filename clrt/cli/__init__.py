@@ -14,7 +14,7 @@ import click
 
 from ..errors import ClrtError, DeviceError, KernelError, OutputError
 from .options import Group
-from .streams import open_missing, patient_stdout, stdout_problem, tell
+from .streams import open_missing, patient_stdout, show_names, stdout_problem, tell
 
 STARTED = time.perf_counter()
 #: What commands find as their context's object where they have the process to themselves.
@@ -50,6 +50,7 @@ def main(arguments: list[str] | None = None) -> None:
     # Python looks for garbage after every 700 new objects, a tenth of the time until all modules are there.
     gc.set_threshold(OBJECTS)
     open_missing()
+    show_names()
     stdout = patient_stdout()
     code = _run(arguments)
     if problem := stdout_problem(stdout):
@@ -65,7 +66,7 @@ def _run(arguments: list[str] | None) -> str | int | None:
     except click.exceptions.Exit as stop:
         return stop.exit_code
     except click.ClickException as error:
-        error.show()
+        error.show(sys.stderr)
         return 2
     except ClrtError as error:
         if isinstance(error, DeviceError | KernelError):

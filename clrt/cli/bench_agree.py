@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from .bench_files import figures_options, write_figures
 from .options import Size
 
 
@@ -19,7 +20,7 @@ from .options import Size
 @click.option("--spp", type=click.IntRange(min=1), default=64, show_default=True, help="Samples a pixel of a picture.")
 @click.option("--seeds", type=click.IntRange(min=2), default=16, show_default=True, help="Pictures of each renderer.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 def agree_command(scenes: tuple[Path, ...], size: tuple[int, int] | None, depth: int | None, spp: int, seeds: int,
                   device: str | None, json_file: Path | None) -> None:
     """Whether clrt and Mitsuba (pip install mitsuba) draw the same pictures of each SCENE.
@@ -27,13 +28,9 @@ def agree_command(scenes: tuple[Path, ...], size: tuple[int, int] | None, depth:
     Each block of 16 x 16 pixels is compared by the spread of its means over the seeds. Exit code 1 where one differs
     by more than chance, or the mean of a picture by more than 0.5 %.
     """
-    from ..output.files import check_target
-    from ..output.report import write_report
     from ..scene.file import load
     from ..study.agreement import agreement
 
-    if json_file is not None:
-        check_target(json_file)
     results = []
     for number, path in enumerate(scenes):
         scene = load(path)
@@ -43,9 +40,7 @@ def agree_command(scenes: tuple[Path, ...], size: tuple[int, int] | None, depth:
         for line in ([] if number else HEAD) + [_line(result)]:
             click.echo(line)
         results.append(result)
-    if json_file is not None:
-        write_report(json_file, {"scenes": results})
-        click.echo(str(json_file))
+    write_figures(json_file, {"scenes": results})
     if not all(result["agree"] for result in results):
         raise SystemExit(1)
 

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from .bench_files import figures_options, write_figures
+
 
 @click.command("blender")
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
@@ -16,7 +18,7 @@ import click
 @click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
               help="Write clrt's image and Cycles', side by side, there as PNG.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 def blender_command(scenes: tuple[str, ...], materials: tuple[str, ...], spp: int, seeds: int, pictures: Path | None,
                     device: str | None, json_file: Path | None) -> None:
     """Build scenes in Blender (pip install bpy), export them as glTF, and compare clrt's images with Cycles'.
@@ -25,14 +27,10 @@ def blender_command(scenes: tuple[str, ...], materials: tuple[str, ...], spp: in
     are mean radiances of the floor, Suzanne, the ball and the cube in clrt over those in Cycles, with their standard
     errors.
     """
-    from ..output.files import check_target
     from ..output.image import save_side_by_side
-    from ..output.report import write_report
     from ..study.blender import judge
     from ..study.blender_scenes import COLORS
 
-    if json_file is not None:
-        check_target(json_file)
     rows = []
     found = judge(scenes, materials, spp, seeds, device)
     click.echo(f"{'scene':11}{'material':9}" + "".join(f"{name:>15}" for name in COLORS))
@@ -43,6 +41,4 @@ def blender_command(scenes: tuple[str, ...], materials: tuple[str, ...], spp: in
                      "errors": judged.errors})
         if pictures is not None:
             save_side_by_side(pictures / f"{judged.scene}_{judged.material}.png", judged.images.values())
-    if json_file is not None:
-        write_report(json_file, {"spp": spp, "seeds": seeds, "rows": rows})
-        click.echo(str(json_file))
+    write_figures(json_file, {"spp": spp, "seeds": seeds, "rows": rows})

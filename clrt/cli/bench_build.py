@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from .bench_files import figures_options, write_figures
 from .tables import race_legend, race_table
 
 
@@ -15,7 +16,7 @@ from .tables import race_legend, race_table
 @click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE", help="A model file; default: a bumpy ball.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
 @click.option("--quick", is_flag=True, help="Up to 16 thousand triangles instead of 10 million.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 def build_command(mesh: Path | None, device: str | None, quick: bool, json_file: Path | None) -> None:
     """Trees over 10 thousand to 10 million triangles: the mesh in a closed room, simplified or subdivided.
 
@@ -23,22 +24,16 @@ def build_command(mesh: Path | None, device: str | None, quick: bool, json_file:
     a second by size, with the line a + b·log2(triangles) that fits the time of a ray; then what a new process takes
     from arrays to first answers.
     """
-    from ..output.files import check_target
-    from ..output.report import write_report
     from ..study.build import measure_build
     from ..study.rays import load_triangles
     from ..study.workloads import bumpy_ball
 
-    if json_file is not None:
-        check_target(json_file)
     figures: dict[str, Any] = {"mesh": mesh, "sizes": []}
     lines = {"size": _builder_lines, "rays": _ray_lines, "fresh": _fresh_lines}
     for part, result in measure_build(*(load_triangles(mesh) if mesh else bumpy_ball()), quick=quick, device=device):
         click.echo("\n".join(lines[part](result)) + "\n")
         figures |= {"sizes": figures["sizes"] + [result]} if part == "size" else {part: result}
-    if json_file is not None:
-        write_report(json_file, figures)
-        click.echo(str(json_file))
+    write_figures(json_file, figures)
 
 
 def _builder_lines(result: Mapping[str, Any]) -> list[str]:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from .bench_files import figures_options, write_figures
+
 if TYPE_CHECKING:
     from ..study.combinations import Verdict
 
@@ -31,7 +33,7 @@ LEGEND = """  rounds: suspicious scenes, rendered again with fresh seeds and mor
               help="Save the scenes that violate a property there, as scene files.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
 @click.option("--quick", is_flag=True, help="Test few scenes.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 def combinations_command(names: tuple[str, ...], scenes: int | None, first: int, seed: int, keep: Path | None,
                          device: str | None, quick: bool, json_file: Path | None) -> None:
     """Test identities that hold for all pictures over random scenes.
@@ -45,12 +47,8 @@ def combinations_command(names: tuple[str, ...], scenes: int | None, first: int,
     property significantly.
     """
     from ..device.open import open_device
-    from ..output.files import check_target
-    from ..output.report import write_report
     from ..study.combinations import keep_scenes, verdicts
 
-    if json_file is not None:
-        check_target(json_file)
     count = scenes or (4 if quick else 500)
     opened, chosen = open_device(device), names or PROPERTIES
     click.echo(f"device {opened.info.index}: {opened.info.name}; seed {seed}, scenes {first} to {first + count - 1}")
@@ -68,10 +66,8 @@ def combinations_command(names: tuple[str, ...], scenes: int | None, first: int,
         results += found
     click.echo(LEGEND)
     off = [each.is_off(count * len(chosen)) for each in results]
-    if json_file is not None:
-        write_report(json_file, {"seed": seed, "first": first, "scenes": count, "verdicts": [
-            asdict(each) | {"off": wrong} for each, wrong in zip(results, off)]})
-        click.echo(str(json_file))
+    write_figures(json_file, {"seed": seed, "first": first, "scenes": count, "verdicts": [
+        asdict(each) | {"off": wrong} for each, wrong in zip(results, off)]})
     if any(off):
         raise SystemExit(1)
 

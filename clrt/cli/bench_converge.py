@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .bench_files import figures_options, write_figures
 from .options import Size
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ INTEGRATORS = ["path", "direct", "local", "raster"]
 @click.option("--reference-spp", type=click.IntRange(min=2),
               help="Samples a pixel of the reference; default: 4096, with --quick 256.")
 @click.option("--quick", is_flag=True, help="Fewer seeds and a rougher reference.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
 def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrators: tuple[Integrator, ...], peers: bool,
                      selectors: tuple[str, ...], size: tuple[int, int] | None, json_file: Path | None,
@@ -50,9 +51,6 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
     clrt estimates is the true one, and whether a contestant is biased (ask for many seeds of one number of samples).
     """
     from ..device.discover import choose
-    from ..output.files import check_target
-    from ..output.plots import check_plot
-    from ..output.report import write_report
     from ..scene.file import load
     from ..study.calibration import calibrations
     from ..study.contestants import CHOICES, MORE_CHOICES
@@ -60,10 +58,6 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
     from ..study.plots import plot_convergence
     from .converge_tables import calibration_lines, scene_lines
 
-    if json_file is not None:
-        check_target(json_file)
-    if plot is not None:
-        check_plot(plot)
     devices = [choose(selector)[0] for selector in selectors or (None,)]
     named = [f"device {device.index}: {device.name} ({device.platform}, {device.driver})" for device in devices]
     click.echo("\n".join(named))
@@ -83,11 +77,9 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
     told = calibrations(results)
     for line in calibration_lines(told):
         click.echo(line)
+    write_figures(json_file, {"quick": asked["quick"], "scenes": results, "calibration": told})
     if plot is not None:
         click.echo(str(plot_convergence(plot, results, named)))
-    if json_file is not None:
-        write_report(json_file, {"quick": asked["quick"], "scenes": results, "calibration": told})
-        click.echo(str(json_file))
 
 
 def _effort(quick: bool, seconds: float | None, spp: tuple[int, ...], seeds: int | None,

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from .bench_files import figures_options, write_figures
 from .options import Size
 
 TRIALS = ("equality", "animation", "kills", "overhead", "huge")
@@ -26,16 +27,18 @@ SCENES = Path(__file__).parents[2] / "scenes"
 @click.option("--out", type=click.Path(path_type=Path), default="huge.exr", show_default=True, metavar="FILE",
               help="Of huge: where the picture is written.")
 @click.option("--quick", is_flag=True, help="Small pictures, and less of everything.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 def farm_command(trials: tuple[str, ...], scenes: tuple[Path, ...], spp: int | None, every: float, workers: int,
                  seconds: float, size: tuple[int, int], out: Path, quick: bool, json_file: Path | None) -> None:
     """Trials of a farm on this machine: is its picture that of one process to the last bit, also where workers are
     killed; how far are 64 workers from 64 times one; and what memory does a client take for a picture of 16k x 16k."""
     from ..farm import trials as trial
-    from ..output.report import write_report
+    from ..output.images import check_writable
     from ..scene.file import load
     from ..scene.model import Scene
 
+    if "huge" in (trials or TRIALS):
+        check_writable(out)
     paths = scenes or tuple(SCENES / f"{name}.toml" for name in ("cornell", "glass", "materials"))
 
     def picture(number: int) -> Scene:
@@ -64,6 +67,4 @@ def farm_command(trials: tuple[str, ...], scenes: tuple[Path, ...], spp: int | N
                 told(trial.overhead(picture(0), 8 if quick else workers, 10 if quick else seconds))
             case _:
                 told(trial.huge(picture(0), (2048, 4608) if quick else size, spp or 1, 2, out))
-    if json_file is not None:
-        write_report(json_file, {"trials": rows})
-        click.echo(str(json_file))
+    write_figures(json_file, {"trials": rows})

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from .bench_files import figures_options, write_figures
+
 
 @click.command("floor")
 @click.option("--light", "chosen", multiple=True, metavar="NAME",
@@ -15,7 +17,7 @@ import click
 @click.option("--spp", type=click.IntRange(min=1), default=1024, show_default=True, help="Samples per pixel.")
 @click.option("--seeds", type=click.IntRange(min=2), default=4, show_default=True, help="Images of each renderer.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 def floor_command(chosen: tuple[str, ...], spp: int, seeds: int, device: str | None, json_file: Path | None) -> None:
     """What a white plastic floor reflects under a sun, a point, an HDRI with a low sun and a low lamp.
 
@@ -24,13 +26,9 @@ def floor_command(chosen: tuple[str, ...], spp: int, seeds: int, device: str | N
     BSDF (pip install bpy). 1 is what a white Lambertian floor reflects.
     """
     from ..errors import UsageError
-    from ..output.files import check_target
-    from ..output.report import write_report
     from ..study.floor import judges, lights, measure_floor
     from ..study.floor_model import MODELS
 
-    if json_file is not None:
-        check_target(json_file)
     if unknown := [name for name in chosen if name not in lights()]:
         raise UsageError(f"--light {unknown[0]}: is none of {', '.join(lights())}")
     found, missing = judges(device)
@@ -42,9 +40,7 @@ def floor_command(chosen: tuple[str, ...], spp: int, seeds: int, device: str | N
         rows.append(row)
     for name, why in missing.items():
         click.echo(f"  {name}: {why}")
-    if json_file is not None:
-        write_report(json_file, {"spp": spp, "seeds": seeds, "missing": missing, "rows": rows})
-        click.echo(str(json_file))
+    write_figures(json_file, {"spp": spp, "seeds": seeds, "missing": missing, "rows": rows})
 
 
 def _line(row: Mapping[str, Any], columns: list[str]) -> str:

@@ -8,11 +8,13 @@ from typing import Any
 
 import click
 
+from .bench_files import figures_options, write_figures
+
 
 @click.command("hits")
 @click.option("--device", metavar="SEL", help="See `clrt devices`; default: all of them.")
 @click.option("--quick", is_flag=True, help="Smaller meshes and fewer rays.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 def hits_command(device: str | None, quick: bool, json_file: Path | None) -> None:
     """The same rays through every tree, builder and device: how many answers are not the same bits.
 
@@ -20,12 +22,8 @@ def hits_command(device: str | None, quick: bool, json_file: Path | None) -> Non
     answers are wrong by float64.
     """
     from ..device.discover import choose, devices
-    from ..output.files import check_target
-    from ..output.report import write_report
     from ..study.hits import measure_hits
 
-    if json_file is not None:
-        check_target(json_file)
     only = None if device is None else choose(device)[0].index
     found, results = [each for each in devices() if each["usable"] and only in (None, each["index"])], []
     for each in found:
@@ -34,9 +32,7 @@ def hits_command(device: str | None, quick: bool, json_file: Path | None) -> Non
     for result in measure_hits(quick=quick, device=device):
         click.echo("\n" + "\n".join(_lines(result)))
         results.append(result)
-    if json_file is not None:
-        write_report(json_file, {"devices": found, "meshes": results})
-        click.echo(str(json_file))
+    write_figures(json_file, {"devices": found, "meshes": results})
 
 
 def _lines(result: Mapping[str, Any]) -> list[str]:

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from .bench_files import figures_options, write_figures
+
 
 @click.command("mitsuba-data")
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
@@ -17,7 +19,7 @@ import click
 @click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
               help="Write clrt's picture, the reference, and the difference of the two times 4 there, as PNG.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 def mitsuba_data_command(folder: Path, scenes: tuple[str, ...], samples: int, pictures: Path | None,
                          device: str | None, json_file: Path | None) -> None:
     """Render the test scenes in DIR, a checkout of github.com/mitsuba-renderer/mitsuba-data, and test them against
@@ -26,12 +28,8 @@ def mitsuba_data_command(folder: Path, scenes: tuple[str, ...], samples: int, pi
     Scenes that clrt cannot express are listed with what is missing. Exit code 1 where one fails.
     """
     from ..errors import UsageError
-    from ..output.files import check_target
-    from ..output.report import write_report
     from ..study.mitsuba_data import cases, judge
 
-    if json_file is not None:
-        check_target(json_file)
     chosen = [case for case in cases(folder) if not scenes or any(text in case.name for text in scenes)]
     if not chosen:
         raise UsageError(f"--scene {scenes[0]}: is in no scene's name; leave it out to see all")
@@ -45,9 +43,7 @@ def mitsuba_data_command(folder: Path, scenes: tuple[str, ...], samples: int, pi
             _write_pictures(pictures / f"{judged.row['scene'].replace('/', '.')}.png", judged.ours, judged.theirs)
     results = [row["result"] for row in rows]
     click.echo("  " + ", ".join(f"{results.count(word)} {word}" for word in dict.fromkeys(results)))
-    if json_file is not None:
-        write_report(json_file, {"scenes": rows})
-        click.echo(str(json_file))
+    write_figures(json_file, {"scenes": rows})
     if {"failed", "not read"} & {*results}:
         raise SystemExit(1)
 

@@ -9,11 +9,13 @@ from typing import Any
 
 import click
 
+from .bench_files import figures_options, write_figures
+
 
 @click.command("numerics")
 @click.option("--device", metavar="SEL", help="See `clrt devices`; default: all but simulators.")
 @click.option("--quick", is_flag=True, help="Seconds instead of many minutes.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against speed there.")
 def numerics_command(device: str | None, quick: bool, json_file: Path | None, plot: Path | None) -> None:
     """Numerical stability: errors beside speeds.
@@ -24,17 +26,10 @@ def numerics_command(device: str | None, quick: bool, json_file: Path | None, pl
     wrong, where 0 is asked of all but M1.
     """
     from ..device.discover import devices
-    from ..output.files import check_target
-    from ..output.plots import check_plot
-    from ..output.report import write_report
     from ..study.families import measure_families
     from ..study.numerics import chosen_devices, measure_device, measure_together
     from ..study.plots import plot_families
 
-    if json_file is not None:
-        check_target(json_file)
-    if plot is not None:
-        check_plot(plot)
     chosen, known = chosen_devices(device), devices()
     results: list[dict[str, Any]] = []
     for index in chosen:
@@ -49,11 +44,9 @@ def numerics_command(device: str | None, quick: bool, json_file: Path | None, pl
     together = [_echo(row) for row in measure_together(chosen, quick=quick)]
     wrong = sum(row["wrong"] for result in results for row in result["rows"])
     click.echo(f"wrong in all: {wrong + sum(row['wrong'] for row in together if row['case'] != 'M1')}")
+    write_figures(json_file, {"quick": quick, "devices": results, "together": together})
     if plot is not None:
         click.echo(str(plot_families(plot, results)))
-    if json_file is not None:
-        write_report(json_file, {"quick": quick, "devices": results, "together": together})
-        click.echo(str(json_file))
 
 
 def _family(name: str, tests: Mapping[str, Mapping[str, Any]]) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from .bench_files import figures_options, write_figures
 from .tables import race_legend, race_table
 
 
@@ -15,28 +16,22 @@ from .tables import race_legend, race_table
 @click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE", help="A model file; default: a bumpy ball.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
 @click.option("--quick", is_flag=True, help="One scene and fewer rays.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 def peers_command(mesh: Path | None, device: str | None, quick: bool, json_file: Path | None) -> None:
     """The same rays through clrt and other libraries, in turns.
 
     Embree, inside pip's embreex, is called from C on all processors: singly or in packets of 8, in fast and in robust
     mode, without and with its flag for coherent rays. Python libraries are measured by whole calls.
     """
-    from ..output.files import check_target
-    from ..output.report import write_report
     from ..study.peers import measure_peers, versions
     from ..study.rays import load_triangles
     from ..study.workloads import bumpy_ball
 
-    if json_file is not None:
-        check_target(json_file)
     results = []
     for result in measure_peers(*(load_triangles(mesh) if mesh else bumpy_ball()), quick=quick, device=device):
         click.echo("\n".join(_lines(result)) + "\n")
         results.append(result)
-    if json_file is not None:
-        write_report(json_file, {"mesh": mesh, "versions": versions(), "scenes": results})
-        click.echo(str(json_file))
+    write_figures(json_file, {"mesh": mesh, "versions": versions(), "scenes": results})
 
 
 def _lines(result: Mapping[str, Any]) -> list[str]:

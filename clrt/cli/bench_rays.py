@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from .bench_files import figures_options, write_figures
 from .options import box_option, triangle_option
 
 
@@ -22,23 +23,19 @@ from .options import box_option, triangle_option
 @box_option
 @click.option("--builder", type=click.Choice(["ploc", "reinsertion", "sah", "midpoint"]), help="Tree builder.")
 @click.option("--quick", is_flag=True, help="Fewer rays, and a smaller ball.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 def rays_command(mesh: Path | None, rays: Path | None, quick: bool, json_file: Path | None, **options: Any) -> None:
     """Rays a second through a mesh, in kernels alone and in whole calls from Python.
 
     With --rays, those of the file: for their closest hits and for any hit. Without, from a camera, on from their hits
     and to two lights, by every tree layout in turns.
     """
-    from ..output.files import check_target
-    from ..output.report import write_report
     from ..study.layouts import measure_layouts
     from ..study.rays import load_rays, load_triangles, measure_rays
     from ..study.workloads import bumpy_ball
 
     if rays is not None and mesh is None:
         raise click.UsageError("--rays needs the mesh that they are for: add --mesh FILE")
-    if json_file is not None:
-        check_target(json_file)
     triangles = load_triangles(mesh) if mesh else bumpy_ball(5 if quick else 7)
     if rays is not None:
         result = measure_rays(*triangles, load_rays(rays), repeats=3 if quick else 7, **options)
@@ -48,9 +45,7 @@ def rays_command(mesh: Path | None, rays: Path | None, quick: bool, json_file: P
         result = measure_layouts(*triangles, quick=quick, **options)
         lines = _lines(result)
     click.echo("\n".join(lines))
-    if json_file is not None:
-        write_report(json_file, result)
-        click.echo(str(json_file))
+    write_figures(json_file, result)
 
 
 def _lines(result: Mapping[str, Any]) -> list[str]:

@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from .bench_files import figures_options, write_figures
+
 
 @click.command("render-fidelity")
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
@@ -20,7 +22,7 @@ import click
 @click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
               help="Write clrt's picture and the others', side by side, there as PNG.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: int | None, spp: int, denoise: bool,
                             pictures: Path | None, device: str | None, json_file: Path | None) -> None:
     """Render the glTF models in DIR, a checkout of github.com/KhronosGroup/glTF-Render-Fidelity with its submodules,
@@ -30,14 +32,10 @@ def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: in
     5 % of theirs, of the whole and by material. Those whose files are missing are listed.
     """
     from ..errors import UsageError
-    from ..output.files import check_target
     from ..output.image import save_side_by_side
-    from ..output.report import write_report
     from ..study.fidelity_suite import scenarios
     from ..study.render_fidelity import judge
 
-    if json_file is not None:
-        check_target(json_file)
     chosen = [each for each in scenarios(folder) if not scenarios_ or any(text in each.name for text in scenarios_)]
     if not chosen:
         raise UsageError(f"--scenario {scenarios_[0]}: is in no scenario's name; leave it out to see all")
@@ -50,9 +48,7 @@ def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: in
             save_side_by_side(pictures / f"{judged.row['scenario']}.png", judged.images.values())
     results = [row["result"] for row in rows]
     click.echo("  " + ", ".join(f"{results.count(word)} {word}" for word in dict.fromkeys(results)))
-    if json_file is not None:
-        write_report(json_file, {"width": width, "spp": spp, "denoise": denoise, "scenarios": rows})
-        click.echo(str(json_file))
+    write_figures(json_file, {"width": width, "spp": spp, "denoise": denoise, "scenarios": rows})
 
 
 def _line(row: Mapping[str, Any]) -> str:

@@ -9,6 +9,8 @@ from typing import Any
 
 import click
 
+from .bench_files import figures_options, write_figures
+
 
 @click.command("theses")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
@@ -16,7 +18,7 @@ import click
 @click.option("--dragon", type=click.Path(path_type=Path), metavar="FILE", help="A model for the generated dragon.")
 @click.option("--tree", type=click.Path(path_type=Path), metavar="FILE", help="A model for the generated tree.")
 @click.option("--statue", type=click.Path(path_type=Path), metavar="FILE", help="A model for the generated statue.")
-@click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE", help="Write the figures there.")
+@figures_options
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw them there.")
 def theses_command(device: str | None, quick: bool, json_file: Path | None, plot: Path | None,
                    **models: Path | None) -> None:
@@ -25,16 +27,9 @@ def theses_command(device: str | None, quick: bool, json_file: Path | None, plot
     The scenes are like those of the theses (docs/theses.md), whose own figures stand beside, from other machines: what
     can be compared is the ratios.
     """
-    from ..output.files import check_target
-    from ..output.plots import check_plot
-    from ..output.report import write_report
     from ..study.plots import plot_theses
     from ..study.theses import QUICK, Effort, Models, measure_theses
 
-    if json_file is not None:
-        check_target(json_file)
-    if plot is not None:
-        check_plot(plot)
     results = []
     for result in measure_theses(QUICK if quick else Effort(), Models(**models), device=device,
                                  say=partial(click.echo, err=True)):
@@ -42,11 +37,9 @@ def theses_command(device: str | None, quick: bool, json_file: Path | None, plot
         results.append(result)
     click.echo("theirs: on another machine, in the scene and at the size of the title"
                "\nof 1/16: measured in a picture of so many times fewer pixels, and scaled")
+    write_figures(json_file, {"quick": quick, "models": models, "experiments": results})
     if plot is not None:
         click.echo(str(plot_theses(plot, results)))
-    if json_file is not None:
-        write_report(json_file, {"quick": quick, "models": models, "experiments": results})
-        click.echo(str(json_file))
 
 
 def _lines(result: Mapping[str, Any]) -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
@@ -15,10 +14,11 @@ import click
 def command(image: Path, reference: Path, as_json: bool) -> None:
     """Compare IMAGE with REFERENCE: relMSE, RMSE, ratio of the means, FLIP, largest difference, non-finite values."""
     from ..output.compare import compare_files
+    from ..output.json_text import json_text
 
     result = compare_files(image, reference)
     if as_json:
-        click.echo(json.dumps(result))
+        click.echo(json_text(result))
         return
     for name, value in result.items():
         numbers = value if isinstance(value, list) else [value]

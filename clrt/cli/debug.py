@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, replace
-from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +43,7 @@ def command(scene: Path, pixel: tuple[int, int], samples: int, device: str | Non
     from ..debug.trace import trace_pixel
     from ..debug.vertices import vertices
     from ..device.open import open_device
+    from ..output.json_text import json_text
     from ..scene.file import load
 
     content = load(scene, camera)
@@ -60,7 +59,7 @@ def command(scene: Path, pixel: tuple[int, int], samples: int, device: str | Non
                   "value": paths.value.tolist(), "dropped": settings.spp - int(paths.kept.sum()), "summary": found,
                   "samples": [{"sample": i, "value": value, "vertices": [asdict(each) for each in path]}
                               for i, value, path in listed]}
-        click.echo(json.dumps(_finite(answer)))
+        click.echo(json_text(answer))
         return
     for i, value, path in listed:
         click.echo("\n".join([*path_lines(i, value, path), ""]))
@@ -72,12 +71,3 @@ def _choices(triangle: str, box: str, sphere: str, **others: Any) -> Choices:
     from ..rendering.choices import Choices
 
     return Choices(tests=HitTests(triangle, box, sphere), **others)
-
-
-def _finite(value: Any) -> Any:
-    """The same with null for numbers that JSON has not."""
-    if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not isfinite(value) else value

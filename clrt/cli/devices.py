@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -36,6 +35,7 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     from ..device.discover import as_dict, find_devices, select
     from ..device.install_advice import no_device
     from ..device.preference import preferred_device
+    from ..output.json_text import json_text
 
     preference = preferred_device()
     before = [info for info, _ in find_devices(again=True)]
@@ -47,7 +47,7 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     found = [replace(info, check=verdicts.get(info.id, info.check)) for info, _ in find_devices(preference=preference)
              if not wanted or info.id in wanted]
     if as_json:
-        click.echo(json.dumps([as_dict(info) for info in found], indent=1))
+        click.echo(json_text([as_dict(info) for info in found], indent=1))
     else:
         click.echo("\n".join(line for info in found for line in _lines(info)), nl=bool(found))
     if not found:

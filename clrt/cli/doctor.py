@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,6 +28,7 @@ def command(as_json: bool, output: Path | None, force: bool) -> None:
     if output is not None and output.suffix.lower() not in FORMS:
         raise UsageError(f"{output}: a report is a {', '.join(FORMS)} file; name one of these")
     from ..device.diagnosis import diagnosis
+    from ..output.json_text import json_text
 
     if output is not None:
         from ..output.files import check_target, check_unprotected
@@ -36,11 +36,13 @@ def command(as_json: bool, output: Path | None, force: bool) -> None:
         check_target(output)
         check_unprotected(output, force)
     found = diagnosis()
+    found_json = json_text(found, indent=1)
     if output is not None:
-        _write(output, found)
+        texts = {"report.txt": as_text(found), "report.json": found_json + "\n"}
+        _write(output, texts | {f"last-{kind}.log": log for kind, log in found["logs"].items()})
         click.echo(str(output))
     else:
-        click.echo(json.dumps(found, indent=1) if as_json else as_text(found), nl=as_json)
+        click.echo(found_json if as_json else as_text(found), nl=as_json)
 
 
 def as_text(found: dict[str, Any]) -> str:
@@ -66,11 +68,9 @@ def _lines(value: Any, indent: str = "") -> Iterator[str]:
         yield from (f"{indent}{line}" for line in str(value).splitlines())
 
 
-def _write(path: Path, found: dict[str, Any]) -> None:
+def _write(path: Path, texts: dict[str, str]) -> None:
     from ..output.files import replacing
 
-    texts = {"report.txt": as_text(found), "report.json": json.dumps(found, indent=1) + "\n"}
-    texts |= {f"last-{kind}.log": log for kind, log in found["logs"].items()}
     with replacing(path) as temporary:
         if path.suffix.lower() == ".zip":
             with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as pack:

@@ -86,7 +86,7 @@ def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: G
     of_farm = ("checkpoint", "resume", "checkpoint_seconds", "aovs")
     chosen = {name: value for name, value in options.items() if name not in of_farm}
     banded = Banded(PictureOrder(scene, chosen, spp=goal.spp, error=goal.error),
-                    checkpoint or Path(f"{results.pictures[0]}.bands"))
+                    checkpoint or Path(f"{next(iter(results.pictures), 'image')}.bands"))
     interrupted: list[bool] = []
     with Interruptible(lambda: interrupted.append(True)):
         for done, count in banded.render(cluster, resume):

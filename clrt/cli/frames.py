@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ..errors import UsageError
+from ..errors import OutputError, UsageError
 from .outputs import Outputs
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 F = TypeVar("F", bound=Callable[..., Any])
 #: Fields of Outputs that say nothing of what is in a picture.
-FILES = {"inputs", "pictures", "report", "plot", "force", "header", "spool", "_errors"}
+FILES = {"inputs", "pictures", "report", "plot", "force", "header", "spool", "pipes", "_errors"}
 
 
 class Numbers(click.ParamType[str]):
@@ -123,9 +123,13 @@ class Sequence:
         """Writes the videos, and removes what was kept for them alone."""
         from ..output.video import write_video
 
+        pattern = next((path for path in self.outputs.pictures if path.suffix.lower() == ".png"), Path())
         for video in self.videos:
-            pattern = next(path for path in self.outputs.pictures if path.suffix.lower() == ".png")
-            click.echo(str(write_video(video, [numbered(pattern, number) for number in self._stills], self._fps)))
+            try:
+                write_video(video, [numbered(pattern, number) for number in self._stills], self._fps)
+            except OutputError as error:
+                raise OutputError(f"{error}; its frames are {pattern}, from which --resume makes it") from error
+            click.echo(str(video))
         if spool := self.outputs.spool:
             for number in self._stills:
                 numbered(spool, number).unlink(missing_ok=True)
@@ -137,6 +141,8 @@ def make_sequence(outputs: Outputs, frames: str | None, resume: bool, single: Ma
     """Of outputs as they were asked for, of which some may be videos; single: options for one picture alone."""
     from ..output.video import is_video
 
+    if outputs.pipes:
+        raise UsageError(f"-o {outputs.pipes[0].path}: takes one image, not many frames; name a file")
     for name, value in single.items():
         if value is not None:
             raise UsageError(f"--{name} is for one picture, not for many frames; leave it out")

@@ -97,4 +97,5 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
 
 
 def _say(problem: str, advice: Callable[[], str]) -> None:
-    print(f"error: {problem}{advice()}", file=sys.stderr, flush=True)
+    start = "\n" if sys.stderr.isatty() else ""     # there may be a line of progress
+    print(f"{start}error: {problem}{advice()}", file=sys.stderr, flush=True)

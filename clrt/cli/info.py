@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from math import prod
 from pathlib import Path
@@ -35,6 +34,7 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
         return
     if scene is None:
         raise click.UsageError("Missing argument 'SCENE'; write a scene file or a model, or --materials")
+    from ..output.json_text import json_text
     from ..rendering.aovs import chosen_aovs, seen_first
     from ..rendering.choices import choices_on
     from ..rendering.compile import compile_scene
@@ -74,7 +74,7 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
         program = first_hit_program(compiled, seen)[0]
         report["first_hit"] = {"aovs": " ".join(seen), "kernel_bytes": len(program.encode())}
     if as_json:
-        click.echo(json.dumps(report))
+        click.echo(json_text(report))
         return
     for name, value in report.items():
         if isinstance(value, dict):

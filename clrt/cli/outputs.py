@@ -13,6 +13,8 @@ import click
 
 from ..errors import OutputError, UsageError
 from . import STARTED
+from .fallback import kept_elsewhere
+from .pipes import STDOUT, Pipe
 
 if TYPE_CHECKING:
     from ..farm.bands import Banded
@@ -25,7 +27,8 @@ class Outputs:
     """inputs: the scene, and the reference if any; pictures: of the end result, with its aovs; denoise: whether
     the raw ones are kept beside them; view, exposure: of .png pictures; force: whether read-only files are replaced;
     header: what is written there beside the report; spool: one of the pictures that is there for a video only: it is
-    not told of, and nothing is kept beside it. One that cannot be written keeps no other from being written."""
+    not told of, and nothing is kept beside it; pipes: where else the picture goes, alone. One that cannot be written
+    keeps no other from being written, and is written elsewhere, where that is possible."""
 
     inputs: tuple[Path, ...]
     pictures: tuple[Path, ...]
@@ -38,6 +41,7 @@ class Outputs:
     force: bool = False
     header: dict[str, Any] = field(default_factory=dict)
     spool: Path | None = None
+    pipes: tuple[Pipe, ...] = ()
     _errors: list[OutputError] = field(default_factory=list)
 
     @property
@@ -67,10 +71,13 @@ class Outputs:
         from ..output.view import check_view
 
         check_view(self.view, self.exposure)
-        if self.aovs and all(picture.suffix.lower() == ".hdr" for picture in self._kept):
-            raise UsageError("an .hdr holds the picture alone, as a video does; for --aov name an .exr or .png, too, "
-                             "with -o")
+        if self.aovs and (all(picture.suffix.lower() == ".hdr" for picture in self._kept)
+                          and all(pipe.suffix != ".exr" for pipe in self.pipes)):
+            raise UsageError("an .hdr holds the picture alone, as a video does, or a .png in a pipe; for --aov name "
+                             "an .exr or .png file, too, with -o")
         self.check_apart((), checkpoint)
+        for pipe in self.pipes:
+            pipe.check()
         for picture in [*self._kept, *self.raws, *self.beside]:
             check_writable(picture)
         for other in (self.report, checkpoint):
@@ -106,25 +113,35 @@ class Outputs:
         """Writes the pictures, or the raw ones."""
         from ..output.layers import files_beside
 
-        if (spool := self.spool) is not None and not raw:
-            self._write(lambda: replace(image, aovs={}).save(spool, view=self.view, exposure=self.exposure), tell=False)
+        def save(path: Path, image: Image = image) -> None:
+            image.save(path, view=self.view, exposure=self.exposure)
+
+        alone = replace(image, aovs={})
+        if self.spool is not None and not raw:
+            self._write(self.spool, lambda path: save(path, alone), tell=False)
         for path in self.raws if raw else self._kept:
-            if self._write(lambda: image.save(path, view=self.view, exposure=self.exposure)):
+            if self._write(path, save):
                 for other in files_beside(path, image.aovs).values():
-                    click.echo(str(other))
+                    self._tell(other)
+        for pipe in () if raw else self.pipes:
+            self._write_pipe(pipe, lambda path: save(path, alone if path.suffix == ".png" else image))
 
     def save_rows(self, banded: Banded) -> None:
         """Writes pictures and report of a picture that is kept in bands; OutputError at the end."""
-        from ..output.report import write_report
+        from ..output.report import header_of, write_report
 
         told = {**banded.summary(), "total_seconds": time.perf_counter() - STARTED}
-        about = {f"clrt:{key}": str(value) for key, value in told.items() if isinstance(value, (str, int, float))}
+
+        def save(path: Path) -> None:
+            banded.save(path, self.view, self.exposure, header_of(told))
+
         for path in self.pictures:
-            self._write(lambda: banded.save(path, self.view, self.exposure, about))
-        if (report := self.report) is not None:
-            self._write(lambda: write_report(report, told))
-        if self._errors:
-            raise OutputError("; ".join(map(str, self._errors)))
+            self._write(path, save)
+        for pipe in self.pipes:
+            self._write_pipe(pipe, save)
+        if self.report is not None:
+            self._write(self.report, lambda path: write_report(path, told))
+        self._raise_errors()
 
     def save_frame(self, image: Image) -> None:
         """Writes the pictures of a frame, also the raw ones, and its report; OutputError at the end."""
@@ -133,30 +150,44 @@ class Outputs:
         if image.raw is not None:
             self.save(replace(image, pixels=image.raw, raw=None, aovs={}), raw=True)
         self.save(image)
-        if (report := self.report) is not None:
-            self._write(lambda: write_report(report, image.report))
-        if self._errors:
-            raise OutputError("; ".join(map(str, self._errors)))
+        if self.report is not None:
+            self._write(self.report, lambda path: write_report(path, image.report))
+        self._raise_errors()
 
     def save_measures(self, renderer: Renderer, image: Image) -> None:
         """Writes report and plot, and then raises OutputError where anything could not be written."""
         from ..output.plots import plot_history
         from ..output.report import write_report
 
-        if (report := self.report) is not None:
-            self._write(lambda: write_report(report, {**image.report, "total_seconds": time.perf_counter() - STARTED}))
-        if (plot := self.plot) is not None:
-            self._write(lambda: plot_history(plot, renderer.scene.name, renderer.history))
-        if self._errors:
-            raise OutputError("; ".join(map(str, self._errors)))
+        if self.report is not None:
+            total = {**image.report, "total_seconds": time.perf_counter() - STARTED}
+            self._write(self.report, lambda path: write_report(path, total))
+        if self.plot is not None:
+            self._write(self.plot, lambda path: plot_history(path, renderer.scene.name, renderer.history))
+        self._raise_errors()
 
-    def _write(self, write: Callable[[], Path], tell: bool = True) -> bool:
+    def _write(self, path: Path, write: Callable[[Path], object], tell: bool = True) -> bool:
         """Whether it was written; prints where."""
         try:
-            path = write()
-            if tell:
-                click.echo(str(path))
+            write(path)
         except OutputError as error:
-            self._errors.append(error)
+            self._errors.append(kept_elsewhere(error, path, write))
             return False
+        if tell:
+            self._tell(path)
         return True
+
+    def _write_pipe(self, pipe: Pipe, write: Callable[[Path], object]) -> None:
+        try:
+            pipe.write(write)
+        except OutputError as error:
+            self._errors.append(kept_elsewhere(error, Path(f"image{pipe.suffix}"), write))
+
+    def _tell(self, path: Path) -> None:
+        """Prints where a result is, unless standard output has the picture."""
+        if all(pipe.path != STDOUT for pipe in self.pipes):
+            click.echo(str(path))
+
+    def _raise_errors(self) -> None:
+        if self._errors:
+            raise OutputError("; ".join(map(str, self._errors)))

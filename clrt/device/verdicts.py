@@ -31,11 +31,11 @@ class Verdict:
     """
 
     passed: bool
-    failures: list[str]
+    failures: list[str] = field(hash=False)     # lists and dicts have no hash; equal verdicts have equal ones without
     when: str
     seconds: float
     kernels: str
-    figures: dict[str, float | str] = field(default_factory=dict)
+    figures: dict[str, float | str] = field(default_factory=dict, hash=False)
 
 
 def keep_verdict(info: DeviceInfo, verdict: Verdict) -> bool:

@@ -6,10 +6,11 @@ import os
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..errors import OutputError
+from ..errors import KeptBesideError, OutputError
+from ..file_names import utf8_path
 from ..file_mode import keep_mode
 
 #: Seconds after each attempt to replace a file that another program has open.
@@ -31,9 +32,9 @@ def check_target(path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Makes a folder, unless it is there; raises OutputError."""
+    """Makes a folder and those that it is in, unless they are there; raises OutputError."""
     try:
-        path.mkdir(exist_ok=True)
+        path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{path}: cannot be made ({error.strerror}); choose another path") from error
 
@@ -46,7 +47,7 @@ def _check_kind(path: Path) -> None:
 def check_unprotected(path: Path, force: bool) -> None:
     """Raise OutputError where there is a read-only file at `path`, unless `force`; its mode decides, also for root."""
     if not force and path.is_file() and not path.stat().st_mode & 0o222:
-        raise OutputError(f"{path}: is read-only; name another file, or replace it with --force")
+        raise OutputError(f"{path}: is read-only; name another file, make it writable, or replace it with --force")
 
 
 @contextmanager
@@ -61,7 +62,8 @@ def replacing(path: Path) -> Iterator[Path]:
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".clrt-{os.urandom(8).hex()}{path.suffix.lower()}")
     try:
-        yield temporary
+        with utf8_path(target.parent) as folder:
+            yield folder / temporary.name
         _check_kind(target)
         keep_mode(target, temporary)
         _move(temporary, target)
@@ -69,7 +71,8 @@ def replacing(path: Path) -> Iterator[Path]:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error}); "
                           "free some space there or choose another path") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):     # it was moved, or its folder is gone or read-only by now
+            temporary.unlink()
 
 
 def _move(new: Path, target: Path) -> None:
@@ -84,5 +87,5 @@ def _move(new: Path, target: Path) -> None:
             time.sleep(pause)
     kept = target.with_name(f"{target.stem}-{os.urandom(4).hex()}{target.suffix}")
     os.replace(new, kept)
-    raise OutputError(f"{target}: cannot be replaced ({problem.strerror}); is it open in another program, or "
-                      f"read-only? The new file is {kept.name} beside it") from problem
+    raise KeptBesideError(f"{target}: cannot be replaced ({problem.strerror}); is it open in another program, or "
+                          f"read-only? The new file is {kept.name} beside it") from problem

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..float_errors import with_default_errors
 from .data import shown_data
 from .images import write_image
+from .report import header_of
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,7 @@ class Image:
 
     def metadata(self) -> dict[str, str]:
         """The report's plain values, for the file's header."""
-        return {f"clrt:{key}": str(value) for key, value in self.report.items()
-                if isinstance(value, (str, int, float))}
+        return header_of(self.report)
 
     def _repr_png_(self) -> bytes:
         """How a notebook shows the picture."""

@@ -12,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import OutputError
+from ..file_names import utf8_path
 from ..scene.pictures import read_picture
 from .files import check_target, replacing
 from .layers import Pictures, drawn, files_beside, layered
 from .view import check_view, to_display
+from .whole import check_whole
 
 FloatArray = NDArray[np.float32]
 
@@ -37,9 +39,11 @@ def metadata_of(path: Path, name: str) -> str | None:
     """What `write_image` was told by a name; None where there is no such file, or nothing of that name in it."""
     import OpenImageIO as oiio
 
-    opened = oiio.ImageInput.open(str(path)) if path.is_file() else None
-    value = opened.spec().get_string_attribute(name) if opened else ""
-    return value or None
+    if not path.is_file():
+        return None
+    with utf8_path(path) as file:
+        opened = oiio.ImageInput.open(str(file))
+    return opened and opened.spec().get_string_attribute(name) or None
 
 
 def check_writable(path: Path) -> None:
@@ -139,3 +143,4 @@ def _write_file(path: Path, samples: NDArray[Any], attributes: Mapping[str, str 
     complaint = (output or oiio).geterror()
     if complaint or not done:
         raise OSError(complaint.splitlines()[0] if complaint else "the writer gave no reason")
+    check_whole(path)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from .files import replacing
 from .images import ATTRIBUTES, check_writable, rgbe_rounded
 from .view import check_view, to_display
+from .whole import check_whole
 
 #: Rows of a block of an .exr that is packed as a whole: every piece but the last must have a multiple of it.
 BLOCK_ROWS = 16
@@ -44,6 +45,7 @@ def write_rows(path: Path, size: tuple[int, int], pieces: Iterable[NDArray[np.fl
             raise OSError(complaint.splitlines()[0] if complaint else "the writer gave no reason")
         if row != height:
             raise OSError(f"there are {row} of its {height} rows")
+        check_whole(temporary)
 
 
 def _samples(piece: NDArray[np.float32], kind: str, view: str, exposure: float) -> NDArray[Any]:

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from fractions import Fraction
 from importlib.util import find_spec
+from io import BytesIO
+from itertools import chain
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import numpy as np
@@ -69,23 +76,40 @@ def _frames(pictures: Sequence[Path]) -> Iterator[NDArray[np.uint8]]:
 
 
 def _write_gif(path: Path, pictures: Sequence[Path], fps: float) -> None:
-    """Frames last whole hundredths of a second, such that none begins more than half of one late or early."""
+    """Frames last whole hundredths of a second, such that none begins more than half of one late or early.
+
+    It is encoded in memory: imageio tries a second time where a file cannot be written, and prints that error.
+    """
     from imageio.v3 import imopen
 
     starts = np.round(np.arange(len(pictures) + 1) * (100 / fps)).astype(int)
     options: dict[str, Any] = {"duration": (10 * np.diff(starts)).tolist(), "loop": 0}
-    with imopen(path, "w", plugin="pillow") as file:
+    encoded = BytesIO()
+    with imopen(encoded, "w", plugin="pillow", extension=".gif") as file:
         for frame in _frames(pictures):
             file.write(frame, **options)
+    path.write_bytes(encoded.getvalue())
 
 
 def _write_by_ffmpeg(path: Path, pictures: Sequence[Path], fps: float) -> None:
-    from imageio.v2 import get_writer
+    """OSError with what ffmpeg says where it fails, which imageio's writer does not tell."""
+    from imageio_ffmpeg import get_ffmpeg_exe
 
     codec, options = CODECS[path.suffix.lower()]
-    settings: dict[str, Any] = {"fps": fps, "codec": codec, "quality": None, "macro_block_size": 2,
-                                "ffmpeg_log_level": "error", "output_params": [*options, *COLORS]}
-    writer: Any = get_writer(path, format="FFMPEG", **settings)
-    with writer:
-        for frame in _frames(pictures):
-            writer.append_data(frame)
+    frames = _frames(pictures)
+    first = next(frames)
+    height, width = first.shape[:2]
+    command = [get_ffmpeg_exe(), "-y", "-v", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+               "-r", str(Fraction(fps).limit_denominator()), "-i", "-", "-vcodec", codec, "-pix_fmt", "yuv420p",
+               *options, *COLORS, str(path)]
+    with TemporaryFile() as errors:
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=errors) as ffmpeg:
+            assert ffmpeg.stdin is not None
+            with suppress(BrokenPipeError):    # it has ended
+                for frame in chain([first], frames):
+                    ffmpeg.stdin.write(frame.tobytes())
+        if ffmpeg.returncode:
+            errors.seek(0)
+            lines = errors.read().decode(errors="replace").splitlines()
+            code = f"ffmpeg ended with code {ffmpeg.returncode}"
+            raise OSError(re.sub(r"^\[.*?\] ", "", lines[0]) if lines else code)

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..awake import wait_awake
 from ..errors import SceneError
+from ..file_names import utf8_path
 from ..threads import Event, beside
 
 #: Seconds that one file may take. The largest picture that is read takes a tenth of it.
@@ -36,12 +37,17 @@ def decode(kind: str, source: Path | bytes, suffix: str = "") -> tuple[Arrays, d
 
     kind: a function of scene.decoding. Raises SceneError with its message, or with how the process ended.
     """
-    if isinstance(source, Path):
-        return _decoded(kind, source)
-    with tempfile.TemporaryDirectory(prefix="clrt-") as folder:
-        file = Path(folder) / f"embedded{suffix}"
-        file.write_bytes(source)
-        return _decoded(kind, file)
+    try:
+        if isinstance(source, Path):
+            with utf8_path(source.absolute()) as path:
+                return _decoded(kind, path)
+        with tempfile.TemporaryDirectory(prefix="clrt-") as folder:
+            file = Path(folder) / f"embedded{suffix}"
+            file.write_bytes(source)
+            return decode(kind, file)
+    except OSError as error:
+        raise SceneError("the system refuses its decoder a process or a temporary file "
+                         f"({error.strerror or error})") from error
 
 
 def _decoded(kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
@@ -87,7 +93,7 @@ class _Process:
 
         beside(watch, daemon=True)
         try:
-            self._requests.write(json.dumps([kind, str(file.absolute())]).encode() + b"\n")
+            self._requests.write(json.dumps([kind, str(file)]).encode() + b"\n")
             self._requests.flush()
             reply = json.loads(self._replies.readline() or "null")
             if reply is None:

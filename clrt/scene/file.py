@@ -12,7 +12,7 @@ from ..errors import SceneError
 from .framing import frame
 from .meshes import SUFFIXES, read_model
 from .model import Scene
-from .paths import check_file
+from .paths import check_file, name_of
 from .source import source_of_model
 from .sky import SUN, default_sky
 from .toml import SceneReader, camera_problems
@@ -61,7 +61,7 @@ def _load_model(path: Path) -> tuple[Scene, list[str]]:
     model = read_model(path)
     camera = next(iter(model.cameras.values()), None) or frame(model.meshes, model.instances)
     return Scene(meshes=model.meshes, instances=model.instances, camera=camera, cameras=model.cameras,
-                 environment=default_sky(), lights=model.lights or [SUN], name=path.stem,
+                 environment=default_sky(), lights=model.lights or [SUN], name=name_of(path),
                  source=source_of_model(path, model)), []
 
 

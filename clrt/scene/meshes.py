@@ -18,7 +18,7 @@ from .materials import Diffuse
 from .instancing import baked
 from .model import Mesh, Model
 from .normals import Normals, choose_normals
-from .paths import check_file
+from .paths import check_file, name_of
 from .pictures import linear_from_srgb
 from .ply import plain_ply
 from .validate import index_problems, mesh_problems
@@ -48,7 +48,7 @@ def read_model(path: Path, normals: Normals = "file") -> Model:
         from .gltf import read_gltf
         return read_gltf(path, normals)
     try:
-        return Model(meshes=_meshes(_parse(path, suffix), path.stem, normals))
+        return Model(meshes=_meshes(_parse(path, suffix), name_of(path), normals))
     except SceneError as error:
         raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
 

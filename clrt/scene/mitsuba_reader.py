@@ -19,6 +19,7 @@ from .mitsuba_textures import TextureReader
 from .mitsuba_values import Doubles
 from .mitsuba_xml import Plugin, UnsupportedError, read_xml
 from .model import Camera, Environment, Filter, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
+from .paths import name_of
 
 Part = TypeVar("Part")
 
@@ -54,7 +55,7 @@ def read_mitsuba(path: Path, stand_in: Material | None = None) -> MitsubaScene:
     stand_in: instead of materials that are not supported. Raises SceneError for what is malformed, and UnsupportedError
     with all that clrt has no counterpart for.
     """
-    return _Reader(stand_in).scene(read_xml(path), path.stem)
+    return _Reader(stand_in).scene(read_xml(path), name_of(path))
 
 
 class _Reader:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError
+from ..file_names import printable
 from .materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from .mtl_maps import Maps, strength
 from .textures import Texture
@@ -58,7 +59,7 @@ def read_library(text: str) -> dict[str, Entry]:
         key, *words = line.split("#")[0].split() or [""]
         key, rest = key.lower(), " ".join(words)
         if key == "newmtl":
-            name = " ".join(line.split()[1:])  # in which # may stand
+            name = printable(" ".join(line.split()[1:]))  # in which # may stand
             entry = entries.setdefault(name, Entry(name))
         elif key.startswith(("map_", "bump", "disp", "decal", "refl", "norm")):
             entry.maps[key] = rest

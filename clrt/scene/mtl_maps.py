@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import SceneError
+from ..file_names import printable
 from .pictures import read_texels
 from .textures import Channel, Picture, Texture, Wrap
 
@@ -61,7 +62,7 @@ class Maps:
         if name not in self._pictures:
             try:
                 file = self._model.parent / name.replace("\\", "/")
-                self._pictures[name] = Picture(read_texels(file), name)
+                self._pictures[name] = Picture(read_texels(file), printable(name))
             except (SceneError, OSError, ValueError) as error:
                 log.warning("%s: a texture is left out: %s", self._model, error)
                 self._pictures[name] = None

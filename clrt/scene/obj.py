@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from ..file_names import printable
 from .editing import free_name
 from .materials import Material
 from .mtl import Entry, left_out, material, read_library
 from .mtl_maps import Maps
-from .paths import note_read
+from .paths import name_of, note_read
 
 log = logging.getLogger(__name__)
 Floats = NDArray[np.float64]
@@ -38,7 +39,7 @@ def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
     groups: dict[str, list[str]] = {}
     pieces = re.split(r"^[ \t]*usemtl\b(.*)$", text, flags=re.MULTILINE) if "usemtl" in text else [text]
     for name, chunk in zip(["", *pieces[1::2]], pieces[::2]):
-        groups.setdefault(" ".join(name.split()), []).extend(_lines(chunk, "f"))
+        groups.setdefault(printable(" ".join(name.split())), []).extend(_lines(chunk, "f"))
     meshes = {}
     for name, lines in groups.items():
         if lines:
@@ -51,8 +52,8 @@ def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
                 "uv": _taken(uv, where[1]), "vertex_colors": None if colors is None else colors[where[0]],
                 "material": libraries.get(name), "material_name": name}
     if len(meshes) == 1:
-        return {path.stem: mesh for mesh in meshes.values()}
-    return {name or free_name(path.stem, meshes): mesh for name, mesh in meshes.items()}
+        return {name_of(path): mesh for mesh in meshes.values()}
+    return {name or free_name(name_of(path), meshes): mesh for name, mesh in meshes.items()}
 
 
 def absolute_indices(text: str) -> str:
@@ -183,4 +184,5 @@ def _libraries(path: Path, text: str) -> dict[str, Material]:
 
 
 def _text(path: Path) -> str:
-    return note_read(path).read_text(encoding="utf-8", errors="replace")
+    """The file, with bytes that are not UTF-8 as file names have them."""
+    return note_read(path).read_text(encoding="utf-8", errors="surrogateescape")

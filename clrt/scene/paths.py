@@ -8,6 +8,7 @@ from contextvars import ContextVar
 from pathlib import Path
 
 from ..errors import SceneError
+from ..file_names import printable
 
 _read: ContextVar[list[Path] | None] = ContextVar("_read", default=None)
 
@@ -28,6 +29,11 @@ def note_read(path: Path) -> Path:
     if (files := _read.get()) is not None:
         files.append(path)
     return path
+
+
+def name_of(path: Path) -> str:
+    """What a scene or mesh from a file at `path` is called: the file's stem, as text."""
+    return printable(path.stem)
 
 
 def check_file(path: Path, what: str) -> None:

@@ -37,6 +37,12 @@ class Source:
     files: list[tuple[object, Path]] = field(default_factory=list)
     cameras: dict[str, Camera] = field(default_factory=dict)
 
+    @property
+    def paths(self) -> list[Path]:
+        """The files of meshes, textures and skies."""
+        return [*(origin.table["file"] for origin in self.meshes if "file" in origin.table),
+                *(path for _, path in self.files)]
+
     def file_of(self, content: object) -> Path | None:
         """Where this very picture or image was read."""
         return next((path for each, path in self.files if each is content), None)

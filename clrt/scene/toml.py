@@ -16,6 +16,7 @@ from .lights import LIGHTS, Light
 from .materials import MATERIALS, Diffuse, Material
 from .mesh_table import MeshTable
 from .model import Camera, Environment, Instance, Model, RenderSettings, Scene, Sphere
+from .paths import name_of
 from .pictures import read_picture
 from .sky import SUN, default_sky
 from .source import Origin, Source, material_of, parts_of
@@ -64,8 +65,9 @@ class SceneReader:
                       for one in self._instance(values, f"instance[{i}]")]
         return Scene(meshes=meshes, instances=instances, lights=lights, spheres=[each for each in spheres if each],
                      camera=self._named_camera(lens) if "name" in lens else camera, cameras=self._cameras,
-                     environment=environment or Environment(), render=render or RenderSettings(), name=self._path.stem,
-                     animation=self._animation(), materials=self._materials, source=self._sources())
+                     environment=environment or Environment(), render=render or RenderSettings(),
+                     name=name_of(self._path), animation=self._animation(), materials=self._materials,
+                     source=self._sources())
 
     def _sources(self) -> Source:
         self._source.files += [(picture, (self._path.parent / name).resolve())

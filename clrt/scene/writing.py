@@ -77,10 +77,8 @@ class _Writer:
         self._scene, self._source = scene, scene.source or Source()
         self._folder, self._stem = Path(os.path.realpath(path)).parent, path.stem
         self.files = SceneFiles()
-        tables = [origin.table["file"] for origin in self._source.meshes if "file" in origin.table]
         #: The names of files here that the scene was read from, and may still show.
-        self._read = {path.name for path in (*tables, *(path for _, path in self._source.files))
-                      if path.parent == self._folder}
+        self._read = {path.name for path in self._source.paths if path.parent == self._folder}
         self._names = {id(material): name for name, material in materials_of(scene).items()}
         self._materials = dict(scene.materials)
         self._named = set(map(id, scene.materials.values()))

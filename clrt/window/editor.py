@@ -13,11 +13,12 @@ from typing import Any
 from imgui_bundle import imgui
 
 from ..device.describe import DeviceInfo
-from ..errors import ClrtError
+from ..errors import ClrtError, UsageError
 from ..live.live import Live
 from ..live.picks import Thing
 from ..live.settings import Settings
 from ..live.snapshot import Snapshot
+from ..output.files import check_unprotected
 from ..output.images import write_image
 from ..output.scenes import save_scene
 from ..scene.editing import materials_of, with_material
@@ -25,6 +26,7 @@ from ..scene.file import load
 from ..scene.lights import DirectionalLight
 from ..scene.material import Material
 from ..scene.model import Camera, Instance, Scene, Sphere
+from ..scene.source import Source
 from .camera_controls import CameraControls
 from .navigation import around, distance
 from .screenshot import screenshot
@@ -122,12 +124,12 @@ class Editor:
     def save_picture(self, path: Path) -> None:
         """Writes the newest picture as it is shown (.png), or its light (.exr, .hdr)."""
         look = self.look
-        self._beside(path, "is written", lambda: self.live.image().save(path, view=look.view, exposure=look.exposure))
+        self._write(path, lambda: self.live.image().save(path, view=look.view, exposure=look.exposure))
 
     def save_scene(self, path: Path) -> None:
         """Writes the scene as a scene file, with what belongs beside it."""
         scene = self.scene
-        self._beside(path, "is written", lambda: save_scene(scene, path))
+        self._write(path, lambda: save_scene(scene, path, force=False))
 
     def open(self, path: Path) -> None:
         """Shows the scene in a file instead, which is a step of undoing."""
@@ -142,7 +144,19 @@ class Editor:
         if self._screenshot is not None:
             path, pixels = self._screenshot, screenshot()
             self._screenshot = None
-            self._beside(path, "is written", lambda: write_image(path, pixels, view="raw"))
+            self._write(path, lambda: write_image(path, pixels, view="raw"))
+
+    def _write(self, path: Path, write: Callable[[], object]) -> None:
+        """Writes a file without waiting for it, unless that would replace one that is read-only or of the scene."""
+        source = self.scene.source or Source()
+
+        def checked() -> None:
+            if path.resolve() in {file.resolve() for file in source.paths}:
+                raise UsageError(f"{path}: is a file of the scene, which would be lost; name another file")
+            check_unprotected(path, force=False)
+            write()
+
+        self._beside(path, "is written", checked)
 
     def _beside(self, path: Path, done: str, do: Callable[[], object]) -> None:
         """Does something with a file without waiting for it. done: what is said of the file then."""

@@ -1,4 +1,4 @@
-"""What the command line never writes over: devices, pipes, its inputs, its other outputs, and others' files."""
+"""What the command line never writes over: devices, its inputs, other outputs, others' files; pipes but for images."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("arguments", [
-    ("render", "ball.toml", "-o", "pipe.png"), ("render", "ball.toml", "--report", "pipe.json"),
-    ("render", "ball.toml", "--plot", "pipe.png"), ("render", "ball.toml", "--checkpoint", "pipe.ck"),
-    ("convert", "a.obj", "pipe.toml", "--force"), ("doctor", "-o", "pipe.txt")], ids=" ".join)
+    ("render", "ball.toml", "--report", "pipe.json"), ("render", "ball.toml", "--plot", "pipe.png"),
+    ("render", "ball.toml", "--checkpoint", "pipe.ck"), ("convert", "a.obj", "pipe.toml", "--force"),
+    ("doctor", "-o", "pipe.txt")], ids=" ".join)
 def test_pipes_are_no_targets(folder: Path, arguments: tuple[str, ...]) -> None:
     pipe = folder / next(argument for argument in arguments if argument.startswith("pipe"))
     os.mkfifo(pipe)

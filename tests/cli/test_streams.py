@@ -57,6 +57,16 @@ def test_results_that_cannot_be_printed(folder: Path, arguments: str) -> None:
     assert closed.returncode == 0 and "rror" not in closed.stderr and "Traceback" not in full.stderr
 
 
+@pytest.mark.parametrize("arguments", ["devices", "info ball.toml", "doctor", "cache", "render ball.toml -q",
+                                       "debug ball.toml --pixel 1,1"])
+def test_no_file_can_be_written(folder: Path, arguments: str) -> None:
+    """Nor a temporary one: one error where one is needed, of the loader, or for want of a driver."""
+    (folder / "limited.sh").write_text(f"ulimit -f 0\nexec {sys.executable} -m clrt {arguments}\n")
+    result = subprocess.run(["bash", "limited.sh"], cwd=folder, capture_output=True, text=True)
+    assert result.returncode in {0, 4} and "Traceback" not in result.stderr
+    assert result.returncode == 0 or result.stderr.count("error: ") == 1
+
+
 def test_an_interrupt_before_it_has_begun(folder: Path) -> None:
     """It comes while modules are loaded, of which one raises it itself."""
     (folder / "click.py").write_text("raise KeyboardInterrupt")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -44,6 +45,19 @@ def test_commands_need_nothing_that_windows_lacks(folder: Path, call: tuple[str,
     done = subprocess.run([*program, *call], cwd=folder, capture_output=True, text=True, encoding="utf-8",
                           env=os.environ | {"PYTHONUTF8": "0", "CLRT_CACHE_DIR": str(folder)})
     assert done.returncode == 0, done.stderr
+
+
+def test_ctrl_break_keeps_the_picture(folder: Path) -> None:
+    """As Ctrl-C does."""
+    process = subprocess.Popen([sys.executable, str(HOUSE / "tests" / "windows_python.py"), "render", "scene.toml",
+                                "--size", "16x16", "--time", "600", "--progress", "json", "-o", "image.png"],
+                               cwd=folder, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    while '"spp"' not in process.stderr.readline():
+        assert process.poll() is None, "ended before it was interrupted"
+    process.send_signal(signal.SIGUSR2)
+    process.communicate(timeout=60)
+    assert process.returncode == 130 and (folder / "image.png").is_file()
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "cp1252:surrogateescape"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import logging
 from dataclasses import replace
@@ -13,6 +14,7 @@ from clrt.device import cache, discover, verdicts
 from clrt.device.describe import DeviceInfo
 from clrt.device.discover import as_dict, choose, find_devices
 from clrt.device.sources import kernel_digest
+from clrt.device.speeds import Speed
 from clrt.device.verdicts import Verdict, forget_verdicts, keep_verdict, kept_verdict
 from clrt.errors import DeviceError
 
@@ -31,6 +33,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def info() -> DeviceInfo:
     return find_devices()[0][0]
+
+
+def test_devices_have_hashes(info: DeviceInfo) -> None:
+    """As keys of a dict they are what they are by comparison, verdict and speed included."""
+    several = [replace(info, check=check, bench=bench) for check in (None, PASSED, FAILED)
+               for bench in (None, Speed(1, 2, 3))]
+    copies = [copy.deepcopy(each) for each in several]
+    assert {each: i for i, each in enumerate(several)} == {each: i for i, each in enumerate(copies)}
+    assert len(set(several + copies)) == 6
 
 
 @pytest.mark.parametrize("verdict", [PASSED, FAILED])

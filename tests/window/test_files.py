@@ -41,6 +41,13 @@ def test_what_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         window.context.item_input_value("picture/##file", "saved.gif")
         window.context.item_click("picture/save picture")
         window.until(lambda: "unknown picture format .gif" in window.app.editor.message, "a complaint")
+        (tmp_path / "locked.png").touch(0o444)
+        for what, name in (("picture", "locked.png"), ("screenshot", "locked.png"), ("picture", "no/such.png")):
+            window.context.item_input_value(f"{what}/##file", name)
+            window.context.item_click(f"{what}/save {what}")
+            told = "no/such.png: the folder no does not exist" if "/" in name else "locked.png: is read-only"
+            window.until(lambda: told in window.app.editor.message, told)
+        assert not (tmp_path / "locked.png").stat().st_size
 
     drive(two_balls(integrator="path"), test, tmp_path)
     done = subprocess.run([sys.executable, "-m", "clrt", "render", "saved.toml", "--spp", "12", "-o", "again.exr"],

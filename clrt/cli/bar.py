@@ -1,0 +1,136 @@
+"""Progress as one line of a terminal that is redrawn in place, in plain characters: no escape sequences, no cursor that
+stays hidden where the process is killed, nothing that wraps."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterable
+from contextlib import suppress
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, TextIO, cast
+
+from .goal import Goal
+from .progress import PHASES, Progress, describe_workers, figures, where
+
+if TYPE_CHECKING:
+    from ..rendering.renderer import State
+
+#: Characters of the bar, and columns of a terminal that does not tell how many it has.
+BAR, COLUMNS = 20, 80
+
+
+class StatusLine:
+    """The line of a terminal in which its cursor is."""
+
+    def __init__(self, terminal: TextIO) -> None:
+        self._terminal, self._shown = terminal, 0
+
+    def show(self, parts: Iterable[str]) -> None:
+        """Replaces what is shown by as many of the parts as there is room for, the first ones first."""
+        room = columns(self._terminal) - 1      # in the last column some terminals go on to the next line
+        text = fitted(parts, room)
+        self._put("\r" + text.ljust(min(self._shown, room)))
+        self._shown = len(text)
+
+    def erase(self) -> None:
+        """Leaves the line empty."""
+        if self._shown:
+            self._put("\r" + " " * min(self._shown, columns(self._terminal) - 1) + "\r")
+        self._shown = 0
+
+    def keep(self) -> None:
+        """Goes on to the next line."""
+        if self._shown:
+            self._put("\n")
+        self._shown = 0
+
+    def _put(self, text: str) -> None:
+        with suppress(OSError):     # of a terminal that has gone
+            self._terminal.write(text)
+            self._terminal.flush()
+
+
+class _Other:
+    """A stream to the same terminal: what is written to it takes the status line's place."""
+
+    def __init__(self, stream: TextIO, line: StatusLine) -> None:
+        self._stream, self._line = stream, line
+
+    def write(self, text: str) -> int:
+        """See TextIO."""
+        self._line.erase()
+        return self._stream.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+class BarProgress(Progress):
+    """A bar with time left, samples, error and rate. What a picture ended with stays above its files' names."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._line = StatusLine(sys.stderr)
+        self._streams = sys.stdout, sys.stderr
+        self._frame, self._where = "", ""
+        self._ended: list[str] = []
+
+    def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
+        self._where = where(device, device_bytes).strip()
+        if name == "write" and self._ended:
+            self._line.show(self._ended)
+            self._line.keep()
+            self._ended = []
+        self._line.show([self._frame + PHASES[name], self._where])
+
+    def frame(self, number: int, done: int, count: int) -> None:
+        super().frame(number, done, count)
+        self._frame = f"frame {number}, {done + 1} of {count}: "
+
+    def state(self, state: State, goal: Goal) -> None:
+        left = self._left(state, goal)
+        samples, seconds, rate, *errors = figures(state, self._pace.rate)
+        percent, told = goal.percent(state).strip(), [samples, *errors, seconds, rate, describe_workers(self._workers)]
+        self._ended = [self._frame + percent, *told]
+        self._line.show([f"{self._frame}{PHASES['render']}", percent, bar(goal.done(state)),
+                         "" if left is None else f"{left:.0f} s left", *told, self._where])
+
+    def bands(self, done: int, count: int) -> None:
+        self._line.show([PHASES["render"], f"{done} of {count} bands", bar(done / count)])
+
+    def __enter__(self) -> Progress:
+        stdout, stderr = self._streams
+        sys.stderr = cast(TextIO, _Other(stderr, self._line))
+        if stdout.isatty():
+            sys.stdout = cast(TextIO, _Other(stdout, self._line))
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self._line.erase()
+        sys.stdout, sys.stderr = self._streams
+
+
+def bar(done: float) -> str:
+    """The part that is done, 0 to 1."""
+    full = int(BAR * done)
+    return f"[{'#' * full}{'-' * (BAR - full)}]"
+
+
+def fitted(parts: Iterable[str], room: int) -> str:
+    """The parts that fit into so many columns, in their order, those that are empty left out; the first one is cut."""
+    line = ""
+    for part in filter(None, parts):
+        longer = f"{line}  {part}" if line else part[:room]
+        line = longer if len(longer) <= room else line
+    return line
+
+
+def columns(terminal: TextIO) -> int:
+    """How many a terminal has, or fewer if COLUMNS says so."""
+    with suppress(OSError, ValueError):
+        found = os.get_terminal_size(terminal.fileno()).columns or COLUMNS
+        asked = os.environ.get("COLUMNS", "")
+        return min(found, int(asked)) if asked.isdecimal() and int(asked) else found
+    return COLUMNS

@@ -1,0 +1,70 @@
+"""The files that an experiment writes: its figures as JSON, plots and pictures."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..errors import OutputError, UsageError
+from .fallback import kept_elsewhere
+
+#: Parameters that name files that are written, and what they are called; those that name folders for pictures.
+FILES = {"json_file": "--json", "plot": "--plot"}
+FOLDERS = ("pictures", "keep")
+
+
+def figures_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add --json and --force to an experiment, whose files are checked before it begins as `clrt render` checks its
+    own; folders are made."""
+    @wraps(command)
+    def checked(force: bool, **given: Any) -> None:
+        _check(given, force)
+        command(**given)
+
+    for option in (click.option("--force", is_flag=True, help="Replace files that are read-only."),
+                   click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE",
+                                help="Write the figures there.")):
+        checked = option(checked)
+    return checked
+
+
+def write_figures(path: Path | None, figures: Mapping[str, Any]) -> None:
+    """Writes them where a file for them was named, and prints its name; OutputError, which names where they are if they
+    could be written elsewhere."""
+    if path is None:
+        return
+    from ..output.report import write_report
+
+    try:
+        write_report(path, figures)
+    except OutputError as error:
+        raise kept_elsewhere(error, path, lambda other: write_report(other, figures)) from error
+    click.echo(str(path))
+
+
+def _check(given: Mapping[str, Any], force: bool) -> None:
+    from ..output.files import check_target, check_unprotected, make_folder
+    from ..output.plots import check_plot
+
+    taken = {os.path.realpath(path): "read" for name, value in given.items() if name not in {*FILES, *FOLDERS}
+             for path in _paths(value)}
+    for name, option in FILES.items():
+        for path in _paths(given.get(name)):
+            if before := taken.get(real := os.path.realpath(path)):
+                raise UsageError(f"{path}: is {before} and {option}, one of which would be lost; name another file")
+            taken[real] = option
+            (check_plot if name == "plot" else check_target)(path)
+            check_unprotected(path, force)
+    for name in FOLDERS:
+        for path in _paths(given.get(name)):
+            make_folder(path)
+
+
+def _paths(value: Any) -> Iterator[Path]:
+    """Those that an option's value consists of."""
+    yield from (each for each in (value if isinstance(value, tuple) else (value,)) if isinstance(each, Path))
