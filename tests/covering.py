@@ -25,6 +25,12 @@ def covering(names: str, *factors: Iterable[Any], strength: int = 1) -> pytest.M
         for row in product(*(range(len(each)) for each in values))])
 
 
+def others(*cases: Any) -> list[Any]:
+    """Parameters, tuples where there are several, that are not run by default but marked `combinations`."""
+    return [pytest.param(*(case if isinstance(case, tuple) else [case]), marks=pytest.mark.combinations)
+            for case in cases]
+
+
 def covering_array(sizes: Sequence[int], strength: int) -> set[Row]:
     """Rows of indices below `sizes` that hold all combinations of indices of any `strength` columns.
 

@@ -11,6 +11,8 @@ import pytest
 
 from clrt.cli import COMMANDS
 
+from ..covering import others
+
 HOUSE = Path(__file__).parents[2]
 SMALL = ("--size", "16x16", "--spp", "1", "-q")
 #: A call of each command; of those that need a display or other software, what they say of themselves.
@@ -55,7 +57,7 @@ def test_names_that_the_code_page_lacks(folder: Path, encoding: str) -> None:
     assert (folder / "ü日.png").exists()
 
 
-@pytest.mark.parametrize("name", ["render", "info", "convert"])
+@pytest.mark.parametrize("name", ["render", *others("info", "convert")])
 def test_commands_in_the_c_locale(folder: Path, name: str) -> None:
     """Where Python takes text for ASCII."""
     ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}

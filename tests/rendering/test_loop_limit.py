@@ -26,6 +26,7 @@ from clrt.scene.materials import Diffuse
 from clrt.scene.model import Camera, Mesh, Scene
 
 from ..check.sabotage import sabotaged
+from ..covering import others
 
 SIZE, SPP = (16, 24), 8
 
@@ -127,7 +128,7 @@ def test_too_long_lists_are_refused(device: Device) -> None:
                 ask(*rays)
 
 
-@pytest.mark.parametrize("entry", ["guides", "first_hit"])
+@pytest.mark.parametrize("entry", ["first_hit", *others("guides")])
 def test_pixels_that_were_ended_are_missed(device: Device, entry: str, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     limit(monkeypatch, 50_000)

@@ -18,6 +18,7 @@ from clrt.rendering.guides import render_guides
 from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Integrator, RenderSettings, Scene, Sphere
 
+from ..covering import others
 from .pictures import film, frame, quad, session, view_rays
 from .test_camera import CAMERAS, seen_at
 from .test_variants import everything
@@ -111,7 +112,7 @@ def test_pictures_are_what_guides_are(device: Device) -> None:
         np.testing.assert_allclose(render_guides(running, 16)[guide], running.film().mean, atol=1e-6)
 
 
-@pytest.mark.parametrize("integrator", ["normals", "albedo", "depth"])
+@pytest.mark.parametrize("integrator", ["albedo", *others("normals", "depth")])
 def test_no_light_is_compiled_or_missed(device: Device, integrator: Integrator,
                                         caplog: pytest.LogCaptureFixture) -> None:
     """Nothing is said of darkness; nothing is 0; lanes agree."""

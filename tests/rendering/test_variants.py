@@ -24,6 +24,7 @@ from clrt.scene.textures import Picture, Texture
 from clrt.study.bsdfs import variants
 from clrt.study.probe import choices
 
+from ..covering import covering, others
 from . import rays
 from .pictures import film, quad, session
 
@@ -106,23 +107,22 @@ def reference(device: Device) -> Doubles:
     return film(device, everything(), lanes=8, layout="bvh8").mean
 
 
-@pytest.mark.parametrize("chosen", [{"lanes": 1}, {"lanes": 16}, {"layout": "bvh2"}, {"layout": "packs"},
-                                    {"layout": "list"}, {"layout": None, "tree": False},
-                                    {"builder": "midpoint"}, {"layout": "cwbvh"}, {"lanes": 1, "layout": "cwbvh"}],
-                         ids=str)
-def test_lanes_layouts_and_builders_agree(device: Device, reference: Doubles, chosen: dict[str, Any]) -> None:
+@covering("chosen, lanes", [{"layout": "cwbvh"}, {"layout": "bvh2"}, {"layout": "packs"}, {"layout": "list"},
+                            {"layout": None, "tree": False}, {"builder": "midpoint"}], [1, 16, 8])
+def test_lanes_layouts_and_builders_agree(device: Device, reference: Doubles, chosen: dict[str, Any],
+                                          lanes: int) -> None:
     """To float rounding: a sample is a chain of some hundred operations, so most pixels agree to 1e-5.
 
     A rounding can also turn a decision (which lobe, which side of an edge): then one of the 4 samples of a pixel is
     another. Each sample takes some 50 decisions that a relative 1e-6 may turn: fewer than 1 pixel in 1000.
     """
-    wanted: dict[str, Any] = {"lanes": 8, "layout": "bvh8"} | chosen
+    wanted: dict[str, Any] = {"lanes": lanes, "layout": "bvh8"} | chosen
     picture = film(device, everything(), **wanted).mean
     differs = np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)
     assert np.mean(differs) < 1e-3, np.argwhere(differs)
 
 
-@pytest.mark.parametrize("lanes, layout", [(1, "bvh8"), (16, "cwbvh")])
+@pytest.mark.parametrize("lanes, layout", [(1, "bvh8"), *others((16, "cwbvh"))])
 def test_lanes_agree_on_textures_and_holes(device: Device, lanes: int, layout: str) -> None:
     """As above; textures decide at more edges."""
     scene = painted(everything())
@@ -143,7 +143,7 @@ def test_spheres_in_the_tree_and_out_of_it_agree(device: Device, reference: Doub
     assert np.mean(differs) < 1e-3, np.argwhere(differs)
 
 
-@pytest.mark.parametrize("sampler, lanes", [("sobol", 16), ("stratified", 8)])
+@pytest.mark.parametrize("sampler, lanes", [("sobol", 16), *others(("stratified", 8))])
 def test_lanes_agree_with_every_sampler(device: Device, sampler: Sampler, lanes: int) -> None:
     """As above, of less: a plastic ball on a floor under a lamp and a sky."""
     floor, lamp, _ = everything().meshes
