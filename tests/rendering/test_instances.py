@@ -97,6 +97,7 @@ def seen(device: Device, scene: Scene) -> tuple[Doubles, Doubles]:
     return running.film().mean, render_guides(running)["normal"].astype(np.float64)
 
 
+@pytest.mark.combinations
 @pytest.mark.parametrize("kind", KINDS)
 def test_instances_look_like_meshes(device: Device, kind: str) -> None:
     """Nearly all pixels to float rounding: at edges a sample may fall on the other side. Thin things have more edges,
@@ -111,7 +112,7 @@ def test_instances_look_like_meshes(device: Device, kind: str) -> None:
     assert 0.1 < (np.abs(expected - expected[0, 0]).max(axis=2) > 0.01).mean()  # much is in view
 
 
-@pytest.mark.parametrize("kind", ["stretched", "mirrored"])
+@pytest.mark.parametrize("kind", ["turned", "stretched", "mirrored"])
 def test_textures_normal_maps_and_colours_go_along(device: Device, kind: str) -> None:
     """Also with normal maps that some instances bring, or bring for other coordinates, and veils."""
     rng, mesh = np.random.default_rng(2), ball()

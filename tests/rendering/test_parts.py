@@ -91,6 +91,7 @@ def test_only_the_film_is_too_large(device: Device, whole: tuple[Renderer, bytes
     assert running.compiled.part_bytes is None and running.compiled.source == whole[0].compiled.source
 
 
+@pytest.mark.combinations
 def test_other_kernels_see_the_parts(device: Device, whole: tuple[Renderer, bytes],
                                      monkeypatch: pytest.MonkeyPatch) -> None:
     expected = render_guides(whole[0].session, 2)
