@@ -47,10 +47,10 @@ def biased(scene: Scene) -> Scene:
 #: All kinds of lights, materials and primitives; textures, partial opacity, coats and instances; every material in all
 #: its variants, media included; many lights, in a light BVH; clamps; and scenes of the gallery.
 SUBJECTS: dict[str, Callable[[], Scene]] = {
-    "biased": lambda: biased(planted(painted(everything()))), "shelf": shelf,
+    "biased": lambda: biased(planted(painted(everything()))),
     "lamps": lambda: replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)])}
 PARTS_OF_SUBJECTS: dict[str, Callable[[], Scene]] = {
-    "everything": everything, "painted": lambda: planted(painted(everything())),
+    "shelf": shelf, "everything": everything, "painted": lambda: planted(painted(everything())),
     "clamped": lambda: biased(everything()), "glass": gallery("glass"), "night": gallery("night")}
 
 

@@ -202,6 +202,7 @@ def test_light_of_two_edges_is_all_direct() -> None:
         assert np.array_equal(found["direct"], pixels) and not found["indirect"].any()
 
 
+@pytest.mark.statistics
 def test_variance_is_that_of_the_mean() -> None:
     """Among pictures of other seeds, of independent samples: their sample variance has 199 degrees of freedom."""
     scene = ball_on_floor()

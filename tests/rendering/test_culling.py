@@ -56,10 +56,11 @@ def test_the_camera_looks_through_back_faces(device: Device, integrator: Integra
 
 
 @pytest.mark.parametrize("few_triangles", [0, *others(1 << 20)], ids=["instance", "mesh"])
+@pytest.mark.parametrize("culling", ["all", *others("camera", "none")])
 @pytest.mark.parametrize("axes, keeps", [((-1, 1, 1), True), ((1, -1, 1), False), ((-1, -1, -1), False),
                                          ((-1, -1, 1), False), ((-1, 1, -1), True)])
 def test_mirrored_instances(device: Device, monkeypatch: pytest.MonkeyPatch, axes: tuple[int, int, int], keeps: bool,
-                            few_triangles: int) -> None:
+                            culling: Culling, few_triangles: int) -> None:
     """A mirrored wall's front is the mirror image of the wall's front, for culling and for emission. Of two walls, as
     one alone would become a mesh, the second is behind the camera."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", few_triangles)
@@ -67,14 +68,13 @@ def test_mirrored_instances(device: Device, monkeypatch: pytest.MonkeyPatch, axe
     camera = Camera(position=(0, 10, 0), look_at=(0, 0, 0), up=(0, 0, 1), fov_degrees=5)
     for material, hidden in ((WALL, True), (LAMP, True), (replace(WALL, double_sided=True), False)):
         wall = square(0, material)
-        for culling in get_args(Culling):
-            scene = Scene(meshes=[square(0, replace(LAMP, emission=(7.0, 7.0, 7.0)))],
-                          instances=[Instance(wall, place) for place in places], camera=camera,
-                          render=RenderSettings(size=(8, 8), spp=4, back_face_culling=culling))
-            assert compile_scene(scene, Choices()).instances == 2 * (few_triangles == 0 and material is not LAMP)
-            through = hidden and not keeps and culling != "none"
-            expected = [7.0] * 3 if through else RADIANCE * (material is LAMP and keeps)
-            np.testing.assert_allclose(film(device, scene).mean, np.broadcast_to(expected, (8, 8, 3)), rtol=1e-6)
+        scene = Scene(meshes=[square(0, replace(LAMP, emission=(7.0, 7.0, 7.0)))],
+                      instances=[Instance(wall, place) for place in places], camera=camera,
+                      render=RenderSettings(size=(8, 8), spp=4, back_face_culling=culling))
+        assert compile_scene(scene, Choices()).instances == 2 * (few_triangles == 0 and material is not LAMP)
+        through = hidden and not keeps and culling != "none"
+        expected = [7.0] * 3 if through else RADIANCE * (material is LAMP and keeps)
+        np.testing.assert_allclose(film(device, scene).mean, np.broadcast_to(expected, (8, 8, 3)), rtol=1e-6)
 
 
 @covering("integrator, culling", ["depth", "albedo", "normals"], CULLINGS)

@@ -137,6 +137,7 @@ def test_textures_normal_maps_and_colours_go_along(device: Device, kind: str) ->
     assert (np.abs(normals - expected_normals).max(axis=2) > 1e-3).mean() < 0.005
 
 
+@pytest.mark.statistics
 def test_instances_look_like_meshes_after_many_bounces(device: Device) -> None:
     """Each channel's mean, of random numbers of their own."""
     scene = replace(crowd("stretched"), render=replace(SETTINGS, max_depth=8))
@@ -192,6 +193,7 @@ def test_a_mesh_that_is_drawn_itself_is_stored_once(device: Device) -> None:
     assert (np.abs(picture - expected).max(axis=2) > 1e-4).mean() < 0.005
 
 
+@pytest.mark.combinations
 def test_lamps_become_meshes(device: Device) -> None:
     """Whether the mesh glows or only the instance; one that is mirrored shines from where its front is then."""
     lamp = quad([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], Diffuse(emission=(6, 5, 4)))

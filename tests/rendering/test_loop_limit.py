@@ -26,7 +26,6 @@ from clrt.scene.materials import Diffuse
 from clrt.scene.model import Camera, Mesh, Scene
 
 from ..check.sabotage import sabotaged
-from ..covering import others
 
 SIZE, SPP = (16, 24), 8
 
@@ -128,7 +127,8 @@ def test_too_long_lists_are_refused(device: Device) -> None:
                 ask(*rays)
 
 
-@pytest.mark.parametrize("entry", ["first_hit", *others("guides")])
+@pytest.mark.combinations
+@pytest.mark.parametrize("entry", ["guides", "first_hit"])
 def test_pixels_that_were_ended_are_missed(device: Device, entry: str, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
     limit(monkeypatch, 50_000)

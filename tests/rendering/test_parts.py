@@ -59,7 +59,7 @@ def test_in_parts_it_is_the_same_picture(device: Device, whole: tuple[Renderer, 
     assert len(buffers_of(running)) > len(running.compiled.buffers) + (0 if limit > 8 else 6)
 
 
-@pytest.mark.parametrize(("layout", "limit"), LIMITS)
+@pytest.mark.parametrize(("layout", "limit"), LIMITS[1:3] + others(LIMITS[0], *LIMITS[3:]))
 def test_in_parts_the_same_is_seen_first(device: Device, whole_depth: tuple[Renderer, bytes],
                                          monkeypatch: pytest.MonkeyPatch, layout: str, limit: int) -> None:
     """As above, of depths, whose programs are small."""

@@ -100,6 +100,7 @@ def test_what_is_clear_is_not_seen(device: Device) -> None:
         np.testing.assert_allclose(picture, np.broadcast_to(expected, picture.shape), rtol=1e-5, atol=1e-7)
 
 
+@pytest.mark.combinations
 def test_pictures_are_what_guides_are(device: Device) -> None:
     """Sample by sample, where nothing is followed through mirrors and glass."""
     scene = replace(everything(), spheres=[Sphere(center=(-1.0, 0.7, 0.5), radius=0.7, material=MetallicRoughness())])
