@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from .program_cache import remove_oldest
 from .this_tree import other_file
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Folder → the group of its tests (see setup.cfg).
 FOLDERS = {"farm": "farm", "oracle": "statistics", "study": "study", "window": "window"}
+#: Of compiled programs kept between runs: one run of all tests makes some 200 MB.
+MOST_KEPT_BYTES = 500_000_000
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -27,6 +30,12 @@ def pytest_configure(config: pytest.Config) -> None:
     # What PoCL compiles is kept in pytest's cache, for all processes of this run and for later ones.
     assert config.cache is not None
     os.environ["POCL_CACHE_DIR"] = str(config.cache.mkdir("pocl"))
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Bounds what PoCL keeps, when all workers have ended."""
+    if not hasattr(config, "workerinput") and config.cache is not None:
+        remove_oldest(config.cache.mkdir("pocl"), MOST_KEPT_BYTES)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -18,6 +18,8 @@ from clrt.device.open import Device
 from clrt.errors import DeviceError
 from clrt.rendering.identity import scene_hash
 
+from .covering import covering
+
 RNG = np.random.default_rng(8)
 VERTICES, FACES = RNG.random((60, 3)), RNG.integers(0, 60, (120, 3))
 SPHERES = np.hstack([RNG.random((20, 3)), np.full((20, 1), 0.05)])
@@ -27,6 +29,10 @@ SCENES = sorted((Path(__file__).parents[1] / "scenes").glob("*.toml"))
 
 COPIES: dict[str, Callable[[Any], Any]] = {
     "pickle": lambda each: pickle.loads(pickle.dumps(each)), "copy": copy.copy, "deepcopy": copy.deepcopy}
+#: Of queries: each layout, and what else there is to keep.
+OPTIONS: dict[str, dict[str, Any]] = {
+    **{layout: {"layout": layout} for layout in ("bvh8", "bvh2", "cwbvh", "packs", "list")},
+    "ploc": {"builder": "ploc"}, "spheres": {"spheres": SPHERES}, "pool": {"traversal": "pool"}}
 
 
 def instanced(device: Device, **options: Any) -> clrt.InstancedRayQuery:
@@ -45,13 +51,10 @@ def assert_same(one: Any, other: Any) -> None:
         np.testing.assert_array_equal(found, expected)
 
 
-@pytest.mark.parametrize("how", COPIES)
-@pytest.mark.parametrize("options", [{"layout": layout} for layout in ("bvh8", "bvh2", "cwbvh", "packs", "list")]
-                         + [{"builder": "ploc"}, {"spheres": SPHERES}, {"traversal": "pool"}],
-                         ids=["bvh8", "bvh2", "cwbvh", "packs", "list", "ploc", "spheres", "pool"])
-def test_a_copy_answers_the_same(device: Device, how: str, options: dict[str, Any]) -> None:
+@covering("name, how", OPTIONS, COPIES)
+def test_a_copy_answers_the_same(device: Device, name: str, how: str) -> None:
     """Before it has been asked and after, also once either has been refitted; the two share nothing that changes."""
-    made = query(device, **options)
+    made = query(device, **OPTIONS[name])
     before = COPIES[how](made)
     assert_same(made, before)
     after, moved = COPIES[how](made), VERTICES[::-1] * 1.5
@@ -64,8 +67,7 @@ def test_a_copy_answers_the_same(device: Device, how: str, options: dict[str, An
     assert before.closest_hit(*RAYS)["t"].tobytes() != after.closest_hit(*RAYS)["t"].tobytes()
 
 
-@pytest.mark.parametrize("how", COPIES)
-@pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh"])
+@covering("layout, how", ["bvh8", "bvh2", "cwbvh"], COPIES)
 def test_a_copy_of_instances(device: Device, how: str, layout: str) -> None:
     """Also where either moves."""
     made = instanced(device, layout=layout)

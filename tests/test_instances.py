@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 import clrt
 from clrt.device.open import Device
 
+from .covering import covering
+
 Doubles = NDArray[np.float64]
 RNG = np.random.default_rng(11)
 MESHES = [(RNG.uniform(-1, 1, (3 * n, 3)).astype(np.float32), np.arange(3 * n, dtype=np.int32).reshape(-1, 3))
@@ -61,10 +63,9 @@ def brute_force(corners: Doubles, origins: Doubles, directions: Doubles) -> tupl
     return np.where(depth >= 0, t, np.inf), depth
 
 
-@pytest.mark.parametrize("layout, traversal", WAYS)
-@pytest.mark.parametrize("kind", ["turned", "stretched", "mirrored", "flat", "tiny"])
-def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, layout: str,
-                                                traversal: str | None) -> None:
+@covering("kind, way", ["turned", "stretched", "mirrored", "flat", "tiny"], WAYS)
+def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, way: tuple[str, str | None]) -> None:
+    layout, traversal = way
     rng = np.random.default_rng(3)
     mesh = rng.integers(0, 3, 12)
     to_world = transforms(rng, kind, 12)

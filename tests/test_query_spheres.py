@@ -11,6 +11,7 @@ import clrt
 from clrt.accel.kernels import SPHERE_TESTS
 from clrt.device.open import Device
 
+from .covering import others
 from .accel.cases import soup, spheres
 from .rendering.rays import hit_spheres, hit_triangles
 
@@ -26,9 +27,9 @@ DIRECTIONS = (RNG.random((3000, 3)) - ORIGINS).astype(np.float32)
 RAYS = ORIGINS.astype(np.float64), DIRECTIONS.astype(np.float64)
 
 
-@pytest.mark.parametrize("mesh, sphere, ways", [(MESH, "robust", WAYS), (NO_MESH, "robust", WAYS[2:3]),
-                                                (MESH, "textbook", WAYS[5:])],
-                         ids=["among triangles", "alone", "textbook"])
+@pytest.mark.parametrize("mesh, sphere, ways", [
+    (MESH, "robust", WAYS), *others((NO_MESH, "robust", WAYS[2:3]), (MESH, "textbook", WAYS[5:]))],
+    ids=["among triangles", "alone", "textbook"])
 def test_hits_are_those_of_the_closed_form(device: Device, mesh: Any, sphere: str,
                                            ways: list[tuple[str, str | None]]) -> None:
     """From outside and inside; spheres are numbered behind the triangles; a limit in t cuts as it does for them."""

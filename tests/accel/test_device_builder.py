@@ -16,6 +16,7 @@ from clrt.device.arrays import on_host
 from clrt.device.open import Device
 from clrt.errors import SceneError
 
+from ..covering import covering
 from .cases import NO_SPHERES, SCENES, edges
 from .device_trees import built, like_gpu, wide_tree
 
@@ -93,8 +94,7 @@ def first_result(layout: str, case: str) -> list[dict[str, bytes]]:
     return []
 
 
-@pytest.mark.parametrize("case", SCENES)
-@pytest.mark.parametrize("layout", SHAPES)
+@covering("case, layout", SCENES, SHAPES)
 def test_the_same_tree_again_and_everywhere(device: Device, layout: str, case: str) -> None:
     again = build_tree(device, layout, "ploc", *SCENES[case]).buffers
     for buffers in (built(device, layout, case).buffers, again):
@@ -102,8 +102,7 @@ def test_the_same_tree_again_and_everywhere(device: Device, layout: str, case: s
         assert first_result(layout, case)[-1] == first_result(layout, case)[0]
 
 
-@pytest.mark.parametrize("layout, case", [*((layout, case) for layout in SHAPES for case in ("blocks", "mixed")),
-                                          ("bvh8", "two"), ("bvh8", "equal_centroids")])
+@covering("case, layout", ["blocks", "mixed", "two", "equal_centroids"], SHAPES)
 def test_the_same_tree_by_many_work_items(device: Device, layout: str, case: str) -> None:
     found = build_tree(like_gpu(device), layout, "ploc", *SCENES[case])
     expected = built(device, layout, case)

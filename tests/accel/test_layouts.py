@@ -21,6 +21,7 @@ from clrt.accel.tree import FloatArray
 from clrt.accel.wide import EMPTY
 from clrt.errors import UsageError
 
+from ..covering import covering
 from .cases import grid, soup, spheres
 
 Doubles = NDArray[np.float64]
@@ -181,9 +182,7 @@ def trace(layout: Layout, ray: Ray) -> Hit:
     return closest
 
 
-@pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("builder", BUILDERS)
-@pytest.mark.parametrize("layout", LAYOUTS)
+@covering("scene, layout, builder", SCENES, LAYOUTS, BUILDERS, strength=2)
 def test_rays_hit_what_brute_force_hits(layout: str, builder: str, scene: str) -> None:
     packed = pack(layout, builder, *SCENES[scene])
     expected = [brute_force(*SCENES[scene], ray) for ray in rays()]

@@ -13,11 +13,11 @@ from clrt.device.blocks import Blocks
 from clrt.device.open import Device
 from clrt.errors import NoRoomError
 
+from ..covering import covering
 from .cases import soup, spheres
 
 
-@pytest.mark.parametrize("builder", ["ploc", "reinsertion"])
-@pytest.mark.parametrize("layout", SHAPES)
+@covering("layout, builder", SHAPES, ["ploc", "reinsertion"])
 def test_no_array_is_larger_than_foretold(device: Device, monkeypatch: pytest.MonkeyPatch, layout: str,
                                           builder: str) -> None:
     """Of triangles in clumps, of triangles all over the place, and of spheres among them."""

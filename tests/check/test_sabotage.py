@@ -11,6 +11,7 @@ from clrt.check.parts import PARTS
 from clrt.device import program
 from clrt.device.open import Device, open_device
 
+from ..covering import others
 from .sabotage import sabotaged
 
 #: The part that must notice, what is replaced in the kernels, by what, and a line before that.
@@ -46,7 +47,12 @@ def best() -> Device:
     return open_device()
 
 
-@pytest.mark.parametrize("name", SABOTAGES)
+#: Trees and pictures take long to compile.
+LARGE = ("binary tree", "tree builder", "furnace", "lamp", "ball", "room")
+SMALL = [name for name, (part, *_) in SABOTAGES.items() if part not in LARGE]
+
+
+@pytest.mark.parametrize("name", SMALL + others(*(name for name in SABOTAGES if name not in SMALL)))
 def test_what_is_broken_is_found(best: Device, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     part, *edit = SABOTAGES[name]
     folder = sabotaged(tmp_path / "kernels", *edit)

@@ -14,6 +14,7 @@ import pytest
 from clrt.output.files import replacing
 from clrt.rendering.checkpoint_file import write_checkpoint
 
+from ..covering import others
 from .test_checkpoints import SCENE
 from .test_commands import clrt
 
@@ -114,12 +115,12 @@ def _in_group(group: int, path: Path) -> Callable[..., os.stat_result]:
     ("a.png", ("render", "ball.toml", "-o", "a.png")),
     ("a.raw.exr", ("render", "ball.toml", "-o", "a.exr", "--denoise")),
     ("a.depth.png", ("render", "ball.toml", "-o", "a.png", "--aov", "depth")),
-    ("a.json", ("render", "ball.toml", "--report", "a.json")), ("p.png", ("render", "ball.toml", "--plot", "p.png")),
-    ("a.ck", ("render", "ball.toml", "--checkpoint", "a.ck")),
-    ("a.ck~", ("render", "ball.toml", "--checkpoint", "a.ck")),
-    ("t_0001.png", ("render", "ball.toml", "--turntable", "2", "-o", "t.png")),
-    ("t.gif", ("render", "ball.toml", "--turntable", "2", "-o", "t.gif")),
-    ("a.toml", ("convert", "a.obj", "a.toml")), ("d.txt", ("doctor", "-o", "d.txt"))])
+    ("a.ck~", ("render", "ball.toml", "--checkpoint", "a.ck")), ("a.toml", ("convert", "a.obj", "a.toml")), *others(
+        ("a.json", ("render", "ball.toml", "--report", "a.json")),
+        ("p.png", ("render", "ball.toml", "--plot", "p.png")),
+        ("a.ck", ("render", "ball.toml", "--checkpoint", "a.ck")),
+        ("t_0001.png", ("render", "ball.toml", "--turntable", "2", "-o", "t.png")),
+        ("t.gif", ("render", "ball.toml", "--turntable", "2", "-o", "t.gif")), ("d.txt", ("doctor", "-o", "d.txt")))])
 def test_read_only_files(folder: Path, name: str, arguments: tuple[str, ...]) -> None:
     """Nothing is written, and the file is named; with --force it is replaced, and stays read-only."""
     (folder / name).touch()

@@ -11,6 +11,7 @@ import pytest
 
 from clrt.output.images import read_image, write_image
 
+from ..covering import others
 from .test_commands import SCENE
 
 RENDER = "render ball.toml -q -o a.png -o a.exr --report r.json"
@@ -74,7 +75,7 @@ def test_an_interrupt_before_it_has_begun(folder: Path) -> None:
     assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
 
 
-@pytest.mark.parametrize("change", ["", "\r\n", "# ü\n"])
+@pytest.mark.parametrize("change", ["# ü\n", *others("", "\r\n")])
 def test_a_scene_from_standard_input(folder: Path, change: str) -> None:
     """Its files are named from the working folder."""
     write_image(folder / "map.png", np.full((2, 2, 3), 0.5, np.float32))

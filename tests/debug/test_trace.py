@@ -25,6 +25,7 @@ from clrt.scene.materials import Diffuse
 from clrt.scene.model import RenderSettings, Scene, Sphere
 
 from ..check.sabotage import sabotaged
+from ..covering import others
 from ..rendering.lamps import lamps
 from ..rendering.test_variants import everything, painted, planted, shelf
 
@@ -37,9 +38,8 @@ def gallery(name: str) -> Callable[[], Scene]:
     return lambda: load(SCENES / f"{name}.toml")
 
 
-def biased() -> Scene:
+def biased(scene: Scene) -> Scene:
     """With clamps that take much away, and back faces that camera rays pass through."""
-    scene = everything()
     settings = replace(scene.render, clamp_direct=0.5, clamp_indirect=0.05, back_face_culling="camera")
     return replace(scene, render=settings)
 
@@ -47,9 +47,11 @@ def biased() -> Scene:
 #: All kinds of lights, materials and primitives; textures, partial opacity, coats and instances; every material in all
 #: its variants, media included; many lights, in a light BVH; clamps; and scenes of the gallery.
 SUBJECTS: dict[str, Callable[[], Scene]] = {
-    "everything": everything, "painted": lambda: planted(painted(everything())), "shelf": shelf,
-    "lamps": lambda: replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)]),
-    "biased": biased, "glass": gallery("glass"), "night": gallery("night")}
+    "biased": lambda: biased(planted(painted(everything()))),
+    "lamps": lambda: replace(lamps(40), spheres=[*lamps(40).spheres, Sphere(radius=0.8)])}
+PARTS_OF_SUBJECTS: dict[str, Callable[[], Scene]] = {
+    "shelf": shelf, "everything": everything, "painted": lambda: planted(painted(everything())),
+    "clamped": lambda: biased(everything()), "glass": gallery("glass"), "night": gallery("night")}
 
 
 def pixels(seed: int, count: int) -> list[tuple[int, int]]:
@@ -57,12 +59,13 @@ def pixels(seed: int, count: int) -> list[tuple[int, int]]:
     return [(int(x), int(y)) for x, y in zip(rng.integers(0, SIZE[0], count), rng.integers(0, SIZE[1], count))]
 
 
-@pytest.fixture(scope="module", params=SUBJECTS)
+@pytest.fixture(scope="module", params=[*SUBJECTS, *others(*PARTS_OF_SUBJECTS)])
 def traced(request: pytest.FixtureRequest, device: Device) -> tuple[Doubles, list[PixelPaths]]:
     """The mean of a render of a subject, and the paths of some of its pixels."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(instancing, "FEW_TRIANGLES", 0)
-        renderer = Renderer(SUBJECTS[request.param](), device=device, size=SIZE, spp=SPP, max_depth=7, seed=5)
+        scene = (SUBJECTS | PARTS_OF_SUBJECTS)[request.param]()
+        renderer = Renderer(scene, device=device, size=SIZE, spp=SPP, max_depth=7, seed=5)
         *_, state = renderer.passes(spp=SPP)
         paths = [trace_pixel(renderer.scene, device, pixel) for pixel in pixels(3, 12)]
     return state.film.mean, paths

@@ -33,6 +33,7 @@ from clrt.scene.materials import MATERIALS
 from clrt.scene.model import Environment, Filter, Sampler
 from clrt.study.bsdfs import variants
 
+from ..covering import others
 from ..rendering.lamps import lamps
 from ..rendering.test_variants import everything, painted, planted, shelf, sights
 
@@ -139,20 +140,21 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     assert sorted(used) == FILES
 
 
-def test_programs_build_without_a_warning(device: Device, capfd: pytest.CaptureFixture[str], tmp_path: Path,
-                                          monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("entry", ["the picture's", *others("guides.cl", "first hits", "debug.cl")])
+def test_programs_build_without_a_warning(device: Device, entry: str, capfd: pytest.CaptureFixture[str],
+                                          tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """They would land on the user's terminal, in the middle of the progress bar. What drivers say besides is theirs."""
     scene = everything()
     scene.spheres = scene.spheres + [type(scene.spheres[0])(material=material)
                                      for kind in MATERIALS for material in variants(kind)]
     compiled = compile_scene(scene, Choices(device.lanes, device.layout, direct_light=True))
-    sources = (compiled.source, compiled.source_of("guides.cl"), first_hit_program(compiled, AOVS)[0],
-               compiled.source_of("debug.cl", vertex_preamble()))
-    for number, source in enumerate(sources):
-        monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path / str(number)))
-        build(device, f"{source}\n// its own text, so that no cache has it")
-        log = cache.kept_logs()["build"]
-        assert "\nbuilt in " in log and not re.findall(r".*\.cl:\d+:\d+: warning.*", log)
+    sources = {"the picture's": compiled.source, "guides.cl": compiled.source_of("guides.cl"),
+               "first hits": first_hit_program(compiled, AOVS)[0],
+               "debug.cl": compiled.source_of("debug.cl", vertex_preamble())}
+    monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path))
+    build(device, f"{sources[entry]}\n// its own text, so that no cache has it")
+    log = cache.kept_logs()["build"]
+    assert "\nbuilt in " in log and not re.findall(r".*\.cl:\d+:\d+: warning.*", log)
     assert "warning" not in capfd.readouterr().err
 
 

@@ -53,6 +53,7 @@ def test_device_agrees_with_numpy(device: Device) -> None:
     assert not wrong
 
 
+@pytest.mark.combinations
 def test_pyopencl_agrees(device: Device) -> None:
     """Its own matcher of dtypes to C structs finds no other layout."""
     for name, dtype in RECORDS.items():

@@ -21,6 +21,7 @@ from clrt.scene.materials import Dielectric, Diffuse, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.textures import Picture, Texture
 
+from ..covering import others
 from .pictures import frame, quad, view_rays
 from .test_variants import everything
 
@@ -60,8 +61,8 @@ def middles(size: tuple[int, int] = SIZE) -> tuple[Doubles, Doubles]:
     return w, np.where(inside > 0, along - np.sqrt(np.maximum(inside, 0)), np.inf)
 
 
-@pytest.mark.parametrize("at, scale", [((0, 0, 0), 1.0), ((4e3, -3e3, 0), 1.0), ((0, 0, 0), 2.0**-40),
-                                       ((0, 0, 0), 2.0**30)], ids=str)
+@pytest.mark.parametrize("at, scale", [
+    ((4e3, -3e3, 0), 1.0), ((0, 0, 0), 2.0**-40), *others(((0, 0, 0), 1.0), ((0, 0, 0), 2.0**30))], ids=str)
 def test_places_and_numbers_are_those_of_the_middle_s_ray(at: Any, scale: float) -> None:
     """Whatever the filter, wherever the scene stands, in its own units."""
     _, found = rendered(ball_on_floor(np.array(at), scale), "depth,position,primitive,object,material",
@@ -161,7 +162,8 @@ def test_albedo_is_a_mean_over_the_pixel() -> None:
     assert not found["albedo"][:, 3:].any()
 
 
-@pytest.mark.parametrize("options", [{}, {"adaptive": True}, {"lanes": 1, "filter": "blackman_harris"}], ids=str)
+@pytest.mark.parametrize("options", [
+    {}, *others({"adaptive": True}, {"lanes": 1, "filter": "blackman_harris"})], ids=str)
 def test_direct_and_indirect_light_add_up_to_the_picture(options: dict[str, Any]) -> None:
     """To the last bit; and the picture is the one that there is without them. Direct light is what paths of two edges
     bring, so it is the picture of depth 2, of the same samples."""
@@ -176,8 +178,8 @@ def test_direct_and_indirect_light_add_up_to_the_picture(options: dict[str, Any]
 
 
 @pytest.mark.parametrize("camera", [
-    {"aperture_radius": 0.3, "focus_distance": 2.0}, {"projection": "orthographic"}, {"projection": "equirectangular"}],
-    ids=str)
+    {"aperture_radius": 0.3, "focus_distance": 2.0},
+    *others({"projection": "orthographic"}, {"projection": "equirectangular"})], ids=str)
 def test_depth_is_what_the_integrator_of_it_shows(camera: dict[str, Any]) -> None:
     """For every camera; of a lens the ray through its middle."""
     scene = ball_on_floor()
@@ -200,6 +202,7 @@ def test_light_of_two_edges_is_all_direct() -> None:
         assert np.array_equal(found["direct"], pixels) and not found["indirect"].any()
 
 
+@pytest.mark.statistics
 def test_variance_is_that_of_the_mean() -> None:
     """Among pictures of other seeds, of independent samples: their sample variance has 199 degrees of freedom."""
     scene = ball_on_floor()

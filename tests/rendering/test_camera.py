@@ -16,6 +16,7 @@ from clrt.scene.model import Camera, Environment, Projection, RenderSettings, Sc
 from clrt.study.probe import choices
 from clrt.study.significance import sidak
 
+from ..covering import others
 from .pictures import film, frame, pixel_p_values, session
 from .skies import lookup
 
@@ -93,7 +94,7 @@ def test_right_is_cross_of_forward_and_up(device: Device) -> None:
     assert picture[..., 1].argmax() == 1 * 9 + 4
 
 
-@pytest.mark.parametrize("depth", [6.0, 12.0, 40.0])
+@pytest.mark.parametrize("depth", [6.0, *others(12.0, 40.0)])
 def test_a_point_out_of_focus_is_an_even_disc(device: Device, depth: float) -> None:
     """Of the radius R·|s − d|/d on the plane of focus, at s, for a lens of radius R and a point at d.
 

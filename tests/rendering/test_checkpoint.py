@@ -15,6 +15,7 @@ from clrt.errors import ClrtError, OutputError, UsageError
 from clrt.rendering.checkpoint_file import write_checkpoint
 from clrt.rendering.renderer import Renderer
 
+from ..covering import covering
 from .checkpoints import renderer, run, same
 
 
@@ -25,8 +26,7 @@ def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("clrt.device.launch.TARGET_SECONDS", 1e-9)
 
 
-@pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
-@pytest.mark.parametrize("stops", [{"spp": 40}, {"error": 0.1}], ids=str)
+@covering("stops, adaptive", [{"spp": 40}, {"error": 0.1}], [False, True])
 def test_interrupted_again_and_again(device: Device, tmp_path: Path, small_launches: None, adaptive: bool,
                                      stops: dict[str, float]) -> None:
     """A new renderer for every few launches, in passes and between them; 40 samples are more than were planned."""
@@ -145,8 +145,7 @@ def test_left_by_break(device: Device, tmp_path: Path, adaptive: bool) -> None:
     goes_on_to_the_same(device, tmp_path / "a.ck", adaptive)
 
 
-@pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
-@pytest.mark.parametrize("launches", [3, 17, 40, *range(5, 12)])
+@covering("launches, adaptive", [3, 17, 40, *range(5, 12)], [False, True])
 def test_left_by_a_keyboard_interrupt(device: Device, tmp_path: Path, small_launches: None, adaptive: bool,
                                       launches: int) -> None:
     """Raised as a launch is waited for, in the middle of a pass or the last of it."""

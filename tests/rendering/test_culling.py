@@ -19,11 +19,13 @@ from clrt.scene.material import Culling
 from clrt.scene.materials import Dielectric, Diffuse, Material, Mirror
 from clrt.scene.model import Camera, Environment, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
 
+from ..covering import covering, others
 from .pictures import box, film, quad
 
 BLACK = (0.0, 0.0, 0.0)
 WALL, LAMP = Diffuse(color=BLACK), Diffuse(color=BLACK, emission=(1.0, 2.0, 3.0))
 RADIANCE = np.array([1.0, 2.0, 3.0])
+CULLINGS = get_args(Culling)[::-1]
 
 
 def square(height: float, material: Material, up: bool = True, half: float = 9.0) -> Mesh:
@@ -43,22 +45,22 @@ def seen(device: Device, culling: Culling, *meshes: Mesh, height: float = 10.0, 
                               render=render), lanes=lanes).mean
 
 
-@pytest.mark.parametrize("integrator, lanes", [("path", 1), ("path", 8), ("local", 8), ("raster", 8)])
-def test_the_camera_looks_through_back_faces(device: Device, integrator: Integrator, lanes: int) -> None:
+@covering("integrator, lanes, culling", ["path", "raster", "local"], [1, 8], CULLINGS)
+def test_the_camera_looks_through_back_faces(device: Device, integrator: Integrator, lanes: int,
+                                             culling: Culling) -> None:
     """A black wall before a lamp, its front or its back to the camera, or of a material with two sides."""
-    behind = square(0, LAMP)
-    for culling in get_args(Culling):
-        for wall, culled in ((square(5, WALL, up=True), False), (square(5, WALL, up=False), culling != "none"),
-                             (square(5, replace(WALL, double_sided=True), up=False), False)):
-            found = seen(device, culling, behind, wall, integrator=integrator, lanes=lanes)
-            np.testing.assert_array_equal(found, np.broadcast_to(RADIANCE * culled, (8, 8, 3)))
+    for wall, culled in ((square(5, WALL, up=True), False), (square(5, WALL, up=False), culling != "none"),
+                         (square(5, replace(WALL, double_sided=True), up=False), False)):
+        found = seen(device, culling, square(0, LAMP), wall, integrator=integrator, lanes=lanes)
+        np.testing.assert_array_equal(found, np.broadcast_to(RADIANCE * culled, (8, 8, 3)))
 
 
-@pytest.mark.parametrize("few_triangles", [0, 1 << 20], ids=["instance", "mesh"])
+@pytest.mark.parametrize("few_triangles", [0, *others(1 << 20)], ids=["instance", "mesh"])
+@pytest.mark.parametrize("culling", ["all", *others("camera", "none")])
 @pytest.mark.parametrize("axes, keeps", [((-1, 1, 1), True), ((1, -1, 1), False), ((-1, -1, -1), False),
                                          ((-1, -1, 1), False), ((-1, 1, -1), True)])
 def test_mirrored_instances(device: Device, monkeypatch: pytest.MonkeyPatch, axes: tuple[int, int, int], keeps: bool,
-                            few_triangles: int) -> None:
+                            culling: Culling, few_triangles: int) -> None:
     """A mirrored wall's front is the mirror image of the wall's front, for culling and for emission. Of two walls, as
     one alone would become a mesh, the second is behind the camera."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", few_triangles)
@@ -66,53 +68,56 @@ def test_mirrored_instances(device: Device, monkeypatch: pytest.MonkeyPatch, axe
     camera = Camera(position=(0, 10, 0), look_at=(0, 0, 0), up=(0, 0, 1), fov_degrees=5)
     for material, hidden in ((WALL, True), (LAMP, True), (replace(WALL, double_sided=True), False)):
         wall = square(0, material)
-        for culling in get_args(Culling):
-            scene = Scene(meshes=[square(0, replace(LAMP, emission=(7.0, 7.0, 7.0)))],
-                          instances=[Instance(wall, place) for place in places], camera=camera,
-                          render=RenderSettings(size=(8, 8), spp=4, back_face_culling=culling))
-            assert compile_scene(scene, Choices()).instances == 2 * (few_triangles == 0 and material is not LAMP)
-            through = hidden and not keeps and culling != "none"
-            expected = [7.0] * 3 if through else RADIANCE * (material is LAMP and keeps)
-            np.testing.assert_allclose(film(device, scene).mean, np.broadcast_to(expected, (8, 8, 3)), rtol=1e-6)
+        scene = Scene(meshes=[square(0, replace(LAMP, emission=(7.0, 7.0, 7.0)))],
+                      instances=[Instance(wall, place) for place in places], camera=camera,
+                      render=RenderSettings(size=(8, 8), spp=4, back_face_culling=culling))
+        assert compile_scene(scene, Choices()).instances == 2 * (few_triangles == 0 and material is not LAMP)
+        through = hidden and not keeps and culling != "none"
+        expected = [7.0] * 3 if through else RADIANCE * (material is LAMP and keeps)
+        np.testing.assert_allclose(film(device, scene).mean, np.broadcast_to(expected, (8, 8, 3)), rtol=1e-6)
 
 
-@pytest.mark.parametrize("culling", get_args(Culling))
-def test_pictures_of_what_is_seen_first(device: Device, culling: Culling) -> None:
-    """Depth, normals, albedo, and the AOVs: of the wall, or of the floor behind it."""
+@covering("integrator, culling", ["depth", "albedo", "normals"], CULLINGS)
+def test_pictures_of_what_is_seen_first(device: Device, integrator: Integrator, culling: Culling) -> None:
+    """Of the wall, or of the floor behind it."""
     floor, wall = square(0, Diffuse(color=(0.25, 0.5, 0.75))), square(5, Diffuse(color=(0.1, 0.1, 0.1)), up=False)
     culled = culling != "none"
-    found = {name: seen(device, culling, floor, wall, integrator=name) for name in ("depth", "normals", "albedo")}
-    np.testing.assert_allclose(found["depth"], 10.0 if culled else 5.0, rtol=1e-6)
-    np.testing.assert_allclose(found["normals"], np.broadcast_to([0, 1, 0], (8, 8, 3)), atol=1e-6)
-    np.testing.assert_allclose(found["albedo"][0, 0], [0.25, 0.5, 0.75] if culled else 0.1, rtol=1e-6)
+    expected = {"depth": [10.0 if culled else 5.0], "normals": [0.0, 1.0, 0.0],
+                "albedo": [0.25, 0.5, 0.75] if culled else [0.1]}[integrator]
+    found = seen(device, culling, floor, wall, integrator=integrator)
+    np.testing.assert_allclose(found, np.broadcast_to(expected, (8, 8, 3)), rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("culling", ["all", *others("camera", "none")])
+def test_aovs_of_what_is_seen_first(device: Device, culling: Culling) -> None:
+    floor, wall = square(0, Diffuse()), square(5, Diffuse(), up=False)
     scene = Scene(meshes=[floor, wall], camera=Camera(position=(0, 10, 0), look_at=(0, 0, 0), up=(0, 0, 1)))
     image = clrt.render(scene, device=device.info.index, size=(4, 4), spp=1, back_face_culling=culling, aovs="object")
-    assert np.all(image.aovs["object"] == (0 if culled else 1))
+    assert np.all(image.aovs["object"] == (1 if culling == "none" else 0))
     assert image.report["back_face_culling"] == culling
 
 
-@pytest.mark.parametrize("integrator", ["path", "local"])
-def test_shadow_rays_pass_back_faces_where_all_are_culled(device: Device, integrator: Integrator) -> None:
+@covering("integrator, culling", ["path", "local"], CULLINGS)
+def test_shadow_rays_pass_back_faces_where_all_are_culled(device: Device, integrator: Integrator,
+                                                          culling: Culling) -> None:
     """They come to a wall that faces the sun from behind. Light is E·albedo/pi, exactly."""
     sun = DirectionalLight(direction=(1, -1, 0), irradiance=(2, 2, 2))
     floor = square(0, Diffuse(color=(0.5, 0.5, 0.5)))
-    for culling in get_args(Culling):
-        for up in (True, False):
-            wall = square(50, WALL, up=up)
-            wall.vertices = wall.vertices - np.array([50, 0, 0], np.float32)
-            lit = culling == "all" and up
-            expected = 0.5 / np.pi * 2 * np.sqrt(0.5) * lit
-            found = seen(device, culling, floor, wall, integrator=integrator, lights=[sun])
-            assert found == pytest.approx(expected, rel=1e-5)
+    for up in (True, False):
+        wall = square(50, WALL, up=up)
+        wall.vertices = wall.vertices - np.array([50, 0, 0], np.float32)
+        lit = culling == "all" and up
+        expected = 0.5 / np.pi * 2 * np.sqrt(0.5) * lit
+        found = seen(device, culling, floor, wall, integrator=integrator, lights=[sun])
+        assert found == pytest.approx(expected, rel=1e-5)
 
 
-@pytest.mark.parametrize("integrator", ["path", "local"])
-def test_mirrors_show_what_the_camera_does_not_see(device: Device, integrator: Integrator) -> None:
+@covering("integrator, culling", ["local", "path"], CULLINGS)
+def test_mirrors_show_what_the_camera_does_not_see(device: Device, integrator: Integrator, culling: Culling) -> None:
     """Above the camera is a wall's back, before a lamp: a mirror shows the wall, unless all rays pass it."""
-    for culling in get_args(Culling):
-        found = seen(device, culling, square(0, Mirror()), square(20, WALL), square(30, LAMP, up=False),
-                     integrator=integrator)
-        np.testing.assert_allclose(found, np.broadcast_to(RADIANCE * (culling == "all"), (8, 8, 3)), rtol=1e-6)
+    found = seen(device, culling, square(0, Mirror()), square(20, WALL), square(30, LAMP, up=False),
+                 integrator=integrator)
+    np.testing.assert_allclose(found, np.broadcast_to(RADIANCE * (culling == "all"), (8, 8, 3)), rtol=1e-6)
 
 
 @pytest.mark.parametrize("culling", ["camera", "all"])

@@ -157,17 +157,26 @@ def test_edges_are_shares_of_the_pixel(device: Device) -> None:
     assert not found["albedo"][:, 3:].any() and found["albedo"][:, :2].min() > 0.09
 
 
-def test_lanes_and_launches_agree(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """To float rounding, but for samples on an edge, which a rounding may turn; and bit for bit however it is cut."""
+@pytest.mark.combinations
+def test_lanes_agree(device: Device) -> None:
+    """To float rounding, but for samples on an edge, which a rounding may turn."""
     pictures = [guides(device, everything(), lanes=lanes) for lanes in (8, 1)]
     for name, picture in pictures[1].items():
         assert np.mean(np.abs(picture - pictures[0][name]).max(axis=2) > 1e-5) < 1e-3, name
+
+
+def test_launches_agree(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bit for bit, however it is cut."""
+    scene = Scene(meshes=[back(Mirror()), front(Diffuse(color=RED))], camera=INSIDE,
+                  render=RenderSettings(size=(60, 40)))
+    whole = guides(device, scene)
     monkeypatch.setattr(pixels, "FIRST_LAUNCH_SAMPLES", 1)
     monkeypatch.setattr(pixels, "FEWEST_TILES", 2)
-    for name, picture in guides(device, everything(), lanes=8).items():
-        assert picture.tobytes() == pictures[0][name].tobytes(), name
+    for name, picture in guides(device, scene).items():
+        assert picture.tobytes() == whole[name].tobytes(), name
 
 
+@pytest.mark.combinations
 def test_they_are_in_range(device: Device) -> None:
     """Of all kinds of surfaces, lights and materials. What the camera looks at turns to it."""
     found = guides(device, everything(), 16)

@@ -30,6 +30,8 @@ from clrt.scene.materials import MATERIALS
 from clrt.scene.model import RenderSettings, Scene
 from clrt.scene.textures import Picture, Texture
 
+from ..covering import others
+
 #: Of each setting and choice a value that is not the default.
 OTHER: dict[str, Any] = {
     "size": (24, 16), "spp": 3, "max_depth": 3, "seed": 7, "integrator": "direct", "shadows": False,
@@ -129,7 +131,7 @@ def test_unknown_content_is_refused() -> None:
         scene_hash(content)
 
 
-@pytest.mark.parametrize("name", [*SETTINGS, *CHOICES, *TESTS])
+@pytest.mark.parametrize("name", [*SETTINGS, *others(*CHOICES, *TESTS)])
 def test_renderer_farm_and_report_take_every_one(device: Device, name: str) -> None:
     """A renderer has each as an option, the farm's orders choose the same by it, and the report tells what counts."""
     options: dict[str, Any] = {"size": (8, 8), "device": device.info.index}

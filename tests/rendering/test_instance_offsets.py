@@ -25,6 +25,7 @@ def keep_all(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
 
 
+@pytest.mark.statistics
 def test_planes_do_not_shadow_themselves(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor are they met by any of the rays that leave them, but were, if the bound of their points left out the rounding
     of the way to the mesh's frame, and rays left from there."""

@@ -127,6 +127,7 @@ def test_too_long_lists_are_refused(device: Device) -> None:
                 ask(*rays)
 
 
+@pytest.mark.combinations
 @pytest.mark.parametrize("entry", ["guides", "first_hit"])
 def test_pixels_that_were_ended_are_missed(device: Device, entry: str, tmp_path: Path,
                                            monkeypatch: pytest.MonkeyPatch) -> None:

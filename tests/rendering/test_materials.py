@@ -6,7 +6,6 @@ from dataclasses import fields, replace
 from typing import Any, get_args, get_type_hints
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 from clrt.rendering.materials import pack_materials
@@ -14,6 +13,8 @@ from clrt.rendering.textures import Textures
 from clrt.scene.materials import MATERIALS, Material
 from clrt.scene.textures import Picture, Texture
 from clrt.study.bsdfs import variants
+
+from ..covering import covering
 
 #: Random materials of a type.
 COUNT = 40
@@ -37,8 +38,7 @@ def names_of(records: NDArray[Any]) -> set[str]:
     return {name for name in records.dtype.names or () if not name.startswith(("pad", "rest"))}
 
 
-@pytest.mark.parametrize("kind", MATERIALS)
-@pytest.mark.parametrize("seed", range(5))
+@covering("kind, seed", MATERIALS, range(5))
 def test_materials_are_packed_together_as_alone(kind: type[Material], seed: int) -> None:
     """A record holds what it holds when packed alone, and no texture that its material does not read."""
     rng = np.random.default_rng(seed)

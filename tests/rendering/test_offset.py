@@ -10,6 +10,8 @@ from clrt.device.open import Device
 from clrt.scene.model import Mesh, Scene, Sphere
 from clrt.study.probe import Probe
 
+from ..covering import covering
+
 
 Doubles = NDArray[np.float64]
 COUNT = 1_000_000
@@ -40,8 +42,7 @@ def rays_to(points: Doubles, normal: Doubles, distance: float) -> tuple[Doubles,
     return origin, points - origin
 
 
-@pytest.mark.parametrize("offset", OFFSETS)
-@pytest.mark.parametrize("axis", [(0.0, 1.0, 0.0), (0.5, 0.7, -0.3)], ids=["level", "tilted"])
+@covering("axis, offset", [(0.5, 0.7, -0.3), (0.0, 1.0, 0.0)], OFFSETS)
 def test_plane(device: Device, offset: float, axis: tuple[float, float, float]) -> None:
     """One large triangle, far away on all axes, lit from both sides."""
     n = np.array(axis) / np.linalg.norm(axis)
@@ -58,8 +59,7 @@ def test_plane(device: Device, offset: float, axis: tuple[float, float, float]) 
     check_error_bound(out, np.abs((out[:, 1:4] - corners[0]) @ exact), exact)
 
 
-@pytest.mark.parametrize("offset", OFFSETS)
-@pytest.mark.parametrize("radius", [1.0, 1000.0])
+@covering("radius, offset", [1.0, 1000.0], OFFSETS)
 def test_sphere(device: Device, offset: float, radius: float) -> None:
     center = np.float32(offset) * np.ones(3)
     n = unit(COUNT, 0)

@@ -12,6 +12,7 @@ from clrt.scene.model import Scene
 from clrt.study.probe import Probe
 
 from ..accel.cases import box
+from ..covering import others
 from .test_traverse import mesh
 
 Doubles = NDArray[np.float64]
@@ -31,7 +32,7 @@ def rays_at(seed: int) -> tuple[Doubles, Doubles]:
     return origin.astype(np.float32).astype(np.float64), direction.astype(np.float32).astype(np.float64)
 
 
-@pytest.mark.parametrize("width", [8, 16])
+@pytest.mark.parametrize("width", [8, *others(16)])
 @pytest.mark.parametrize("order", [(0, 5), (3, 0), (2, 4, 3, 0, 1), (4, 0, 1, 2, 3)])
 def test_hits_are_those_of_all_triangles(device: Device, order: tuple[int, ...], width: int) -> None:
     """Of those at the same t the first is taken, though it may be in the last pack, in the lane of the other."""

@@ -19,6 +19,7 @@ from clrt.rendering.session import Session
 from clrt.scene.materials import Diffuse
 from clrt.scene.model import Mesh, Scene, Sphere
 
+from ..covering import others
 from .rays import icosphere
 from .test_variants import everything, painted
 
@@ -31,8 +32,8 @@ def scene() -> Scene:
     return replace(full, spheres=[*full.spheres, *more])
 
 
-def film(device: Device, layout: str) -> tuple[Renderer, bytes]:
-    running = Renderer(scene(), device=device.info.index, layout=layout, spp=4)
+def film(device: Device, layout: str, integrator: str = "path") -> tuple[Renderer, bytes]:
+    running = Renderer(scene(), device=device.info.index, layout=layout, spp=4, integrator=integrator)
     return running, list(running.passes(spp=4))[-1].film.pixels.tobytes()
 
 
@@ -41,18 +42,44 @@ def whole(device: Device) -> tuple[Renderer, bytes]:
     return film(device, "bvh8")
 
 
-@pytest.mark.parametrize(("layout", "limit"),
-                         [("bvh8", 8), ("bvh8", 24), ("bvh2", 8), ("cwbvh", 8), ("list", 8), ("packs", 12)])
+@pytest.fixture(scope="module")
+def whole_depth(device: Device) -> tuple[Renderer, bytes]:
+    return film(device, "bvh8", "depth")
+
+
+#: Layouts, and KiB of the largest buffer.
+LIMITS = [("bvh8", 24), ("bvh2", 8), ("cwbvh", 8), ("list", 8), ("packs", 12)]
+
+
+@pytest.mark.parametrize(("layout", "limit"), [("bvh8", 8), *others(*LIMITS)])
 def test_in_parts_it_is_the_same_picture(device: Device, whole: tuple[Renderer, bytes],
                                          monkeypatch: pytest.MonkeyPatch, layout: str, limit: int) -> None:
     """Bit for bit, in every layout; no buffer is larger than allowed, and of 8 KiB most arrays fill several."""
+    running = assert_same_in_parts(device, whole, monkeypatch, layout, limit)
+    assert len(buffers_of(running)) > len(running.compiled.buffers) + (0 if limit > 8 else 6)
+
+
+@pytest.mark.parametrize(("layout", "limit"), LIMITS[1:3] + others(LIMITS[0], *LIMITS[3:]))
+def test_in_parts_the_same_is_seen_first(device: Device, whole_depth: tuple[Renderer, bytes],
+                                         monkeypatch: pytest.MonkeyPatch, layout: str, limit: int) -> None:
+    """As above, of depths, whose programs are small."""
+    running = assert_same_in_parts(device, whole_depth, monkeypatch, layout, limit)
+    assert len(buffers_of(running)) > len(running.compiled.buffers)
+
+
+def buffers_of(running: Renderer) -> list[cl.Buffer]:
+    return [each for each in running.session.scene_arguments if isinstance(each, cl.Buffer)]
+
+
+def assert_same_in_parts(device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch, layout: str,
+                         limit: int) -> Renderer:
+    """The renderer whose largest buffer has `limit` KiB, and whose picture is that of `whole`."""
     assert isinstance(whole[0].session, Session) and whole[0].compiled.part_bytes is None
     monkeypatch.setenv(VARIABLE, f"{limit}K")
-    running, found = film(device, layout)
-    buffers = [each for each in running.session.scene_arguments if isinstance(each, cl.Buffer)]
+    running, found = film(device, layout, whole[0].scene.render.integrator)
     assert isinstance(running.session, Crew) and found == whole[1]
-    assert max(buffer.size for buffer in buffers) <= limit << 10
-    assert len(buffers) > len(running.compiled.buffers) + (0 if limit > 8 else 6)
+    assert max(buffer.size for buffer in buffers_of(running)) <= limit << 10
+    return running
 
 
 def test_only_the_film_is_too_large(device: Device, whole: tuple[Renderer, bytes],
@@ -64,6 +91,7 @@ def test_only_the_film_is_too_large(device: Device, whole: tuple[Renderer, bytes
     assert running.compiled.part_bytes is None and running.compiled.source == whole[0].compiled.source
 
 
+@pytest.mark.combinations
 def test_other_kernels_see_the_parts(device: Device, whole: tuple[Renderer, bytes],
                                      monkeypatch: pytest.MonkeyPatch) -> None:
     expected = render_guides(whole[0].session, 2)

@@ -18,6 +18,7 @@ from clrt.rendering.guides import render_guides
 from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Integrator, RenderSettings, Scene, Sphere
 
+from ..covering import others
 from .pictures import film, frame, quad, session, view_rays
 from .test_camera import CAMERAS, seen_at
 from .test_variants import everything
@@ -99,6 +100,7 @@ def test_what_is_clear_is_not_seen(device: Device) -> None:
         np.testing.assert_allclose(picture, np.broadcast_to(expected, picture.shape), rtol=1e-5, atol=1e-7)
 
 
+@pytest.mark.combinations
 def test_pictures_are_what_guides_are(device: Device) -> None:
     """Sample by sample, where nothing is followed through mirrors and glass."""
     scene = replace(everything(), spheres=[Sphere(center=(-1.0, 0.7, 0.5), radius=0.7, material=MetallicRoughness())])
@@ -111,7 +113,7 @@ def test_pictures_are_what_guides_are(device: Device) -> None:
         np.testing.assert_allclose(render_guides(running, 16)[guide], running.film().mean, atol=1e-6)
 
 
-@pytest.mark.parametrize("integrator", ["normals", "albedo", "depth"])
+@pytest.mark.parametrize("integrator", ["albedo", *others("normals", "depth")])
 def test_no_light_is_compiled_or_missed(device: Device, integrator: Integrator,
                                         caplog: pytest.LogCaptureFixture) -> None:
     """Nothing is said of darkness; nothing is 0; lanes agree."""

@@ -45,6 +45,7 @@ def test_numbers_do_not_repeat(draw: Draw) -> None:
     assert repetitions(draw, 256) == 0
 
 
+@pytest.mark.statistics
 @pytest.mark.parametrize("what", WEAK)
 def test_weak_generators_are_rejected(device: Device, what: str) -> None:
     weak = draw_on(Probe(device, INDEPENDENT, changes=dict([WEAK[what]])))

@@ -21,17 +21,16 @@ from clrt.scene.lights import DirectionalLight
 from clrt.scene.materials import Dielectric, Diffuse, Mirror
 from clrt.scene.model import Environment, Scene, Sphere
 
-from .test_raster import AHEAD, SETTINGS, SIZE, ball, plain
-from .test_variants import everything, painted
+from .test_raster import AHEAD, PLANTED, SETTINGS, SIZE, ball, plain
+from .test_variants import everything
 
 
 def test_several_devices_and_tiles_render_the_same_picture(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the film on the host, where buffers are small, it is that of one session bit for bit."""
-    scene = painted(everything())
     films = []
     for limit in ("1G", "80K"):
         monkeypatch.setenv(VARIABLE, limit)
-        renderer = Renderer(scene, device=device.info.index, integrator="raster", spp=4)
+        renderer = Renderer(PLANTED, device=device.info.index, integrator="raster", sampler="independent", spp=4)
         assert isinstance(renderer.session, Crew) == (limit == "80K")
         films.append(list(renderer.passes(spp=4))[-1].film.pixels.tobytes())
     assert films[0] == films[1]

@@ -15,6 +15,7 @@ from clrt.study.cases.subject import Subject
 from ..check.sabotage import sabotaged
 
 
+@pytest.mark.statistics
 def test_products_that_are_rounded_before_they_are_added(device: Device, tmp_path: Path,
                                                          monkeypatch: pytest.MonkeyPatch) -> None:
     """Compilers for devices with an instruction for it make one operation of a·b + c, others two. Of 10 000 paths some

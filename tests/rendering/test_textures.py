@@ -19,6 +19,7 @@ from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, S
 from clrt.scene.textures import Channel, Picture, Texture, Wrap
 from clrt.study.probe import Probe
 
+from ..covering import covering, others
 from .ggx import bump_shadowing
 
 Doubles = NDArray[np.float64]
@@ -139,9 +140,8 @@ def test_vertex_colors_multiply(device: Device) -> None:
     assert not found[..., 2].any()
 
 
-@pytest.mark.parametrize("turn", [0.0, 40.0, 90.0, 200.0])
-@pytest.mark.parametrize("mirrored", [False, True])
-@pytest.mark.parametrize("shape", ["flat", "smooth", "own tangents"])
+@covering("shape, mirrored, turn", ["flat", "smooth", "own tangents"], [False, True], [0.0, 40.0, 90.0, 200.0],
+          strength=2)
 def test_normal_maps_tilt_along_the_picture(device: Device, turn: float, mirrored: bool, shape: str) -> None:
     """Red tilts the normal to the picture's right and green to its top, wherever these lie on the surface: light that
     comes from there falls on it with the cosine of that, and bumps shadow themselves."""
@@ -176,7 +176,7 @@ def test_normal_maps_on_spheres(device: Device) -> None:
     assert a.max() > 0.3 and np.abs(a - b).max() < 1e-5
 
 
-@pytest.mark.parametrize("lanes", [1, 8])
+@pytest.mark.parametrize("lanes", [8, *others(1)])
 def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: int) -> None:
     """A picture that is half black: the light below is that of the other half alone, by light samples and without.
 

@@ -17,6 +17,7 @@ from clrt.scene.model import Mesh, Scene, Sphere
 from clrt.study.probe import Probe
 
 from ..accel.cases import soup, spheres
+from ..covering import covering, others
 from . import rays
 
 Doubles = NDArray[np.float64]
@@ -44,8 +45,7 @@ def random_rays(count: int, seed: int) -> tuple[Doubles, Doubles]:
 closed_sphere = cache(lambda: rays.icosphere(6))
 
 
-@pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh"])
-@pytest.mark.parametrize("offset", [0.0, 1000.0])
+@covering("layout, offset", ["bvh8", "bvh2", "cwbvh"], [0.0, 1000.0])
 def test_closed_mesh_has_no_cracks(device: Device, layout: str, offset: float) -> None:
     """From inside 81 920 triangles towards their vertices, edges and faces: not one of 10^6 rays gets out."""
     vertices, faces = closed_sphere()
@@ -180,8 +180,7 @@ def test_any_hit_is_a_closest_hit_before_t_max(device: Device, layout: str) -> N
     assert not any(wrong.values()), wrong
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("scale", [2.0**-66, 2.0**-30, 2.0**30, 2.0**50])
+@covering("layout, scale", LAYOUTS, [2.0**-66, 2.0**-30, 2.0**30, 2.0**50])
 def test_scaled_mesh_has_the_same_hits(device: Device, layout: str, scale: float) -> None:
     """From 1e-20 to 1e15: powers of two change no digit, so nothing may change but t. The device has its own unit."""
     corners = soup(300, 0.3)
@@ -195,8 +194,7 @@ def test_scaled_mesh_has_the_same_hits(device: Device, layout: str, scale: float
     np.testing.assert_allclose(scaled[:, 0], scale * unscaled[:, 0], rtol=1e-6)
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("length", [2.0**-30, 2.0**-10, 2.0**10, 2.0**30])
+@covering("layout, length", LAYOUTS, [2.0**-30, 2.0**30, 2.0**-10, 2.0**10])
 def test_length_of_the_direction_does_not_matter(device: Device, layout: str, length: float) -> None:
     """t counts lengths of the direction; shadow rays have that of the way to their light, whatever the scene's unit."""
     scene = Scene(meshes=[mesh(soup(300, 0.3))], spheres=balls(spheres(20)))
@@ -232,8 +230,8 @@ for layout in {LAYOUTS}:
 
 
 @pytest.mark.parametrize(("layout", "triangles", "other"), [
-    ("bvh8", 2000, "PORTABLE_MASK 1"), ("packs", 60, "PORTABLE_MASK 1"), ("packs", 60, "WIDTH 8"),
-    ("packs", 60, "WIDTH 16")])
+    ("bvh8", 2000, "PORTABLE_MASK 1"), ("packs", 60, "WIDTH 8"),
+    *others(("packs", 60, "PORTABLE_MASK 1"), ("packs", 60, "WIDTH 16"))])
 def test_other_instructions_give_the_same_hits(device: Device, layout: str, triangles: int, other: str) -> None:
     """The multiplication that gathers mask bits where there is no instruction for it, and halves of packs."""
     scene = Scene(meshes=[mesh(soup(triangles, 0.1))], spheres=balls(spheres(50)))
