@@ -182,7 +182,8 @@ def _without_background(scene: Scene, pixels: Floats, effort: Effort) -> tuple[F
         environment=Environment(), render=replace(scene.render, integrator="albedo"))
     alpha = np.clip(_rendered(mask, effort)[0][..., :1], 0, 1)
     background, _ = _rendered(replace(scene, meshes=[], instances=[], lights=[]), effort)
-    return np.maximum(pixels - (1 - alpha) * background, 0) / np.maximum(alpha, 1e-3), alpha
+    surfaces = np.maximum(pixels - (1 - alpha) * background, 0) / np.maximum(alpha, 1e-3)
+    return np.asarray(surfaces, np.float32), alpha
 
 
 def verdict(images: Mapping[str, Floats], means: Mapping[str, Means]) -> dict[str, Any]:
