@@ -30,9 +30,9 @@ POWER = {"blender-cycles": 2.2, "vray": 2.2}
 #: What a scenario does not say (src/config-reader.ts).
 LIGHTING, SIZE, FOV = "environments/lightroom_14b.hdr", {"width": 768, "height": 768}, 45.0
 TARGET, ORBIT = {"x": 0.0, "y": 0.0, "z": 0.0}, {"theta": 0.0, "phi": 90.0, "radius": 1.0}
-#: Columns of the website's images, to which larger ones were shrunk, encoded and multiplied by alpha, by the Lanczos
-#: kernel with this many lobes (sharp's `resize`).
-WEBSITE_WIDTH, LOBES = 512, 3
+#: Columns of the website's images, to which larger ones were shrunk by the Lanczos kernel with this many lobes (sharp's
+#: `resize`), and the quality of their lossy compression, which halves the resolution of hues.
+WEBSITE_WIDTH, LOBES, QUALITY = 512, 3, 90
 #: Linear Rec. 709 to the space of the fit, what the fit multiplies values by first, and back (Hill, BakingLab; MIT).
 EXPOSURE = 1 / 0.6
 ACES_IN = np.array([[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]])
@@ -115,24 +115,35 @@ def tone_mapped(linear: NDArray[Any]) -> Floats:
 
 def golden(renderer: str, path: Path, size: tuple[int, int]) -> tuple[Floats, Floats] | None:
     """The image, as `over_white`; None where its shape is another, as of one that was framed differently."""
-    texels = np.asarray(read_texels(path) / 255, np.float32)
+    rgba = np.asarray(read_texels(path) / 255, np.float32)
     width, height = size
-    if abs(texels.shape[0] * width / (texels.shape[1] * height) - 1) > 0.02:
+    if abs(rgba.shape[0] * width / (rgba.shape[1] * height) - 1) > 0.02:
         return None
-    return over_white(texels[..., :3], texels[..., 3:], size, POWER.get(renderer))
+    return over_white(shrunk(rgba, size), POWER.get(renderer))
 
 
-def over_white(encoded: Floats, alpha: Floats, size: tuple[int, int],
-               power: float | None = None) -> tuple[Floats, Floats]:
-    """The display's linear light over white, (height, width, 3), and the alpha, (height, width), of an image of encoded
-    values, (h, w, 3), and alpha, (h, w, 1), shrunk as the website does. power: decodes; None: the sRGB curve does.
+def shrunk(rgba: Floats, size: tuple[int, int]) -> Floats:
+    """Encoded colours and alpha, (h, w, 4) in [0, 1], shrunk as for the website: colours count by their alpha. So text,
+    highlights and edges smaller than a pixel weigh as in the images that were shrunk there."""
+    premultiplied = rgba * np.concatenate([np.broadcast_to(rgba[..., 3:], (*rgba.shape[:2], 3)), np.ones_like(
+        rgba[..., 3:])], axis=2)
+    pixels = np.clip(lanczos(premultiplied, size), 0, 1)
+    pixels[..., :3] = np.minimum(pixels[..., :3] / np.maximum(pixels[..., 3:], 1 / 255), 1)
+    return pixels
 
-    So text, highlights and edges smaller than a pixel weigh as in the images that were shrunk there.
-    """
-    shrunk_alpha = np.clip(lanczos(alpha, size), 0, 1)
-    colors = np.clip(lanczos(encoded * alpha, size), 0, shrunk_alpha) / np.maximum(shrunk_alpha, 1 / 255)
-    decoded = linear_from_srgb(np.asarray(colors, np.float32)) if power is None else colors ** power
-    return np.asarray(decoded * shrunk_alpha + 1 - shrunk_alpha, np.float32), shrunk_alpha[..., 0]
+
+def compressed(rgba: Floats) -> Floats:
+    """What the website's compression leaves of it."""
+    import imageio.v3 as imageio
+    stored = imageio.imwrite("<bytes>", np.rint(rgba * 255).astype(np.uint8), extension=".webp", quality=QUALITY)
+    return np.asarray(imageio.imread(stored, extension=".webp", mode="RGBA") / 255, np.float32)
+
+
+def over_white(rgba: Floats, power: float | None = None) -> tuple[Floats, Floats]:
+    """The display's linear light over white, (h, w, 3), and the alpha, (h, w). power: decodes; None: the sRGB curve."""
+    colors, alpha = rgba[..., :3], rgba[..., 3:]
+    decoded = linear_from_srgb(colors) if power is None else colors ** power
+    return np.asarray(decoded * alpha + 1 - alpha, np.float32), alpha[..., 0]
 
 
 def reduced(pixels: Floats, size: tuple[int, int]) -> Floats:

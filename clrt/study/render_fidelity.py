@@ -29,7 +29,8 @@ from ..scene.meshes import read_model
 from ..scene.model import Environment, Mesh, RenderSettings, Scene
 from ..scene.pictures import read_picture
 from ..scene.validate import validate
-from .fidelity_suite import WEBSITE_WIDTH, Floats, Scenario, files_of, golden, over_white, reduced, tone_mapped
+from .fidelity_suite import (WEBSITE_WIDTH, Floats, Scenario, compressed, files_of, golden, over_white, reduced, shrunk,
+                             tone_mapped)
 
 #: By how much a mean may be beyond those of the others; the part of an image that a region has at least.
 MARGIN, LEAST = 0.05, 0.005
@@ -128,7 +129,9 @@ def _judged(row: dict[str, Any], scenario: Scenario, scene: Scene, effort: Effor
         pixels, alpha = _without_background(scene, pixels, effort._replace(denoiser=None))
     inside = alpha[..., 0] > COVERED
     size = _size(scenario, min(scene.render.size[0], WEBSITE_WIDTH))
-    images = {"clrt": over_white(np.asarray(srgb(tone_mapped(pixels)), np.float32), alpha, size)[0]}
+    rgba = shrunk(np.concatenate([srgb(tone_mapped(pixels)), alpha], axis=2, dtype=np.float32), size)
+    from_website = any(path.suffix == ".webp" for path in scenario.goldens.values())
+    images = {"clrt": over_white(compressed(rgba) if from_website else rgba)[0]}
     stored = np.ones(images["clrt"].shape[:2], np.bool_)
     for renderer, path in scenario.goldens.items():
         if (read := golden(renderer, path, size)) is not None:
