@@ -8,6 +8,7 @@ website. All were tone mapped by three.js' fit of ACES, then encoded.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import unquote
@@ -16,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import UsageError
-from ..output.view import srgb
 from ..scene.model import Camera
 from ..scene.pictures import linear_from_srgb, read_texels
 
@@ -30,8 +30,9 @@ POWER = {"blender-cycles": 2.2, "vray": 2.2}
 #: What a scenario does not say (src/config-reader.ts).
 LIGHTING, SIZE, FOV = "environments/lightroom_14b.hdr", {"width": 768, "height": 768}, 45.0
 TARGET, ORBIT = {"x": 0.0, "y": 0.0, "z": 0.0}, {"theta": 0.0, "phi": 90.0, "radius": 1.0}
-#: Columns of the website's images, to which larger ones were shrunk by the means of encoded values.
-WEBSITE_WIDTH = 512
+#: Columns of the website's images, to which larger ones were shrunk by the Lanczos kernel with this many lobes (sharp's
+#: `resize`), and the quality of their lossy compression, which halves the resolution of hues.
+WEBSITE_WIDTH, LOBES, QUALITY = 512, 3, 90
 #: Linear Rec. 709 to the space of the fit, what the fit multiplies values by first, and back (Hill, BakingLab; MIT).
 EXPOSURE = 1 / 0.6
 ACES_IN = np.array([[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]])
@@ -113,30 +114,52 @@ def tone_mapped(linear: NDArray[Any]) -> Floats:
 
 
 def golden(renderer: str, path: Path, size: tuple[int, int]) -> tuple[Floats, Floats] | None:
-    """The display's linear light over white, (h, w, 3), and the alpha, (h, w), shrunk to `size` as the website does;
-    None where the shape is another, as of images that were framed differently."""
-    texels = np.asarray(read_texels(path) / 255, np.float32)
+    """The image, as `over_white`; None where its shape is another, as of one that was framed differently."""
+    rgba = np.asarray(read_texels(path) / 255, np.float32)
     width, height = size
-    if abs(texels.shape[0] * width / (texels.shape[1] * height) - 1) > 0.02:
+    if abs(rgba.shape[0] * width / (rgba.shape[1] * height) - 1) > 0.02:
         return None
-    alpha = np.minimum(reduced(texels[..., 3:], size), np.float32(1))
-    encoded: Floats = np.divide(reduced(texels[..., :3] * texels[..., 3:], size), np.maximum(alpha, 1 / 255),
-                                dtype=np.float32)
-    decoded = encoded ** POWER[renderer] if renderer in POWER else linear_from_srgb(encoded)
+    return over_white(shrunk(rgba, size), POWER.get(renderer))
+
+
+def shrunk(rgba: Floats, size: tuple[int, int]) -> Floats:
+    """Encoded colours and alpha, (h, w, 4) in [0, 1], shrunk as for the website: colours count by their alpha. So text,
+    highlights and edges smaller than a pixel weigh as in the images that were shrunk there."""
+    premultiplied = rgba * np.concatenate([np.broadcast_to(rgba[..., 3:], (*rgba.shape[:2], 3)), np.ones_like(
+        rgba[..., 3:])], axis=2)
+    pixels = np.clip(lanczos(premultiplied, size), 0, 1)
+    pixels[..., :3] = np.minimum(pixels[..., :3] / np.maximum(pixels[..., 3:], 1 / 255), 1)
+    return pixels
+
+
+def compressed(rgba: Floats) -> Floats:
+    """What the website's compression leaves of it."""
+    import imageio.v3 as imageio
+    stored = imageio.imwrite("<bytes>", np.rint(rgba * 255).astype(np.uint8), extension=".webp", quality=QUALITY)
+    return np.asarray(imageio.imread(stored, extension=".webp", mode="RGBA") / 255, np.float32)
+
+
+def over_white(rgba: Floats, power: float | None = None) -> tuple[Floats, Floats]:
+    """The display's linear light over white, (h, w, 3), and the alpha, (h, w). power: decodes; None: the sRGB curve."""
+    colors, alpha = rgba[..., :3], rgba[..., 3:]
+    decoded = linear_from_srgb(colors) if power is None else colors ** power
     return np.asarray(decoded * alpha + 1 - alpha, np.float32), alpha[..., 0]
-
-
-def shrunk(linear: Floats, size: tuple[int, int]) -> Floats:
-    """The display's linear light of an image shrunk as the website does, by the means of encoded values: text and
-    highlights smaller than a pixel are darker than by the means of light."""
-    return linear_from_srgb(reduced(np.asarray(srgb(linear), np.float32), size))
 
 
 def reduced(pixels: Floats, size: tuple[int, int]) -> Floats:
     """(h, w, c) to (height, width, c): means over the area of each pixel."""
+    return _resampled(pixels, size, _averages)
+
+
+def lanczos(pixels: Floats, size: tuple[int, int]) -> Floats:
+    """(h, w, c) to (height, width, c) by the Lanczos kernel, which rings: values may lie beyond those of the pixels."""
+    return _resampled(pixels, size, _lanczos_weights)
+
+
+def _resampled(pixels: Floats, size: tuple[int, int], weights: Callable[[int, int], Floats]) -> Floats:
     width, height = size
-    return np.ascontiguousarray(_averages(pixels.shape[1], width) @ (
-        _averages(pixels.shape[0], height) @ pixels.transpose(2, 0, 1)).transpose(0, 2, 1)).transpose(2, 1, 0)
+    return np.ascontiguousarray(weights(pixels.shape[1], width) @ (
+        weights(pixels.shape[0], height) @ pixels.transpose(2, 0, 1)).transpose(0, 2, 1)).transpose(2, 1, 0)
 
 
 def _averages(n: int, m: int) -> Floats:
@@ -145,3 +168,10 @@ def _averages(n: int, m: int) -> Floats:
     cells = np.arange(n)
     covered = np.minimum(edges[1:, None], cells + 1) - np.maximum(edges[:-1, None], cells)
     return np.asarray(np.maximum(covered, 0) * (m / n), np.float32)
+
+
+def _lanczos_weights(n: int, m: int) -> Floats:
+    """(m, n): row i has the kernel at the n pixels, as wide as the larger pixels, around the i-th of m."""
+    x = ((np.arange(m)[:, None] + 0.5) * n / m - np.arange(n) - 0.5) * min(m / n, 1.0)
+    kernel = np.where(np.abs(x) < LOBES, np.sinc(x) * np.sinc(x / LOBES), 0.0)
+    return np.asarray(kernel / kernel.sum(axis=1, keepdims=True), np.float32)

@@ -22,13 +22,15 @@ from ..device.discover import choose
 from ..errors import SceneError, UsageError
 from ..output.compare import compare
 from ..output.denoise import Denoiser
+from ..output.view import srgb
 from ..rendering.renderer import Renderer
 from ..scene.materials import Diffuse, Material
 from ..scene.meshes import read_model
 from ..scene.model import Environment, Mesh, RenderSettings, Scene
 from ..scene.pictures import read_picture
 from ..scene.validate import validate
-from .fidelity_suite import WEBSITE_WIDTH, Floats, Scenario, files_of, golden, reduced, shrunk, tone_mapped
+from .fidelity_suite import (WEBSITE_WIDTH, Floats, Scenario, compressed, files_of, golden, over_white, reduced, shrunk,
+                             tone_mapped)
 
 #: By how much a mean may be beyond those of the others; the part of an image that a region has at least.
 MARGIN, LEAST = 0.05, 0.005
@@ -122,16 +124,19 @@ def _size(scenario: Scenario, width: int) -> tuple[int, int]:
 
 def _judged(row: dict[str, Any], scenario: Scenario, scene: Scene, effort: Effort) -> Judged:
     pixels, objects = _rendered(scene, effort)
-    inside = np.ones(objects.shape, np.bool_)
+    alpha = np.ones((*objects.shape, 1), np.float32)
     if not scenario.skybox:
-        pixels, inside = _over_white(scene, pixels, effort._replace(denoiser=None))
+        pixels, alpha = _without_background(scene, pixels, effort._replace(denoiser=None))
+    inside = alpha[..., 0] > COVERED
     size = _size(scenario, min(scene.render.size[0], WEBSITE_WIDTH))
-    images = {"clrt": shrunk(pixels if not scenario.skybox else tone_mapped(pixels), size)}
+    rgba = shrunk(np.concatenate([srgb(tone_mapped(pixels)), alpha], axis=2, dtype=np.float32), size)
+    from_website = any(path.suffix == ".webp" for path in scenario.goldens.values())
+    images = {"clrt": over_white(compressed(rgba) if from_website else rgba)[0]}
     stored = np.ones(images["clrt"].shape[:2], np.bool_)
     for renderer, path in scenario.goldens.items():
         if (read := golden(renderer, path, size)) is not None:
-            images[renderer], alpha = read
-            stored &= scenario.skybox | (alpha > STORED_COVERED)
+            images[renderer], stored_alpha = read
+            stored &= scenario.skybox | (stored_alpha > STORED_COVERED)
     names = np.array([_material_name(part) for part in [*scene.meshes, *(one.mesh for one in scene.instances)]] + [""])
     regions = {"": np.ones(stored.shape, np.bool_)} | {
         str(name): stored & _wholly(inside & (objects >= 0) & (names[objects] == name), size)
@@ -162,8 +167,8 @@ def _rendered(scene: Scene, effort: Effort) -> tuple[Floats, NDArray[np.int32]]:
     return effort.denoiser(state.pixels, guides["albedo"], guides["normal"]), objects
 
 
-def _over_white(scene: Scene, pixels: Floats, effort: Effort) -> tuple[Floats, NDArray[np.bool_]]:
-    """The display's light with white where no surface is, and where the model covers pixels wholly.
+def _without_background(scene: Scene, pixels: Floats, effort: Effort) -> tuple[Floats, Floats]:
+    """The surfaces' light, (h, w, 3), and the part of each pixel that they cover, (h, w, 1).
 
     A pixel's light is that of the surfaces and the rest of the background's; tone mapping is of the first alone.
     """
@@ -181,7 +186,7 @@ def _over_white(scene: Scene, pixels: Floats, effort: Effort) -> tuple[Floats, N
     alpha = np.clip(_rendered(mask, effort)[0][..., :1], 0, 1)
     background, _ = _rendered(replace(scene, meshes=[], instances=[], lights=[]), effort)
     surfaces = np.maximum(pixels - (1 - alpha) * background, 0) / np.maximum(alpha, 1e-3)
-    return alpha * tone_mapped(surfaces) + 1 - alpha, alpha[..., 0] > COVERED
+    return np.asarray(surfaces, np.float32), alpha
 
 
 def verdict(images: Mapping[str, Floats], means: Mapping[str, Means]) -> dict[str, Any]:

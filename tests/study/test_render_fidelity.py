@@ -7,6 +7,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import PIL.Image
 import pytest
 from click.testing import CliRunner
 from numpy.typing import NDArray
@@ -14,8 +15,11 @@ from numpy.typing import NDArray
 from clrt.cli.bench_render_fidelity import render_fidelity_command
 from clrt.errors import UsageError
 from clrt.output.image import Image
+from clrt.output.view import srgb
 from clrt.scene.pictures import linear_from_srgb
-from clrt.study.fidelity_suite import GENERATOR, golden, orbit_camera, reduced, scenarios, shrunk, tone_mapped
+from clrt.study import render_fidelity
+from clrt.study.fidelity_suite import (GENERATOR, golden, lanczos, orbit_camera, over_white, reduced, scenarios, shrunk,
+                                       tone_mapped)
 from clrt.study.render_fidelity import judge, verdict
 from tests.scene.glb import Gltf
 
@@ -139,17 +143,48 @@ def test_reduction_keeps_means() -> None:
     assert reduced(image, (17, 11)).mean((0, 1)) == pytest.approx(image.mean((0, 1)), abs=1e-6)
 
 
-def test_images_are_shrunk_as_the_website_does(tmp_path: Path) -> None:
-    """By means of encoded values: 51 and 204 of 255 become 127.5, not the mean of their light."""
-    import imageio.v3 as imageio
-    texels = np.tile(np.array([[51, 204], [204, 51]], np.uint8)[..., None], (4, 4, 3))
-    path = tmp_path / "a.png"
-    imageio.imwrite(path, texels)
-    read = golden("stellar", path, (4, 4))
-    assert read is not None and read[0] == pytest.approx(((0.5 + 0.055) / 1.055) ** 2.4, rel=1e-5)
-    light = linear_from_srgb(np.asarray(texels / 255, np.float32))
-    assert shrunk(light, (4, 4)) == pytest.approx(read[0], rel=1e-5)
-    assert shrunk(light, (8, 8)) == pytest.approx(light, rel=1e-5)
+def shrunk_by_pillow(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
+    """(h, w, c) by Pillow's Lanczos kernel, which has three lobes as well."""
+    return np.stack([np.asarray(PIL.Image.fromarray(channel).resize(size, PIL.Image.Resampling.LANCZOS))
+                     for channel in pixels.transpose(2, 0, 1)], axis=2)
+
+
+@pytest.mark.parametrize("size", [(28, 20), (21, 10), (42, 30), (50, 40)])
+def test_the_lanczos_kernel_is_pillow_s(size: tuple[int, int]) -> None:
+    image = np.random.default_rng(6).random((30, 42, 3)).astype(np.float32)
+    assert lanczos(image, size) == pytest.approx(shrunk_by_pillow(image, size), abs=1e-5)
+
+
+def test_transparency_is_shrunk_before_the_white_is_laid_under_it() -> None:
+    """Half of a pixel's width is covered by encoded 0.2: half of its light is that, half is white."""
+    rgba = np.full((8, 24, 4), 0.2, np.float32)
+    rgba[..., 3] = np.arange(24) < 13
+    light, covered = over_white(shrunk(rgba, (12, 4)))
+    edge = shrunk_by_pillow(rgba, (12, 4))[0, 6, 3]
+    assert covered[:, 6] == pytest.approx(edge, abs=1e-5) and 0.4 < edge < 0.6
+    dark = float(linear_from_srgb(np.array(0.2, np.float32)))
+    assert light[:, 6] == pytest.approx(edge * dark + 1 - edge, abs=1e-5)
+    assert light[:, 1] == pytest.approx(dark, abs=1e-5) and light[:, 11] == pytest.approx(1, abs=1e-5)
+
+
+def test_clrt_s_image_is_shrunk_as_the_website_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The website's image of the same wall, with its alpha, is the same image, at the wall's edge as well."""
+    folder = suite(tmp_path)
+    (entry,) = json.loads((folder / GENERATOR / "test" / "config.json").read_text())["scenarios"]
+    entry["target"] = {"x": 0.04}
+    (folder / GENERATOR / "test" / "config.json").write_text(json.dumps({"scenarios": [entry]}))
+    edge = 32 - 0.04 * 32 / (4 * np.tan(np.radians(22.5)))
+    alpha = np.tile(np.clip(edge - np.arange(64, dtype=np.float32), 0, 1)[None, :, None], (64, 1, 1))
+    colors = np.asarray(srgb(expected(False)[:1, :1]), np.float32) * alpha
+    rgba = shrunk_by_pillow(np.concatenate([colors, alpha], axis=2), (SIZE, SIZE)).clip(0, 1)
+    rgba[..., :3] /= np.maximum(rgba[..., 3:], 1 / 255)
+    place = folder / "public" / "thumbnails" / "goldens" / "wall"
+    place.mkdir(parents=True)
+    texels = np.round(255 * rgba.clip(0, 1)).astype(np.uint8)
+    PIL.Image.fromarray(texels).save(place / "stellar-golden.thumb.webp", quality=90)
+    monkeypatch.setattr(render_fidelity, "WEBSITE_WIDTH", SIZE)
+    (judged,) = judge(scenarios(folder), 64, 64)
+    assert judged.images["clrt"] == pytest.approx(judged.images["stellar"], abs=0.02)
 
 
 def test_images_are_decoded_as_they_were_encoded(tmp_path: Path) -> None:
@@ -160,10 +195,10 @@ def test_images_are_decoded_as_they_were_encoded(tmp_path: Path) -> None:
     texels[:, 2:, 3] = 0
     path = Path(imageio.imwrite(tmp_path / "a.png", texels) or tmp_path / "a.png")
     for renderer, value in (("blender-cycles", 0.2**2.2), ("stellar", linear_from_srgb(np.array(0.2, np.float32)))):
-        read = golden(renderer, path, (2, 2))
+        read = golden(renderer, path, (4, 4))
         assert read is not None
-        assert read[0][:, :, 1] == pytest.approx(np.tile([float(value), 1.0], (2, 1)), abs=1e-5)
-        assert read[1].tolist() == [[1, 0], [1, 0]]
+        assert read[0][0, :, 1] == pytest.approx(np.repeat([float(value), 1.0], 2), abs=1e-5)
+        assert read[1] == pytest.approx(np.repeat([[1.0, 0.0]], 2, axis=1).repeat(4, axis=0), abs=1e-6)
     assert golden("stellar", path, (2, 3)) is None
 
 
