@@ -36,12 +36,13 @@ class Lobe:
 
     def __init__(self, f: OfCosine, rows: int) -> None:
         self._f = f
-        self._mean = sum(2 * weight * root**3 * f(np.full(rows, root**2)) for root, weight in zip(ROOTS, WEIGHTS))
+        self._mean: Doubles = np.asarray(sum(2 * weight * root**3 * f(np.full(rows, root**2))
+                                             for root, weight in zip(ROOTS, WEIGHTS)))
 
     def __call__(self, wo: Doubles, wi: Doubles) -> Doubles:
         """(n, c) of f (n, c)."""
         product = self._f(wo[:, 2]) * self._f(wi[:, 2])
-        return np.divide(product, self._mean, out=np.zeros_like(product), where=self._mean > 0)
+        return np.asarray(np.divide(product, self._mean, out=np.zeros_like(product), where=self._mean > 0))
 
 
 def by_half_vector(substance: Substance, wo: Doubles, wi: Doubles) -> Doubles:

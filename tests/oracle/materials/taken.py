@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import cache
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,13 @@ THREADS: Nodes = tuple(np.geomspace(0.1, 1, 7))
 STRENGTHS: Nodes = (0.0, 0.5, 1.0)
 
 
+class Axis(NamedTuple):
+    """Of a table: its nodes, and what rows have, (n,)."""
+
+    nodes: Nodes
+    values: Doubles
+
+
 class Taken:
     """By a material's film and fibres where rays hit it."""
 
@@ -41,26 +48,30 @@ class Taken:
         fibres = _axis(material.sheen_color, at.color(material.sheen_color).max(axis=1), STRENGTHS)
         threads = _axis(material.sheen_roughness, at.number(material.sheen_roughness), THREADS)
         self._smith = material.smith
-        self._gloss, self._sheen = (base, film, smooth, fibres, threads), (film, smooth, threads)
+        self._gloss, self._sheen = [base, film, smooth, fibres, threads], [film, smooth, threads]
 
     def from_gloss(self, cosine: Doubles) -> tuple[Doubles, Doubles]:
         """(n, 1) of F0 and of F90 of a single bounce, at cosines (n,)."""
-        axes, places = zip(*self._gloss, (COSINES, cosine))
-        found = _interpolated(_gloss(self._smith, *axes), axes, places)
+        nodes, values = _with_cosines(self._gloss, cosine)
+        found = _interpolated(_gloss(self._smith, *nodes), nodes, values)
         return found[:, :1], found[:, 1:]
 
     def from_fibres(self, cosine: Doubles) -> Doubles:
         """(n, 1) of white ones, by the film, at cosines (n,)."""
-        axes, places = zip(*self._sheen, (COSINES, cosine))
-        return _interpolated(_sheen(*axes), axes, places)
+        nodes, values = _with_cosines(self._sheen, cosine)
+        return _interpolated(_sheen(*nodes), nodes, values)
 
 
-def _axis(parameter: Any, values: Doubles, nodes: Nodes) -> tuple[Nodes, Doubles]:
-    """A table's nodes, and what rows have."""
-    return nodes if isinstance(parameter, Texture) else (float(values[0]),), values
+def _axis(parameter: Any, values: Doubles, nodes: Nodes) -> Axis:
+    """Of a parameter with these values, or between these nodes if it is a texture."""
+    return Axis(nodes if isinstance(parameter, Texture) else (float(values[0]),), values)
 
 
-def _interpolated(table: Doubles, axes: tuple[Nodes, ...], values: tuple[Doubles, ...]) -> Doubles:
+def _with_cosines(axes: list[Axis], cosine: Doubles) -> tuple[list[Nodes], list[Doubles]]:
+    return [each.nodes for each in axes] + [COSINES], [each.values for each in axes] + [cosine]
+
+
+def _interpolated(table: Doubles, axes: list[Nodes], values: list[Doubles]) -> Doubles:
     """(n, c) of a table (..., c) linear between its nodes, at values (n,) for each axis."""
     places = [np.interp(value, nodes, np.arange(len(nodes))) for nodes, value in zip(axes, values)]
     firsts = [np.minimum(place.astype(int), max(len(nodes) - 2, 0)) for nodes, place in zip(axes, places)]
