@@ -107,10 +107,21 @@ def _metallic_roughness(draws: Draws) -> dict[str, Any]:
         "metallic": draws.one_of((0.0, 1.0, draws.number(0.0))), "smith": draws.one_of(get_args(Smith))}
     if draws.chance(0.3):
         given |= {"specular": draws.number(0.0), "specular_color": draws.color(0.2, 2.0)}
+    given |= _layers(draws)
     coupling = draws.one_of((None, *get_args(Coupling)))
     # The oracle knows further bounces of metals below the albedo coupling alone.
     given |= {"coupling": coupling, "multiple_scattering": None if coupling in (None, "albedo") else False}
     return given | {"preset": draws.one_of(F0_PRESETS) if draws.chance(0.2) else None}
+
+
+def _layers(draws: Draws) -> dict[str, Any]:
+    """A film, fibres and a sheet, some of them."""
+    given: dict[str, Any] = {}
+    if draws.chance(0.3):
+        given |= {"clearcoat": draws.number(0.0), "clearcoat_roughness": draws.number(SMOOTHEST)}
+    if draws.chance(0.3):
+        given |= {"sheen_color": draws.color(0.0, 1.0), "sheen_roughness": draws.number(0.0)}
+    return given | ({"transmission": draws.number(0.0)} if draws.chance(0.3) else {})
 
 
 def _phong(draws: Draws) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import os
 from dataclasses import fields, replace
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 import pytest
@@ -19,6 +19,7 @@ from clrt.rendering.session import Session
 from clrt.scene.lights import LIGHTS, PointLight
 from clrt.scene.materials import MATERIALS, Diffuse, Material
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.textures import Texture
 from clrt.scene.validate import scene_problems
 from clrt.study.combinations import ROUNDS, keep_scenes, verdict, verdicts
 from clrt.study.identities import PROPERTIES, Side, single_lights, strategies
@@ -104,15 +105,22 @@ def test_other_strategies_draw_other_noise(device: Device, name: str) -> None:
 
 
 def test_scenes_have_everything() -> None:
-    """Every material and light with each of its fields off its default, in valid scenes."""
-    varied: set[tuple[str, str]] = set()
-    for batch in range(60):
+    """Every material and light with each of its fields off its default and, if it may be one, as a texture, in valid
+    scenes; of a film and fibres also what bends it, and roughnesses from textures."""
+    varied, textured, features = set[tuple[Any, str]](), set[tuple[Any, str]](), set[str]()
+    for batch in range(300):
         scene = random_scene(3, batch * BATCH)
         assert not scene_problems(scene)
         users: list[Any] = [*materials(scene), *scene.lights]
-        varied |= {(type(each).__name__, field.name) for each in users for field in fields(each)
-                   if getattr(each, field.name) != field.default}
-    assert {(kind.__name__, field.name) for kind in (*MATERIALS, *LIGHTS) for field in fields(kind)} <= varied
+        values = [(type(each), field, getattr(each, field.name)) for each in users for field in fields(each)]
+        varied |= {(kind, field.name) for kind, field, value in values if value != field.default}
+        textured |= {(kind, field.name) for kind, field, value in values if isinstance(value, Texture)}
+        features = features.union(*(each.features() for each in materials(scene)))
+    every = {(kind, field.name): get_type_hints(kind)[field.name]
+             for kind in (*MATERIALS, *LIGHTS) for field in fields(kind)}
+    assert every.keys() <= varied
+    assert {field for field, hint in every.items() if Texture in get_args(hint)} <= textured
+    assert {"COAT_NORMALS", "LAYER_ROWS"} <= features
 
 
 def test_scenes_have_instances(device: Device) -> None:

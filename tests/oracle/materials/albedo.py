@@ -43,19 +43,19 @@ def _table(smith: str) -> Doubles:
     roots = np.append(np.maximum(np.linspace(0, 1, NODES), 1e-3), (x + 1) / 2)
     rows = []
     for alpha in alpha_of(np.linspace(ROUGHNESS, 1, NODES)):
-        row = np.array([_bounce(root**2, alpha, smith) for root in roots])
+        row = np.array([bounces(root**2, alpha, smith)[1].sum(axis=0) for root in roots])
         # With the cosine c = root², the weight 2·c·dc is 4·root³·droot.
         mean = (weights / 2 * 4 * roots[NODES:]**3) @ row[NODES:]
         rows.append(np.vstack([row[:NODES], mean]))
     return np.array(rows)
 
 
-def _bounce(cosine: float, alpha: float, smith: str) -> tuple[float, float]:
-    """By_f0 and by_f90 of one cosine."""
+def bounces(cosine: float, alpha: float, smith: str) -> tuple[Doubles, Doubles]:
+    """Of light from an angle, as a quadrature: cosines (m,) of where it goes, and how much, (m, 2) by f0 and f90."""
     wo, h, share = visible_nodes(cosine, alpha, DIRECTIONS)
     alphas, cos_i = np.full(len(wo), alpha), reflected(wo, h)[:, 2]
     up = cos_i > 0
     seen = shadowing(wo[:, 2], np.where(up, cos_i, 1), alphas, smith)
     weight = share * np.where(up, seen * (1 + smith_lambda(wo[:, 2], alphas)), 0)     # G2/G1
     grazing = np.maximum(1 - dot(wo, h), 0)**5
-    return float(weight @ (1 - grazing)), float(weight @ grazing)
+    return np.maximum(cos_i, 0), weight[:, None] * np.column_stack([1 - grazing, grazing])

@@ -1,12 +1,15 @@
-"""glTF 2.0's metallic-roughness material (its specification, appendix B), with KHR_materials_ior and _specular.
+"""glTF 2.0's metallic-roughness material (its specification, appendix B), with KHR_materials_ior, _specular, and
+_transmission, under a film and fibres (see layers).
 
-    f = F(wi·h)·D·G/(4·cos·cos) + coupling·body/π,  body = (1 − metallic)·color
+    f = F(wi·h)·D·G/(4·cos·cos) + coupling·body/π,  body = (1 − metallic)·(1 − transmission)·color
 
-F is Schlick's, between F0 (of a dielectric and of `color`, mixed by `metallic`) and F90. The coupling is 1 − F(wi·h)
-(glTF), (1 − F(cos wi))(1 − F(cos wo)), or that of Kelemen and Szirmay-Kalos 2001, "A Microfacet Based Coupled
-Specular-Matte BRDF Model", (1 − E(wi))(1 − E(wo))/(1 − mean E) with the directional albedo E of the dielectric's gloss.
-That one has further bounces between microfacets of the metal (Kulla and Conty 2017, "Revisiting Physically Based
-Shading at Imageworks") in the same lobe, r(wi)·r(wo)/(π·mean r), r = body·(1 − E) + metallic·multiple·lost.
+F is Schlick's, between F0 (of a dielectric and of `color`, mixed by `metallic`) and F90; for the coupling see there.
+With passing = (1 − metallic)·transmission·color a sheet passes passing·(1 − F(wi·h))·D·G/(4·cos·cos), F of the
+dielectric, and wi mirrored to wo's side; under the albedo coupling also passing·lost(wi)·lost(wo)/(π·mean lost), what
+single bounces lose.
+
+Below layers, which leave T of light from an angle, single bounces are weighed by min(T(wi), T(wo)), and a diffuse lobe
+f(wi)·f(wo)/mean f is that of f·T.
 """
 
 from __future__ import annotations
@@ -14,62 +17,53 @@ from __future__ import annotations
 import numpy as np
 
 from clrt.scene.metallic_roughness import MetallicRoughness
-from clrt.scene.presets import F0_PRESETS
 
 from ..surface import Surface
 from ..vectors import Doubles, dot
-from .albedo import Albedos
-from .fresnel import schlick
-from .ggx import VisibleNormals, alpha_of, reflection
-from .scattering import Cosine, Mixed, halfway
+from .coupling import ByAlbedo, Lobe, by_fresnel, by_half_vector
+from .ggx import VisibleNormals, reflection
+from .layers import layers_of
+from .scattering import Cosine, Mixed, Through, halfway, mirrored_below
+from .substance import Substance
 
 
 class CookTorrance(Mixed):
     def __init__(self, material: MetallicRoughness, at: Surface) -> None:
-        self.smith, self.alpha = material.smith, alpha_of(at.number(material.roughness))
-        base: Doubles = np.array(((material.ior - 1) / (material.ior + 1))**2)
-        color, metallic = at.tinted(material.color), at.number(material.metallic)[:, None]
-        if material.preset is not None:
-            f0, is_metal = F0_PRESETS[material.preset]
-            base, metallic = np.array(f0), np.full_like(metallic, is_metal)
-            color = at.tinted(f0) if is_metal else color
-        specular = at.number(material.specular)[:, None]
-        plastic = np.minimum(base * at.color(material.specular_color), 1) * specular
-        self.f0 = plastic + metallic * (color - plastic)
-        self.f90 = specular + metallic * (1 - specular)
-        self.body = (1 - metallic) * color
-        self.diffuse = {"albedo": self._by_albedo, "fresnel": self._by_fresnel,
-                        "half_vector": self._by_half_vector}[material.coupled_by]
-        self.strategies = [VisibleNormals(self.alpha), Cosine()]
+        self._of, self._layers, rows = Substance(material, at), layers_of(material, at), len(at.p)
+        self.strategies = [VisibleNormals(self._of.alpha), Cosine(), *self._layers.strategies]
+        if material.transmission != 0:
+            self.strategies += [Through(VisibleNormals(self._of.alpha)), Through(Cosine())]
+        self._coupling, self._scattered = None, None
         if material.coupled_by == "albedo":
-            self._albedos, self._under = Albedos(self.smith, at.number(material.roughness)), (plastic, specular)
-            mean_f, lost = (1 + 20 * color) / 21, 1 - sum(self._albedos.mean())
-            self._multiple = metallic * mean_f**2 * (1 - lost) / (1 - mean_f * lost)
-            self._multiple = np.zeros_like(color) if material.multiple_scattering is False else self._multiple
+            albedo = ByAlbedo(material, at, self._of, self._layers)
+            self._diffuse = Lobe(albedo.reflected, rows)
+            if material.transmission != 0 and material.multiple_scattering is not False:
+                self._scattered = Lobe(lambda cosine: self._left(cosine) * albedo.lost(cosine), rows)
         else:
             assert not material.multiple_scattering
+            self._diffuse = Lobe(self._left, rows)
+            self._coupling = by_fresnel if material.coupled_by == "fresnel" else by_half_vector
 
     def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
-        under = self.diffuse(wo, wi) * np.maximum(wi[:, 2:], 0) / np.pi
-        gloss = self._fresnel(np.abs(dot(wo, halfway(wo, wi))))
-        return np.asarray(under + gloss * reflection(wo, wi, self.alpha, self.smith)[:, None])
+        up = wi[:, 2:] > 0
+        above = np.where(up, wi, mirrored_below(wi))
+        return np.where(up, self._reflected(wo, above), self._passed(wo, above))
 
-    def _by_half_vector(self, wo: Doubles, wi: Doubles) -> Doubles:
-        return np.asarray((1 - self._fresnel(np.abs(dot(wo, halfway(wo, wi))))) * self.body)
+    def _reflected(self, wo: Doubles, wi: Doubles) -> Doubles:
+        gloss = self._of.gloss.at(dot(wo, halfway(wo, wi))) * self._facets(wo, wi)
+        coupling = self._coupling(self._of, wo, wi) if self._coupling else 1.0
+        return gloss + self._diffuse(wo, wi) * coupling * wi[:, 2:] / np.pi + self._layers.evaluate(wo, wi)
 
-    def _by_fresnel(self, wo: Doubles, wi: Doubles) -> Doubles:
-        return np.asarray((1 - self._fresnel(wo[:, 2])) * (1 - self._fresnel(np.maximum(wi[:, 2], 0))) * self.body)
+    def _passed(self, wo: Doubles, wi: Doubles) -> Doubles:
+        once = (1 - self._of.dielectric.at(dot(wo, halfway(wo, wi)))) * self._facets(wo, wi)
+        again = self._scattered(wo, wi) * wi[:, 2:] / np.pi if self._scattered else 0.0
+        return self._of.passing * (once + again)
 
-    def _by_albedo(self, wo: Doubles, wi: Doubles) -> Doubles:
-        mean = self._left(self._albedos.mean())
-        product = self._left(self._albedos.at(wo[:, 2])) * self._left(self._albedos.at(wi[:, 2]))
-        return np.divide(product, mean, out=np.zeros_like(product), where=mean > 0)
+    def _facets(self, wo: Doubles, wi: Doubles) -> Doubles:
+        """(n, 1) of D·G/(4·cos) below layers."""
+        left = np.minimum(self._left(wo[:, 2]), self._left(wi[:, 2]))
+        return np.asarray(left * reflection(wo, wi, self._of.alpha, self._of.smith)[:, None])
 
-    def _left(self, albedos: tuple[Doubles, Doubles]) -> Doubles:
-        """r, of one angle or the mean."""
-        by_f0, by_f90 = albedos
-        f0, f90 = self._under
-        return np.asarray(self.body * (1 - f0 * by_f0 - f90 * by_f90) + self._multiple * (1 - by_f0 - by_f90))
-
-    def _fresnel(self, cosine: Doubles) -> Doubles:
-        return schlick(cosine, self.f0, self.f90)
+    def _left(self, cosine: Doubles) -> Doubles:
+        """(n, 1) T."""
+        return self._layers.left(cosine)[:, None]

@@ -67,6 +67,29 @@ class Cosine:
         return np.maximum(wi[:, 2], 0) / np.pi
 
 
+class Uniform:
+    """Over the hemisphere."""
+
+    def draw(self, wo: Doubles, rng: np.random.Generator) -> Doubles:
+        return power_directions(0.0, rng.random((len(wo), 2)))
+
+    def density(self, wo: Doubles, wi: Doubles) -> Doubles:
+        return np.where(wi[:, 2] > 0, 0.5 / np.pi, 0.0)
+
+
+class Through:
+    """Another strategy, on the other side of the surface."""
+
+    def __init__(self, strategy: Strategy) -> None:
+        self._strategy = strategy
+
+    def draw(self, wo: Doubles, rng: np.random.Generator) -> Doubles:
+        return mirrored_below(self._strategy.draw(wo, rng))
+
+    def density(self, wo: Doubles, wi: Doubles) -> Doubles:
+        return self._strategy.density(wo, mirrored_below(wi))
+
+
 def mirrored_below(w: Doubles) -> Doubles:
     """To the other side of the surface."""
     return w * [1.0, 1.0, -1.0]

@@ -1,0 +1,36 @@
+"""A clear film, KHR_materials_clearcoat: Cook–Torrance by Schlick's F from 0.04 to 1, times its strength.
+
+It leaves 1 − strength·E of light from an angle, E the directional albedo of its single bounce.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..vectors import Doubles, dot
+from .albedo import Albedos
+from .fresnel import schlick
+from .ggx import VisibleNormals, alpha_of, reflection
+from .scattering import halfway
+
+F0 = 0.04
+
+
+class Film:
+    """Films of strengths and roughnesses (n,)."""
+
+    def __init__(self, strength: Doubles, roughness: Doubles) -> None:
+        self._strength, self._alpha = strength, alpha_of(roughness)
+        self._albedos = Albedos("height_correlated", roughness)
+        self.strategy = VisibleNormals(self._alpha)
+
+    def left(self, cosine: Doubles) -> Doubles:
+        """(n,) of cosines (n,)."""
+        by_f0, by_f90 = self._albedos.at(cosine)
+        return 1 - self._strength * (F0 * by_f0 + by_f90)[:, 0]
+
+    def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
+        """(n, 1) of f·cos wi."""
+        f0, f90 = np.full((len(wo), 1), F0), np.ones((len(wo), 1))
+        fresnel = schlick(np.abs(dot(wo, halfway(wo, wi))), f0, f90)[:, 0]
+        return np.asarray(self._strength * fresnel * reflection(wo, wi, self._alpha))[:, None]
