@@ -27,6 +27,7 @@ typedef struct {
 #endif
 #if COAT_NORMALS
     real3 coat_normal;    // the shading normal as a coat's own map bends it (normal_maps.cl)
+    real coat_cos_o;      // as cos_o, between that and where it is seen from
 #endif
 } Surface;
 
@@ -204,6 +205,7 @@ static inline void turn_towards(Surface *surface, real3 towards) {
 #endif
 #if COAT_NORMALS
     surface->coat_normal = turned(surface->coat_normal, surface, towards);
+    surface->coat_cos_o = dot3(surface->coat_normal, towards);
 #endif
 }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
+from . import layer_energy
 from .limits import Ge, Le
 from .material import ALPHA_MIN, Albedo, Material, Parameter, Radiance, Unit
 from .presets import F0_PRESETS, Preset
@@ -44,7 +45,7 @@ class MetallicRoughness(Material):
     """
 
     kernel: ClassVar[str] = "metallic_roughness"
-    parts: ClassVar[tuple[str, ...]] = ("LAYERS", "SHEEN", "GGX_ALBEDO",
+    parts: ClassVar[tuple[str, ...]] = ("LAYERS", "LAYER_ENERGY", "SHEEN", "GGX_ALBEDO",
                                         *(f"ALBEDO_{smith.upper()}" for smith in get_args(Smith)))
     color: Albedo | Texture = (0.8, 0.8, 0.8)
     metallic: Unit | Texture = 0.0
@@ -88,7 +89,15 @@ class MetallicRoughness(Material):
             values |= {} if self.clearcoat_normal_map is None else {"clearcoat_normal_map": self.clearcoat_normal_map}
         if "SHEEN" in has:
             values |= {"sheen_color": self.sheen_color, "sheen_roughness": self.sheen_roughness}
+        if "LAYER_ENERGY" in has:
+            rows = [layer_energy.rows(roughness) for roughness in self._roughnesses(has)]
+            values |= {"layer_energy": layer_energy.tables(*rows), "last_rows": tuple(len(each) - 1.0 for each in rows)}
         return values | ({"transmission": self.transmission} if "THROUGH" in has else {})
+
+    def _roughnesses(self, has: frozenset[str]) -> tuple[Unit | Texture, ...]:
+        """Of the base, the film and the fibres; of a layer that there is not, any number."""
+        return (self.roughness, self.clearcoat_roughness if "CLEARCOAT" in has else 0.0,
+                self.sheen_roughness if "SHEEN" in has else 1.0)
 
     @property
     def bent_by(self) -> Texture | None:
@@ -112,14 +121,19 @@ class MetallicRoughness(Material):
         further = self.coupled_by == "albedo" if self.multiple_scattering is None else self.multiple_scattering
         # A body under the albedo coupling has all that the gloss does not reflect, so a metal alone loses light.
         further &= metallic != 0 or self.coupled_by != "albedo" or layers["THROUGH"]
-        fitted = further or (metallic != 1 and self.coupled_by == "albedo")
+        above = layers["CLEARCOAT"] or layers["SHEEN"]
+        coupled = metallic != 1 or above    # what layers take from gloss leaves with what is coupled
+        fitted = further or (coupled and self.coupled_by == "albedo")
         # A coat's own albedo is that of the height-correlated form.
         forms = {self.smith} if fitted else set()
         forms |= {"height_correlated"} if layers["CLEARCOAT"] else set()
-        has = {f"SMITH_{self.smith.upper()}": True, f"COUPLING_{self.coupled_by.upper()}": metallic != 1,
+        has = {f"SMITH_{self.smith.upper()}": True, f"COUPLING_{self.coupled_by.upper()}": coupled,
                "MULTIPLE_SCATTERING": further, "GGX_ALBEDO": bool(forms), **layers,
                **{f"ALBEDO_{form.upper()}": True for form in forms},
                "COAT_NORMALS": layers["CLEARCOAT"] and self.bent_by is not None,
-               "LAYERS": any(layers.values()), "SPECULAR": self.specular != 1 or self.specular_color != (1, 1, 1),
+               "LAYERS": any(layers.values()), "LAYER_ENERGY": above,
+               "LAYER_ROWS": above and any(isinstance(r, Texture) for r in (self.roughness, self.clearcoat_roughness,
+                                                                            self.sheen_roughness)),
+               "SPECULAR": self.specular != 1 or self.specular_color != (1, 1, 1),
                "TRANSMISSION": layers["THROUGH"], "TRANSMISSION_LOBES": layers["THROUGH"]}
         return frozenset(name for name, present in has.items() if present)

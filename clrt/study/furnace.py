@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
@@ -23,6 +23,21 @@ COLOR = (0.8, 0.5, 0.2)
 GLASSES = [Dielectric(ior=ior, roughness=roughness, thin=thin)
            for ior, thin in [*((ior, False) for ior in (0.25, 0.7, 0.99, 1.01, 1.1, 1.33, 1.5, 2.4, 4.0)), (1.5, True)]
            for roughness in ROUGHNESSES[1:]]
+
+
+#: What may lie on white, or pass light through it, and what is below.
+WHITE = (1.0, 1.0, 1.0)
+FILM_ROUGHNESSES, FIBRE_ROUGHNESSES = (0.0, 0.1, 0.3, 0.6, 1.0), (0.1, 0.2, 0.35, 0.6, 1.0)
+FILMS: list[dict[str, Any]] = [{"clearcoat": 1.0, "clearcoat_roughness": roughness} for roughness in FILM_ROUGHNESSES]
+FIBRES: list[dict[str, Any]] = [{"sheen_color": WHITE, "sheen_roughness": roughness} for roughness in FIBRE_ROUGHNESSES]
+LAYERS: dict[str, list[dict[str, Any]]] = {
+    "a film": FILMS, "fibres": FIBRES, "a film over fibres": [film | fibres for film in FILMS for fibres in FIBRES],
+    "a thin sheet": [{"transmission": transmission} for transmission in (0.5, 1.0)],
+    "a sheet under a film": [{"transmission": 0.5} | film for film in FILMS]}
+BELOW: dict[str, dict[str, Any]] = {"matte": {"specular": 0.0}, "ior 1.5": {}, "ior 3": {"ior": 3.0},
+                                    "half metal": {"metallic": 0.5}, "metal": {"metallic": 1.0}}
+#: Nearer to the horizon fits of albedos are less exact, and light from there is of no weight.
+LAYER_COSINES = tuple(cosine for cosine in COSINES if cosine >= 0.03)
 
 
 class Reflected(NamedTuple):
@@ -64,6 +79,16 @@ def measure_plastics(device: Device, samples: int) -> Iterator[Reflected]:
     for which, plastic in enumerate(plastics):
         for cosine in COSINES:
             yield Reflected(plastic, cosine, float(_weights(subject, which, cosine, numbers)[:, 0].mean()), 1.0)
+
+
+def measure_layers(device: Device, samples: int, name: str, step: int = 1) -> Iterator[Reflected]:
+    """White below layers of a name of LAYERS, of every step-th roughness."""
+    whites = [MetallicRoughness(color=WHITE, roughness=roughness, **below, **layer) for layer in LAYERS[name]
+              for below in BELOW.values() for roughness in ROUGHNESSES[::step]]
+    subject, numbers = bsdfs(device, [*whites]), evenly(samples)
+    for which, white in enumerate(whites):
+        for cosine in LAYER_COSINES:
+            yield Reflected(white, cosine, float(_weights(subject, which, cosine, numbers)[:, 0].mean()), 1.0)
 
 
 def measure_glass(device: Device, samples: int, glasses: Sequence[Dielectric] = GLASSES) -> Iterator[Kept]:

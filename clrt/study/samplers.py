@@ -14,7 +14,8 @@ from ..scene.materials import Diffuse, Material
 from ..scene.model import Camera, RenderSettings, Scene, Sphere
 from .accumulation import accumulate, stream_errors
 from .bsdfs import Bsdfs, bsdfs
-from .furnace import GLASSES, SMITHS, inexact, measure_glass, measure_metals, measure_plastics
+from .furnace import (GLASSES, LAYERS, SMITHS, inexact, measure_glass, measure_layers, measure_metals,
+                      measure_plastics)
 from .jacobians import check_density
 from .light_sampling import light_tests
 from .probe import Probe
@@ -26,8 +27,8 @@ from .warps import warp_density_errors, warp_p_values, warp_probe
 
 #: What furnaces may be off the albedo of one bounce, and 1 with multiple scattering.
 FURNACE = 1e-3
-#: What furnaces of rough glass may be off 1.
-GLASS_FURNACE = 2e-3
+#: What furnaces of rough glass and of layers may be off 1.
+GLASS_FURNACE, LAYER_FURNACE = 2e-3, 2.5e-3
 #: What a density may miss 1/area and a closed form by, and a mean of the film the true one.
 AREA, DENSITY, MEAN = 2e-3, 1e-5, 1e-6
 LAMP_SAMPLES = 64
@@ -76,6 +77,10 @@ def _furnaces(device: Device, effort: Effort) -> Iterator[Row]:
                         ("white under gloss reflects all", list(measure_plastics(device, effort.furnace)))):
         errors = [abs(each.found - each.exact) for each in found]
         yield Row("L1", what, len(errors), sum(not error <= FURNACE for error in errors), max(errors), "largest error")
+    for name in LAYERS:
+        errors = [abs(each.found - 1) for each in measure_layers(device, effort.furnace, name, min(effort.step, 4))]
+        wrong = sum(not error <= LAYER_FURNACE for error in errors)
+        yield Row("L1", f"white with {name} keeps all light", len(errors), wrong, max(errors), "largest error")
     glasses = list(measure_glass(device, 4 * effort.furnace, GLASSES[::effort.step]))
     errors = [abs(kept.found - 1) for kept in glasses]
     wrong = sum(not error <= GLASS_FURNACE for error in errors)

@@ -9,12 +9,12 @@
 // the geometric surface (horizon.cl).
 //
 // A coat leaves T(c) = 1 − clearcoat·E(c) of light from an angle, with the albedo E of its single bounce (ggx_albedo.cl); what
-// that loses goes below. Fibres leave 1 − max(sheen_color)·E, E theirs (sheen.cl), at most 1. Of the product T of both
+// that loses goes below. Fibres leave 1 − max(sheen_color)·E, E theirs. Of the product T of both
 //   gloss, fibres, and what passes through microfacets have min(T(wo), T(wi)): T of one angle where they are smooth
-//   diffuse lobes, r(wo)·r(wi)/(pi·mean r), have T(wo)·T(wi)/T', T' = mean r·T/mean r: T, exactly, in a white furnace
-// Both are reciprocal and make no light. What min takes from rough gloss is lost: under a coat at most 0.02 of white plastic of
-// index 1.5, 0.054 of white metal.
-// glTF takes a coat's share at wo alone. The fibres' f is divided by the larger E of wo and wi where that exceeds 1.
+//   the diffuse lobe r(wo)·r(wi)/(pi·mean r) becomes R(wo)·R(wi)/(pi·mean R), R = T·r + what min takes beyond 1 − T
+//   (layer_energy.cl), by colour; other diffuse lobes have T(wo)·T(wi)/mean T
+// All are reciprocal, and what is white in a white furnace stays so. The couplings without albedos lose what min takes.
+// glTF takes a coat's share at wo alone. The fibres' f is divided by the larger of the albedos of wo and wi where that exceeds 1.
 //
 // What a single bounce loses of the light that passes is passed on by Kulla and Conty's lobe, if MULTIPLE_SCATTERING.
 #if COAT_NORMALS
@@ -22,20 +22,16 @@
 #define IN_COAT(m, w) to_local((m)->coat_frame, w)
 #define OF_COAT(m, w) to_world((m)->coat_frame, w)
 #define IF_ABOVE(wo, wi, value) ((((wo).z > 0.0f) & ((wi).z > 0.0f)) ? (value) : ZERO)
+#define COAT_COS(surface) (surface)->coat_cos_o
 #else
 #define IN_BASE(m, w) (w)
 #define IN_COAT(m, w) (w)
 #define OF_COAT(m, w) (w)
 #define IF_ABOVE(wo, wi, value) (value)
+#define COAT_COS(surface) (surface)->cos_o
 #endif
 
 #if CLEARCOAT
-// What a film of strength 1 reflects of light from an angle in a single bounce. What it loses lies below it.
-static inline real coat_albedo(const struct metallic_roughness *m, real cos_theta) {
-    Bounce bounce = ggx_bounce(&m->coat_bounces, maximum(cos_theta, ZERO));
-    return 0.04f * bounce.by_f0 + bounce.by_f90;
-}
-
 static inline real coat_fresnel(const struct metallic_roughness *m, real cos_theta) {
     real c = 1.0f - minimum(absolute(cos_theta), ONE), c2 = c * c;
     return m->coat * (0.04f + 0.96f * c2 * c2 * c);
@@ -57,62 +53,7 @@ static inline real3 sheen_value(const struct metallic_roughness *m, real3 wo, re
 }
 #endif
 
-// Which lanes have a film, and fibres. Few surfaces of a scene do, so nothing is computed where no lane has any.
-static inline ireal has_film(const struct metallic_roughness *m) {
-#if CLEARCOAT
-    return m->coat > 0.0f;
-#else
-    return NO_LANES;
-#endif
-}
-
-static inline ireal has_fibres(const struct metallic_roughness *m) {
-#if SHEEN
-    return largest(m->sheen) > 0.0f;
-#else
-    return NO_LANES;
-#endif
-}
-
-// What layers leave of light from a direction: the film to all below it, and it and the fibres to the body.
-typedef struct { real film, body; } Left;
-
-static inline Left left_at(const struct metallic_roughness *m, real base_cos, real coat_cos) {
-    Left left = {ONE, ONE};
-#if CLEARCOAT
-    if (ANY(has_film(m))) left.film -= m->coat * coat_albedo(m, coat_cos);
-    left.body = left.film;
-#endif
-#if SHEEN
-    if (ANY(has_fibres(m))) left.body *= 1.0f - largest(m->sheen) * minimum(fibres_albedo(&m->fibres, base_cos), ONE);
-#endif
-    return left;
-}
-
-#define SCATTERS (THROUGH && MULTIPLE_SCATTERING)
-
-// 1/T', by Gauss and Legendre's rule in √cos. For all diffuse lobes and colours it is that of their sum.
-constant float MEAN_ROOT[5] = {0.04691008f, 0.23076534f, 0.5f, 0.76923466f, 0.95308992f};
-constant float MEAN_WEIGHT[5] = {0.11846344f, 0.23931434f, 0.28444444f, 0.23931434f, 0.11846344f};
-
-static inline real diffuse_scale(const struct metallic_roughness *m) {
-    if (!ANY(has_film(m) | has_fibres(m))) return ONE;
-    real all = ZERO, left = ZERO;
-    for (int k = 0; k < 5; ++k) {
-        real root = (real)(MEAN_ROOT[k]), cosine = root * root, weight = MEAN_WEIGHT[k] * cosine * root;
-#if COUPLING_ALBEDO
-        Bounce bounce = ggx_bounce(&m->bounces, cosine);
-        real3 seen = left_albedo(m, bounce);
-#if SCATTERS
-        seen = mad3(m->scattered, bounce.lost, seen);
-#endif
-        weight *= BY_ALBEDO(m) ? luminance(seen) : ONE;
-#endif
-        all += weight;
-        left += weight * left_at(m, cosine, cosine).body;
-    }
-    return left > 0.0f ? all / left : ONE;
-}
+#include "bsdf/below_layers.cl"
 
 #if THROUGH
 // What microfacets pass on in a single bounce.
@@ -121,22 +62,42 @@ static inline real3 passed_on(const struct metallic_roughness *m, real cos_h) {
 }
 #endif
 
-// The probabilities of the lobes: about their shares of the light that leaves.
-typedef struct { real coat, sheen, scattered, through, base; Left left; } LayerShares;     // left: at wo
-
-static inline LayerShares layer_shares(const struct metallic_roughness *m, real3 base_o, real3 coat_o) {
-    LayerShares share = {ZERO, ZERO, ZERO, ZERO, ONE, left_at(m, base_o.z, coat_o.z)};
-    real left = share.left.body;
-#if CLEARCOAT
-    share.coat = 1.0f - share.left.film;
+// Sets what is the same for all wi. specular_o, multiple_o, diffuse_o: what the lobes reflect of light from wo, without layers.
+static inline void lay_over(struct metallic_roughness *m, const Surface *surface, real specular_o, real multiple_o,
+                            real diffuse_o) {
+    m->left = left_at(m, surface->cos_o, COAT_COS(surface));
+    Means mean;
+    mean.other = ONE;
+#if COUPLING_ALBEDO
+    mean.left = left_albedo(m, m->bounces.mean);
 #endif
+#if SCATTERS
+    mean.lost = m->bounces.mean.lost;
+#endif
+    if (ANY(has_layers(m))) add_layers(m, &mean);
+#if OTHER_COUPLINGS
+    m->diffuse_scale = inverse_or_zero(mean.other);
+#endif
+#if SCATTERS
+    m->scattered_scale = m->bounces.mean.lost * inverse_or_zero(mean.lost);
+#endif
+    real left = m->left.body, moved = ZERO;
+#if COUPLING_ALBEDO
+    real3 from = taken(m, m->left);
+    real3 R = mad3(m->left_o, left, from);
+    m->left_o = mul(R, vector(inverse_or_zero(mean.left.x), inverse_or_zero(mean.left.y), inverse_or_zero(mean.left.z)));
+    moved = BY_ALBEDO(m) ? luminance(from) : ZERO;
+#endif
+    specular_o = maximum(left * specular_o - moved, ZERO);
+    multiple_o *= left;
+    diffuse_o = diffuse_o * left + moved;
+    m->shares = lobe_shares(specular_o, multiple_o, diffuse_o);
+    LayerShares share = {1.0f - m->left.film, ZERO, ZERO, ZERO, specular_o + multiple_o + diffuse_o};
 #if SHEEN
-    share.sheen = share.left.film * luminance(m->sheen) * minimum(fibres_albedo(&m->fibres, base_o.z), ONE);
+    share.sheen = m->left.film * luminance(m->sheen) * m->left.fibres;
 #endif
-    real3 f = base_fresnel(m, base_o.z);
-    share.base = left * (luminance(f) + luminance(mul(sub(splat(ONE), f), m->albedo)));
 #if THROUGH
-    share.through = left * luminance(passed_on(m, base_o.z));
+    share.through = left * luminance(passed_on(m, surface->cos_o));
 #endif
 #if SCATTERS
     share.scattered = left * luminance(m->scattered) * m->lost_o * m->bounces.mean.lost;
@@ -144,8 +105,8 @@ static inline LayerShares layer_shares(const struct metallic_roughness *m, real3
     real sum = share.coat + share.sheen + share.scattered + share.through + share.base;
     ireal some = sum > 0.0f;
     real inverse = some ? 1.0f / sum : ZERO;
-    return (LayerShares){share.coat * inverse, share.sheen * inverse, share.scattered * inverse,
-                         share.through * inverse, some ? share.base * inverse : ONE, share.left};
+    m->layers = (LayerShares){share.coat * inverse, share.sheen * inverse, share.scattered * inverse,
+                              share.through * inverse, some ? share.base * inverse : ONE};
 }
 
 #if THROUGH
@@ -153,58 +114,65 @@ static inline ireal metallic_roughness_transmits(const struct metallic_roughness
 #endif
 
 // What each lobe reflects, and what passes on.
-static inline BsdfValue layers_reflected(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
+static inline BsdfValue layers_reflected(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), coat_o = IN_COAT(m, wo), coat_i = IN_COAT(m, wi);
     Left left = left_at(m, base_i.z, coat_i.z);
-    BsdfValue at = weighed_lobes(m, base_o, base_i, minimum(share.left.body, left.body),
-                                 share.left.body * left.body * m->diffuse_scale);
-    at.pdf *= share.base;
+    real diffuse = left.body;
+#if OTHER_COUPLINGS
+    diffuse *= BY_ALBEDO(m) ? ONE : m->left.body * m->diffuse_scale;
+#endif
+    BsdfValue at = weighed_lobes(m, base_o, base_i, minimum(m->left.body, left.body), diffuse);
+#if COUPLING_ALBEDO
+    real below = BY_ALBEDO(m) & (base_o.z > 0.0f) & (base_i.z > 0.0f) ? base_i.z * (1.0f / PI) : ZERO;
+    at.value = mad3(mul(m->left_o, taken(m, left)), below, at.value);
+#endif
+    at.pdf *= m->layers.base;
 #if SHEEN
-    at.value = mad3(sheen_value(m, base_o, base_i), minimum(share.left.film, left.film), at.value);
-    at.pdf += IF_ABOVE(base_o, base_i, share.sheen * (0.5f / PI));
+    at.value = mad3(sheen_value(m, base_o, base_i), minimum(m->left.film, left.film), at.value);
+    at.pdf += IF_ABOVE(base_o, base_i, m->layers.sheen * (0.5f / PI));
 #endif
 #if CLEARCOAT
     real hidden, density = reflected_density(coat_o, coat_i, m->coat_alpha, &hidden);
     real coat = coat_fresnel(m, 0.5f * length3(add(wo, wi))) * density * hidden;
     at.value = add(at.value, splat(IF_ABOVE(coat_o, coat_i, coat)));
-    at.pdf += IF_ABOVE(coat_o, coat_i, share.coat * density);
+    at.pdf += IF_ABOVE(coat_o, coat_i, m->layers.coat * density);
 #endif
     return at;
 }
 
 #if THROUGH
-static inline BsdfValue layers_transmitted(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
+static inline BsdfValue layers_transmitted(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), mirrored = vector(base_i.x, base_i.y, -base_i.z);
     real3 sum = add(base_o, mirrored);
     real facets = ggx_d(normalize3(sum), m->alpha) / (4.0f * base_o.z);
     real3 on = passed_on(m, 0.5f * length3(sum));
     Left left = left_at(m, mirrored.z, -IN_COAT(m, wi).z);
     real seen = facets * smith_shadowing(base_o, mirrored, m->alpha, m->smith);
-    real3 value = scale(on, seen * minimum(share.left.body, left.body));
-    real pdf = share.through * facets / (1.0f + ggx_lambda(base_o, m->alpha));
+    real3 value = scale(on, seen * minimum(m->left.body, left.body));
+    real pdf = m->layers.through * facets / (1.0f + ggx_lambda(base_o, m->alpha));
 #if SCATTERS
     real lost = m->lost_o * ggx_bounce(&m->bounces, mirrored.z).lost * mirrored.z * (1.0f / PI);
-    value = mad3(m->scattered, lost * share.left.body * left.body * m->diffuse_scale, value);
-    pdf += share.scattered * multiple_pdf(m, mirrored.z);
+    value = mad3(m->scattered, lost * m->left.body * left.body * m->scattered_scale, value);
+    pdf += m->layers.scattered * multiple_pdf(m, mirrored.z);
 #endif
     ireal above = (base_o.z > 0.0f) & (mirrored.z > 0.0f);
     return choose_value(above, (BsdfValue){value, splat(ZERO), pdf}, no_value());
 }
 #endif
 
-static inline BsdfValue layers_eval(const struct metallic_roughness *m, LayerShares share, real3 wo, real3 wi) {
-    BsdfValue at = layers_reflected(m, share, wo, wi);
+static inline BsdfValue layers_eval(const struct metallic_roughness *m, real3 wo, real3 wi) {
+    BsdfValue at = layers_reflected(m, wo, wi);
 #if COAT_NORMALS
     real3 across = vector(wi.x, wi.y, -wi.z);
-    BsdfValue folded = layers_reflected(m, share, wo, across);
+    BsdfValue folded = layers_reflected(m, wo, across);
     at.value = add(at.value, sub(folded.value, folded.matte));
     at.pdf += folded.pdf;
 #endif
     at = choose_value((wo.z > 0.0f) & (wi.z > 0.0f), at, no_value());
 #if THROUGH
-    BsdfValue on = layers_transmitted(m, share, wo, wi);
+    BsdfValue on = layers_transmitted(m, wo, wi);
 #if COAT_NORMALS
-    folded = layers_transmitted(m, share, wo, across);
+    folded = layers_transmitted(m, wo, across);
     on.value = add(on.value, folded.value);
     on.pdf += folded.pdf;
 #endif
@@ -214,7 +182,7 @@ static inline BsdfValue layers_eval(const struct metallic_roughness *m, LayerSha
 }
 
 static inline BsdfValue metallic_roughness_eval(const struct metallic_roughness *m, real3 wo, real3 wi) {
-    return layers_eval(m, layer_shares(m, IN_BASE(m, wo), IN_COAT(m, wo)), wo, wi);
+    return layers_eval(m, wo, wi);
 }
 
 static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m) {
@@ -225,7 +193,7 @@ static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m
     Left left = left_at(m, ONE, ONE);
     albedo = scale(albedo, left.body);
 #if SHEEN
-    albedo = mad3(m->sheen, left.film * fibres_albedo(&m->fibres, ONE), albedo);
+    albedo = mad3(m->sheen, left.film * left.fibres, albedo);
 #endif
     albedo = add(albedo, splat(1.0f - left.film));
     return albedo;
@@ -233,7 +201,7 @@ static inline real3 metallic_roughness_albedo(const struct metallic_roughness *m
 
 static inline BsdfSample metallic_roughness_sample(const struct metallic_roughness *m, real3 wo, real2 u, real lobe) {
     real3 base_o = IN_BASE(m, wo), coat_o = IN_COAT(m, wo);
-    LayerShares share = layer_shares(m, base_o, coat_o);
+    LayerShares share = m->layers;
     real below = 1.0f - share.base;
     ireal is_base = lobe >= below;
     BsdfSample sample = base_sample(m, base_o, u, is_base ? minimum((lobe - below) / share.base, BELOW_ONE) : ZERO);
@@ -271,6 +239,6 @@ static inline BsdfSample metallic_roughness_sample(const struct metallic_roughne
     // What a lobe sends below its own horizon has failed, though another lobe may send something there.
     kept = kept & (lobe < share.coat ? reflected.z > 0.0f : own_side);
 #endif
-    weigh_sample(&sample, layers_eval(m, share, wo, sample.wi), kept);
+    weigh_sample(&sample, layers_eval(m, wo, sample.wi), kept);
     return sample;
 }

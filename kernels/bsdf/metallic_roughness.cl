@@ -41,13 +41,22 @@
 // The lobes' probabilities: their shares of the reflected light, by their albedos at wo, or by the Fresnel term there.
 typedef struct { real specular, multiple, diffuse; } LobeShares;
 
+#if LAYERS
+// What layers leave of light from a direction: the film to all below it, and it and the fibres to the body; what white fibres
+// reflect; and of what lies below, what min(T(wo), T(wi)) takes beyond 1 − T (layers.cl).
+typedef struct { real film, body, fibres, taken_f0, taken_f90, taken_fibres; } Left;
+
+// The probabilities of the lobes: about their shares of the light that leaves.
+typedef struct { real coat, sheen, scattered, through, base; } LayerShares;
+#endif
+
 struct metallic_roughness {
     real3 albedo, f0;
     real alpha;
     ireal smith, coupling;
     LobeShares shares;
 #if COUPLING_ALBEDO
-    real3 left_o;               // r(wo)/mean r
+    real3 left_o;               // r(wo)/mean r; below layers R(wo)/mean R
 #endif
 #if COUPLING_ALBEDO || THROUGH
     real3 body_f0;              // of the dielectric part
@@ -68,7 +77,18 @@ struct metallic_roughness {
     GgxAlbedo coat_bounces;
 #endif
 #if LAYERS
+    LayerShares layers;
+    Left left;                  // at wo
+#endif
+#if LAYERS && OTHER_COUPLINGS
     real diffuse_scale;
+#endif
+#if LAYER_ENERGY
+    const Scene *scene;
+    ireal index;                // of its record
+#endif
+#if LAYER_ROWS
+    real3 row;                  // of the base, the film and the fibres
 #endif
 #if COAT_NORMALS
     Frame base_frame, coat_frame;   // in that of the unbent normal
@@ -79,6 +99,9 @@ struct metallic_roughness {
 #endif
 #if THROUGH
     real3 through, scattered;   // by a single bounce, and by more of them
+#endif
+#if THROUGH && MULTIPLE_SCATTERING
+    real scattered_scale;
 #endif
 };
 
@@ -133,7 +156,8 @@ static inline real3 transmitted(const struct metallic_roughness *m, real c) {
 }
 
 #if LAYERS
-static inline real diffuse_scale(const struct metallic_roughness *m);
+static inline void lay_over(struct metallic_roughness *m, const Surface *surface, real specular_o, real multiple_o,
+                            real diffuse_o);
 #endif
 
 static inline real inverse_or_zero(real x) { return x > 0.0f ? 1.0f / x : ZERO; }
@@ -179,6 +203,20 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     m.scattered = scale(m.through, PARAMETER(metallic_roughness, multiple));
     m.albedo = scale(m.albedo, 1.0f - transmission);
 #endif
+#if LAYER_ENERGY
+    m.scene = scene;
+    m.index = index;
+#endif
+#if LAYER_ROWS
+    m.row = PARAMETER3(metallic_roughness, last_rows);
+    m.row.x *= sqrt(roughness);
+#if CLEARCOAT
+    m.row.y *= sqrt(PARAMETER(metallic_roughness, clearcoat_roughness));
+#endif
+#if SHEEN
+    m.row.z *= sqrt(PARAMETER(metallic_roughness, sheen_roughness));
+#endif
+#endif
 #if GGX_ALBEDO
     m.bounces = bounces_of(m.alpha, m.smith);
 #endif
@@ -209,12 +247,17 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
 #endif
 #if COUPLING_ALBEDO
     real3 mean = left_albedo(&m, m.bounces.mean), left = left_albedo(&m, bounce_o);
+#if LAYERS
+    m.left_o = left;
+#else
     m.left_o = vector(left.x * inverse_or_zero(mean.x), left.y * inverse_or_zero(mean.y), left.z * inverse_or_zero(mean.z));
+#endif
     diffuse_o = BY_ALBEDO(&m) ? luminance(body_left(&m, bounce_o)) : diffuse_o;
 #endif
-    m.shares = lobe_shares(specular_o, multiple_o, diffuse_o);
 #if LAYERS
-    m.diffuse_scale = diffuse_scale(&m);
+    lay_over(&m, surface, specular_o, multiple_o, diffuse_o);
+#else
+    m.shares = lobe_shares(specular_o, multiple_o, diffuse_o);
 #endif
     return m;
 }

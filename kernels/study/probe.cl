@@ -89,6 +89,7 @@ static Bsdf material_at(const Scene *scene, real code, real3 wo, ireal front) {
     surface.handedness = ONE;
     bend_normal(scene, &surface);
     surface.cos_o = dot3(surface.ns, wo);
+    surface.coat_cos_o = dot3(surface.coat_normal, wo);
 #endif
     Bsdf bsdf;
     bsdf_at(scene, &surface, &bsdf);

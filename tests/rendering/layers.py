@@ -1,4 +1,4 @@
-"""What layers leave to what lies below them, in float64, by quadratures of clrt's own."""
+"""What layers leave to what lies below them, and how that reflects it, in float64."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def under_coat(strength: float, roughness: float) -> Left:
 
 
 def under_fibres(strength: float, roughness: float) -> Left:
-    """1 − strength·E, E at most 1."""
-    left = 1 - strength * np.minimum(sheen.albedo(ROOTS**2, max(roughness, 0.1)**-2), 1)
+    """1 − strength·E, E of fibres as they are bounded."""
+    left = 1 - strength * sheen.bounded_albedo(ROOTS**2, max(roughness, 0.1)**-2)
     return lambda cosines: np.interp(np.sqrt(cosines), ROOTS, left)
 
 
@@ -52,26 +52,42 @@ def tables(roughness: float) -> tuple[Doubles, Doubles]:
     return albedos(ROOTS**2, max(roughness**2, ALPHA_MIN), "height_correlated")
 
 
-def mean(f: Left) -> float:
-    """Over the hemisphere, weighted by the cosine."""
+def mean(f: Left) -> Doubles:
+    """Over the hemisphere, weighted by the cosine, of f with values (n, ...)."""
     t, weight = np.polynomial.legendre.leggauss(60)
     root = (t + 1) / 2
-    return float(weight @ (f(root**2) * 2 * root**3))
+    return np.asarray(np.tensordot(weight * 2 * root**3, f(root**2), 1))
 
 
-def diffuse(color: tuple[float, float, float], metallic: float, roughness: float) -> Left:
-    """r of the lobe of body and further bounces, in luminance, with an index of 1.5 (bsdf/metallic_roughness.cl)."""
-    luminance, colors = np.array([0.2126, 0.7152, 0.0722]), np.array(color)
-    fresnel, mean_lost = (1 + 20 * colors) / 21, mean(lambda c: lost(c, roughness))
-    multiple = metallic * fresnel**2 * (1 - mean_lost) / (1 - fresnel * mean_lost)
-    return lambda c: ((1 - metallic) * (luminance @ colors) * (1 - gloss_albedo(c, roughness, 0.04))
-                      + (luminance @ multiple) * lost(c, roughness))
+class Below:
+    """What a body of index 1.5 with further bounces reflects below layers: gloss·min(T, T) + R(wo)·R(wi)/(pi·mean R),
+    R = T·r + what min takes from the gloss (bsdf/layers.cl). left: T."""
 
+    def __init__(self, color: tuple[float, float, float], metallic: float, roughness: float, left: Left) -> None:
+        self.roughness, self.metallic, self.colors = roughness, metallic, np.array(color)
+        self.f0 = 0.04 + metallic * (self.colors - 0.04)
+        steps = np.linspace(0.02, 1, 50)
+        taken = [[taken_from_gloss(left, root**2, roughness**2, f0) for f0 in self.f0] for root in steps]
+        self.steps, self.taken_at = np.append(0, steps), np.concatenate([np.zeros((1, 3)), taken])
+        self.mean = mean(lambda cosines: left(cosines)[:, None] * self.r(cosines) + self.taken(cosines))
 
-def left_to_diffuse(left: Left, r: Left) -> Left:
-    """What a lobe r(wo)·r(wi)/(pi·mean r) is weighed by at wo and wi: left/√(mean r·left/mean r)."""
-    scale = np.sqrt(mean(r) / mean(lambda c: r(c) * left(c)))
-    return lambda cosines: scale * left(cosines)
+    def r(self, cosines: Doubles) -> Doubles:
+        """(n, 3)"""
+        fresnel, mean_lost = (1 + 20 * self.colors) / 21, mean(lambda c: lost(c, self.roughness))
+        multiple = self.metallic * fresnel**2 * (1 - mean_lost) / (1 - fresnel * mean_lost)
+        body = (1 - self.metallic) * self.colors * (1 - gloss_albedo(cosines, self.roughness, 0.04))[:, None]
+        return np.asarray(body + multiple * lost(cosines, self.roughness)[:, None])
+
+    def taken(self, cosines: Doubles) -> Doubles:
+        """(n, 3)"""
+        return np.column_stack([np.interp(np.sqrt(cosines), self.steps, each) for each in self.taken_at.T])
+
+    def value(self, gloss: Doubles, cos_o: Doubles, cos_i: Doubles, left_o: Doubles, left_i: Doubles) -> Doubles:
+        """(n, 3) f·cos wi, with the gloss without layers (n, 3), and of wo and wi the cosines and T there (n,)."""
+        each = [left[:, None] * self.r(cosines) + self.taken(cosines)
+                for left, cosines in ((left_o, cos_o), (left_i, cos_i))]
+        diffuse = each[0] * each[1] * cos_i[:, None] / (np.pi * self.mean)
+        return np.asarray(np.minimum(left_o, left_i)[:, None] * gloss + diffuse)
 
 
 def taken_from_gloss(left: Left, cosine: float, alpha: float, f0: float) -> float:

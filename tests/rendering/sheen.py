@@ -9,18 +9,30 @@ from numpy.typing import NDArray
 Doubles = NDArray[np.float64]
 
 
+#: Gauss and Legendre's rule, denser at the horizon: cosines, and their weights.
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(96)
+COS_I, WEIGHT = ((NODES + 1) / 2)**2, WEIGHTS * (NODES + 1) / 2    # dcos = 2u du
+
+
 def albedo(cosines: Doubles, n: float) -> Doubles:
-    """(m,) of cosines (m,) in (0, 1]: ∫ D·V·cos wi dωi, by Gauss and Legendre's rule, denser at the horizon."""
-    nodes, weights = np.polynomial.legendre.leggauss(96)
-    u = (nodes + 1) / 2
-    cos_i, weight = u**2, weights * u    # dcos = 2u du
+    """(m,) of cosines (m,) in (0, 1]: ∫ D·V·cos wi dωi."""
+    return np.asarray(across(cosines, n) @ WEIGHT)
+
+
+def bounded_albedo(cosines: Doubles, n: float) -> Doubles:
+    """(m,) likewise, of D·V over the larger of the albedos of wo and wi where that exceeds 1."""
+    values, bound = across(cosines, n), np.maximum(albedo(COS_I, n), 1)
+    return np.asarray(values / np.maximum((values @ WEIGHT)[:, None], bound) @ WEIGHT)
+
+
+def across(cosines: Doubles, n: float) -> Doubles:
+    """(m, 96): D·V·cos wi, integrated over the azimuth, at cosines (m,) and COS_I."""
     phi = np.pi * (np.arange(96) + 0.5) / 96
-    co, ci = np.asarray(cosines)[:, None, None], cos_i[:, None]
+    co, ci = np.asarray(cosines)[:, None, None], COS_I[:, None]
     along = np.sqrt((1 - co**2) * (1 - ci**2)) * np.cos(phi)
     cos_h = (co + ci) / np.sqrt(np.maximum(2 * (1 + co * ci + along), 1e-300))
     d = (2 + n) / (2 * np.pi) * np.maximum(1 - cos_h**2, 0)**(n / 2)
-    values = d * ci / (4 * (co + ci - co * ci))
-    return np.asarray(2 * np.pi * values.mean(axis=2) @ weight)
+    return np.asarray(2 * np.pi * (d * ci / (4 * (co + ci - co * ci))).mean(axis=2))
 
 
 def interpolated(across: int, along: int) -> Doubles:

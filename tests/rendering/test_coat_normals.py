@@ -21,7 +21,7 @@ from clrt.study.scattering import FITTED, FLIP, above
 from clrt.study.significance import chi2_test, mean_test, rejected
 
 from .ggx import bump_shadowing, masking
-from .layers import diffuse, left_to_diffuse, under_coat
+from .layers import Below, mean, under_coat
 from .test_textures import plain, quad, seen
 
 pytestmark = pytest.mark.statistics
@@ -82,21 +82,19 @@ def test_coat_and_base_have_normals_of_their_own(device: Device, base: str | Non
                      clearcoat_normal_map=texture(other)) for one, other in ((base, coat), ("right", "up"))]
     f0: Any = tuple(0.04 + metallic * (c - 0.04) for c in COLOR)
     gloss = replace(bare, color=f0, metallic=1.0, multiple_scattering=False)
-    both = bsdfs(device, [bare, *coats, gloss])
+    both = bsdfs(device, [gloss, *coats])
     base_normal, coat_normal = normal(base), normal(coat)
     wo, wi = above(20_000, 1), above(20_000, 2)
     mirrored = np.maximum((wi * FLIP) @ base_normal, (wi * FLIP) @ coat_normal) > 0
     known = (wo @ base_normal > 1e-3) & (wo @ coat_normal > 1e-3) & ((metallic == 1) | ~mirrored)
     wo, wi = wo[known], wi[known]
     turn, left = around(base_normal).T, under_coat(0.8, 0.5)
-    rest = left_to_diffuse(left, diffuse(COLOR, metallic, 0.7))
-    cos_o = wo @ coat_normal
+    body = Below(COLOR, metallic, 0.7, left)
 
     def lobes(wi: Doubles) -> Doubles:
-        cos_i = np.maximum(wi @ coat_normal, 1e-6)
-        below, facets = both.value(0, wo @ turn, wi @ turn)[0], both.value(3, wo @ turn, wi @ turn)[0]
-        below = (np.minimum(left(cos_o), left(cos_i))[:, None] * facets
-                 + (rest(cos_o) * rest(cos_i))[:, None] * (below - facets))
+        lefts = [left(np.maximum(w @ coat_normal, 1e-6)) for w in (wo, wi)]
+        cosines = [np.maximum(w @ base_normal, 0) for w in (wo, wi)]
+        below = body.value(both.value(0, wo @ turn, wi @ turn)[0], *cosines, *lefts)
         return np.asarray(below + 0.8 * film(wo, wi, coat_normal, 0.25)[:, None])
 
     expected = lobes(wi) + lobes(wi * FLIP)
@@ -177,7 +175,7 @@ def test_highlights_lie_where_the_coat_is_bent_to(device: Device, base: str | No
     n, towards_eye, alpha = normal("up"), np.array([[0.0, 0.0, 1.0]]), 0.25**2
     body = replace(MetallicRoughness(color=COLOR, specular=0.0), normal_map=texture(base))
     coated = replace(body, clearcoat=1.0, clearcoat_roughness=0.25, clearcoat_normal_map=texture("up"))
-    coat_left = left_to_diffuse(under_coat(1.0, 0.25), np.ones_like)     # specular = 0: all of the body is left
+    coat_left = under_coat(1.0, 0.25)
     mirrored = 2 * n[2] * n - UP
     found = []
     for turn in (-0.3, -0.1, 0.0, 0.1, 0.3):
@@ -188,7 +186,8 @@ def test_highlights_lie_where_the_coat_is_bent_to(device: Device, base: str | No
                       lights=[DirectionalLight(direction=tuple(-light), irradiance=(1, 1, 1))])
         picture = seen(device, scene, size=8, spp=4, max_depth=2).mean(axis=(0, 1))
         gloss = film(towards_eye, light[None], n, alpha) + film(towards_eye, light[None] * FLIP, n, alpha)
-        left = np.prod(coat_left(np.array([n[2], light @ n]))) * bump_shadowing(UP, normal(base), light)
+        left = np.prod(coat_left(np.array([n[2], light @ n]))) / mean(coat_left)
+        left *= bump_shadowing(UP, normal(base), light)
         lambert = left * np.array(COLOR) / np.pi * max(light @ normal(base), 0)
         np.testing.assert_allclose(picture, gloss + lambert, rtol=2 * FITTED)
         found.append(picture[2])

@@ -1,0 +1,141 @@
+"""What a film and fibres take from the gloss below them beyond their own share, as a table that a kernel looks up.
+
+Of light from an angle of cosine c a layer leaves T(c) to what lies below. Gloss is weighed by min(T(wo), T(wi)), which
+is reciprocal, and right where it is smooth. Of rough gloss it takes more than the layers reflect, which
+kernels/bsdf/layers.cl gives back:
+  taken(co) = ∫ gloss(wo, wi)·(T(co) − T(ci)) dwi  over the wi nearer the horizon, ci < co
+With T = (1 − film·E_film)·(1 − fibres·E_fibres) this is a sum over film, fibres and their product, each times the
+integral with its albedo E, for which T falls where E grows. The film takes from the fibres' light in the same way.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .dielectric_energy import microfacets
+from .material import ALPHA_MIN
+from .microfacets import albedos
+from .textures import Texture
+
+Doubles = NDArray[np.float64]
+Roughnesses = tuple[float, ...]
+
+#: Steps of a table's angles, even in √cos.
+STEPS = 96
+#: Of an entry: what a film, fibres, and their product take, of f0 and of f90 each; what the film takes from fibres; and
+#: what fibres reflect, over the smaller of their unbounded albedo and 1.
+ENTRY = 8
+#: Rows for a roughness from a texture, even in its square root.
+ROWS = 12
+GRID: Roughnesses = tuple((np.linspace(0, 1, ROWS)**2).tolist())
+#: Smoother fibres would shine at the horizon alone (kernels/bsdf/sheen.cl).
+SMOOTHEST = 0.1
+#: √cos where albedos are known, linear in between.
+ROOTS = np.linspace(0, 1, 193)
+NEAREST = 1e-3    # the least √cos of an integral
+LATTICE = (2584, 1597)
+
+
+def rows(roughness: float | Texture) -> Roughnesses:
+    """The number itself, or GRID."""
+    return GRID if isinstance(roughness, Texture) else (float(roughness),)
+
+
+@lru_cache(128)
+def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses) -> tuple[float, ...]:
+    """For each roughness of the base, of the film (none: (0,)), and of the fibres (none: (1,)) the mean entry over
+    the hemisphere, weighted by the cosine, and those of STEPS + 1 angles."""
+    films = np.array([film_albedo(ROOTS, r) for r in film])
+    threads = [Fibres(r) for r in fibres]
+    bounded = np.array([each.reflected for each in threads])
+    both = films[:, None] * bounded
+    table = np.zeros((len(base), len(film), len(fibres), STEPS + 1, ENTRY))
+    for row, roughness in zip(table, base):
+        for part, lost in enumerate(taken_from_gloss(roughness)):
+            row[..., part] = (films @ lost.T)[:, None]
+            row[..., 2 + part] = bounded @ lost.T
+            row[..., 4 + part] = both @ lost.T
+        for index, each in enumerate(threads):
+            row[:, index, :, 6] = films @ each.taken.T
+            row[:, index, :, 7] = each.part
+    # Within alpha of the horizon a film leaves more, not less, as its single bounces lose light.
+    table = np.maximum(table, 0)
+    table = np.concatenate([_means() @ table, table], axis=-2)
+    return tuple(table.astype(np.float32).ravel().tolist())
+
+
+def _means() -> Doubles:
+    """(1, STEPS + 1): what makes ∫ f·2c dc, c the cosine, of f at the angles of a table."""
+    roots = (np.arange(16 * STEPS) + 0.5) / (16 * STEPS)
+    steps = np.linspace(0, 1, STEPS + 1)
+    return np.array([[np.mean(4 * roots**3 * np.interp(roots, steps, one)) for one in np.eye(STEPS + 1)]])
+
+
+def film_albedo(roots: Doubles, roughness: float) -> Doubles:
+    """(n,) what a film of F0 0.04 reflects in a single bounce, at √cos (n,)."""
+    whole, grazing = albedos(np.maximum(roots, NEAREST)**2, max(roughness**2, ALPHA_MIN), "height_correlated")
+    return np.asarray(0.04 * (whole - grazing) + grazing)
+
+
+def taken_from_gloss(roughness: float) -> tuple[Doubles, Doubles]:
+    """(STEPS + 1, len(ROOTS)) twice: what is taken from f0 and f90 per albedo at ROOTS."""
+    cosines = np.maximum(np.linspace(0, 1, STEPS + 1), NEAREST)**2
+    met = microfacets(cosines, max(roughness**2, ALPHA_MIN), LATTICE)
+    grazing = np.maximum(1 - met.cos_o, 0)**5
+    seen = met.weight * met.seen
+    return _below(cosines, met.back, seen * (1 - grazing)), _below(cosines, met.back, seen * grazing)
+
+
+def _below(cosines: Doubles, others: Doubles, weights: Doubles) -> Doubles:
+    """(n, len(ROOTS)): Σ weights·(E(others) − E(cosines)) over the others (n, m) below each of the cosines (n,)."""
+    weights = np.where((others > 0) & (others < cosines[:, None]), weights, 0)
+    matrix = -weights.sum(axis=1, keepdims=True) * _at(cosines[:, None], np.ones((len(cosines), 1)))
+    return np.asarray(matrix + _at(np.clip(others, 0, 1), weights))
+
+
+def _at(cosines: Doubles, weights: Doubles) -> Doubles:
+    """(n, len(ROOTS)): what makes Σ weights·E(cosines), both (n, m), of E at ROOTS."""
+    place = np.sqrt(cosines) * (len(ROOTS) - 1)
+    first = np.minimum(place.astype(np.int64), len(ROOTS) - 2)
+    across, row = place - first, len(ROOTS) * np.arange(len(cosines))[:, None]
+    size = len(cosines) * len(ROOTS)
+    counted = (np.bincount((row + first + step).ravel(), (weights * part).ravel(), size)
+               for step, part in ((0, 1 - across), (1, across)))
+    return np.asarray(sum(counted)).reshape(len(cosines), len(ROOTS))
+
+
+class Fibres:
+    """White ones of one roughness.
+
+    reflected: (len(ROOTS),) what they reflect, bounded; part: (STEPS + 1,) that over the smaller of their unbounded
+    albedo and 1; taken: (STEPS + 1, len(ROOTS)), what a film takes from it per albedo of the film at ROOTS.
+    """
+
+    def __init__(self, roughness: float) -> None:
+        n = max(roughness, SMOOTHEST)**-2
+        nodes, weights = np.polynomial.legendre.leggauss(64)
+        roots = (nodes + 1) / 2
+        across = _fibres(roots**2, roots**2, n) @ (weights * roots)
+        every = np.union1d(ROOTS, np.linspace(0, 1, STEPS + 1))
+        cosines = np.maximum(every, NEAREST)**2
+        values = _fibres(cosines, roots**2, n) * (weights * roots)
+        unbounded = values.sum(axis=1)
+        values /= np.maximum(np.maximum(unbounded[:, None], across), 1)
+        reflected = values.sum(axis=1)
+        self.reflected = reflected[np.isin(every, ROOTS)]
+        steps = np.isin(every, np.linspace(0, 1, STEPS + 1))
+        self.part = (reflected / np.maximum(np.minimum(unbounded, 1), 1e-30))[steps]
+        self.taken = _below(cosines[steps], np.broadcast_to(roots**2, values[steps].shape), values[steps])
+
+
+def _fibres(cos_o: Doubles, cos_i: Doubles, n: float) -> Doubles:
+    """(n, m) their f·cos wi, integrated over the azimuth, of cosines (n,) and (m,)."""
+    o, i = cos_o[:, None], cos_i
+    phi = np.pi * (np.arange(64) + 0.5)[:, None, None] / 64
+    along = np.sqrt((1 - o**2) * (1 - i**2)) * np.cos(phi)
+    sine2 = np.maximum(1 - (o + i)**2 / np.maximum(2 * (1 + o * i + along), 1e-300), 0)
+    d = (2 + n) / (2 * np.pi) * np.mean(sine2**(n / 2), axis=0)
+    return np.asarray(2 * np.pi * d * i / (4 * (o + i - o * i)))

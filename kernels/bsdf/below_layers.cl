@@ -1,0 +1,111 @@
+// What layers leave to what lies below them, of light from an angle, and what min(T(wo), T(wi)) takes beyond (layers.cl).
+#include LAYER_ENERGY_FILE
+
+#if CLEARCOAT
+// What a film of strength 1 reflects of light from an angle in a single bounce. What it loses lies below it.
+static inline real coat_albedo(const struct metallic_roughness *m, real cos_theta) {
+    Bounce bounce = ggx_bounce(&m->coat_bounces, maximum(cos_theta, ZERO));
+    return 0.04f * bounce.by_f0 + bounce.by_f90;
+}
+#endif
+
+static inline real film_strength(const struct metallic_roughness *m) {
+#if CLEARCOAT
+    return m->coat;
+#else
+    return ZERO;
+#endif
+}
+
+static inline real fibres_strength(const struct metallic_roughness *m) {
+#if SHEEN
+    return largest(m->sheen);
+#else
+    return ZERO;
+#endif
+}
+
+// Few surfaces of a scene have layers, so nothing is computed where no lane has any.
+static inline ireal has_layers(const struct metallic_roughness *m) {
+    return (film_strength(m) > 0.0f) | (fibres_strength(m) > 0.0f);
+}
+
+#if LAYER_ENERGY
+static inline void take(const struct metallic_roughness *m, LayerEntry entry, Left *left) {
+    real film = film_strength(m), fibres = fibres_strength(m), both = film * fibres;
+    left->taken_f0 = maximum(film * entry.part[0] + fibres * entry.part[2] - both * entry.part[4], ZERO);
+    left->taken_f90 = maximum(film * entry.part[1] + fibres * entry.part[3] - both * entry.part[5], ZERO);
+    left->taken_fibres = film * entry.part[6];
+}
+#endif
+
+static inline Left left_at(const struct metallic_roughness *m, real base_cos, real coat_cos) {
+    Left left = {ONE, ONE, ZERO, ZERO, ZERO, ZERO};
+#if LAYER_ENERGY
+    if (!ANY(has_layers(m))) return left;
+    LayerEntry entry = entry_at(m, layer_place(base_cos));
+    take(m, entry, &left);
+#if CLEARCOAT
+    if (ANY(m->coat > 0.0f)) left.film -= m->coat * coat_albedo(m, coat_cos);
+#endif
+#if SHEEN
+    left.fibres = entry.part[7] * minimum(fibres_albedo(&m->fibres, base_cos), ONE);
+#endif
+    left.body = left.film * (1.0f - fibres_strength(m) * left.fibres);
+#endif
+    return left;
+}
+
+// All that min takes beyond 1 − T.
+static inline real3 taken(const struct metallic_roughness *m, Left left) {
+    real3 all = mad3(m->f0, left.taken_f0, splat(F90(m) * left.taken_f90));
+#if THROUGH
+    real3 passed = mad3(sub(splat(ONE), m->body_f0), left.taken_f0, splat((1.0f - m->body_f90) * left.taken_f90));
+    all = add(all, mul(passed, m->through));
+#endif
+#if SHEEN
+    all = mad3(m->sheen, left.taken_fibres, all);
+#endif
+    return all;
+}
+
+#define SCATTERS (THROUGH && MULTIPLE_SCATTERING)
+
+// Of the diffuse lobes without layers, the means over the hemisphere; `other`: of Lambert's, whatever his albedo.
+typedef struct {
+#if COUPLING_ALBEDO
+    real3 left;
+#endif
+#if SCATTERS
+    real lost;
+#endif
+    real other;
+} Means;
+
+// What layers add to them, by Gauss and Legendre's rule in √cos.
+#define MEAN_NODES 6
+constant float MEAN_ROOT[MEAN_NODES] = {0.03376524f, 0.1693953f, 0.3806904f, 0.6193096f, 0.8306047f, 0.9662348f};
+constant float MEAN_WEIGHT[MEAN_NODES] = {0.08566225f, 0.1803808f, 0.233957f, 0.233957f, 0.1803808f, 0.08566225f};
+
+static inline void add_layers(const struct metallic_roughness *m, Means *mean) {
+#if COUPLING_ALBEDO && LAYER_ENERGY
+    Left taken_on_average;
+    take(m, entry_at(m, LAYER_MEAN), &taken_on_average);
+    mean->left = add(mean->left, taken(m, taken_on_average));
+#endif
+    for (int k = 0; k < MEAN_NODES; ++k) {
+        real root = (real)(MEAN_ROOT[k]), cosine = root * root, weight = 4.0f * MEAN_WEIGHT[k] * cosine * root;
+        Left left = left_at(m, cosine, cosine);
+        real less = weight * (left.body - 1.0f);
+#if COUPLING_ALBEDO || SCATTERS
+        Bounce bounce = ggx_bounce(&m->bounces, cosine);
+#endif
+#if COUPLING_ALBEDO
+        mean->left = mad3(left_albedo(m, bounce), less, mean->left);
+#endif
+#if SCATTERS
+        mean->lost += bounce.lost * less;
+#endif
+        mean->other += less;
+    }
+}

@@ -1,0 +1,54 @@
+"""The tables of what layers take from gloss, against quadratures of other coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from clrt.scene.layer_energy import ENTRY, STEPS, tables
+
+from ..rendering import sheen
+from ..rendering.layers import Left, taken_from_gloss, under_coat, under_fibres
+
+Doubles = NDArray[np.float64]
+PICKED = [12, 24, 48, 72, 96]
+COSINES = (np.array(PICKED) / STEPS)**2
+
+
+def entries(base: float, film: float, fibres: float) -> Doubles:
+    """(STEPS + 2, ENTRY) the mean, and those of the angles."""
+    return np.array(tables((base,), (film,), (fibres,))).reshape(-1, ENTRY)
+
+
+@pytest.mark.parametrize("base", [0.1, 0.3, 0.7, 1.0])
+@pytest.mark.parametrize("film, fibres", [(0.0, 0.15), (0.3, 0.3), (0.8, 1.0)])
+def test_what_layers_take_from_gloss(base: float, film: float, fibres: float) -> None:
+    """∫ gloss·(T(wo) − min(T(wo), T(wi))) dwi of film, fibres, and both, of f0 and of f90."""
+    coat, threads = under_coat(1, film), under_fibres(1, fibres)
+    layers: list[Left] = [coat, threads, lambda c: coat(c) + threads(c) - coat(c) * threads(c)]    # 1 − E·E of both
+    found = entries(base, film, fibres)[1:][PICKED]
+    for layer, left in enumerate(layers):
+        whole, by_f90 = (np.array([taken_from_gloss(left, c, base**2, f0) for c in COSINES]) for f0 in (1.0, 0.0))
+        np.testing.assert_allclose(found[:, 2 * layer], whole - by_f90, atol=6e-4)
+        np.testing.assert_allclose(found[:, 2 * layer + 1], by_f90, atol=6e-4)
+
+
+@pytest.mark.parametrize("fibres", [0.1, 0.3, 1.0])
+def test_what_a_film_takes_from_fibres(fibres: float) -> None:
+    found, n = entries(0.5, 0.2, fibres)[1:][PICKED], fibres**-2
+    values = sheen.across(COSINES, n) * sheen.WEIGHT
+    values /= np.maximum(np.maximum(values.sum(axis=1)[:, None], sheen.albedo(sheen.COS_I, n)), 1)
+    left = under_coat(1, 0.2)
+    taken = np.maximum(left(COSINES)[:, None] - left(sheen.COS_I), 0)
+    np.testing.assert_allclose(found[:, 6], np.sum(values * taken, axis=1), atol=6e-4)
+    part = sheen.bounded_albedo(COSINES, n) / np.minimum(sheen.albedo(COSINES, n), 1)
+    np.testing.assert_allclose(found[:, 7], part, atol=2e-3)
+
+
+def test_the_mean_entry_is_that_of_the_hemisphere() -> None:
+    table = entries(0.4, 0.1, 0.5)
+    roots = np.linspace(0, 1, 100_001)
+    mean = [np.trapezoid(4 * roots**3 * np.interp(roots, np.linspace(0, 1, STEPS + 1), each), roots)
+            for each in table[1:].T]
+    np.testing.assert_allclose(table[0], mean, rtol=1e-4)
