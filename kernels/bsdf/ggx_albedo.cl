@@ -16,6 +16,8 @@
 #define FRESNEL_Y 6
 #define MEAN_LOSS_Y 12
 #define MEAN_FRESNEL_Y 9
+// Horner's loops are chains of dependent operations, which overlap where they are unrolled.
+#define UNROLLED _Pragma("unroll")
 
 typedef struct { real by_f0, by_f90, lost; } Bounce;
 
@@ -40,19 +42,19 @@ static inline GgxAlbedo ggx_albedo_of(real alpha, real width, ireal squared, rea
     a.squared = squared;
 #endif
     real roughness = sqrt(alpha), y = 2.0f * roughness - 1.0f, root_y = 2.0f * sqrt(roughness) - 1.0f;
-    for (int k = 0; k < LOSS_X; ++k) {
+    UNROLLED for (int k = 0; k < LOSS_X; ++k) {
         real sum = ZERO;
-        for (int j = LOSS_Y - 1; j >= 0; --j) sum = sum * y + loss[k][j];
+        UNROLLED for (int j = LOSS_Y - 1; j >= 0; --j) sum = sum * y + loss[k][j];
         a.loss[k] = sum;
     }
-    for (int k = 0; k < FRESNEL_X; ++k) {
+    UNROLLED for (int k = 0; k < FRESNEL_X; ++k) {
         real sum = ZERO;
-        for (int j = FRESNEL_Y - 1; j >= 0; --j) sum = sum * root_y + fresnel[k][j];
+        UNROLLED for (int j = FRESNEL_Y - 1; j >= 0; --j) sum = sum * root_y + fresnel[k][j];
         a.fresnel[k] = sum;
     }
     real lost = ZERO, by_f90 = ZERO;
-    for (int j = MEAN_LOSS_Y - 1; j >= 0; --j) lost = lost * root_y + mean_loss[j];
-    for (int j = MEAN_FRESNEL_Y - 1; j >= 0; --j) by_f90 = by_f90 * root_y + mean_fresnel[j];
+    UNROLLED for (int j = MEAN_LOSS_Y - 1; j >= 0; --j) lost = lost * root_y + mean_loss[j];
+    UNROLLED for (int j = MEAN_FRESNEL_Y - 1; j >= 0; --j) by_f90 = by_f90 * root_y + mean_fresnel[j];
     a.mean.lost = scale * lost;
     a.mean.by_f90 = by_f90;
     a.mean.by_f0 = 1.0f - a.mean.lost - by_f90;
@@ -62,12 +64,12 @@ static inline GgxAlbedo ggx_albedo_of(real alpha, real width, ireal squared, rea
 static inline Bounce ggx_bounce(const GgxAlbedo *a, real cos_theta) {
     real width = 2.0f * a->alpha, sum = ZERO, g = ZERO;
     real q = cos_theta / (cos_theta + width), x = 2.0f * sqrt(q * (1.0f + width)) - 1.0f;
-    for (int k = FRESNEL_X - 1; k >= 0; --k) g = g * x + a->fresnel[k];
+    UNROLLED for (int k = FRESNEL_X - 1; k >= 0; --k) g = g * x + a->fresnel[k];
 #if SCHLICK_FORMS
     q = cos_theta / (cos_theta + a->loss_width);
     x = 2.0f * sqrt(q * (1.0f + a->loss_width)) - 1.0f;
 #endif
-    for (int k = LOSS_X - 1; k >= 0; --k) sum = sum * x + a->loss[k];
+    UNROLLED for (int k = LOSS_X - 1; k >= 0; --k) sum = sum * x + a->loss[k];
     Bounce bounce;
     real far = 1.0f - minimum(maximum(cos_theta + a->alpha * g, ZERO), ONE);
     bounce.lost = maximum((1.0f - q) * sum, ZERO);
