@@ -10,8 +10,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..errors import KeptBesideError, OutputError
-from ..file_names import utf8_path
 from ..file_mode import keep_mode
+from ..file_names import utf8_path
 
 #: Seconds after each attempt to replace a file that another program has open.
 PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)

@@ -121,10 +121,10 @@ def test_every_command(folder: Path, name: str, locale: str) -> None:
         assert done.stdout == b"sc\xe8ne.png\n", "the name itself, for other programs"
 
 
-@pytest.mark.parametrize(("locale", "arguments"), zip(cycle(LOCALES), [
+@pytest.mark.parametrize(("locale", "arguments"), [*zip(cycle(LOCALES), [
     ("render", f"{NAME}0.toml"), ("render", f"{NAME}.toml", "-o", f"{NAME}.pgn"), ("info", f"{NAME}0.obj"),
     ("convert", f"{NAME}.obj", f"{NAME}.toml"), ("compare", f"{NAME}0.exr", f"{NAME}.exr"), (f"{NAME}",),
-    ("debug", f"{NAME}0.toml", "--pixel", "1,1"), ("doctor", "-o", f"{NAME}.exe")]))
+    ("debug", f"{NAME}0.toml", "--pixel", "1,1"), ("doctor", "-o", f"{NAME}.exe")])])
 def test_messages(folder: Path, locale: str, arguments: tuple[str, ...]) -> None:
     done = clrt(*arguments, cwd=folder, **LOCALES[locale])
     told = done.stderr.decode("ascii")
