@@ -88,8 +88,7 @@ def plane_departures(device: Device, offset: str, shift: float, size: float) -> 
     return departures(probe, scale * origin, direction, leaving(side, 2)), side, scale
 
 
-@pytest.mark.parametrize("shift", OFFSETS)
-@pytest.mark.parametrize("offset", ["bound", "ulp", "fixed"])
+@covering("offset, shift", ["fixed", "ulp", "bound"], OFFSETS[::-1])
 def test_far_away_a_fixed_distance_is_not_enough(device: Device, offset: str, shift: float) -> None:
     """At 10^6 an ulp is 0.06: there a thousandth leaves many rays where they meet their own plane."""
     out, side, _ = plane_departures(device, offset, shift, 100.0)

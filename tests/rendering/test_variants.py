@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS, HitTests
+from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, HitTests
 from clrt.device.open import Device
 from clrt.errors import UsageError
 from clrt.rendering import pack as pack_module
 from clrt.rendering import session as session_module
-from clrt.rendering.choices import OFFSETS, Choices
+from clrt.rendering.choices import LANES, OFFSETS, Choices
 from clrt.rendering.compile import compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, MetallicRoughness, Mirror
@@ -109,14 +109,16 @@ def sights(scene: Scene) -> Iterator[tuple[str, Scene]]:
             yield integrator, replace(scene, render=replace(scene.render, integrator=integrator))
 
 
+#: Layouts and lanes that are compared with the reference's by default.
+WAYS = [("cwbvh", 1), ("packs", 8)]
+
+
 @pytest.fixture(scope="module")
 def reference(device: Device) -> Doubles:
     return film(device, everything(), lanes=8, layout="bvh8").mean
 
 
-@pytest.mark.parametrize("layout, lanes", [("cwbvh", 1), ("packs", 8), *others(
-    ("bvh2", 16), *product(("cwbvh", "bvh2", "list"), (8,)), *product(("bvh8", "bvh2", "packs", "list"), (1,)),
-    *product(("bvh8", "cwbvh", "packs", "list"), (16,)))])
+@pytest.mark.parametrize("layout, lanes", WAYS + others(*(way for way in product(TREES, LANES) if way not in WAYS)))
 def test_lanes_and_layouts_agree(device: Device, reference: Doubles, layout: str, lanes: int) -> None:
     """To float rounding: a sample is a chain of some hundred operations, so most pixels agree to 1e-5.
 
