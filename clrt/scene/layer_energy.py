@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from .dielectric_energy import microfacets
 from .material import ALPHA_MIN
-from .microfacets import albedos
+from .microfacets import albedos, shadowing
 from .textures import Texture
 
 Doubles = NDArray[np.float64]
@@ -45,16 +45,17 @@ def rows(roughness: float | Texture) -> Roughnesses:
 
 
 @lru_cache(128)
-def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses) -> tuple[float, ...]:
+def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses,
+           smith: str = "height_correlated") -> tuple[float, ...]:
     """For each roughness of the base, of the film (none: (0,)), and of the fibres (none: (1,)) the mean entry over
-    the hemisphere, weighted by the cosine, and those of STEPS + 1 angles."""
+    the hemisphere, weighted by the cosine, and those of STEPS + 1 angles. smith: the gloss's form of masking."""
     films = np.array([film_albedo(ROOTS, r) for r in film])
     threads = [Fibres(r) for r in fibres]
     bounded = np.array([each.reflected for each in threads])
     both = films[:, None] * bounded
     table = np.zeros((len(base), len(film), len(fibres), STEPS + 1, ENTRY))
     for row, roughness in zip(table, base):
-        for part, lost in enumerate(taken_from_gloss(roughness)):
+        for part, lost in enumerate(taken_from_gloss(roughness, smith)):
             row[..., part] = (films @ lost.T)[:, None]
             row[..., 2 + part] = bounded @ lost.T
             row[..., 4 + part] = both @ lost.T
@@ -80,12 +81,14 @@ def film_albedo(roots: Doubles, roughness: float) -> Doubles:
     return np.asarray(0.04 * (whole - grazing) + grazing)
 
 
-def taken_from_gloss(roughness: float) -> tuple[Doubles, Doubles]:
+def taken_from_gloss(roughness: float, smith: str) -> tuple[Doubles, Doubles]:
     """(STEPS + 1, len(ROOTS)) twice: what is taken from f0 and f90 per albedo at ROOTS."""
     cosines = np.maximum(np.linspace(0, 1, STEPS + 1), NEAREST)**2
-    met = microfacets(cosines, max(roughness**2, ALPHA_MIN), LATTICE)
+    alpha = max(roughness**2, ALPHA_MIN)
+    met = microfacets(cosines, alpha, LATTICE)
     grazing = np.maximum(1 - met.cos_o, 0)**5
-    seen = met.weight * met.seen
+    there = met.cosine, np.maximum(met.back, NEAREST**2), alpha
+    seen = met.weight * met.seen * shadowing(*there, smith) / shadowing(*there, "height_correlated")
     return _below(cosines, met.back, seen * (1 - grazing)), _below(cosines, met.back, seen * grazing)
 
 

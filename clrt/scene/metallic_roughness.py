@@ -91,7 +91,8 @@ class MetallicRoughness(Material):
             values |= {"sheen_color": self.sheen_color, "sheen_roughness": self.sheen_roughness}
         if "LAYER_ENERGY" in has:
             rows = [layer_energy.rows(roughness) for roughness in self._roughnesses(has)]
-            values |= {"layer_energy": layer_energy.tables(*rows), "last_rows": tuple(len(each) - 1.0 for each in rows)}
+            values |= {"layer_energy": layer_energy.tables(*rows, self.smith),
+                       "last_rows": tuple(len(each) - 1.0 for each in rows)}
         return values | ({"transmission": self.transmission} if "THROUGH" in has else {})
 
     def _roughnesses(self, has: frozenset[str]) -> tuple[Unit | Texture, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,11 +20,14 @@ from .compare import ROUNDS, verdict
 from .draws import DRAWERS, Draws, random_material
 from .geometry import Geometry
 from .materials import SCATTERINGS, scattering_of
+from .materials.scattering import mirrored_below
 from .paths import Paths
 from .scenes import BATCH, SIZE, random_scene, todays_seed
 from .surface import Surface
 from .vectors import Doubles
 
+FILM: dict[str, Any] = {"clearcoat": 1.0, "clearcoat_roughness": 0.3}
+FIBRES: dict[str, Any] = {"sheen_color": (0.9, 0.9, 0.9), "sheen_roughness": 0.35}
 #: In the suite, from batches of their own.
 SCENES = range(0, 3 * BATCH, BATCH)
 
@@ -92,6 +96,25 @@ def test_white_keeps_energy(roughness: float, metallic: float) -> None:
     wo, at = view(0.4, 200_000)
     weight = scattering_of(white, at).sample(wo, np.random.default_rng(1)).weight[:, 0]
     assert abs(weight.mean() - 1) < 0.001 + 4.5 * weight.std() / np.sqrt(len(wo))
+
+
+@pytest.mark.parametrize("layers", [FILM, FIBRES, FILM | FIBRES, FILM | FIBRES | {"transmission": 0.7}])
+@pytest.mark.parametrize("roughness", [0.3, 0.8])
+@pytest.mark.parametrize("metallic", [0.0, 0.6, 1.0])
+def test_white_under_layers_keeps_energy(roughness: float, metallic: float, layers: dict[str, Any]) -> None:
+    """All that leaves, by quadrature in √cos and the root of the azimuth from where wo is mirrored."""
+    white = MetallicRoughness(color=(1.0, 1.0, 1.0), roughness=roughness, metallic=metallic, **layers)
+    x, weights = np.polynomial.legendre.leggauss(64)
+    u = (x + 1) / 2
+    root, turn = (each.ravel() for each in np.meshgrid(u, np.pi * u**2, indexing="ij"))
+    across = np.sqrt(1 - root**4)
+    wi = np.column_stack([-across * np.cos(turn), across * np.sin(turn), root**2])
+    area = 2 * np.pi * np.outer(weights * u, weights * u).ravel()
+    for cosine in (0.15, 0.6, 1.0):
+        wo, at = view(cosine, len(wi))
+        scattering = scattering_of(white, at)
+        leaving = sum(area @ scattering.evaluate(wo, each) for each in (wi, mirrored_below(wi)))
+        np.testing.assert_allclose(leaving, 1, atol=1e-3)
 
 
 @pytest.mark.parametrize("roughness", [0.3, 1.0])

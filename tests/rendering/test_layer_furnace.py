@@ -43,11 +43,12 @@ def drawn(rng: np.random.Generator, **fields: Any) -> MetallicRoughness:
 
 
 def test_white_under_layers_keeps_all(device: Device) -> None:
-    """Whatever the index, the metal, what passes, and all roughnesses."""
+    """Whatever the index, the metal, what passes, the form of masking, and all roughnesses."""
     seed = todays_seed()
     print(f"seed {seed}")
     rng = np.random.default_rng(seed)
-    materials = [drawn(rng, transmission=rng.choice([0, rng.random()])) for _ in range(48)]
+    materials = [drawn(rng, transmission=rng.choice([0, rng.random()]), smith=smith, coupling="albedo",
+                       multiple_scattering=True) for smith in SMITHS for _ in range(12)]
     part = found(device, materials, np.array([1.0, 0.7, 0.4, 0.2, 0.05]))
     np.testing.assert_allclose(part, 1, atol=2.5e-3)
 

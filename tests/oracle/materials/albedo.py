@@ -12,7 +12,7 @@ from .ggx import alpha_of, shadowing, smith_lambda, visible_nodes
 from .scattering import reflected
 
 #: Nodes of roughness from ROUGHNESS to 1, of the root of the cosine from 0 to 1, and of each of a direction's numbers.
-NODES, DIRECTIONS = 33, 40
+NODES, DIRECTIONS = 49, 40
 #: Smoother surfaces are not in the tables.
 ROUGHNESS = 0.25
 
