@@ -47,14 +47,22 @@ def rows(roughness: float | Texture) -> Roughnesses:
 @lru_cache(128)
 def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses,
            smith: str = "height_correlated") -> tuple[float, ...]:
-    """For each roughness of the base, of the film (none: (0,)), and of the fibres (none: (1,)) the mean entry over
-    the hemisphere, weighted by the cosine, and those of STEPS + 1 angles. smith: the gloss's form of masking."""
+    """For each roughness of the base, of the film (none: (0,)), and of the fibres (none: (1,)) entries of means over
+    the hemisphere, weighted by the cosine, and those of STEPS + 1 angles. smith: the gloss's form of masking.
+
+    The first entry is the mean one. The next two are the means of the albedo of the film, of fibres, and of their
+    product, each times 1, by_f0, by_f90 and lost of a bounce at the base (kernels/bsdf/ggx_albedo.cl).
+    """
     films = np.array([film_albedo(ROOTS, r) for r in film])
     threads = [Fibres(r) for r in fibres]
     bounded = np.array([each.reflected for each in threads])
     both = films[:, None] * bounded
     table = np.zeros((len(base), len(film), len(fibres), STEPS + 1, ENTRY))
-    for row, roughness in zip(table, base):
+    means = np.zeros((len(base), len(film), len(fibres), 2 * ENTRY))
+    for row, mean, roughness in zip(table, means, base):
+        below = _bounce(roughness, smith) * _mean_weights(ROOTS)
+        for part, albedo in enumerate((films[:, None], bounded, both)):
+            mean[..., 4 * part:4 * part + 4] = albedo @ below.T
         for part, lost in enumerate(taken_from_gloss(roughness, smith)):
             row[..., part] = (films @ lost.T)[:, None]
             row[..., 2 + part] = bounded @ lost.T
@@ -64,15 +72,22 @@ def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses,
             row[:, index, :, 7] = each.part
     # Within alpha of the horizon a film leaves more, not less, as its single bounces lose light.
     table = np.maximum(table, 0)
-    table = np.concatenate([_means() @ table, table], axis=-2)
+    weights = _mean_weights(np.linspace(0, 1, STEPS + 1))
+    table = np.concatenate([weights[None] @ table, means.reshape(*means.shape[:-1], 2, ENTRY), table], axis=-2)
     return tuple(table.astype(np.float32).ravel().tolist())
 
 
-def _means() -> Doubles:
-    """(1, STEPS + 1): what makes ∫ f·2c dc, c the cosine, of f at the angles of a table."""
-    roots = (np.arange(16 * STEPS) + 0.5) / (16 * STEPS)
-    steps = np.linspace(0, 1, STEPS + 1)
-    return np.array([[np.mean(4 * roots**3 * np.interp(roots, steps, one)) for one in np.eye(STEPS + 1)]])
+def _mean_weights(roots: Doubles) -> Doubles:
+    """(n,): what makes ∫ f·2c dc, c the cosine, of f at these roots of c, even from 0 to 1, and linear in between."""
+    steps = 16 * (len(roots) - 1)
+    fine = (np.arange(steps) + 0.5) / steps
+    return np.array([np.mean(4 * fine**3 * np.interp(fine, roots, one)) for one in np.eye(len(roots))])
+
+
+def _bounce(roughness: float, smith: str) -> Doubles:
+    """(4, len(ROOTS)): 1, and by_f0, by_f90 and lost of a single bounce."""
+    whole, grazing = albedos(np.maximum(ROOTS, NEAREST)**2, max(roughness**2, ALPHA_MIN), smith)
+    return np.array([np.ones_like(whole), whole - grazing, grazing, 1 - whole])
 
 
 def film_albedo(roots: Doubles, roughness: float) -> Doubles:

@@ -71,7 +71,7 @@ static inline real3 taken(const struct metallic_roughness *m, Left left) {
 
 #define SCATTERS (THROUGH && MULTIPLE_SCATTERING)
 
-// Of the diffuse lobes without layers, the means over the hemisphere; `other`: of Lambert's, whatever his albedo.
+// Means over the hemisphere of the diffuse lobes; `other`: of Lambert's, whatever its albedo.
 typedef struct {
 #if COUPLING_ALBEDO
     real3 left;
@@ -82,30 +82,27 @@ typedef struct {
     real other;
 } Means;
 
-// What layers add to them, by Gauss and Legendre's rule in √cos.
-#define MEAN_NODES 6
-constant float MEAN_ROOT[MEAN_NODES] = {0.03376524f, 0.1693953f, 0.3806904f, 0.6193096f, 0.8306047f, 0.9662348f};
-constant float MEAN_WEIGHT[MEAN_NODES] = {0.08566225f, 0.1803808f, 0.233957f, 0.233957f, 0.1803808f, 0.08566225f};
-
+#if LAYER_ENERGY
+// What layers make of the means without them: of f it is mean f·(T − 1), and of `left` what min takes, too.
 static inline void add_layers(const struct metallic_roughness *m, Means *mean) {
-#if COUPLING_ALBEDO && LAYER_ENERGY
-    Left taken_on_average;
-    take(m, entry_at(m, LAYER_MEAN), &taken_on_average);
-    mean->left = add(mean->left, taken(m, taken_on_average));
-#endif
-    for (int k = 0; k < MEAN_NODES; ++k) {
-        real root = (real)(MEAN_ROOT[k]), cosine = root * root, weight = 4.0f * MEAN_WEIGHT[k] * cosine * root;
-        Left left = left_at(m, cosine, cosine);
-        real less = weight * (left.body - 1.0f);
-#if COUPLING_ALBEDO || SCATTERS
-        Bounce bounce = ggx_bounce(&m->bounces, cosine);
-#endif
+    real film = film_strength(m), fibres = fibres_strength(m), both = film * fibres, less[4];
+    LayerEntry single = entry_at(m, LAYER_PRODUCTS), product = entry_at(m, LAYER_PRODUCTS + 1.0f);
+    for (int of = 0; of < 4; ++of) {
+        less[of] = both * product.part[of] - film * single.part[of] - fibres * single.part[4 + of];
+    }
+    mean->other += less[0];
 #if COUPLING_ALBEDO
-        mean->left = mad3(left_albedo(m, bounce), less, mean->left);
+    Left left;
+    take(m, entry_at(m, LAYER_MEAN), &left);
+    Bounce bounce = {less[1], less[2], less[3]};
+    real3 body = mul(m->albedo, sub(splat(less[0]), bounce_albedo(m->body_f0, m->body_f90, bounce)));
+#if MULTIPLE_SCATTERING
+    body = mad3(m->multiple, bounce.lost, body);
+#endif
+    mean->left = add(mean->left, add(taken(m, left), body));
 #endif
 #if SCATTERS
-        mean->lost += bounce.lost * less;
+    mean->lost += less[3];
 #endif
-        mean->other += less;
-    }
 }
+#endif

@@ -1,9 +1,11 @@
 // What min(T(wo), T(wi)) takes from gloss and fibres (layers.cl) by the table of clrt/scene/layer_energy.py: for each roughness of
-// the base, the film and the fibres the mean entry, and those of LAYER_STEPS + 1 angles, even in √cos.
+// the base, the film and the fibres three entries of means, and those of LAYER_STEPS + 1 angles, even in √cos.
 #define LAYER_STEPS 96
 #define LAYER_PARTS 8
-#define LAYER_ENTRIES (LAYER_STEPS + 2)
-#define LAYER_MEAN ZERO       // its place; of an angle see layer_place
+#define LAYER_ENTRIES (LAYER_STEPS + 4)
+// Places of entries; of an angle's see layer_place.
+#define LAYER_MEAN ZERO
+#define LAYER_PRODUCTS ONE
 
 typedef struct { real part[LAYER_PARTS]; } LayerEntry;
 
@@ -30,14 +32,14 @@ static inline float8 entry_in_rows(global const float *table, const float *place
 #endif
 
 static inline real layer_place(real cos_theta) {
-    return 1.0f + (float)LAYER_STEPS * sqrt(minimum(maximum(cos_theta, ZERO), ONE));
+    return 3.0f + (float)LAYER_STEPS * sqrt(minimum(maximum(cos_theta, ZERO), ONE));
 }
 
 static inline LayerEntry entry_at(const struct metallic_roughness *m, real place) {
     RealLanes parts[LAYER_PARTS];
     for (int lane = 0; lane < LANES; ++lane) {
         global const MetallicRoughness *record = RECORD(m->scene->metallic_roughness, LANE_INT(m->index, lane));
-        int step = clamp((int)LANE(place, lane), 0, LAYER_STEPS);    // that of an idle lane may be anything
+        int step = clamp((int)LANE(place, lane), 0, LAYER_ENTRIES - 2);    // that of an idle lane may be anything
         global const float *table = record->layer_energy + step * LAYER_PARTS;
         float across = LANE(place, lane) - step;
 #if LAYER_ROWS

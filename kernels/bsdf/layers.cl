@@ -74,7 +74,9 @@ static inline void lay_over(struct metallic_roughness *m, const Surface *surface
 #if SCATTERS
     mean.lost = m->bounces.mean.lost;
 #endif
+#if LAYER_ENERGY
     if (ANY(has_layers(m))) add_layers(m, &mean);
+#endif
 #if OTHER_COUPLINGS
     m->diffuse_scale = inverse_or_zero(mean.other);
 #endif
