@@ -15,9 +15,9 @@ KERNELS = sorted((HOUSE / "kernels").rglob("*.cl"))
 LONGEST = 300
 
 #: In order: a room imports only from itself and those before it. `clrt` itself is the public names alone.
-ROOMS = ["errors", "threads", "awake", "float_errors", "file_mode", "scene", "device", "accel", "tree_query",
-         "query", "instances", "trimesh", "rendering", "check", "output", "study", "debug", "api", "live", "window",
-         "farm", "clrt", "cli", "__main__"]
+ROOMS = ["errors", "threads", "awake", "float_errors", "file_mode", "file_names", "scene", "device", "accel",
+         "tree_query", "query", "instances", "trimesh", "rendering", "check", "output", "study", "debug", "api", "live",
+         "window", "farm", "clrt", "cli", "__main__"]
 KNOW_OPENCL = {"device", "accel", "tree_query", "rendering"}
 #: Beyond the order: trees know nothing of scenes, and pictures are written without any device.
 NEVER = {"accel": {"scene"}, "output": {"device", "accel", "tree_query", "query", "instances", "trimesh", "rendering"}}

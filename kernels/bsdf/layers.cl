@@ -125,7 +125,7 @@ static inline BsdfValue layers_reflected(const struct metallic_roughness *m, rea
 #endif
     BsdfValue at = weighed_lobes(m, base_o, base_i, minimum(m->left.body, left.body), diffuse);
 #if COUPLING_ALBEDO
-    real below = BY_ALBEDO(m) & (base_o.z > 0.0f) & (base_i.z > 0.0f) ? base_i.z * (1.0f / PI) : ZERO;
+    real below = (BY_ALBEDO(m) & (base_o.z > 0.0f) & (base_i.z > 0.0f)) ? base_i.z * (1.0f / PI) : ZERO;
     at.value = mad3(mul(m->left_o, taken(m, left)), below, at.value);
 #endif
     at.pdf *= m->layers.base;

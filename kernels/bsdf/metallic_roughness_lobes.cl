@@ -1,0 +1,76 @@
+// The lobes of metallic_roughness: what they reflect, their densities and samples.
+// By the couplings without albedos, of the body: f·pi. cos_h: wi·h.
+static inline real3 crossing_value(const struct metallic_roughness *m, real3 wo, real3 wi, real cos_h) {
+    real3 crossing = mul(transmitted(m, wi.z), transmitted(m, wo.z));
+#if COUPLING_HALF_VECTOR
+    crossing = choose(m->coupling == 2, transmitted(m, cos_h), crossing);
+#endif
+    return mul(crossing, m->albedo);
+}
+
+// The lobes of the body and of multiple scattering. matte: of the body alone; where both share a lobe, that part which is the
+// body's own by wi.
+static inline BsdfValue diffuse_lobes(const struct metallic_roughness *m, real3 wo, real3 wi, real cos_h) {
+    real3 body = splat(ZERO);
+#if OTHER_COUPLINGS
+    body = crossing_value(m, wo, wi, cos_h);
+#endif
+    real3 both = body;
+    real pdf = m->shares.diffuse * cosine_pdf(wi.z);
+#if GGX_ALBEDO
+    Bounce bounce_i = ggx_bounce(&m->bounces, wi.z);
+#endif
+#if MULTIPLE_SCATTERING
+    both = mad3(m->multiple, m->lost_o * bounce_i.lost, both);
+    pdf += m->shares.multiple * multiple_pdf(m, wi.z);
+#endif
+#if COUPLING_ALBEDO
+    body = choose(BY_ALBEDO(m), mul(m->left_o, body_left(m, bounce_i)), body);
+    both = choose(BY_ALBEDO(m), mul(m->left_o, left_albedo(m, bounce_i)), both);
+#endif
+    real cosine = wi.z * (1.0f / PI);
+    return (BsdfValue){scale(both, cosine), scale(body, cosine), pdf};
+}
+
+// gloss, diffuse: factors of the lobes.
+static inline BsdfValue weighed_lobes(const struct metallic_roughness *m, real3 wo, real3 wi, real gloss, real diffuse) {
+    real3 sum = add(wo, wi);
+    real length = length3(sum), cos_h = 0.5f * length;     // wi·h = wo·h, which as products differ near wi = −wo
+    real facets = ggx_d(scale(sum, 1.0f / length), m->alpha) / (4.0f * wo.z);
+    BsdfValue at = diffuse_lobes(m, wo, wi, cos_h);
+    at.matte = scale(at.matte, diffuse);
+    at.value = mad3(base_fresnel(m, cos_h), gloss * facets * smith_shadowing(wo, wi, m->alpha, m->smith),
+                    scale(at.value, diffuse));
+    at.pdf += m->shares.specular * facets / (1.0f + ggx_lambda(wo, m->alpha));
+    return choose_value((wo.z > 0.0f) & (wi.z > 0.0f), at, no_value());
+}
+
+static inline BsdfValue BASE(eval)(const struct metallic_roughness *m, real3 wo, real3 wi) {
+    return weighed_lobes(m, wo, wi, ONE, ONE);
+}
+
+// As if no light were lost between microfacets, without fits of their albedos: f0, and what goes through the surface
+// twice: (1 − f0) of it straight in, and (1 − f0)·20/21, the cosine-weighted mean of 1 − F, out again.
+static inline real3 BASE(albedo)(const struct metallic_roughness *m) {
+    real3 in = sub(splat(ONE), m->f0);
+    real3 albedo = mad3(mul(mul(in, in), m->albedo), (real)(20.0f / 21.0f), m->f0);
+#if COUPLING_ALBEDO
+    Bounce straight = ggx_bounce(&m->bounces, ONE);
+    real3 coupled = add(bounce_albedo(m->f0, F90(m), straight), left_albedo(m, straight));
+    albedo = choose(BY_ALBEDO(m), coupled, albedo);
+#endif
+    return albedo;
+}
+
+static inline BsdfSample BASE(sample)(const struct metallic_roughness *m, real3 wo, real2 u, real lobe) {
+    real3 h = sample_visible_normal(wo, m->alpha, u);
+    real3 reflected = sub(scale(h, 2.0f * dot3(wo, h)), wo);
+    BsdfSample sample = no_sample();
+    LobeShares share = m->shares;
+    sample.wi = choose(lobe < share.specular, reflected, sample_cosine(u));
+#if MULTIPLE_SCATTERING
+    sample.wi = choose(lobe >= 1.0f - share.multiple, sample_multiple(m, u), sample.wi);
+#endif
+    weigh_sample(&sample, BASE(eval)(m, wo, sample.wi), ALL_LANES);
+    return sample;
+}
