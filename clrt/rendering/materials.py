@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..scene.layer_energy import ENTRY, Table
 from ..scene.material import Culling, as_color
 from ..scene.materials import MATERIALS, Material
 from ..scene.textures import Texture
-from .records import material_record
+from .records import LAYER_PARTS, material_record
 from .textures import Textures
 
 Number = float | tuple[float, ...] | int
@@ -49,6 +50,28 @@ class Materials:
         return bool(self.mapped("normal_map") or self.mapped("clearcoat_normal_map"))
 
 
+class Tables:
+    """Those of all materials, equal ones once."""
+
+    def __init__(self) -> None:
+        self._first: dict[Table, int] = {}
+        self._entries = 0
+
+    def first(self, table: Table) -> int:
+        """The number of its first entry."""
+        if table not in self._first:
+            self._first[table] = self._entries
+            self._entries += len(table) // ENTRY
+        return self._first[table]
+
+    def buffers(self) -> dict[str, tuple[str, NDArray[Any]]]:
+        """The buffer of all entries, if there is any."""
+        if not self._first:
+            return {}
+        entries = np.concatenate([np.array(table, np.float32) for table in self._first]).reshape(-1, ENTRY)
+        return {"layer_entries": ("LayerParts", np.ascontiguousarray(entries).view(LAYER_PARTS).ravel())}
+
+
 def pack_materials(users: Iterable[Material], textures: Textures, culling: Culling) -> Materials:
     """The materials of these users, equal ones packed once, with their textures added to `textures`; culling: of back
     faces."""
@@ -58,10 +81,11 @@ def pack_materials(users: Iterable[Material], textures: Textures, culling: Culli
         indices = distinct.setdefault(type(material), {})
         codes.append(MATERIALS.index(type(material)) | indices.setdefault(material, len(indices)) << 4)
     used = [kind for kind in MATERIALS if kind in distinct]
+    tables = Tables()
     buffers: dict[str, tuple[str, NDArray[Any]]] = {}
     reads: dict[str, bool] = {}
     for kind in used:
-        values = [_values(material, textures, culling) for material in distinct[kind]]
+        values = [_values(material, textures, tables, culling) for material in distinct[kind]]
         records = np.zeros(len(values), material_record(values))
         for name in records.dtype.names or ():
             if name.endswith("_texture"):
@@ -79,12 +103,13 @@ def pack_materials(users: Iterable[Material], textures: Textures, culling: Culli
         names = {name for named in values for name in named}
         reads |= {f"{kind.kernel}_{name}": f"{name}_texture" in names for name in sorted(names)
                   if not name.endswith("_texture")}
+    buffers |= tables.buffers()
     features = {kind: frozenset[str]().union(*(material.features() for material in distinct[kind])) for kind in used}
     return Materials(np.array(codes, np.int32), buffers, reads, used, features)
 
 
-def _values(material: Material, textures: Textures, culling: Culling) -> dict[str, Number]:
-    """What its record holds: of a texture its factor, and its number as NAME_texture."""
+def _values(material: Material, textures: Textures, tables: Tables, culling: Culling) -> dict[str, Number]:
+    """What its record holds: of a texture its factor, and its number as NAME_texture; of a table its first entry's."""
     parameters = material.parameters()
     parameters |= material.surface_parameters(culling)
     colors = {field.name for field in fields(material) if isinstance(field.default, tuple)}
@@ -93,6 +118,8 @@ def _values(material: Material, textures: Textures, culling: Culling) -> dict[st
         if isinstance(value, Texture):
             values[name] = as_color(value.factor) if name in colors else value.factor
             values[f"{name}_texture"] = textures.number(value)
+        elif isinstance(value, Table):
+            values[name] = float(tables.first(value))
         else:
             values[name] = value
     return values

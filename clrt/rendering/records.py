@@ -68,6 +68,8 @@ PIXEL_WITH_DIRECT = np.dtype([*PIXEL.descr, *DIRECT.descr])
 #: or of a sphere its centre and radius; instance: below 0 for spheres; rows: of pixels, that it may cover.
 OUTLINE = record(edge0="3f4", primitive="i4", edge1="3f4", instance="i4", edge2="3f4", first_row="i4", nearness="3f4",
                  last_row="i4")
+#: An entry of the tables of what layers take (clrt/scene/layer_energy.py).
+LAYER_PARTS = record(part="8f4")
 #: A filter's quantile, in pixels from a pixel's edge.
 FILTER = np.dtype([("quantile", "f4")])
 

@@ -23,6 +23,12 @@ from .textures import Texture
 Doubles = NDArray[np.float64]
 Roughnesses = tuple[float, ...]
 
+
+class Table(tuple[float, ...]):
+    """Entries of ENTRY numbers each, kept once for all materials whose table is equal: a material has the first one's
+    number."""
+
+
 #: Steps of a table's angles, even in √cos.
 STEPS = 96
 #: Of an entry: what a film, fibres, and their product take, of f0 and of f90 each; what the film takes from fibres; and
@@ -46,7 +52,7 @@ def rows(roughness: float | Texture) -> Roughnesses:
 
 @lru_cache(128)
 def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses,
-           smith: str = "height_correlated") -> tuple[float, ...]:
+           smith: str = "height_correlated") -> Table:
     """For each roughness of the base, of the film (none: (0,)), and of the fibres (none: (1,)) entries of means over
     the hemisphere, weighted by the cosine, and those of STEPS + 1 angles. smith: the gloss's form of masking.
 
@@ -74,7 +80,7 @@ def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses,
     table = np.maximum(table, 0)
     weights = _mean_weights(np.linspace(0, 1, STEPS + 1))
     table = np.concatenate([weights[None] @ table, means.reshape(*means.shape[:-1], 2, ENTRY), table], axis=-2)
-    return tuple(table.astype(np.float32).ravel().tolist())
+    return Table(table.astype(np.float32).ravel().tolist())
 
 
 def _mean_weights(roots: Doubles) -> Doubles:

@@ -9,13 +9,15 @@
 
 typedef struct { real part[LAYER_PARTS]; } LayerEntry;
 
-static inline float8 entry_between(global const float *entry, float across) {
+// Linear between an entry and the next one, by the number of the former.
+static inline float8 entry_between(const Scene *scene, int number, float across) {
+    global const float *entry = RECORD(scene->layer_entries, number)->part;
     return mix(vload8(0, entry), vload8(1, entry), across);
 }
 
 #if LAYER_ROWS
 // Linear between the roughnesses next to the place on each of the three axes, which have as many steps: 0 where all agree.
-static inline float8 entry_in_rows(global const float *table, const float *place, const float *steps, float across) {
+static inline float8 entry_in_rows(const Scene *scene, int number, const float *place, const float *steps, float across) {
     float8 sum = 0.0f;
     for (int corner = 0; corner < 8; ++corner) {
         float weight = 1.0f;
@@ -25,7 +27,7 @@ static inline float8 entry_in_rows(global const float *table, const float *place
             weight *= beyond ? place[axis] - first : 1.0f - (place[axis] - first);
             row = row * ((int)steps[axis] + 1) + first + beyond;
         }
-        if (weight > 0.0f) sum += weight * entry_between(table + row * LAYER_ENTRIES * LAYER_PARTS, across);
+        if (weight > 0.0f) sum += weight * entry_between(scene, number + row * LAYER_ENTRIES, across);
     }
     return sum;
 }
@@ -38,16 +40,15 @@ static inline real layer_place(real cos_theta) {
 static inline LayerEntry entry_at(const struct metallic_roughness *m, real place) {
     RealLanes parts[LAYER_PARTS];
     for (int lane = 0; lane < LANES; ++lane) {
-        global const MetallicRoughness *record = RECORD(m->scene->metallic_roughness, LANE_INT(m->index, lane));
         int step = clamp((int)LANE(place, lane), 0, LAYER_ENTRIES - 2);    // that of an idle lane may be anything
-        global const float *table = record->layer_energy + step * LAYER_PARTS;
+        int number = LANE_INT(m->first_entry, lane) + step;
         float across = LANE(place, lane) - step;
 #if LAYER_ROWS
         float at[3] = {LANE(m->row.x, lane), LANE(m->row.y, lane), LANE(m->row.z, lane)};
-        float steps[3] = {record->last_rows[0], record->last_rows[1], record->last_rows[2]};
-        float8 entry = entry_in_rows(table, at, steps, across);
+        float steps[3] = {LANE(m->last_row.x, lane), LANE(m->last_row.y, lane), LANE(m->last_row.z, lane)};
+        float8 entry = entry_in_rows(m->scene, number, at, steps, across);
 #else
-        float8 entry = entry_between(table, across);
+        float8 entry = entry_between(m->scene, number, across);
 #endif
         for (int part = 0; part < LAYER_PARTS; ++part) parts[part].lane[lane] = ((const float *)&entry)[part];
     }

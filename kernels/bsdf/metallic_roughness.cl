@@ -85,10 +85,10 @@ struct metallic_roughness {
 #endif
 #if LAYER_ENERGY
     const Scene *scene;
-    ireal index;                // of its record
+    ireal first_entry;
 #endif
 #if LAYER_ROWS
-    real3 row;                  // of the base, the film and the fibres
+    real3 row, last_row;        // of the base, the film and the fibres
 #endif
 #if COAT_NORMALS
     Frame base_frame, coat_frame;   // in that of the unbent normal
@@ -205,10 +205,10 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
 #endif
 #if LAYER_ENERGY
     m.scene = scene;
-    m.index = index;
+    m.first_entry = TO_INT(PARAMETER(metallic_roughness, layer_energy));
 #endif
 #if LAYER_ROWS
-    m.row = PARAMETER3(metallic_roughness, last_rows);
+    m.row = m.last_row = PARAMETER3(metallic_roughness, last_rows);
     m.row.x *= sqrt(roughness);
 #if CLEARCOAT
     m.row.y *= sqrt(PARAMETER(metallic_roughness, clearcoat_roughness));
