@@ -72,16 +72,15 @@ class Tables:
         return {"layer_entries": ("LayerParts", np.ascontiguousarray(entries).view(LAYER_PARTS).ravel())}
 
 
-def pack_materials(users: Iterable[Material], textures: Textures, culling: Culling) -> Materials:
-    """The materials of these users, equal ones packed once, with their textures added to `textures`; culling: of back
-    faces."""
+def pack_materials(users: Iterable[Material], textures: Textures, tables: Tables, culling: Culling) -> Materials:
+    """The materials of these users, equal ones packed once, with their textures added to `textures`, and their tables
+    to `tables`; culling: of back faces."""
     distinct: dict[type[Material], dict[Material, int]] = {}
     codes = []
     for material in users:
         indices = distinct.setdefault(type(material), {})
         codes.append(MATERIALS.index(type(material)) | indices.setdefault(material, len(indices)) << 4)
     used = [kind for kind in MATERIALS if kind in distinct]
-    tables = Tables()
     buffers: dict[str, tuple[str, NDArray[Any]]] = {}
     reads: dict[str, bool] = {}
     for kind in used:
@@ -103,7 +102,6 @@ def pack_materials(users: Iterable[Material], textures: Textures, culling: Culli
         names = {name for named in values for name in named}
         reads |= {f"{kind.kernel}_{name}": f"{name}_texture" in names for name in sorted(names)
                   if not name.endswith("_texture")}
-    buffers |= tables.buffers()
     features = {kind: frozenset[str]().union(*(material.features() for material in distinct[kind])) for kind in used}
     return Materials(np.array(codes, np.int32), buffers, reads, used, features)
 

@@ -26,7 +26,7 @@ from .emitters import Emitters, pack_emitters
 from .environment import Sky
 from .filters import filter_quantiles
 from .geometry import Corners, normal_records, sphere_records, triangle_records
-from .materials import Materials, pack_materials
+from .materials import Materials, Tables, pack_materials
 from .placements import Objects, Placements
 from .records import COUNTS
 from .textures import Textures
@@ -127,12 +127,12 @@ def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: C
         normals = normal_records(shapes.scene.meshes)
     finally:    # else it could replace the sky of the next scene
         sky = packing()
-    textures = Textures()
+    textures, tables = Textures(), Tables()
     emitters = pack_emitters(shapes.scene, sky, textures)
-    materials = pack_materials(shapes.users, textures, scene.render.back_face_culling)
+    materials = pack_materials(shapes.users, textures, tables, scene.render.back_face_culling)
     buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, normals, tree is not NO_RAYS)
     buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, materials.normal_maps)
-    buffers |= materials.buffers | textures.buffers() | emitters.buffers | sky.buffers
+    buffers |= materials.buffers | tables.buffers() | textures.buffers() | emitters.buffers | sky.buffers
     if scene.render.filter != "box":
         buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))
     return Packed(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, _counts(shapes, emitters))

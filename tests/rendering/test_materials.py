@@ -8,7 +8,7 @@ from typing import Any, get_args, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.rendering.materials import pack_materials
+from clrt.rendering.materials import Tables, pack_materials
 from clrt.rendering.textures import Textures
 from clrt.scene.materials import MATERIALS, Material
 from clrt.scene.textures import Picture, Texture
@@ -43,11 +43,12 @@ def test_materials_are_packed_together_as_alone(kind: type[Material], seed: int)
     """A record holds what it holds when packed alone, and no texture that its material does not read."""
     rng = np.random.default_rng(seed)
     users = [textured(kind, rng) for _ in range(COUNT)]
-    textures = Textures()
-    together = pack_materials(users, textures, "none")
+    textures, tables = Textures(), Tables()
+    together = pack_materials(users, textures, tables, "none")
     _, records = together.buffers[kind.kernel]
     for code, user in zip(together.codes, users):
-        record, (_, (alone,)) = records[code >> 4], pack_materials([user], textures, "none").buffers[kind.kernel]
+        record, (_, (alone,)) = records[code >> 4], pack_materials([user], textures, tables,
+                                                                   "none").buffers[kind.kernel]
         # Arrays are as long as the longest of the type, and end in zeros.
         assert all(np.array_equal(np.ravel(record[name])[:alone[name].size], np.ravel(alone[name]))
                    for name in names_of(alone))
