@@ -1,4 +1,5 @@
-"""Materials as Mitsuba 3 is told of them: its own plugins where they mean the same, and `gltf` (mitsuba_gltf.py).
+"""Materials as Mitsuba 3 is told of them: its own plugins where they mean the same, with `height_correlated` over them
+(mitsuba_smith.py) where their Smith term is another, and `gltf` (mitsuba_gltf.py).
 
 To add a material, write what it is in BSDFS.
 """
@@ -141,11 +142,13 @@ def _mirror(material: Mirror) -> Plugin:
 
 def _metallic_roughness(material: MetallicRoughness) -> Plugin:
     """`principled` is GGX under Schlick's Fresnel term with the separable Smith term, if metallic is 1, exactly."""
-    if material.features() & {"LAYERS", "SPECULAR"}:
-        raise ValueError("metallic_roughness with layers")
+    if material.features() & {"THROUGH", "SPECULAR"}:
+        raise ValueError("metallic_roughness with transmission or specular")
     if material.smith not in ("separable", "height_correlated"):
         raise ValueError('metallic_roughness but with smith = "separable" or "height_correlated"')
     values, multiple = material.parameters(), "MULTIPLE_SCATTERING" in material.features()
+    if "LAYERS" in material.features():
+        return _layers(material) | {"multiple": multiple}
     if material.smith == "separable" and values["metallic"] == 1 and not material.textures() and not multiple:
         lobes = material.lobes
         return {"type": "principled", "metallic": 1.0, "roughness": sqrt(lobes.alpha), "base_color": rgb(lobes.f0)}
@@ -154,28 +157,39 @@ def _metallic_roughness(material: MetallicRoughness) -> Plugin:
             "smith": material.smith, "coupling": material.coupled_by, "multiple": multiple}
 
 
+def _layers(material: MetallicRoughness) -> Plugin:
+    if material.textures() or material.smith != "height_correlated" or material.coupled_by != "albedo":
+        raise ValueError('layers but without textures, over smith = "height_correlated" and coupling = "albedo"')
+    values = material.parameters()
+    return {"type": "gltf_layers", "color": color(values["color"]), "f0": rgb(values["f0"]),
+            "metallic": number(values["metallic"]), "roughness": number(material.roughness),
+            "clearcoat": number(material.clearcoat), "clearcoat_roughness": number(material.clearcoat_roughness),
+            "sheen_color": color(material.sheen_color), "sheen_roughness": number(material.sheen_roughness)}
+
+
 def _dielectric(material: Dielectric) -> Plugin:
     if material.thin and material.rough:
         raise ValueError("glass that is thin and rough")
     if material.scatters_again:
-        raise ValueError("rough glass but with multiple_scattering = false: its own follows a single bounce")
-    if untextured(material.roughness)**2 > NEARLY_SMOOTH:
-        raise ValueError("glass rougher than 0.3: its own has the separable Smith term")
+        raise ValueError("rough glass's further bounces; set multiple_scattering = false")
     if material.thin and untextured(material.color) != (1.0, 1.0, 1.0):
         raise ValueError("thin glass in color: its own is not crossed again by what bounces inside")
-    plugin = {"type": "thindielectric" if material.thin else "dielectric", "int_ior": material.ior, "ext_ior": 1.0}
-    if material.rough:
-        plugin |= {"type": "roughdielectric", "distribution": "ggx",
-                   "alpha": max(untextured(material.roughness)**2, ALPHA_MIN)}
-    return plugin | {"specular_transmittance": color(material.color)}
+    plugin = {"type": "thindielectric" if material.thin else "dielectric", "int_ior": material.ior, "ext_ior": 1.0,
+              "specular_transmittance": color(material.color)}
+    return _rough(plugin | {"type": "roughdielectric"}, material.roughness) if material.rough else plugin
 
 
 def _conductor(material: Conductor) -> Plugin:
     values = material.parameters()
-    if untextured(material.roughness)**2 > NEARLY_SMOOTH:
-        raise ValueError("conductor rougher than 0.3: its own has the separable Smith term")
-    return {"type": "roughconductor", "distribution": "ggx", "eta": rgb(values["eta"]), "k": rgb(values["k"]),
-            "alpha": max(untextured(material.roughness)**2, ALPHA_MIN)}
+    plugin = {"type": "roughconductor", "eta": rgb(values["eta"]), "k": rgb(values["k"])}
+    return _rough(plugin, material.roughness)
+
+
+def _rough(plugin: Plugin, roughness: float | Texture) -> Plugin:
+    """With GGX and the height-correlated Smith term."""
+    alpha = max(untextured(roughness)**2, ALPHA_MIN)
+    plugin = plugin | {"distribution": "ggx", "alpha": alpha}
+    return plugin if alpha <= NEARLY_SMOOTH else {"type": "height_correlated", "alpha": alpha, "bsdf": plugin}
 
 
 BSDFS: dict[type[Material], Callable[[Any], Plugin]] = {

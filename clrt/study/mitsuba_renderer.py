@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from ..scene.model import Scene
+from . import mitsuba_gltf, mitsuba_layers, mitsuba_smith
 from .contestants import Contestant, Picture
 from .mitsuba_bsdfs import Plugin
-from .mitsuba_gltf import register
 from .mitsuba_scene import mitsuba_scene
 
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
@@ -71,7 +71,8 @@ def load() -> tuple[Any, str]:
     library = import_module("mitsuba")
     library.set_variant(variant)
     library.set_log_level(library.LogLevel.Error)
-    register(library)
+    for plugins in (mitsuba_gltf, mitsuba_layers, mitsuba_smith):
+        plugins.register(library)
     return library, f"mitsuba {variant.split('_')[0]}"
 
 

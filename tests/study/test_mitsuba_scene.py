@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from clrt.errors import UsageError
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
-from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.materials import MATERIALS, Conductor, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.textures import Picture, Texture
 from clrt.study.mitsuba_bsdfs import BSDFS, finer
@@ -81,8 +81,9 @@ def test_materials_are_told_by_what_they_reflect() -> None:
 
 
 @pytest.mark.parametrize(("material", "words"), [
-    (MetallicRoughness(clearcoat=0.5), "with layers"), (MetallicRoughness(smith="schlick"), 'smith = "separable"'),
-    (Dielectric(roughness=0.5, multiple_scattering=False), "rougher than 0.3"),
+    (MetallicRoughness(transmission=0.5), "with transmission"),
+    (MetallicRoughness(smith="schlick"), 'smith = "separable"'),
+    (MetallicRoughness(clearcoat=0.5, coupling="fresnel"), 'coupling = "albedo"'),
     (Dielectric(roughness=0.2), "multiple_scattering = false"), (Diffuse(one_sided=True), "one side")])
 def test_what_has_no_counterpart_is_refused_by_name(material: Material, words: str) -> None:
     with pytest.raises(UsageError, match=f"the ball: Mitsuba cannot draw .*{words}"):
@@ -104,6 +105,24 @@ def test_other_gloss_is_a_plugin_of_our_own() -> None:
     assert plastic == {"type": "gltf", "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}, "metallic": 0,
                        "roughness": 0.4, "f0": {"type": "rgb", "value": [0.05, 0.05, 0.05]},
                        "smith": "height_correlated", "coupling": "albedo", "multiple": False}
+
+
+@pytest.mark.parametrize(("material", "kind"), [
+    (Dielectric(roughness=0.7, multiple_scattering=False), "roughdielectric"),
+    (Conductor(preset="gold", roughness=0.7), "roughconductor")])
+def test_rough_glass_and_metal_have_the_height_correlated_smith_term(material: Material, kind: str) -> None:
+    plugin = mitsuba_scene(ball(material))["sphere0"]["bsdf"]
+    plugin = plugin["front"] if plugin["type"] == "twosided" else plugin
+    assert (plugin["type"], plugin["alpha"]) == ("height_correlated", pytest.approx(0.49))
+    assert (plugin["bsdf"]["type"], plugin["bsdf"]["alpha"]) == (kind, plugin["alpha"])
+
+
+def test_layers_are_a_plugin_of_our_own() -> None:
+    velvet = bsdf(MetallicRoughness(color=(0.1, 0.2, 0.3), roughness=0.4, clearcoat=0.5, sheen_color=(0.6, 0.7, 0.8)))
+    assert velvet == {"type": "gltf_layers", "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]},
+                      "f0": {"type": "rgb", "value": [pytest.approx(0.04)] * 3}, "metallic": 0, "roughness": 0.4,
+                      "sheen_color": {"type": "rgb", "value": [0.6, 0.7, 0.8]}, "clearcoat": 0.5,
+                      "clearcoat_roughness": 0, "sheen_roughness": 0, "multiple": False}
 
 
 PICTURE = Picture(np.array([[[0, 51, 102, 255], [255, 153, 204, 0]]], np.uint8))

@@ -1,0 +1,51 @@
+"""The height-correlated Smith term for those of Mitsuba's microfacet materials that have the separable one.
+
+Both have G1 of either direction, by which their quotient is known: G2 = g·g'/(g + g' − g·g') over g·g' (Heitz 2014,
+"Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", eq. 98 and 99).
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+
+def register(mi: Any) -> None:
+    """Makes the plugin "height_correlated" known to `mi`, the module of Mitsuba with its variant chosen.
+
+    alpha: of GGX; bsdf: a roughconductor or roughdielectric with it, whose values are multiplied by the quotient. It
+    draws directions as before.
+    """
+    dr = import_module("drjit")
+
+    class HeightCorrelated(mi.BSDF):  # type: ignore[misc]
+        def __init__(self, props: Any) -> None:
+            mi.BSDF.__init__(self, props)
+            self.alpha, self.separable = props["alpha"], props["bsdf"]
+            self.m_components = [self.separable.flags(i) for i in range(self.separable.component_count())]
+            self.m_flags = self.separable.flags()
+
+        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
+            bs, weight = self.separable.sample(ctx, si, sample1, sample2, active)
+            return bs, weight * self._quotient(si.wi, bs.wo)
+
+        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.separable.eval(ctx, si, wo, active) * self._quotient(si.wi, wo)
+
+        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.separable.pdf(ctx, si, wo, active)
+
+        def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+        def _quotient(self, wi: Any, wo: Any) -> Any:
+            g_i, g_o = (2 / (1 + dr.sqrt(1 + self.alpha**2 * mi.Frame3f.tan_theta_2(w))) for w in (wi, wo))
+            return dr.select(g_i + g_o > 0, 1 / (g_i + g_o - g_i * g_o), 0)
+
+        def traverse(self, callback: Any) -> None:
+            """Nothing of it changes."""
+
+        def to_string(self) -> str:
+            return "HeightCorrelated[]"
+
+    mi.register_bsdf("height_correlated", HeightCorrelated)
