@@ -209,7 +209,7 @@ main(["bench", "converge", "ball.toml", "--quick", "--time", "0.004", "--peers",
         assert len(row["spp"]) == len(row["seconds"]) == len(row["relmse"]) == len(row["noise_ratio"])
         assert any(line.startswith(f"  {name}  ") for line in done.stdout.splitlines())
     assert scene["contestants"]["clrt"]["ratio"] == 1
-    assert done.stdout.splitlines()[-2:] == ["c.png", "c.json"] and read_image(tmp_path / "c.png").std() > 0.05
+    assert done.stdout.splitlines()[-2:] == ["c.json", "c.png"] and read_image(tmp_path / "c.png").std() > 0.05
     assert "ball: step 1 of 2 of its reference" in done.stderr and "step" not in done.stdout
 
 

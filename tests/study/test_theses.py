@@ -125,7 +125,7 @@ main(["bench", "theses", "--quick", "--tree", {str(MODELS / "tree.obj")!r}, "--j
     depths = [row["depth"] for row in written["experiments"][4]["rows"].values() if row["depth"]]
     assert depths == list(DEPTHS)
     assert "theirs: Radeon RX 9070 XT" in done.stdout and "theirs 35.67" in done.stdout
-    assert done.stdout.splitlines()[-2:] == ["t.png", "t.json"] and (tmp_path / "t.png").stat().st_size > 10_000
+    assert done.stdout.splitlines()[-2:] == ["t.json", "t.png"] and (tmp_path / "t.png").stat().st_size > 10_000
 
 
 def test_mistakes_end_in_one_message(tmp_path: Path) -> None:
