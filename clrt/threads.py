@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from math import inf
 from typing import TypeVar
-from weakref import ref
+from weakref import finalize, ref
 
 T = TypeVar("T")
 U = TypeVar("U")
@@ -143,6 +143,11 @@ def in_parallel(work: Callable[[U], T], items: Iterable[U]) -> list[T]:
     if errors:
         raise errors[min(errors)]
     return [results[number] for number in range(len(todo))]
+
+
+# What threads hold, temporary folders among it, lives until they have ended: a process at its end calls functions in
+# reverse order, and weakref registers its own with the first of its objects.
+finalize(Condition, bool).detach()
 
 
 @atexit.register

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 FOLDERS = {"farm": "farm", "oracle": "statistics", "study": "study", "window": "window"}
 #: Of compiled programs kept between runs: one run of all tests makes some 200 MB.
 MOST_KEPT_BYTES = 500_000_000
+#: Those that decide what a terminal is shown: tests set them themselves, whatever the machine has.
+DISPLAY_VARIABLES = ("CI", "COLUMNS", "FORCE_COLOR", "LINES", "NO_COLOR")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -68,6 +70,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 def fresh_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """What clrt keeps, verdicts on devices among them, is kept in a folder of this process's own."""
     with pytest.MonkeyPatch.context() as patch:
+        for name in DISPLAY_VARIABLES:
+            patch.delenv(name, raising=False)
         patch.setenv("CLRT_CACHE_DIR", str(tmp_path_factory.mktemp("clrt")))
         yield
 

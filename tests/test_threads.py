@@ -203,6 +203,28 @@ time.sleep(0.3)
     assert (done.returncode, done.stdout, done.stderr) == (0, "" if daemon else "done\n", "")
 
 
+def test_temporary_folders_outlive_the_threads_that_write_to_them() -> None:
+    program = """
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from clrt.threads import beside
+def work():
+    with TemporaryDirectory() as folder:
+        begun.append(True)
+        for number in range(100):
+            time.sleep(1e-3)
+            Path(folder, str(number)).touch()
+    print("done", flush=True)
+begun = []
+beside(work)
+while not begun:
+    time.sleep(1e-3)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=LONG)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
+
+
 def test_a_process_that_is_taken_apart_waits_for_no_thread() -> None:
     """None runs any more then: its result is an error."""
     program = """
