@@ -29,12 +29,18 @@ def mean_texels(texture: Texture, uv: Doubles) -> Doubles:
     """(m, 3) for texture coordinates (m, corners, 2)."""
     encoded = texture.picture.texels[..., :3].astype(np.float32) / np.float32(255)
     linear = linear_from_srgb(encoded).astype(np.float64)
+    clamped = np.array([wrap == "clamp" for wrap in texture.wrap])
+    placed = (uv @ texture.to_picture[:, :2].T + texture.to_picture[:, 2]) * linear.shape[1::-1]
+    for axis, wrap in zip((1, 0), texture.wrap):
+        if wrap == "mirror":    # the same as repeating the picture and its mirror image
+            linear = np.concatenate([linear, np.flip(linear, axis)], axis)
     size = np.array(linear.shape[1::-1])
-    placed = (uv @ texture.to_picture[:, :2].T + texture.to_picture[:, 2]) * size
-    placed -= np.floor(placed[:, :1] / size) * size   # by whole pictures, so that the first corner lies inside
-    low, high = np.floor(placed.min(axis=1) - 1).astype(np.int64), np.ceil(placed.max(axis=1) + 1).astype(np.int64)
-    outside = (low < 0) | (high > size)
-    low, high = np.where(outside, 0, low), np.where(outside, size, high)
+    # By whole periods, so that the first corner lies inside; beyond a picture that is clamped are its outermost texels.
+    placed -= np.where(clamped, 0, np.floor(placed[:, :1] / size) * size)
+    low, high = np.floor(placed.min(axis=1) - 1), np.ceil(placed.max(axis=1) + 1)
+    outside = ((low < 0) | (high > size)) & ~clamped
+    low = np.where(outside, 0, np.clip(low, 0, size - 1)).astype(np.int64)
+    high = np.where(outside, size, np.clip(high, 1, size)).astype(np.int64)
     sums = np.zeros((size[1] + 1, size[0] + 1, 3))
     sums[1:, 1:] = linear.cumsum(axis=0).cumsum(axis=1)
     (left, top), (right, bottom) = low.T, high.T
