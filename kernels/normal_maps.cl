@@ -30,6 +30,19 @@ static inline NormalMap coat_normal_map(const Scene *scene, const Surface *surfa
 }
 #endif
 
+#if SPHERES
+// The tangent of a sphere and its handedness follow the image as the texture places it. On a sphere u goes to the east, a
+// turn for 1, and v to the south, half a turn for 1.
+static inline void place_sphere_tangent(const Scene *scene, ireal texture, real3 n, real3 *tangent, real *handedness) {
+    real3 u_row = GATHER3(scene->textures, texture, .u_row), v_row = GATHER3(scene->textures, texture, .v_row);
+    real side = u_row.x * v_row.y - u_row.y * v_row.x < 0.0f ? -ONE : ONE;
+    real3 east = *tangent, north = cross3(n, normalize3(east));
+    ireal is_sphere = *handedness == 2.0f;
+    *tangent = choose(is_sphere, scale(mad3(east, 2.0f * v_row.y, scale(north, v_row.x)), side), *tangent);
+    *handedness = is_sphere ? side : *handedness;
+}
+#endif
+
 static inline real3 bent(const Scene *scene, const Surface *surface, NormalMap map) {
     ireal mapped = (map.texture >= 0) & (surface->handedness != 0.0f);
     if (!ANY(mapped)) return surface->ns;
@@ -37,8 +50,13 @@ static inline real3 bent(const Scene *scene, const Surface *surface, NormalMap m
     real x = (2.0f * filtered(&found, (ureal)(0)) - 1.0f) * map.strength;
     real y = (2.0f * filtered(&found, (ureal)(8)) - 1.0f) * map.strength;
     real z = 2.0f * filtered(&found, (ureal)(16)) - 1.0f;
-    real3 n = surface->ns, t = normalize3(sub(surface->tangent, scale(n, dot3(surface->tangent, n))));
-    real3 b = scale(cross3(n, t), surface->handedness);
+    real3 n = surface->ns, along = surface->tangent;
+    real handedness = surface->handedness;
+#if SPHERES
+    place_sphere_tangent(scene, mapped ? map.texture : (ireal)(0), n, &along, &handedness);
+#endif
+    real3 t = normalize3(sub(along, scale(n, dot3(along, n))));
+    real3 b = scale(cross3(n, t), handedness);
     real3 turned = mad3(t, x, mad3(b, y, scale(n, z)));
     real norm2 = dot3(turned, turned);
     return choose(mapped & (norm2 > 0.0f), scale(turned, rsqrt(norm2)), n);

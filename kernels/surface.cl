@@ -22,7 +22,7 @@ typedef struct {
 #endif
 #if NORMAL_MAPS
     real3 tangent;        // not of unit length
-    real handedness;      // of the bitangent; 0 where there are no tangents
+    real handedness;      // of the bitangent; 0 where there are no tangents, 2 on spheres (place_sphere_tangent)
     real3 unbent;         // the shading normal as no map bends it
 #endif
 #if COAT_NORMALS
@@ -131,8 +131,8 @@ static inline void sphere_surface(const Scene *scene, real3 origin, real3 direct
     surface->tint_opacity = ONE;
 #endif
 #if NORMAL_MAPS
-    surface->tangent = vector(n.z, ZERO, -n.x);
-    surface->handedness = ONE;
+    surface->tangent = vector(n.z, ZERO, -n.x);     // sin θ long
+    surface->handedness = (real)(2.0f);
 #endif
     surface->material = GATHER(ireal, scene->spheres, sphere, .material);
     surface->light = GATHER(ireal, scene->spheres, sphere, .light);

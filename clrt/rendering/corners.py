@@ -32,7 +32,7 @@ def pack_corners(meshes: Sequence[Mesh], uv_sets: int, normal_maps: bool) -> dic
         if mesh.colors is not None:
             colors[own, :, :mesh.colors.shape[1]] = mesh.colors[mesh.faces]
         if mesh.material.bent_by is not None and normal_maps:
-            tangent, sign = corner_tangents(mesh, mesh.material.bent_by.uv_set)
+            tangent, sign = corner_tangents(mesh, mesh.material.bent_by)
             for i in range(3):
                 tangents[f"t{i}"][own] = tangent[:, i]
             tangents["sign"][own] = sign

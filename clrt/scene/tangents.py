@@ -7,25 +7,27 @@ from numpy.typing import NDArray
 
 from .model import Mesh
 from .normals import weld
+from .textures import Texture
 from .transform import unit
 
 Doubles = NDArray[np.float64]
 
 
-def corner_tangents(mesh: Mesh, uv_set: int = 0) -> tuple[Doubles, Doubles]:
+def corner_tangents(mesh: Mesh, texture: Texture) -> tuple[Doubles, Doubles]:
     """Unit tangents (m, 3, 3) at the corners of each face, and its handedness (m,): 1, −1, or 0 where there is none.
 
-    The bitangent, the picture's up, is handedness · cross(normal, tangent). The mesh's own tangents, or the faces',
-    weighted by their angle at each point and averaged over those around it that are not mirrored (as Mikkelsen 2008,
-    "Simulation of Wrinkled Surfaces Revisited", ch. 3, has it, without his splits at sharp seams).
+    The bitangent, up in the texture's image, is handedness · cross(normal, tangent). The mesh's own tangents, or the
+    faces', along the image as the texture places it, weighted by their angle at each point and averaged over those
+    around it that are not mirrored (as Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited", ch. 3, has it,
+    without his splits at sharp seams).
     """
     if mesh.tangents is not None:
         corners = mesh.tangents[mesh.faces].astype(np.float64)
         return unit(corners[..., :3]), np.sign(corners[:, 0, 3])
-    uv = mesh.uv1 if uv_set else mesh.uv
+    uv = mesh.uv1 if texture.uv_set else mesh.uv
     if uv is None:
         return np.zeros((len(mesh.faces), 3, 3)), np.zeros(len(mesh.faces))
-    p, t = mesh.vertices[mesh.faces].astype(np.float64), uv[mesh.faces].astype(np.float64)
+    p, t = mesh.vertices[mesh.faces].astype(np.float64), uv[mesh.faces] @ texture.to_picture[:, :2].T
     e1, e2, s1, s2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]
     # Solves e = du·tangent − dv·bitangent for both edges; v points down in the picture, the bitangent up.
     area = s1[:, 0] * s2[:, 1] - s2[:, 0] * s1[:, 1]

@@ -140,11 +140,27 @@ def test_vertex_colors_multiply(device: Device) -> None:
     assert not found[..., 2].any()
 
 
-@covering("shape, mirrored, turn", ["flat", "smooth", "own tangents"], [False, True], [0.0, 40.0, 90.0, 200.0],
-          strength=2)
-def test_normal_maps_tilt_along_the_picture(device: Device, turn: float, mirrored: bool, shape: str) -> None:
-    """Red tilts the normal to the picture's right and green to its top, wherever these lie on the surface: light that
-    comes from there falls on it with the cosine of that, and bumps shadow themselves."""
+#: How a texture places its image: as the coordinates say, turned and stretched, mirrored.
+PLACED: dict[str, dict[str, Any]] = {
+    "plain": {}, "turned": {"rotation_degrees": 30.0, "scale": (2.0, 0.7)},
+    "mirrored": {"rotation_degrees": -75.0, "scale": (-1.3, 0.8), "offset": (0.3, 0.1)}}
+
+
+def image_axes(texture: Texture, along_u: Doubles, along_v: Doubles, normal: Doubles) -> tuple[Doubles, Doubles]:
+    """Unit vectors to the right and up in a texture's image on a surface, from its derivatives by u and by v."""
+    by_x, by_y = np.linalg.inv(texture.to_picture[:, :2]).T @ np.stack([along_u, along_v])
+    right = by_x / np.linalg.norm(by_x)
+    up = np.cross(normal, right)
+    return right, up if up @ by_y < 0 else -up
+
+
+@covering("shape, mirrored, turn, placed", ["flat", "smooth", "own tangents"], [False, True], [0.0, 40.0, 90.0, 200.0],
+          list(PLACED), strength=2)
+def test_normal_maps_tilt_along_the_picture(device: Device, turn: float, mirrored: bool, shape: str,
+                                            placed: str) -> None:
+    """Red tilts the normal to the image's right and green to its top, wherever these lie on the surface: light that
+    comes from there falls on it with the cosine of that, and bumps shadow themselves. A mesh's own tangents are those
+    of the image as it is placed."""
     angle = np.radians(turn)
     right, top = np.array([np.cos(angle), np.sin(angle), 0]), np.array([-np.sin(angle), np.cos(angle), 0])
     right = -right if mirrored else right
@@ -152,18 +168,38 @@ def test_normal_maps_tilt_along_the_picture(device: Device, turn: float, mirrore
     texel = np.array([200, 60, 210])
     tilt = texel / 255 * 2 - 1
     strength = 0.5
+    texture = Texture(picture=plain(200, 60, 210), factor=strength, **PLACED[placed])
+    if shape != "own tangents":
+        right, top = image_axes(texture, right, -top, np.array([0.0, 0.0, 1.0]))
     bent = strength * tilt[0] * right + strength * tilt[1] * top + [0, 0, tilt[2]]
     towards = np.array([0.3, -0.2, 0.9])
     cosine = bent @ towards / np.linalg.norm(bent) / np.linalg.norm(towards)
     normals = np.tile(np.array([0, 0, 1], np.float32), (4, 1)) if shape != "flat" else None
     own = np.tile(np.array([*right, -1 if mirrored else 1], np.float32), (4, 1)) if shape == "own tangents" else None
-    material = Diffuse(color=(0.8, 0.8, 0.8), normal_map=Texture(picture=plain(200, 60, 210), factor=strength))
-    scene = Scene(meshes=[quad(material, uv=uv, normals=normals, tangents=own)],
+    scene = Scene(meshes=[quad(Diffuse(color=(0.8, 0.8, 0.8), normal_map=texture), uv=uv, normals=normals,
+                               tangents=own)],
                   lights=[DirectionalLight(direction=tuple(-towards), irradiance=(1, 1, 1))])
     found = seen(device, scene, size=8, spp=4, max_depth=2)
     left = bump_shadowing(np.array([0.0, 0.0, 1.0]), bent, towards)
     assert found.mean() == pytest.approx(0.8 / np.pi * cosine * left, rel=1e-4)
     assert found.std() < 1e-5
+
+
+@pytest.mark.parametrize("placed", PLACED)
+def test_normal_maps_tilt_along_the_picture_on_spheres(device: Device, placed: str) -> None:
+    """At a point of a sphere, seen through a lens that shows nothing else."""
+    theta, phi, texel = 1.1, 0.4, np.array([200, 60, 210])
+    normal = np.array([np.sin(theta) * np.sin(phi), np.cos(theta), np.sin(theta) * np.cos(phi)])
+    along_u = 2 * np.pi * np.array([normal[2], 0.0, -normal[0]])
+    along_v = np.pi * np.array([np.cos(theta) * np.sin(phi), -np.sin(theta), np.cos(theta) * np.cos(phi)])
+    texture = Texture(picture=plain(*texel), **PLACED[placed])
+    right, up = image_axes(texture, along_u, along_v, normal)
+    bent = np.stack([right, up, normal], axis=1) @ (texel / 255 * 2 - 1)
+    scene = Scene(spheres=[Sphere(material=Diffuse(normal_map=texture))],
+                  camera=Camera(position=tuple(3 * normal), look_at=(0.0, 0.0, 0.0), fov_degrees=0.01),
+                  render=RenderSettings(size=(4, 4), integrator="normals"))
+    *_, last = Renderer(scene, spp=4, device=device.info.index).passes(spp=4)
+    np.testing.assert_allclose(last.film.mean.mean(axis=(0, 1)), bent / np.linalg.norm(bent), atol=2e-4)
 
 
 def test_normal_maps_on_spheres(device: Device) -> None:
