@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from .mitsuba_primitives import cube, cylinder, disk, rectangle, sphere
 from .mitsuba_textures import Attribute, TextureReader
 from .mitsuba_values import Doubles
 from .mitsuba_xml import Plugin, UnsupportedError
-from .materials import Diffuse
+from .materials import Dielectric, Diffuse
 from .meshes import read_model
 from .model import FloatArray, Instance, Mesh, Sphere
 from .normals import smooth_normals
@@ -30,6 +31,15 @@ FILES = ("obj", "ply")
 UNEVEN = 1e-5
 Part = Mesh | Sphere
 Attributes = Mapping[str, FloatArray]
+
+
+class Piece(NamedTuple):
+    """A mesh, its attributes, and whether Mitsuba turns it inside out under a transform that mirrors: it takes the
+    side that emits from normals, those of the shape, or else those of its corners' order."""
+
+    mesh: Mesh
+    attributes: Attributes
+    turns: bool
 
 
 class ShapeReader:
@@ -67,12 +77,14 @@ class ShapeReader:
                 return
         elif plugin.kind == "cylinder":
             to_world = to_world @ _between(plugin)
+        mirrored = float(np.linalg.det(to_world[:3, :3])) < 0
         if plugin.kind in PRIMITIVES:
-            pieces: list[tuple[Mesh, Attributes]] = [(PRIMITIVES[plugin.kind](), {})]
+            pieces = [Piece(PRIMITIVES[plugin.kind](), {}, turns=plugin.kind == "sphere")]
         else:
             pieces = list(_from_file(plugin))
-        for mesh, attributes in pieces:
-            yield _dressed(transform_mesh(mesh, to_world), look, attributes, plugin)
+        for mesh, attributes, turns in pieces:
+            moved = transform_mesh(mesh, to_world)
+            yield _dressed(_turned(moved) if mirrored and turns else moved, look, attributes, plugin)
 
     def _look(self, plugin: Plugin) -> Look:
         """Of the shape's BSDF and what is inside; or what stands in for it."""
@@ -148,17 +160,27 @@ def _between(plugin: Plugin) -> Doubles:
 
 
 def _sphere(to_world: Doubles, look: Look, name: str) -> Sphere | None:
-    """A sphere of radius 1 in the world, where it stays one and nothing on it tells how it is turned."""
+    """A sphere of radius 1 in the world, where it stays one and nothing on it tells how it is turned, nor, where a
+    transform that mirrors has turned it inside out, which side is which."""
     linear = to_world[:3, :3]
     squares = linear.T @ linear
     radius = float(np.cbrt(abs(np.linalg.det(linear))))
-    if look.material.textures() or np.abs(squares - radius**2 * np.eye(3)).max() > UNEVEN * radius**2:
+    sided = any(look.material.radiance) or isinstance(look.material, Dielectric)
+    if np.linalg.det(linear) < 0 and sided or look.material.textures():
+        return None
+    if np.abs(squares - radius**2 * np.eye(3)).max() > UNEVEN * radius**2:
         return None
     x, y, z = to_world[:3, 3].tolist()
     return Sphere(center=(x, y, z), radius=radius, material=look.material, name=name)
 
 
-def _from_file(plugin: Plugin) -> Iterator[tuple[Mesh, Attributes]]:
+def _turned(mesh: Mesh) -> Mesh:
+    """The mesh inside out."""
+    return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]),
+                   normals=None if mesh.normals is None else -mesh.normals)
+
+
+def _from_file(plugin: Plugin) -> Iterator[Piece]:
     """The meshes of a file, with smooth normals where it has none, as Mitsuba makes them."""
     path = Path(plugin.value("filename", str, ""))
     flat = plugin.value("face_normals", bool, False)
@@ -168,11 +190,12 @@ def _from_file(plugin: Plugin) -> Iterator[tuple[Mesh, Attributes]]:
         if mesh.uv is not None and downward != (own is None):
             mesh.uv[:, 1] = 1 - mesh.uv[:, 1]
         mesh.colors, mesh.tangents = None, None
+        turns = flat or mesh.normals is None
         if flat:
             mesh.normals = None
         elif mesh.normals is None:
             mesh.normals = smooth_normals(mesh.vertices, mesh.faces)
-        yield mesh, attributes
+        yield Piece(mesh, attributes, turns)
 
 
 def _ply(path: Path) -> tuple[Mesh, Attributes] | None:
