@@ -10,6 +10,8 @@ from dataclasses import replace
 from math import exp, sqrt
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..errors import SceneError
 from .materials import Conductor, Dielectric, Diffuse, Material, Mirror
 from .mitsuba_indices import DIELECTRICS, METALS
@@ -74,6 +76,9 @@ class MaterialReader:
         if not (shadowed and type(look.material) is Diffuse):
             self.differences.append(f"{plugin.where}: normal map that shadows diffuse reflection, and nothing else")
         normals = self._textures.normals(plugin, "normalmap")
+        if not np.allclose(normals.image_axes, np.eye(2)):
+            self.differences.append(f"{plugin.where}: a normal map bends along its image as to_uv turns it, in Mitsuba "
+                                    "along u")
         return look._replace(material=replace(look.material, normal_map=normals))
 
     def _blend(self, plugin: Plugin) -> Look:

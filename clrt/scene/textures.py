@@ -58,6 +58,13 @@ class Texture:
         turned = np.array([[c, s], [-s, c]]) @ np.diag(self.scale)
         return np.column_stack([turned, self.offset])
 
+    @property
+    def image_axes(self) -> NDArray[np.float64]:
+        """(2, 2): unit vectors to the image's right and up, on the plane of u and −v."""
+        (a, b), (c, d) = self.to_picture[:, :2]
+        axes = np.array([np.sign(a * d - b * c) * np.array([d, c]), [-c, d]])
+        return np.asarray(axes / np.hypot(c, d))
+
 
 def untextured(value: Value | Texture) -> Value:
     """A parameter of a material that is no texture; ValueError if it is one."""

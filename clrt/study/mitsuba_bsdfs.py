@@ -110,9 +110,12 @@ def finer(texels: Any, wrap: tuple[Wrap, Wrap], times: int) -> Any:
 
 
 def _bend(texture: Texture) -> Plugin:
-    """A normal map: linear, and with the factor in it."""
+    """A normal map: linear, with the factor in it, and bent along u and v."""
+    axes = texture.image_axes   # Mitsuba bends along u and v, however to_uv turns the image
+    if np.abs(np.abs(axes) - 0.5).max() < 0.499:
+        raise ValueError(f"the normal map {texture.picture.name}, which is not turned by quarters")
     xyz = _channels(texture, "red", "green", "blue")
-    xyz[..., :2] = 0.5 + (xyz[..., :2] - 0.5) * np.max(texture.factor)
+    xyz[..., :2] = 0.5 + (xyz[..., :2] - 0.5) @ axes * np.max(texture.factor)
     return _bitmap(texture, xyz)
 
 
