@@ -1,4 +1,4 @@
-"""How bright triangles are whose emission is a texture: what they are chosen by as lights."""
+"""Mean emission of triangles with an emission texture, which determines how they are sampled as lights."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ Doubles = NDArray[np.float64]
 
 
 def mean_emission(mesh: Mesh) -> Doubles:
-    """(m, 3) of each triangle the mean, from 0 to 1, of its emission's texels over the box of its texture coordinates.
+    """Return (m, 3), for each triangle the mean, in [0, 1], of its emission texels over the bounding box of its UVs.
 
-    A texel wider, as filtering reads; of the whole picture where the box leaves it. 0 only where nothing shines, and 1
-    without a texture.
+    The box is one texel wider on each side, as filtering reads these; if it leaves the image, the mean is that of the
+    whole image. It is 0 only if nothing is emitted, and 1 without a texture.
     """
     texture = mesh.material.emission
     uv = mesh.uv1 if isinstance(texture, Texture) and texture.uv_set else mesh.uv
@@ -26,12 +26,12 @@ def mean_emission(mesh: Mesh) -> Doubles:
 
 
 def mean_texels(texture: Texture, uv: Doubles) -> Doubles:
-    """(m, 3) for texture coordinates (m, corners, 2)."""
+    """Return (m, 3), the same for texture coordinates (m, corners, 2)."""
     encoded = texture.picture.texels[..., :3].astype(np.float32) / np.float32(255)
     linear = linear_from_srgb(encoded).astype(np.float64)
     size = np.array(linear.shape[1::-1])
     placed = (uv @ texture.to_picture[:, :2].T + texture.to_picture[:, 2]) * size
-    placed -= np.floor(placed[:, :1] / size) * size   # by whole pictures, so that the first corner lies inside
+    placed -= np.floor(placed[:, :1] / size) * size   # by whole images, so that the first corner lies inside
     low, high = np.floor(placed.min(axis=1) - 1).astype(np.int64), np.ceil(placed.max(axis=1) + 1).astype(np.int64)
     outside = (low < 0) | (high > size)
     low, high = np.where(outside, 0, low), np.where(outside, size, high)
@@ -39,6 +39,6 @@ def mean_texels(texture: Texture, uv: Doubles) -> Doubles:
     sums[1:, 1:] = linear.cumsum(axis=0).cumsum(axis=1)
     (left, top), (right, bottom) = low.T, high.T
     inside = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
-    # Differences of long sums may miss 0 by rounding; one level of one texel is 3e-4.
+    # Differences of long sums may deviate from 0 by rounding; one level of one texel is 3e-4.
     mean = inside / ((right - left) * (bottom - top))[:, None]
     return np.asarray(np.where(inside > 1e-5, mean, 0.0))
