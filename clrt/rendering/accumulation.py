@@ -34,7 +34,7 @@ class Accumulation(ABC):
 
     @property
     def tile_samples(self) -> NDArray[np.int64]:
-        """(rows, columns) samples per pixel of each tile, or those before the work in hand."""
+        """(rows, columns) samples per pixel of each tile, or those before the pending work."""
         return self.work.samples
 
     @property
@@ -71,7 +71,7 @@ class Accumulation(ABC):
 
     @property
     def _busy(self) -> bool:
-        """Whether there is work in hand."""
+        """Whether work is pending."""
         return bool(self.work.parts)
 
     def work_left(self) -> Work:
@@ -104,14 +104,14 @@ class Accumulation(ABC):
             self.work.settle()
 
     def _settle(self) -> None:
-        """Complete the work if nothing is in hand or in flight; not if it is torn, as the missing samples are unknown.
+        """Complete the work if nothing is pending or in flight; not if it is torn, as the missing samples are unknown.
         """
         if not self._torn:
             self.work.settle()
 
     @abstractmethod
     def _work(self) -> Iterator[None]:
-        """Launch the work in hand."""
+        """Launch the pending work."""
 
     def look(self, camera: Camera) -> None:
         """Start afresh, without samples, from this camera (see `SceneOnDevice.look`)."""

@@ -73,7 +73,7 @@ class Crew(Accumulation):
         self._film.fill(0)
 
     def wait(self) -> None:
-        """Wait for the launches in flight, but start none of the work in hand."""
+        """Wait for the launches in flight, without starting pending work."""
         with self._tearing():
             self.team.drain(self.work, self._film)
             self._settle()

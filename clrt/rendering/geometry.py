@@ -13,8 +13,8 @@ from .records import NORMALS, SPHERE, TRIANGLE
 
 
 class Corners:
-    """Corners of all meshes' triangles, (m, 3, 3) float32, computed anew for each conversion to a numpy array: they
-    take twice the memory of the meshes, and only as long as the array is referenced."""
+    """Corners of all meshes' triangles, (m, 3, 3) float32, computed on each conversion to a numpy array: they take
+    twice the memory of the meshes, and only as long as the array is referenced."""
 
     def __init__(self, meshes: Sequence[Mesh]) -> None:
         self._meshes = meshes

@@ -60,7 +60,7 @@ class PictureWarnings:
             _log.warning("%s: %s", scene.name, text)
 
     def of(self, film: Film) -> list[str]:
-        """Return all warnings for the image so far, a line each; for a band of an image only those of the scene."""
+        """Return all warnings for the image so far, one line each; for a band of an image only those of the scene."""
         return [*self._of_scene, *self._of_film(film)]
 
     def log(self, film: Film) -> None:

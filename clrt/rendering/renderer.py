@@ -46,7 +46,7 @@ class Renderer:
 
     device: see `clrt devices`, or an open device; several render one image together. size: (width, height); triangle,
     box, sphere: see `HitTests`; offset, builder, layout, tree, lanes, paths: see `choices.Choices`. spp: planned
-    samples per pixel: the sampler distributes neighbouring pixels' errors for this count and starts afresh after it
+    samples per pixel: the sampler makes neighbouring pixels' errors differ at this count and starts afresh after it
     (kernels/sampler); `passes` stops there by default. adaptive: distribute samples over tiles by estimated error.
     on_phase is called with "build" (packing, BVH build) and "compile" (program build, upload) as each begins.
     checkpoint: a file updated while rendering, about every `checkpoint_seconds` and at the end; resume: continue from

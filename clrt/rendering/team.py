@@ -73,7 +73,7 @@ class Team:
         return [share for worker in self.workers for share in worker.at]
 
     def run(self, work: Work, film: NDArray[Any], numbers: NDArray[np.uint32]) -> Iterator[None]:
-        """Render the work in hand into the film (tiles, TILE_PIXELS), whose tiles have these numbers in the image;
+        """Render the pending work into the film (tiles, TILE_PIXELS), whose tiles have these numbers in the image;
         yield after each collection. If it is left before its end, call `drain`, or `run` again."""
         while work.parts or self.at:
             for worker in [*self.workers] * IN_FLIGHT:
@@ -85,14 +85,13 @@ class Team:
         work.settle()
 
     def drain(self, work: Work, film: NDArray[Any]) -> None:
-        """Wait for the launches in flight, but start none of the work in hand."""
+        """Wait for the launches in flight, without starting pending work."""
         while self.at:
             if not self._collect(work, film):
                 time.sleep(PAUSE)
 
     def _feed(self, worker: Worker, work: Work, film: NDArray[Any], numbers: NDArray[np.uint32]) -> None:
-        """Give a share to a worker with too little in flight, smaller ones near the end, so that all finish together.
-        """
+        """Give a share to a worker with too little in flight, smaller near the end, so that all finish together."""
         if worker in self.lost or worker.launches.full:
             return
         size = worker.launches.size / TILE_PIXELS
@@ -134,6 +133,6 @@ class Team:
         _log.warning("%s is left out: %s; the others do its work again", worker.name, error)
 
     def _take_back(self, worker: Worker, work: Work) -> None:
-        """Return a worker's shares in flight to the work in hand; nothing of them has entered the film."""
+        """Return a worker's shares in flight to the pending work; nothing of them has entered the film."""
         for share in reversed(worker.at):
             work.give_back(share.part)

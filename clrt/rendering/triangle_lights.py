@@ -104,7 +104,7 @@ def _joined(corners: Doubles, mesh: Integers, face: Integers,
             missed = np.abs(a[:, 0] + b[:, 0] - a[:, 1] - a[:, 2]).max(axis=1, initial=0)
             apex[shared & (missed <= error)] = i
     joined = (apex >= 0) & plain & (np.roll(face, -1) == face + 1) & (np.roll(mesh, -1) == mesh)
-    # Of several in a row that could each be joined with the next, every other one is.
+    # If several in a row could each be joined with the next, every other one is.
     here = np.arange(len(joined))
     since = here - np.maximum.accumulate(np.where(joined, -1, here))
     joined &= since % 2 == 1

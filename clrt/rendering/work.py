@@ -12,7 +12,7 @@ from .tiles import scattered
 
 
 class Part(NamedTuple):
-    """Tiles first … end − 1 of those in hand, which get `more` samples in addition to the `samples` they have."""
+    """Tiles first … end − 1 of the pending ones, which get `more` samples in addition to the `samples` they have."""
 
     first: int
     end: int
@@ -34,10 +34,10 @@ class _Now(NamedTuple):
 
 
 class Work:
-    """Samples rendered so far, and the work in hand, which must be rendered before more is chosen.
+    """Samples rendered so far, and the pending work, which must be rendered before more is chosen.
 
-    samples: (rows, columns) samples per pixel of each tile, or those before the work in hand; then: the same after it.
-    tiles: uint32 numbers of those in hand, in their order on the device. parts: what is left in hand.
+    samples: (rows, columns) samples per pixel of each tile, or those before the pending work; then: the same after it.
+    tiles: uint32 numbers of the pending tiles, in their order on the device. parts: what is still pending.
     """
 
     def __init__(self, samples: NDArray[np.int64], then: NDArray[np.int64] | None = None,
@@ -66,19 +66,19 @@ class Work:
         return self._now.parts
 
     def take(self, tiles: NDArray[np.integer[Any]], parts: Iterable[Part]) -> None:
-        """Take these tiles in hand; there must not be any in hand yet."""
+        """Add work for these tiles; none may be pending yet."""
         parts, then = tuple(parts), self.samples.copy()
         for part in parts:
             then.ravel()[tiles[part.first:part.end]] += part.more
         self._now = _Now(self.samples, then, tiles.astype(np.uint32), parts)
 
     def add_to_all(self, samples: int) -> None:
-        """Take in hand `samples` more samples for every tile; all must have the same number."""
+        """Add `samples` more samples per pixel for every tile to the pending work; all must have the same number."""
         every = scattered(self.samples.size)
         self.take(every, [Part(0, len(every), int(self.samples[0, 0]), samples)])
 
     def double(self, tiles: NDArray[np.intp]) -> None:
-        """Take in hand a doubling of the samples of these tiles, numbered as in `samples`."""
+        """Add a doubling of these tiles' samples to the pending work; tiles are numbered as in `samples`."""
         samples, places = self.samples.ravel()[tiles], np.argsort(scattered(self.samples.size))
         order = np.lexsort((places[tiles], samples))
         levels, firsts = (found.tolist() for found in np.unique(samples[order], return_index=True))
@@ -87,7 +87,7 @@ class Work:
 
     def cut(self, most: int, least_tiles: int, most_tiles: int | None = None, most_samples: int | None = None,
             busy: Sequence[Part] = ()) -> Part | None:
-        """Remove and return the next part of the work in hand, of about `most` tiles times samples per pixel: at least
+        """Remove and return the next part of the pending work, of about `most` tiles times samples per pixel: at least
         `least_tiles` tiles, at most `most_tiles` and `most_samples` per pixel, and none among the `busy`. Return None
         if nothing is left for now.
 
@@ -109,7 +109,7 @@ class Work:
         return share
 
     def _first_free(self, busy: Sequence[Part]) -> tuple[int, int, int] | None:
-        """Return the index of a part in hand, and its first range of tiles that are not busy or in an earlier part."""
+        """Return the index of a pending part, and its first range of tiles that are not busy or in an earlier part."""
         taken = np.zeros(len(self.tiles) + 1, bool)
         taken[-1] = True
         for part in busy:
@@ -122,16 +122,16 @@ class Work:
         return None
 
     def give_back(self, share: Part) -> None:
-        """Take a share in hand again that was not rendered."""
+        """Return a share that was not rendered to the pending work."""
         self._now = self._now._replace(parts=(share, *self.parts))
 
     def settle(self) -> None:
-        """Update `samples` once everything that was cut is rendered, if nothing is left in hand."""
+        """Update `samples` once everything that was cut is rendered, if nothing is pending."""
         if not self.parts:
             self._now = self._now._replace(samples=self.then)
 
     def take_stock(self, found: NDArray[np.int64]) -> None:
-        """Set the work in hand to the samples missing from those found, (rows, columns) of each tile's pixels,
+        """Set the pending work to the samples missing from those found, (rows, columns) of each tile's pixels,
         regardless of what was cut; nothing may be in flight."""
         has, then = found.ravel()[self.tiles], self.then.ravel()[self.tiles]
         ends = [*(np.flatnonzero((np.diff(has) != 0) | (np.diff(then) != 0)) + 1).tolist(), len(has)]
@@ -142,7 +142,7 @@ class Work:
 
     @property
     def left(self) -> int:
-        """Work in hand, as the sum of tiles times samples per pixel."""
+        """Pending work, as the sum of tiles times samples per pixel."""
         return sum((part.end - part.first) * part.more for part in self.parts)
 
 
