@@ -1,1 +1,1 @@
-"""What the paths of one pixel meet: the answer to "why is it black?"."""
+"""Path tracing of single pixels with every vertex recorded: the answer to "why is it black?"."""

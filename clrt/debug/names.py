@@ -1,4 +1,4 @@
-"""What the objects, materials and lights of a scene are called, by the numbers that the kernels have for them."""
+"""Names of a scene's objects, materials and lights, by their numbers in the kernels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ IntArray = NDArray[np.int64]
 
 
 class Names:
-    """The names of one scene, as `compiled`. Objects are numbered as in the AOV `object`."""
+    """Names in one scene, as `compiled`. Objects are numbered as in the AOV `object`."""
 
     def __init__(self, scene: Scene, compiled: CompiledScene) -> None:
         self._scene, self._compiled = scene, compiled
@@ -25,16 +25,16 @@ class Names:
         self._materials = {id(material): name for name, material in scene.materials.items()}
 
     def hits(self, primitive: NDArray[np.int32], instance: NDArray[np.int32]) -> tuple[IntArray, IntArray]:
-        """The objects that were hit, and which of their triangles, both (n,); −1 at misses."""
+        """Return the objects that were hit, and which of their triangles, both (n,); −1 at misses."""
         return self._compiled.objects.met(primitive, instance)
 
     def object(self, number: int) -> str:
-        """An object by its kind and name, and by its number where others share those."""
+        """Return an object's kind and name, and its number if others share those."""
         plain = _plain(self._objects[number])
         return plain if self._shared[plain] == 1 else f"{plain} (object {number})"
 
     def material(self, number: int) -> str:
-        """The material of an object by its name, if it has one, and its type."""
+        """Return the name of an object's material, if it has one, and its type."""
         each = self._objects[number]
         material = each.material if isinstance(each, Sphere) else material_of(each)
         mesh = each.mesh if isinstance(each, Instance) else each
@@ -43,7 +43,7 @@ class Names:
         return f'"{name}" ({material.kernel})' if name else material.kernel
 
     def light(self, number: int) -> str:
-        """An entry of the light table: an object, a light of the scene, or the environment."""
+        """Return the name of an entry of the light table: an object, a light of the scene, or the environment."""
         first, kind = 0, ""
         for kind in TYPES:
             count = int(self._compiled.counts[f"{kind}_lights"][0])
@@ -62,14 +62,14 @@ class Names:
         return f"light[{entry}] ({self._scene.lights[entry].kernel})"
 
     def _object_of(self, primitive: int) -> int:
-        """That of a primitive which no instance shows; those of instances come first."""
+        """Return the object of a primitive that does not belong to an instance; primitives of instances come first."""
         placed = "placements" in self._compiled.buffers
         before = int(self._compiled.buffers["placements"][1]["first"][0]) if placed else 0
         return int(self.hits(np.array([primitive - before], np.int32), np.zeros(1, np.int32))[0][0])
 
     @property
     def infinite(self) -> str:
-        """What paths find that escape; empty where there is nothing."""
+        """What escaping paths reach; empty if there is nothing."""
         found = {"SKY": "the environment", "LIGHT_SUN": "the discs of directional lights"}
         return " and ".join(name for feature, name in found.items() if feature in self._compiled.features)
 

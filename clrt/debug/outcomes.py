@@ -1,4 +1,4 @@
-"""What became of a light sample."""
+"""Outcomes of light samples."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-#: A light sample of which less than this part is lost is not shadowed: the rest is rounding.
+#: A light sample that loses less than this fraction is not shadowed: the rest is rounding.
 ROUNDING = 1e-5
 
 
 class Outcome(StrEnum):
-    """What became of a light sample, in words."""
+    """Outcome of a light sample, in words."""
 
     LIT = "not shadowed"
     PARTLY = "partly shadowed"
@@ -26,7 +26,7 @@ class Outcome(StrEnum):
 
 
 def outcomes(rows: NDArray[Any]) -> list[Outcome]:
-    """Return the outcome of the light sample of each VERTEX record (n,); of UNSAMPLED ones nothing else is known."""
+    """Return the outcome of the light sample of each VERTEX record (n,); for UNSAMPLED ones nothing else is known."""
     dark, no_bsdf = (~_any(rows[name]) for name in ("light_radiance", "light_bsdf"))
     above = np.all([np.sum(rows["light_direction"] * rows[normal], axis=1) > 0
                     for normal in ("geometric_normal", "shading_normal")], axis=0)

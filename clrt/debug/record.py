@@ -1,4 +1,4 @@
-"""The record of a path vertex, and why a path ends there (kernels/debug.cl)."""
+"""Record of a path vertex, and the reasons why paths end (kernels/debug.cl)."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from ..device.preamble import defines, typedefs
 from ..device.records import record
 
-#: position … direction: world frame of the compiled scene. throughput: radiance at the eye over radiance here, on
-#: arrival. radiance: emission that arrives here; emission: its contribution. emitter: entry of the light table, or −1.
-#: light …: the light sample, where light is not −1; light_bsdf: f·|cos|; light_weight: its MIS weight; sent: whether it
-#: got a shadow ray; unshadowed, direct: its contribution without occluders and with them; blocker: a primitive, or −1.
-#: direction, weight, pdf, specular: the BSDF sample; weight: f·|cos|/pdf. emission_clamp, direct_clamp: the factors by
-#: which clamps scale both contributions, 1 without.
+#: position … direction: in the world frame of the compiled scene. throughput: radiance at the camera over radiance
+#: arriving here. radiance: emission that arrives here; emission: its contribution. emitter: entry of the light table,
+#: or −1. light …: the light sample, unless light is −1; light_bsdf: f·|cos|; light_weight: its MIS weight; sent:
+#: whether a shadow ray was traced; unshadowed, direct: its contribution without and with occluders; blocker: a
+#: primitive, or −1. direction, weight, pdf, specular: the BSDF sample; weight: f·|cos|/pdf. emission_clamp,
+#: direct_clamp: the factors by which clamps scale both contributions, 1 without.
 VERTEX = record(position="3f4", distance="f4", geometric_normal="3f4", primitive="i4", shading_normal="3f4",
                 instance="i4", throughput="3f4", end="i4", radiance="3f4", front="i4", emission="3f4", emitter="i4",
                 light_direction="3f4", light="i4", light_radiance="3f4", light_probability="f4", light_bsdf="3f4",
@@ -24,8 +24,8 @@ VERTEX = record(position="3f4", distance="f4", geometric_normal="3f4", primitive
 
 
 class End(IntEnum):
-    """Why a path ends at a vertex. NONE: it goes on. SIDE: the BSDF sample is on the wrong side of the geometric
-    normal. LOOPS: the driver ended the kernel's loops (device.loops)."""
+    """Reason why a path ends at a vertex. NONE: it continues. SIDE: the BSDF sample is on the wrong side of the
+    geometric normal. LOOPS: the driver ended the kernel's loops (device.loops)."""
 
     NONE = 0
     ESCAPED = 1
@@ -37,7 +37,7 @@ class End(IntEnum):
 
 
 def vertex_preamble() -> str:
-    """What kernels/debug.cl needs defined: the record, its members by kind, and the numbers of End."""
+    """Return the definitions that kernels/debug.cl needs: the record, its members by kind, and the numbers of End."""
     lists = {"ROWS": np.dtype("3f4"), "REALS": np.dtype("f4"), "INTS": np.dtype("i4")}
     members = {kind: [name for name in VERTEX.names or () if VERTEX[name] == of] for kind, of in lists.items()}
     return "\n".join([

@@ -1,4 +1,4 @@
-"""Says in one sentence what the paths of a pixel found: where its light comes from, or why it is black."""
+"""One-sentence summary of a pixel's paths: where its light comes from, or why it is black."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .outcomes import Outcome, outcomes
 from .record import End
 from .trace import PixelPaths, contributions
 
-#: Of several causes so many are named.
+#: Maximum number of causes that are named.
 MOST_NAMED = 3
 
 
 def summary(paths: PixelPaths, names: Names) -> str:
-    """Return what the samples of a pixel found, all of them together."""
+    """Return a summary of all samples of a pixel."""
     samples, dropped = len(paths.starts), int(np.count_nonzero(~paths.kept))
     facts = [f"{dropped} of {samples} samples are not finite and were dropped"] if dropped else []
     if paths.value.any():
@@ -32,7 +32,7 @@ def summary(paths: PixelPaths, names: Names) -> str:
 
 
 def _first(paths: PixelPaths, names: Names) -> str:
-    """What the camera sees."""
+    """Return what the camera sees."""
     rows = paths.rows[paths.starts]
     rows = rows[rows["primitive"] >= 0]
     missed = len(paths.starts) - len(rows)
@@ -42,7 +42,7 @@ def _first(paths: PixelPaths, names: Names) -> str:
 
 
 def _sources(paths: PixelPaths, names: Names) -> str:
-    """Shares of the light, by where it comes from, and how much of it is indirect."""
+    """Return the shares of the light by source, and how much of it is indirect."""
     rows, kept = paths.rows, np.repeat(paths.kept, paths.lengths)
     shares: Counter[str] = Counter()
     indirect = 0.0
@@ -59,7 +59,7 @@ def _sources(paths: PixelPaths, names: Names) -> str:
 
 def _by_source(rows: NDArray[Any], part: str, light: NDArray[np.float64],
                names: Names) -> dict[str, NDArray[np.bool_]]:
-    """Which rows' light is of which source. An emissive mesh is one, however many lights its triangles are."""
+    """Return which rows' light is from which source. An emissive mesh is one, however many triangle lights it has."""
     key = rows["emitter" if part == "emission" else "light"]
     found: dict[str, NDArray[np.bool_]] = {}
     for number in np.unique(key[light > 0]):
@@ -70,7 +70,7 @@ def _by_source(rows: NDArray[Any], part: str, light: NDArray[np.float64],
 
 
 def _darkness(paths: PixelPaths, names: Names) -> list[str]:
-    """What keeps light away from a pixel, as far as its paths show that."""
+    """Return what keeps light from reaching a pixel, as far as its paths show it."""
     rows, features = paths.rows, paths.compiled.features
     if not {"LIGHTS", "SKY"} & set(features):
         return ["nothing in this scene emits light"]
@@ -92,7 +92,7 @@ def _darkness(paths: PixelPaths, names: Names) -> list[str]:
 
 
 def _light_samples(rows: NDArray[Any], names: Names, title: str) -> list[str]:
-    """What became of the light samples, where some came to nothing."""
+    """Return the outcomes of the light samples, if some of them failed."""
     rows = rows[rows["light"] >= 0]
     found = np.array(outcomes(rows), object)
     facts = []
@@ -106,7 +106,7 @@ def _light_samples(rows: NDArray[Any], names: Names, title: str) -> list[str]:
 
 
 def _cause(outcome: Outcome, rows: NDArray[Any], names: Names) -> str:
-    """What an outcome is due to, in brackets."""
+    """Return the cause of an outcome, in brackets."""
     if outcome == Outcome.SHADOWED:
         return _bracketed(_hits(rows[rows["blocker"] >= 0], names, names.object, "blocker", "blocker_instance"), "by ")
     if outcome == Outcome.NO_BSDF:
@@ -117,7 +117,7 @@ def _cause(outcome: Outcome, rows: NDArray[Any], names: Names) -> str:
 
 
 def _ends(paths: PixelPaths, names: Names) -> list[str]:
-    """Why the paths end."""
+    """Return why the paths end."""
     ends = Counter(End(end) for end in paths.rows["end"] if end != End.NONE)
     absorbing = paths.rows[paths.rows["end"] == End.ABSORBED]
     materials = _bracketed(_hits(absorbing, names, names.material), "by ")
@@ -134,7 +134,7 @@ def _beyond(names: Names) -> str:
 
 def _hits(rows: NDArray[Any], names: Names, name: Callable[[int], str], primitive: str = "primitive",
           instance: str = "instance") -> Counter[str]:
-    """How often each object was hit, by what `name` calls it."""
+    """Return how often each object was hit, keyed by what `name` returns for it."""
     return _counted(names.hits(rows[primitive], rows[instance])[0], name)
 
 
@@ -150,7 +150,7 @@ def _bracketed(counts: Counter[str], how: str = "") -> str:
 
 
 def _listed(counts: Counter[str], how: str = "") -> str:
-    """The most frequent names with their counts, a single one without."""
+    """Return the most frequent names with their counts, or a single one without."""
     if len(counts) <= 1:
         return "".join(f"{how}{name}" for name in counts)
     most = counts.most_common(MOST_NAMED)

@@ -1,4 +1,4 @@
-"""Paths as text to read: a paragraph a sample, a few lines a vertex."""
+"""Paths as readable text: a paragraph per sample, a few lines per vertex."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _bsdf_sample(sample: BsdfSample) -> str:
 
 
 def _direction(values: Triple | None) -> str:
-    """A unit vector without the digits that are rounding."""
+    """Return a unit vector without the digits that are due to rounding."""
     return " ".join(f"{round(value, 6) + 0.0:.4g}" for value in values or ())
 
 

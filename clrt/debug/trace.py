@@ -1,4 +1,4 @@
-"""Traces the samples of one pixel on a device, and keeps every vertex of their paths."""
+"""Tracing of one pixel's samples on a device, recording every vertex of their paths."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from ..rendering.session import depth_of, first_launch, first_launch_samples
 from ..scene.model import RenderSettings, Scene
 from .record import VERTEX, End, vertex_preamble
 
-#: Records of a launch, at most, but for those of a single sample.
+#: Maximum records per launch, unless a single sample needs more.
 MOST_RECORDS = 1 << 15
-#: Samples of a brighter component, or one that is not finite, are dropped (kernels/film.cl).
+#: Samples with a component brighter than this, or not finite, are dropped (kernels/film.cl).
 BRIGHTEST = np.float32(1e31)
 
 
 @dataclass(frozen=True)
 class PixelPaths:
-    """The paths of a pixel's samples, in order.
+    """Paths of a pixel's samples, in order.
 
     rows: (n,) VERTEX records, path by path, in the frame of the compiled scene. starts: (spp,) where each path begins.
     values: (spp, 3) float32, the samples as the render adds them up.
@@ -46,34 +46,34 @@ class PixelPaths:
 
     @property
     def kept(self) -> NDArray[np.bool_]:
-        """(spp,) the samples that the film keeps: those that are finite."""
+        """(spp,) which samples the film accepts: those that are finite."""
         with np.errstate(invalid="ignore"):
             return np.asarray(np.all(np.abs(self.values) <= BRIGHTEST, axis=1))
 
     @property
     def value(self) -> NDArray[np.float64]:
-        """(3,) the mean of the samples that are kept: the pixel of the render; 0 where none is."""
+        """(3,) mean of the accepted samples, i.e. the pixel of the render; 0 if there are none."""
         kept = self.values[self.kept].astype(np.float64)
         return np.asarray(kept.mean(axis=0) if len(kept) else np.zeros(3))
 
     @property
     def depth(self) -> NDArray[np.int64]:
-        """(n,) the number of each vertex in its path, from 1."""
+        """(n,) path depth of each vertex, from 1."""
         return np.arange(len(self.rows)) - np.repeat(self.starts, self.lengths) + 1
 
     @property
     def lengths(self) -> NDArray[np.int64]:
-        """(spp,) vertices of each path."""
+        """(spp,) number of vertices of each path."""
         return np.diff(np.append(self.starts, len(self.rows)))
 
 
 def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: Choices = Choices(),
                 lanes: int | None = None) -> PixelPaths:
-    """Trace all `scene.render.spp` samples of the pixel (column, row), counted from the upper left corner, as a render
-    with the scene's settings traces them.
+    """Trace all `scene.render.spp` samples of the pixel (column, row), counted from the upper left corner, exactly as a
+    render with the scene's settings does.
 
-    choices, lanes: see `Renderer`. UsageError where the pixel is outside of the picture, or the integrator follows no
-    paths; SceneError, DeviceError and KernelError as of a render.
+    choices, lanes: see `Renderer`. Raises UsageError if the pixel is outside the image, or the integrator does not
+    trace paths; SceneError, DeviceError and KernelError like a render.
     """
     settings = scene.render
     _check(settings, pixel)
@@ -106,7 +106,7 @@ def trace_pixel(scene: Scene, device: Device, pixel: tuple[int, int], choices: C
 
 
 def contributions(rows: NDArray[Any], part: str) -> NDArray[np.float32]:
-    """(n, 3) float32: what these VERTEX records add to their samples by their `part`, "emission" or "direct"."""
+    """Return (n, 3) float32: what VERTEX records contribute to their samples by `part`, "emission" or "direct"."""
     return np.asarray(rows[part] * rows[f"{part}_clamp"][:, None])
 
 
@@ -120,7 +120,7 @@ def _check(settings: RenderSettings, pixel: tuple[int, int]) -> None:
 
 
 def _sums(paths: NDArray[Any], used: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """(count, 3) each path's contributions in float32, in the order in which the render adds them."""
+    """Return (count, 3), each path's contributions in float32, summed in the order of the render."""
     total = np.zeros((len(paths), 3), np.float32)
     with np.errstate(invalid="ignore", over="ignore"):
         for depth in range(paths.shape[1]):

@@ -1,4 +1,4 @@
-"""The vertices of a path as plain values with names, in the scene's own frame: what is printed, and written as JSON."""
+"""Path vertices as plain named values, in the scene's own frame, for printing and for JSON output."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ ENDS = {End.ESCAPED: "escaped", End.DEPTH: "depth limit", End.ABSORBED: "absorbe
 
 @dataclass(frozen=True)
 class Emission:
-    """Emission that the path found by itself. source: an object, or what lies infinitely far away; mis_weight: None
-    where nothing is emitted towards the path; clamp: the factor by which a clamp scales the contribution, 1 without;
-    contribution: to the sample's value."""
+    """Emission that the path hit by BSDF sampling or from the camera. source: an object, or something infinitely far
+    away; mis_weight: None if nothing is emitted towards the path; clamp: the factor by which a clamp scales the
+    contribution, 1 without; contribution: to the sample's value."""
 
     source: str
     radiance: Triple
@@ -35,12 +35,12 @@ class Emission:
 
 @dataclass(frozen=True)
 class LightSample:
-    """A light that was chosen, and a direction to it.
+    """Light sample: a chosen light, and a direction to it.
 
-    probability: of choosing this light; pdf: of the direction per solid angle, that included (a point, spot or
-    directional light without a size has that alone); radiance: that arrives if nothing is in between, or the irradiance
+    probability: of choosing this light; pdf: of the direction per solid angle, including that probability (for a point,
+    spot or directional light without a size it is just that); radiance: unoccluded incident radiance, or the irradiance
     of such a light; bsdf: f·|cos|; outcome: see `Outcome`; blocker: the object that casts the shadow; unshadowed: the
-    contribution if there were neither shadows nor clamps; clamp, contribution: as of `Emission`.
+    contribution without shadows or clamps; clamp, contribution: as in `Emission`.
     """
 
     light: str
@@ -59,8 +59,8 @@ class LightSample:
 
 @dataclass(frozen=True)
 class BsdfSample:
-    """The direction drawn from the material. pdf: per solid angle; weight: f·|cos|/pdf; specular: whether it is one of
-    single directions, of which no light sample is any."""
+    """Direction sampled from the BSDF. pdf: per solid angle; weight: f·|cos|/pdf; specular: whether it is from a delta
+    distribution, which light samples never hit."""
 
     direction: Triple
     pdf: float
@@ -70,9 +70,8 @@ class BsdfSample:
 
 @dataclass(frozen=True)
 class Vertex:
-    """One vertex of a path. object … shading_normal: None where the path escaped. front: whether the surface is seen
-    from its front side. throughput: radiance at the camera over radiance that arrives here. end: why the path ends
-    here, or None."""
+    """Vertex of a path. object … shading_normal: None if the path escaped. front: whether the front side is seen.
+    throughput: radiance at the camera over radiance that arrives here. end: why the path ends here, or None."""
 
     depth: int
     object: str | None
@@ -112,8 +111,8 @@ def vertices(paths: PixelPaths, names: Names, sample: int) -> Iterator[Vertex]:
 
 
 def mis_weight(row: NDArray[Any]) -> float | None:
-    """The weight with which the emission found at a vertex counts; None where there is none. Of several suns and a sky
-    together it is what remains of their sum."""
+    """Return the MIS weight of the emission found at a vertex; None if there is none. For several suns and a sky
+    together it is the weighted over the unweighted sum."""
     whole = row["throughput"].astype(np.float64) * row["radiance"]
     channel = int(np.argmax(whole))
     return float(row["emission"][channel] / whole[channel]) if whole[channel] > 0 else None

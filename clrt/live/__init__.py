@@ -1,1 +1,1 @@
-"""A scene that is looked at while it changes: all that an interactive window needs but the window."""
+"""Rendering of a scene while it is edited: everything that an interactive window needs except the window."""

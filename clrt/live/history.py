@@ -1,4 +1,4 @@
-"""Undo and redo: which parts of a scene were replaced, step by step."""
+"""Undo and redo of scene edits, as steps that replace parts of a scene."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 from ..scene.model import Scene
 
 Parts = dict[str, Any]
-#: Steps that can be undone; older ones are forgotten, and with them what they replaced.
+#: Maximum number of steps that can be undone; older ones are dropped with the parts that they replaced.
 STEPS = 200
 
 
 class History:
-    """Steps from one scene to the next. A step knows the parts that it replaced alone (fields of Scene, by identity),
-    so what changes beside them without being a step, such as where a walker stands, stays when one is undone."""
+    """Steps from one scene to the next. A step stores only the parts that it replaced (fields of Scene, by identity),
+    so changes that are not steps, such as the camera of a walk, are kept when one is undone."""
 
     def __init__(self) -> None:
         self._done: list[tuple[Parts, Parts]] = []
@@ -22,7 +22,7 @@ class History:
         self._going_on = False
 
     def record(self, before: Scene, after: Scene, goes_on: bool = False) -> None:
-        """A step; goes_on: the next one belongs to it, such as each position of something that is dragged."""
+        """Record a step; goes_on: the next one is merged into it, such as each position of a dragged object."""
         names = [each.name for each in fields(Scene) if getattr(before, each.name) is not getattr(after, each.name)]
         old, new = ({name: getattr(scene, name) for name in names} for scene in (before, after))
         if self._going_on and self._done:
@@ -34,11 +34,11 @@ class History:
         self._going_on = goes_on and bool(new)
 
     def undo(self, scene: Scene) -> Scene:
-        """The scene without the last step, or itself where there is none."""
+        """Return the scene without the last step, or the scene itself if there is none."""
         return self._move(scene, self._done, self._undone, 0)
 
     def redo(self, scene: Scene) -> Scene:
-        """The scene with the step that was undone last, or itself."""
+        """Return the scene with the step that was undone last, or the scene itself if there is none."""
         return self._move(scene, self._undone, self._done, 1)
 
     @property
@@ -48,7 +48,7 @@ class History:
 
     @property
     def can_redo(self) -> bool:
-        """Whether there is a step that was undone."""
+        """Whether there is a step to redo."""
         return bool(self._undone)
 
     def _move(self, scene: Scene, source: list[tuple[Parts, Parts]], target: list[tuple[Parts, Parts]],

@@ -1,4 +1,4 @@
-"""A scene that is edited while it is rendered: the newest one asked for is worked at, the newest picture is at hand."""
+"""Interactive rendering of a scene that is edited: a thread renders the newest scene and publishes snapshots."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ from .picks import Picks, Thing
 from .settings import Selector, Settings
 from .snapshot import Snapshot
 
-#: A movement without anything new for so many seconds has ended.
+#: Seconds without an edit after which a movement has ended.
 SETTLED = 0.2
 _log = logging.getLogger(__name__)
 
 
 class Live:
-    """Everything may be called from any thread and returns at once, but for `wait`, `image` and `close`.
+    """Interactive renderer. All methods are thread-safe and return at once, except for `wait`, `image` and `close`.
 
-    Scenes are never changed in place: `edit` takes a new one that shares what stays the same (dataclasses.replace),
-    which then is not uploaded, built or compiled again. device: instead of that of `settings`.
+    Scenes are never modified in place: `edit` takes a new one that shares what is unchanged (dataclasses.replace),
+    which is then not uploaded, built or compiled again. device: overrides that of `settings`.
     """
 
     def __init__(self, scene: Scene, *, device: Selector = None,
@@ -54,31 +54,31 @@ class Live:
         self._history, self._picks = History(), Picks()
         self._lock, self._changed = RLock(), Condition()
         self._closed = False
-        self._unseen = True     # no picture of what is being rendered was published
+        self._unseen = True     # no image of the current request has been published
         self._renderer = LiveRenderer(self._begin)
         self._wait_for_end = beside(self._work, daemon=True)
 
     @property
     def scene(self) -> Scene:
-        """The newest one asked for."""
+        """The newest scene requested."""
         return self._asked.scene
 
     @property
     def settings(self) -> Settings:
-        """The newest ones asked for."""
+        """The newest settings requested."""
         return self._asked.settings
 
     @property
     def asked(self) -> int:
-        """The number of the newest edit or choice; a snapshot says which one it shows."""
+        """Number of the newest edit or choice; a snapshot contains the number that it shows."""
         return self._asked.number
 
     def edit(self, scene: Scene, *, moving: bool = False, step: bool = True) -> None:
-        """Shows this scene from now on; accumulation begins anew.
+        """Show this scene from now on; accumulation starts afresh.
 
-        moving: more edits follow at once, as while something is dragged or one walks: the resolution is lowered as far
-        as the wanted frame rate takes, until none has come for SETTLED seconds. They are one step of the history.
-        step: whether it can be undone; walks had better not.
+        moving: more edits follow immediately, as while dragging or walking: the resolution is reduced as far as the
+        target frame rate requires, until there was none for SETTLED seconds. They form one step of the history. step:
+        whether it can be undone; walks should not be.
         """
         with self._lock:
             if step:
@@ -86,37 +86,37 @@ class Live:
             self._ask(scene=scene, moving=moving)
 
     def choose(self, settings: Settings) -> None:
-        """Renders with these from now on."""
+        """Use these settings from now on."""
         self._ask(settings=settings, moving=False)
 
     def undo(self) -> None:
-        """Takes the last step back, if there is one."""
+        """Undo the last step, if there is one."""
         with self._lock:
             if self._history.can_undo:
                 self._ask(scene=self._history.undo(self.scene), moving=False)
 
     def redo(self) -> None:
-        """Takes the step again that was taken back last, if there is one."""
+        """Redo the step that was undone last, if there is one."""
         with self._lock:
             if self._history.can_redo:
                 self._ask(scene=self._history.redo(self.scene), moving=False)
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is a step to take back."""
+        """Whether there is a step to undo."""
         return self._history.can_undo
 
     @property
     def can_redo(self) -> bool:
-        """Whether there is a step to take again."""
+        """Whether there is a step to redo."""
         return self._history.can_redo
 
     def snapshot(self) -> Snapshot:
-        """The newest picture, and how it is coming along."""
+        """Return the newest image and its progress."""
         return self._snapshot
 
     def wait(self, until: Callable[[Snapshot], bool], seconds: float | None = None) -> Snapshot:
-        """The first snapshot of which that holds, or the one after so many seconds."""
+        """Return the first snapshot for which `until` holds, or the current one after `seconds` or when closed."""
         snapshot = self._snapshot
 
         def holds() -> bool:
@@ -128,8 +128,9 @@ class Live:
         return snapshot
 
     def pick(self, x: float, y: float) -> Future[Thing | None]:
-        """What is seen first at a place of the picture, or None for the sky; (0, 0) is its upper left corner, (1, 1)
-        the lower right. It is an object of the scene that was shown when that was found out. Raises what renders do."""
+        """Return a future of the first hit at a position of the image, or None for the sky; (0, 0) is the upper left
+        corner, (1, 1) the lower right. It is an object of the scene shown when answered. Raises the errors of renders.
+        """
         with self._lock:
             found = self._picks.ask(x, y)
             if self._closed:
@@ -138,14 +139,14 @@ class Live:
         return found
 
     def image(self) -> Image:
-        """The newest picture, to be saved; with its whole report if it is of the whole size."""
+        """Return the newest image for saving; with its full report if it has the full size."""
         with self._lock:
             still, snapshot = self._still, self._snapshot
         report = render_report(*still) if still else {"integrator": snapshot.scene.render.integrator}
         return Image(snapshot.shown, report, None if snapshot.denoised is None else snapshot.pixels)
 
     def close(self) -> None:
-        """Ends the work and waits for that."""
+        """Stop the thread and wait for its end."""
         with self._lock:
             self._closed = True
             self._renderer.abandon()
@@ -168,7 +169,7 @@ class Live:
             self._changed.notify()
 
     def _work(self) -> None:
-        """The thread: shows what was asked for last, until that is closed."""
+        """Render the newest request, until closed. Runs in the thread."""
         last: Asked | None = None
         while (asked := self._next(last)) is not None:
             try:
@@ -181,18 +182,18 @@ class Live:
                 pass
             except ClrtError as error:
                 self._publish(asked=asked.number, error=str(error), phase="rest")
-            except Exception as error:  # a mistake of ours must not leave a picture that never changes again
+            except Exception as error:  # a bug must not freeze the image forever
                 _log.exception("a picture failed")
                 self._publish(asked=asked.number, error=f"{type(error).__name__}: {error}", phase="rest")
 
     def _next(self, last: Asked | None) -> Asked | None:
-        """What to show, once it is not the last, or the last where something is asked of it; None in the end."""
+        """Wait for a request other than the last, or for picks in the last, and return it; None when closed."""
         self._changed.wait_for(lambda: self._closed or bool(self._picks) or self._asked is not last)
-        with self._lock:    # else what was asked for just now could be abandoned with the last
+        with self._lock:    # else the newest request could be abandoned along with the last
             return None if self._closed else self._asked
 
     def _show(self, asked: Asked) -> None:
-        """Renders it to the end, first a small picture where a whole one would take too long."""
+        """Render a request to its end, first at reduced size if the full size would take too long."""
         self._unseen = True
         quick = self._renderer.quick_size(asked)
         if quick != asked.size:
@@ -219,13 +220,13 @@ class Live:
             raise Superseded
 
     def _is_denoised(self, asked: Asked, size: tuple[int, int]) -> bool:
-        """Whether this picture is to be: of light, and whole."""
+        """Return whether the image is denoised: it must show light and have the full size."""
         light = asked.scene.render.integrator in INTEGRATORS
         return asked.settings.denoise and light and size == asked.size and not self._is_superseded(asked)
 
     def _is_superseded(self, asked: Asked) -> bool:
-        """Whether something newer is to be shown instead; a movement first shows what was begun, or it would show
-        nothing as long as it lasts."""
+        """Return whether something newer is to be shown instead; during a movement the current image is shown first, as
+        otherwise nothing would be shown until it ends."""
         newest = self._asked
         return self._closed or newest is not asked and not (self._unseen and newest.moving)
 

@@ -1,4 +1,4 @@
-"""Renders what is asked for, one after another: what belongs to the thread that works."""
+"""Renderer of successive requests, used only by the rendering thread."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from .picks import Thing
 from .settings import Selector, Settings
 
 
-#: The part of the time that denoising may take before all samples are there.
+#: Maximum fraction of the time spent on denoising before all samples are rendered.
 DENOISING = 0.25
 
 
 class Asked(NamedTuple):
-    """What is to be seen. number: of the edit or choice; moving: more like it will follow at once."""
+    """Request of an image. number: of the edit or choice; moving: more requests of its kind follow immediately."""
 
     number: int
     scene: Scene
@@ -34,42 +34,42 @@ class Asked(NamedTuple):
 
     @property
     def size(self) -> tuple[int, int]:
-        """Of the whole picture, (width, height)."""
+        """Full size of the image, (width, height)."""
         return self.settings.size_of(self.scene.render.size)
 
 
 class Superseded(Exception):
-    """Something else was asked for meanwhile."""
+    """Raised if there is a newer request."""
 
 
 class LiveRenderer:
-    """Keeps what the next picture can use of the last one.
+    """Renderer that keeps what the next image can reuse from the last one.
 
-    on_phase: hears what begins, and raises Superseded where that has become useless.
+    on_phase: called as each phase begins; raises Superseded if that is no longer needed.
     """
 
     def __init__(self, on_phase: Callable[[str], None]) -> None:
         self._on_phase = on_phase
         self._devices: list[Device] = []
-        self._selector: object = self     # nobody's
+        self._selector: object = self     # equal to no selector
         self._pace = Pace()
         self.renderer: Renderer | None = None
-        #: How often another one was needed than before.
+        #: Number of program changes.
         self.programs = 0
         self._denoiser: Denoiser | None = None
         self._guides: dict[str, NDArray[np.float32]] = {}
-        self._guided: Renderer | None = None    # whose guides these are
+        self._guided: Renderer | None = None    # renderer of these guides
         self._denoise_from = 0.0
-        self._met: NDArray[np.generic] = np.zeros((0, 0), np.int32)    # objects' numbers, pixel by pixel
-        self._met_by: Renderer | None = None    # where these are seen
+        self._met: NDArray[np.generic] = np.zeros((0, 0), np.int32)    # object numbers per pixel
+        self._met_by: Renderer | None = None    # renderer of these numbers
 
     def quick_size(self, asked: Asked) -> tuple[int, int]:
-        """Of a picture that comes in time while things move; the whole one's where that does."""
+        """Return the image size that meets the target frame rate during movements; the full size if that does."""
         rate = asked.settings.frame_rate
         return self._pace.size(asked.size, asked.settings.samples, 1 / rate) if rate else asked.size
 
     def states(self, asked: Asked, size: tuple[int, int], spp: int) -> Iterator[State]:
-        """The picture at more and more samples, up to `spp`."""
+        """Yield the image's states with increasing sample counts, up to `spp`."""
         start = time.perf_counter()
         self._guided = self._met_by = None
         self._open(asked.settings.device)
@@ -85,7 +85,7 @@ class LiveRenderer:
             if first == 0:
                 preparation = begun - start - renderer.session.build_seconds
                 self._pace.note(size, state.spp, preparation, time.perf_counter() - begun)
-                if changed:     # drivers compile at the first launch, some of them
+                if changed:     # some drivers compile at the first launch
                     give_back()
             yield state
 
@@ -95,7 +95,7 @@ class LiveRenderer:
             self._devices, self._selector = open_devices(selector), selector
 
     def denoised(self, state: State) -> NDArray[np.float32] | None:
-        """The state's pixels denoised; None while that would take more of the time than DENOISING."""
+        """Return the state's denoised pixels; None as long as that would exceed the fraction DENOISING of the time."""
         renderer, now = self.renderer, time.perf_counter()
         if renderer is None or now < self._denoise_from and not renderer.stop_reason:
             return None
@@ -108,7 +108,7 @@ class LiveRenderer:
         return pixels
 
     def seen_at(self, x: float, y: float) -> Thing | None:
-        """What is seen first there (see `Picks`), in the middle of a pixel."""
+        """Return the first hit at a position (see `Picks`), at a pixel's centre."""
         renderer = self.renderer
         if renderer is None:
             return None
@@ -121,6 +121,6 @@ class LiveRenderer:
         return None if number < 0 else things[number]
 
     def abandon(self) -> None:
-        """Has `states` end soon; for any thread."""
+        """Make `states` end soon; thread-safe."""
         if (renderer := self.renderer) is not None:
             renderer.abandon()

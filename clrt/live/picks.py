@@ -1,4 +1,4 @@
-"""What is seen at places of a picture: any thread asks, the one that renders answers."""
+"""Queue of picking requests: any thread asks for the first hit at an image position, the rendering thread answers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Thing = Mesh | Instance | Sphere
 
 
 class Picks:
-    """Those that are not answered yet."""
+    """Picking requests that are not answered yet."""
 
     def __init__(self) -> None:
         self._asked: deque[tuple[float, float, Future[Thing | None]]] = deque()
@@ -21,25 +21,25 @@ class Picks:
         return bool(self._asked)
 
     def ask(self, x: float, y: float) -> Future[Thing | None]:
-        """What is at (x, y), or None for the sky; (0, 0) is the picture's upper left corner, (1, 1) its lower right."""
+        """Return a future of what is at (x, y), None for the sky; the corners are (0, 0), upper left, and (1, 1)."""
         found: Future[Thing | None] = Future()
         self._asked.append((x, y, found))
         return found
 
     def answer(self, seen_at: Callable[[float, float], Thing | None]) -> None:
-        """Answers all."""
+        """Answer all requests."""
         while self._asked:
             x, y, found = self._asked.popleft()
             if not found.set_running_or_notify_cancel():
-                continue    # nobody waits for it any more
+                continue    # the request was cancelled
             try:
                 thing = seen_at(x, y)
-            except Exception as error:    # whatever it is, it is who asked that must know
+            except Exception as error:    # any error is passed to the caller of `ask`
                 found.set_exception(error)
             else:
                 found.set_result(thing)
 
     def cancel(self) -> None:
-        """Has nobody wait for the others any more."""
+        """Cancel all remaining requests."""
         while self._asked:
             self._asked.popleft()[-1].cancel()

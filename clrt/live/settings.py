@@ -1,4 +1,4 @@
-"""What a user chooses about an interactive picture beside the scene, whose own settings are edited with it."""
+"""Settings of interactive rendering that are not part of the scene, whose own settings are edited with it."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from ..errors import UsageError
 
 
 Selector = str | int | Sequence[str | int] | None
-#: Settings that are not a renderer's, or are given to it otherwise.
+#: Settings that are not passed to the renderer, or not by the same name.
 OWN = {"device", "scale", "frame_rate", "samples", "denoise"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """How the newest scene is rendered; integrator, depth, size and end (`spp`) are those of `scene.render`.
+    """Settings for rendering the newest scene; integrator, depth, size and end (`spp`) are those of `scene.render`.
 
-    device: see `clrt devices`; tree, builder, layout, triangle: see `rendering.renderer.Renderer`. scale: of the
-    picture's width and height. frame_rate: pictures a second while things move, for which the resolution is lowered as
-    far as it takes; 0: never. samples: a pixel of each of these. denoise: whether a picture at rest is denoised.
+    device: see `clrt devices`; tree, builder, layout, triangle: see `rendering.renderer.Renderer`. scale: factor for
+    width and height. frame_rate: target images per second during movements, for which the resolution is reduced as far
+    as needed; 0: never. samples: samples per pixel of each of these. denoise: whether an image at rest is denoised.
     Raises UsageError.
     """
 
@@ -42,14 +42,14 @@ class Settings:
 
     @property
     def tracing(self) -> dict[str, Any]:
-        """Those that a Renderer takes by the same names."""
+        """Settings that a Renderer takes by the same names."""
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in OWN}
 
     def size_of(self, size: tuple[int, int]) -> tuple[int, int]:
-        """A scene's (width, height), scaled."""
+        """Return a scene's (width, height), scaled."""
         return scaled(size, self.scale)
 
 
 def scaled(size: tuple[int, int], factor: float) -> tuple[int, int]:
-    """(width, height) times a factor, at least a pixel each."""
+    """Return (width, height) times a factor, at least 1 pixel each."""
     return max(1, round(size[0] * factor)), max(1, round(size[1] * factor))

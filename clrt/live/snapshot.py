@@ -1,4 +1,4 @@
-"""What an interactive picture looks like now, and how it is coming along."""
+"""Snapshot of an interactive image and of its progress."""
 
 from __future__ import annotations
 
@@ -11,24 +11,22 @@ from numpy.typing import NDArray
 from ..scene.model import Scene
 from .settings import Settings
 
-#: "start": nothing yet; "build": packing, tree; "compile": program, upload; "render"; "rest": all samples are there, or
-#: there is an error, or nothing to do until a movement goes on or ends.
+#: "start": nothing yet; "build": packing, BVH build; "compile": program build, upload; "render"; "rest": all samples
+#: are rendered, or there is an error, or nothing to do until a movement continues or ends.
 Phase = Literal["start", "build", "compile", "render", "rest"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Snapshot:
-    """The newest picture. Nothing in it changes any more, so it may be kept and read by any thread.
+    """Newest image. It is immutable, so it may be kept and read by any thread.
 
-    number: how many pictures there were before it. pixels: (height, width, 3) float32, linear Rec. 709, smaller than
-    `size`, (width, height), while things move; denoised: likewise, of these
-    samples or some before, if there is such. spp: samples a pixel; seconds:
-    that they took; noise: estimated √relMSE, or None; history: the same as samples grew, {spp, seconds, noise} each.
-    scene, settings: what the picture shows, and `asked` which edit or choice that was (Live.asked); error: why
-    what was asked for last is not shown, or None.
-    frames_per_second: pictures in the last second. rays_per_second: of this picture. device: its name; device_bytes:
-    memory there; tree: as the report's `bvh`; features: what is compiled in;
-    programs: how often another program was needed than before.
+    number: how many images preceded it. pixels: (height, width, 3) float32, linear Rec. 709, smaller than `size`,
+    (width, height), during movements; denoised: likewise, of these samples or an earlier state, if available. spp:
+    samples per pixel; seconds: their rendering time; noise: estimated √relMSE, or None; history: the same as samples
+    grew, {spp, seconds, noise} each. scene, settings: those of the image, and `asked` the number of their edit or
+    choice (Live.asked); error: why the newest request is not shown, or None. frames_per_second: images in the last
+    second. rays_per_second: of this image. device: its name; device_bytes: memory used there; tree: like the report's
+    `bvh`; features: those compiled in; programs: number of program changes.
     """
 
     scene: Scene
@@ -54,5 +52,5 @@ class Snapshot:
 
     @property
     def shown(self) -> NDArray[np.float32]:
-        """The denoised pixels where there are such, else the pixels."""
+        """The denoised pixels if available, else the pixels."""
         return self.pixels if self.denoised is None else self.denoised

@@ -1,1 +1,1 @@
-"""How it is drawn: a scene packed into buffers and a program, launches, accumulation, noise."""
+"""Rendering: scene packing, program assembly, kernel launches, sample accumulation and error estimation."""

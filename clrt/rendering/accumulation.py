@@ -1,4 +1,4 @@
-"""A picture in the making, whoever renders it: which samples it has, and how it gets more."""
+"""Base class of images in progress: which samples they have, and how samples are added."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ from .work import Work
 
 
 class Accumulation(ABC):
-    """The samples of one compiled scene at one size. Nothing depends on how the work is cut, or on who does it."""
+    """Samples of one compiled scene at one size. The result does not depend on how work is divided or among which
+    devices."""
 
-    #: Its number in the scene's whole picture.
+    #: Number of its first tile in the whole image.
     first_tile = 0
 
     def __init__(self, size: tuple[int, int]) -> None:
@@ -33,18 +34,19 @@ class Accumulation(ABC):
 
     @property
     def tile_samples(self) -> NDArray[np.int64]:
-        """(rows, columns) samples that the pixels of each tile have, or had before the work in hand."""
+        """(rows, columns) samples per pixel of each tile, or those before the pending work."""
         return self.work.samples
 
     @property
     def samples_done(self) -> int:
-        """Samples a pixel, the mean over all, rounded."""
+        """Samples per pixel, averaged over the image and rounded."""
         return mean_samples(self.tile_samples, self.size)
 
     def render(self, samples: int) -> Iterator[None]:
-        """Adds the next `samples` samples to every pixel, in bounded launches; yields after each.
+        """Add the next `samples` samples to every pixel, in bounded launches; yield after each.
 
-        All tiles must have as many. If it is left before its end, the next call, of `double` too, first ends that.
+        All tiles must have the same sample count. If it is left before its end, the next call, also of `double`,
+        finishes that work first.
         """
         self.mend()
         if not self._busy:
@@ -52,16 +54,16 @@ class Accumulation(ABC):
         yield from self._run()
 
     def advance(self, room: Callable[[int], int]) -> Iterator[None]:
-        """Adds a pass: as many samples to every pixel as there is `room` for after those done, `pass_limit` at most;
-        otherwise like `render`. Of more samples than are done room tells what may follow; 0 where nothing does."""
+        """Add a pass of at most `pass_limit` samples per pixel; otherwise like `render`. `room` maps a sample count,
+        which may be ahead of the samples done, to the number of samples that may follow it, 0 if none."""
         yield from self.render(max(1, min(room(self.samples_done), self.pass_limit())))
 
     def advance_ahead(self, room: Callable[[int], int]) -> Iterator[None] | None:
-        """Like `advance`, but the first launch is made now; None where that would have to wait for something."""
+        """Like `advance`, but make the first launch now; return None if that would have to wait."""
         return None
 
     def double(self, tiles: NDArray[np.intp]) -> Iterator[None]:
-        """Doubles the samples of these tiles, by their number in `tile_samples`; otherwise like `render`."""
+        """Double the samples of these tiles, numbered as in `tile_samples`; otherwise like `render`."""
         self.mend()
         if not self._busy:
             self.work.double(tiles)
@@ -69,11 +71,11 @@ class Accumulation(ABC):
 
     @property
     def _busy(self) -> bool:
-        """Whether there is work in hand."""
+        """Whether work is pending."""
         return bool(self.work.parts)
 
     def work_left(self) -> Work:
-        """The work as a checkpoint keeps it, beside the film as it is now."""
+        """Return the work as a checkpoint stores it, along with the current film."""
         return self.work
 
     def _run(self) -> Iterator[None]:
@@ -82,18 +84,18 @@ class Accumulation(ABC):
 
     @contextmanager
     def _tearing(self) -> Iterator[None]:
-        """Around what an exception, as of Ctrl-C, may end between two steps, so that the film has not what the work
-        says."""
+        """Mark the work as torn if an exception such as Ctrl-C may have left the film and the work inconsistent."""
         try:
             yield
-        except GeneratorExit:    # it comes between launches
+        except GeneratorExit:    # raised between launches
             raise
         except BaseException:
             self._torn = True
             raise
 
     def mend(self) -> None:
-        """Where the work was torn it becomes what the film has not; where it was left after its last launch it ends."""
+        """Make work and film consistent: torn work becomes the samples that the film lacks, and work left after its
+        last launch is completed."""
         if self._torn:
             self.wait()
             self.work.take_stock(self.film().tile_samples)
@@ -102,16 +104,17 @@ class Accumulation(ABC):
             self.work.settle()
 
     def _settle(self) -> None:
-        """Where nothing is in hand or in flight; of torn work it is not known what is missing."""
+        """Complete the work if nothing is pending or in flight; not if it is torn, as the missing samples are unknown.
+        """
         if not self._torn:
             self.work.settle()
 
     @abstractmethod
     def _work(self) -> Iterator[None]:
-        """Launches what is in hand."""
+        """Launch the pending work."""
 
     def look(self, camera: Camera) -> None:
-        """Begins anew, without any samples, as this camera sees the scene (see `SceneOnDevice.look`)."""
+        """Start afresh, without samples, from this camera (see `SceneOnDevice.look`)."""
         self.wait()
         self.work, self._torn = Work(np.zeros(tiles_of(self.size), np.int64)), False
         for scene in self.scenes:
@@ -120,89 +123,89 @@ class Accumulation(ABC):
 
     @abstractmethod
     def _clear(self) -> None:
-        """Makes the film black."""
+        """Set the film to black."""
 
     @abstractmethod
     def wait(self) -> None:
-        """Waits for the launches in flight."""
+        """Wait for the launches in flight."""
 
     @abstractmethod
     def pass_limit(self) -> int:
-        """The most samples a pixel that one pass should add, so that ending inside a pass leaves an even picture."""
+        """Return the maximum samples per pixel for one pass, so that stopping inside a pass leaves an even image."""
 
     @abstractmethod
     def film(self) -> Film:
-        """The film so far; waits for the launches in flight."""
+        """Return the current film; waits for the launches in flight."""
 
     def whole_film(self) -> Film:
-        """The film, which has what the work says, whatever was interrupted."""
+        """Return the film, consistent with the work even after an interruption."""
         self.mend()
         return self.film()
 
     @abstractmethod
     def restore(self, film: Film, work: Work) -> None:
-        """Goes on from a film of this size and the work that it was rendered by."""
+        """Resume from a film of this size and the work that produced it."""
 
     @property
     @abstractmethod
     def scene(self) -> SceneOnDevice:
-        """The scene where other kernels can be run on it."""
+        """The scene on a device where other kernels can be run on it."""
 
     @property
     @abstractmethod
     def longest_launch(self) -> float:
-        """Seconds of the launch that took longest."""
+        """Duration of the longest launch in seconds."""
 
     @property
     def scenes(self) -> list[SceneOnDevice]:
-        """The scene on every device that is still there."""
+        """The scene on every device that is still in use."""
         return [self.scene]
 
     @property
     def build_seconds(self) -> float:
-        """What building its programs took."""
+        """Seconds spent building its programs."""
         return sum(scene.build_seconds for scene in self.scenes)
 
     @property
     def cached(self) -> bool:
-        """Whether all programs had been built before."""
+        """Whether all programs came from the cache."""
         return all(scene.program.cached for scene in self.scenes)
 
     @property
     def device_bytes(self) -> int:
-        """Memory of all buffers, on the device that has most."""
+        """Memory of all buffers, on the device that uses most."""
         return max(scene.device_bytes for scene in self.scenes)
 
     def shares(self) -> list[dict[str, Any]]:
-        """What each of several devices did, for the report."""
+        """Return what each of several devices rendered, for the report."""
         return []
 
     def machine(self, devices: Sequence[Device]) -> dict[str, Any]:
-        """What a report says of these devices, which were to render it, and of what they built."""
-        from .machine import machine_report    # like the next two it takes a whole Accumulation
+        """Return the report's fields on these devices, and on the programs and BVHs built for them."""
+        from .machine import machine_report    # needs the complete Accumulation class, like the next two
 
         return machine_report(devices, self)
 
     def guides(self) -> dict[str, NDArray[np.float32]]:
-        """What guides a denoiser: see `render_guides`."""
+        """Return the guides for a denoiser, see `render_guides`."""
         from .guides import render_guides
 
         return render_guides(self)
 
     def first_hits(self, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
-        """What is seen first of the scene that this is of: see `first_hits`."""
+        """Return AOVs of the first hits in the scene being rendered, see `first_hits`."""
         from .first_hits import first_hits
 
         return first_hits(self, scene, names)
 
     @property
     def device(self) -> Device:
-        """The scene's."""
+        """The scene's device."""
         return self.scene.device
 
     @property
     def compiled(self) -> CompiledScene:
-        """The scene's."""
+        """The compiled scene."""
         return self.scene.compiled
 
     @property
@@ -212,9 +215,9 @@ class Accumulation(ABC):
 
     @property
     def scene_arguments(self) -> list[Any]:
-        """What every kernel of the scene takes first."""
+        """Leading arguments of every kernel of the scene."""
         return self.scene.scene_arguments
 
     def enqueue(self, kernel: cl.Kernel, pixel_count: int) -> cl.Event:
-        """See `SceneOnDevice.enqueue`."""
+        """Enqueue a kernel, see `SceneOnDevice.enqueue`."""
         return self.scene.enqueue(kernel, pixel_count)

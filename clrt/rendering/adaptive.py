@@ -1,9 +1,9 @@
-"""Adaptive sampling: which tiles' samples to double next.
+"""Adaptive sampling: selection of the tiles whose samples are doubled next.
 
-It biases a picture: where the samples so far happen to be bright they differ more, too, so more are taken and make up
-for it; where they happen to be dark none are, and nothing does. The less, the more samples there are. Half of what is
-said of a tile's error is its four neighbours', who know nothing of that chance: it takes half of the bias away, and a
-twentieth of the gain (docs/performance.md).
+It biases the image: tiles whose samples happen to be bright also show a higher variance, so they get more samples,
+which corrects them; tiles that happen to be dark get none and stay dark. The bias decreases with the sample count. Half
+of a tile's error estimate comes from its four neighbours, which are independent of that chance: this removes half of
+the bias, and a twentieth of the gain (docs/performance.md).
 """
 
 from __future__ import annotations
@@ -14,27 +14,27 @@ from numpy.typing import NDArray
 from .film import Film
 from .tiles import tile_pixels, tile_sums
 
-#: Samples that all pixels get before any tile gets more than others.
+#: Samples per pixel before the distribution becomes adaptive.
 FLOOR_SPP = 16
-#: By what part of all samples so far a round adds to them.
+#: Fraction of all samples so far that one round adds.
 GROWTH = 0.5
-#: By how much some tiles' samples may exceed what is planned before they begin anew.
+#: Maximum factor by which a tile's samples may exceed the plan before the sampler starts afresh.
 MOST_TIMES_PLANNED = 4
 
 
 def most_planned(spp: int | None, adaptive: bool) -> int | None:
-    """The samples that any pixel may get, where so many are planned for each."""
+    """Return the maximum samples of any pixel, given the planned samples per pixel."""
     return None if spp is None else int(spp) * (MOST_TIMES_PLANNED if adaptive else 1)
 
 
 def tiles_to_double(film: Film, tile_samples: NDArray[np.int64], errors: NDArray[np.float64],
                     spp: int | None) -> NDArray[np.intp]:
-    """The tiles of a round, by number; none where `spp` samples a pixel are reached. tile_samples, errors: (rows,
-    columns), of each tile's pixels and of all its values."""
+    """Return the tile numbers of the next round; none if `spp` samples per pixel are reached. tile_samples, errors:
+    (rows, columns), samples per pixel of each tile and squared error summed over its values."""
     height, width = film.pixels.shape
     samples = tile_samples * tile_pixels((width, height))
     done = int(samples.sum())
-    most = max(GROWTH * done, samples.max())    # of few tiles at least the dearest, else none may ever fit
+    most = max(GROWTH * done, samples.max())    # at least the most expensive tile, else none might ever fit
     if spp is not None:
         most = min(most, spp * film.pixels.size - done)
     return worth_doubling(errors, tile_sums(film.pixels["rays"]), samples, most)
@@ -42,10 +42,11 @@ def tiles_to_double(film: Film, tile_samples: NDArray[np.int64], errors: NDArray
 
 def worth_doubling(errors: NDArray[np.float64], rays: NDArray[np.float64], samples: NDArray[np.int64],
                    most: float) -> NDArray[np.intp]:
-    """The tiles whose doubling takes most error away for what it costs, by number, of `most` samples together at most.
+    """Return the tiles whose doubling reduces the error most per cost, with at most `most` samples in total.
 
-    All arrays (rows, columns), sums over a tile's values or pixels: squared error, which falls by half or so with each
-    doubling; rays so far, which is what as many samples cost again; samples so far. What does not fit is passed over.
+    All arrays are (rows, columns) sums over a tile's values or pixels: squared error, which about halves with each
+    doubling; rays so far, the cost of another as many samples; samples so far. Tiles that exceed the remaining budget
+    are skipped.
     """
     worth = _with_neighbours(errors) / np.maximum(rays, 1)
     best, costs, chosen = np.argsort(-worth.ravel(), kind="stable"), samples.ravel(), []

@@ -1,7 +1,7 @@
-"""A scene's program, begun before its tree: where the tree's builder has to be compiled, too, that takes as long.
+"""Early program compilation, in parallel with the BVH build if the builder has to be compiled, too: both take as long.
 
-What is compiled does not depend on how many triangles a mesh has, so it is found out with one of each. Where that
-should be wrong the program is compiled when it is needed, as ever.
+The program does not depend on the triangle count of a mesh, so it is derived from an outline with one triangle per
+mesh. If the outline yields a different program, the right one is compiled later, when it is needed.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from ..scene.model import Mesh, Scene
 from ..threads import beside
 from .choices import Choices
 
-#: By how much more memory a scene takes once it is packed, about; and the most that may be in an outline.
+#: Approximate factor by which packing enlarges a scene in memory; and the maximum number of primitives in an outline.
 PACKED, MOST = 3, 1000
 PER_VERTEX = ("vertices", "normals", "uv", "uv1", "colors", "tangents")
 
 
 def begin_program(scene: Scene, choices: Choices, device: Device, source: Callable[[Scene, Choices], str]) -> None:
-    """Has another process compile what `source` makes of a scene, where that saves time, and takes little memory."""
+    """Compile the program `source` of a scene in another process, if that saves time and takes little memory."""
     if not device.is_pocl or scene.instances or _processors() < 2:
         return
     count, spheres = sum(len(mesh.faces) for mesh in scene.meshes), len(scene.spheres)
     in_tree = spheres if spheres > FEW_SPHERES else 0
     layout = choices.layout or fitting_layout(device, count, in_tree, choices.tests.triangle, False, choices.tree)
-    with suppress(ClrtError):   # what is wrong will be told where it matters
+    with suppress(ClrtError):   # errors are reported by the regular compilation
         outlined = outline(scene)
         builder = builder_source(device, layout, choices.builder, count, in_tree)
         if (builder is None or is_kept(device, builder) or PACKED * _bytes(scene) > LARGE
@@ -46,17 +46,17 @@ def begin_program(scene: Scene, choices: Choices, device: Device, source: Callab
 
 
 def _compile(device: Device, outlined: Scene, choices: Choices, source: Callable[[Scene, Choices], str]) -> None:
-    with suppress(ClrtError):   # it will come again
+    with suppress(ClrtError):   # the error recurs in the regular compilation
         compile_ahead(device, source(outlined, choices))
 
 
 def _processors() -> int:
-    """That this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def outline(scene: Scene) -> Scene:
-    """The scene with one triangle of each mesh that is no lamp."""
+    """Return the scene with each mesh that is not emissive reduced to one triangle."""
     return replace(scene, meshes=[mesh if any(mesh.material.radiance) else _one_triangle(mesh)
                                   for mesh in scene.meshes])
 
@@ -68,7 +68,7 @@ def _one_triangle(mesh: Mesh) -> Mesh:
 
 
 def _bytes(scene: Scene) -> int:
-    """Of its arrays, which are packed twice."""
+    """Return the size of its arrays, which are packed twice."""
     arrays: list[NDArray[Any] | None] = [getattr(mesh, name) for mesh in scene.meshes
                                          for name in ("faces", *PER_VERTEX)]
     materials = [mesh.material for mesh in scene.meshes] + [sphere.material for sphere in scene.spheres]

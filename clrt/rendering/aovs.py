@@ -1,4 +1,4 @@
-"""Pictures beside the picture (AOVs): which there are, and where they come from."""
+"""AOVs (arbitrary output variables): which exist, and how they are computed."""
 
 from __future__ import annotations
 
@@ -16,15 +16,14 @@ from .features import WITH_LIGHT
 from .film import Film
 from .first_hits import MEANS, OF_THE_MIDDLE
 
-#: What the film of the render itself holds; of these the first two ask it to keep direct light apart.
+#: AOVs from the render's film; the first two make it accumulate direct light separately.
 LIGHT = ("direct", "indirect")
 OF_THE_FILM = (*LIGHT, "variance", "samples")
 AOVS = (*MEANS, *OF_THE_MIDDLE, *OF_THE_FILM)
 
 
 class Aovs:
-    """Those of one render, by the names and in the order that they were asked for. UsageError as of `chosen_aovs` and
-    `check_light`."""
+    """AOVs of one render, by name in the requested order. Raises UsageError like `chosen_aovs` and `check_light`."""
 
     def __init__(self, names: str | Iterable[str], integrator: str) -> None:
         self._names = chosen_aovs(names)
@@ -32,18 +31,19 @@ class Aovs:
         self._first_hits = dict[str, NDArray[np.generic]]()
 
     def begin(self, picture: Accumulation, scene: Scene) -> None:
-        """Makes those of first hits, so that an interrupted picture has them, too."""
+        """Render the first-hit AOVs, so that an interrupted render has them, too."""
         seen = seen_first(self._names)
         self._first_hits = picture.first_hits(scene, seen) if seen else {}
 
     def of(self, film: Film) -> dict[str, NDArray[np.generic]]:
-        """All of them, with this film."""
+        """Return all requested AOVs, given this film."""
         made = self._first_hits | film_aovs(film, self._names)
         return {name: made[name] for name in self._names}
 
 
 def chosen_aovs(names: str | Iterable[str]) -> tuple[str, ...]:
-    """The names, each once; text is taken for names with commas between. UsageError for one that is none of AOVS."""
+    """Return the names without duplicates; a string holds names separated by commas. Raises UsageError for names not in
+    AOVS."""
     if not isinstance(names, Iterable):
         raise UsageError(f"aovs is {names!r}; give names, in a list or with commas between")
     given = names.split(",") if isinstance(names, str) else list(names)
@@ -58,27 +58,27 @@ def chosen_aovs(names: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def needs_direct_light(names: Iterable[str]) -> bool:
-    """Whether the film has to keep direct light apart for them."""
+    """Return whether the film must accumulate direct light separately for these AOVs."""
     return not set(LIGHT).isdisjoint(names)
 
 
 def check_light(names: Iterable[str], integrator: str) -> None:
-    """UsageError where they are of light, and the integrator is not."""
+    """Raise UsageError if AOVs of light are requested from an integrator that does not compute light transport."""
     if needs_direct_light(names) and integrator not in WITH_LIGHT:
         raise UsageError(f"the AOVs {' and '.join(LIGHT)} are of light, and the integrator is {integrator}; choose "
                          f"{' or '.join(WITH_LIGHT)}")
 
 
 def seen_first(names: Iterable[str]) -> tuple[str, ...]:
-    """Those that are of what rays meet first (`first_hits`)."""
+    """Return the names of the first-hit AOVs among them (`first_hits`)."""
     return tuple(name for name in names if name in (*MEANS, *OF_THE_MIDDLE))
 
 
 @with_default_errors
 def film_aovs(film: Film, names: Iterable[str]) -> dict[str, NDArray[np.generic]]:
-    """Those of OF_THE_FILM that `names` has: (height, width, 3) float32, but samples (height, width) uint32.
+    """Return the AOVs of OF_THE_FILM in `names`: (height, width, 3) float32, but samples (height, width) uint32.
 
-    variance is that of a pixel's mean, were its samples independent; NaN of fewer than two.
+    variance is that of a pixel's mean for independent samples; NaN below two samples.
     """
     wanted, pictures = set(names), dict[str, NDArray[np.generic]]()
     if "variance" in wanted:
@@ -91,9 +91,9 @@ def film_aovs(film: Film, names: Iterable[str]) -> dict[str, NDArray[np.generic]
 
 
 def split_light(film: Film) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Direct and indirect light (height, width, 3), rounded so that their sum is the picture to the last bit.
+    """Return direct and indirect light (height, width, 3), rounded so that their sum equals the image exactly.
 
-    Of p − d and p − (p − d), where 0 <= d <= p, one is exact (Sterbenz 1974).
+    One of p − d and p − (p − d), where 0 <= d <= p, is exact (Sterbenz 1974).
     """
     picture = film.picture()
     indirect = picture - np.minimum(film.direct.astype(np.float32), picture)

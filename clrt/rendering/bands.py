@@ -1,4 +1,4 @@
-"""Whole pictures are worked on some rows at a time, by all cores: what is made of a band stays in their caches."""
+"""Parallel processing of whole images in bands of rows: the intermediate results of a band stay in the CPU caches."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from typing import TypeVar
 from ..threads import in_parallel
 from .tiles import TILE
 
-#: Pixels of a band, about: so few that what is made of them is taken from memory that is there. Larger arrays come anew
-#: from the system each time, which took longer than all sums.
+#: Approximate pixels per band: small enough for intermediate arrays to reuse memory already allocated. Larger ones are
+#: newly mapped by the system each time, which took longer than all sums.
 PIXELS = 1 << 15
 T = TypeVar("T")
 
 
 class Unwanted(Exception):
-    """Nobody waits any more for what was being made of a picture."""
+    """Raised if the result of a computation is no longer needed."""
 
 
 def bands_of(size: tuple[int, ...]) -> list[slice]:
-    """The rows of each band of a picture, (height, width, …), from the top down. No tile is in two."""
+    """Return the rows of each band of an image, (height, width, …), from the top down. Bands do not split tiles."""
     height, width = size[:2]
     step = max(1, PIXELS // (width * TILE)) * TILE
     return [slice(first, min(first + step, height)) for first in range(0, height, step)]
@@ -27,7 +27,8 @@ def bands_of(size: tuple[int, ...]) -> list[slice]:
 
 def in_bands(size: tuple[int, ...], work: Callable[[slice], T], unwanted: Callable[[], bool] = lambda: False,
              ) -> list[T]:
-    """What `work` returns for the rows of each band of a picture; several run at a time. Unwanted as soon as it is."""
+    """Return the results of `work` for the rows of each band, run in parallel. Raises Unwanted once `unwanted` is true.
+    """
     def wanted(rows: slice) -> T:
         if unwanted():
             raise Unwanted

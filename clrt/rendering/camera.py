@@ -1,4 +1,4 @@
-"""The camera as the kernels see it: its file, and its part of the LAUNCH record."""
+"""Kernel-side camera: its kernel file, and its fields of the LAUNCH record."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from .records import LAUNCH
 
 FILES = {"perspective": "camera/pinhole.cl", "orthographic": "camera/orthographic.cl",
          "equirectangular": "camera/equirectangular.cl"}
-#: Of the LAUNCH record.
+#: Camera fields of the LAUNCH record.
 CAMERA_FIELDS = ("position", "right", "up", "forward", "lens_radius")
 
 
 def camera_file(camera: Camera, integrator: str) -> str:
-    """The kernel file of its rays. A depth is that of what is in focus: the ray through the middle of a lens."""
+    """Return the kernel file that generates its rays. Integrator `depth` uses the ray through the lens centre."""
     return "camera/thin_lens.cl" if camera.aperture_radius and integrator != "depth" else FILES[camera.projection]
 
 
 def launch_record(camera: Camera, size: tuple[int, int]) -> NDArray[Any]:
-    """A LAUNCH record with camera and size. What right, up and forward are to the camera is said in its file."""
+    """Return a LAUNCH record with camera and size. The camera's kernel file defines right, up and forward."""
     width, height = size
     forward = np.subtract(camera.look_at, camera.position, dtype=np.float64)
     distance = np.linalg.norm(forward)

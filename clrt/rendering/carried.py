@@ -1,4 +1,4 @@
-"""Trees and skies that are carried over from one scene to the next, where what they are made of stayed the same."""
+"""Reuse of BVHs and environment maps between successive scenes, as far as their inputs are unchanged."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float32]
 
 
 class Carried:
-    """The last tree and the last sky. Where only instances moved the tree's buffers are rewritten, on the device, too.
+    """Cache of the last BVH and environment. If only instances moved, the BVH buffers are updated, also on the device.
     """
 
     def __init__(self) -> None:
@@ -33,16 +33,16 @@ class Carried:
         self._to_world: NDArray[np.float64] = np.zeros(0)
 
     def sky(self, environment: Environment) -> Sky:
-        """`pack_sky`, once as long as it is the same object."""
+        """Return `pack_sky` of the environment, cached while it is the same object."""
         if self._sky is None or environment is not self._environment:
             self._sky, self._environment = pack_sky(environment), environment
         return self._sky
 
     def tree(self, device: Device | None, layout: str, builder: str | None, meshes: list[Mesh], triangles: Triangles,
              spheres: FloatArray, test: str, placements: Placements) -> Layout:
-        """The tree over the meshes' triangles and spheres (s, 4), and over instances if there are any."""
+        """Return the BVH over the meshes' triangles and spheres (s, 4), and over instances if there are any."""
         names = layout, builder, test, len(placements.materials), len(meshes)
-        arrays = [spheres, placements.mesh, placements.starts]  # meshes' own arrays are half as large as triangles
+        arrays = [spheres, placements.mesh, placements.starts]  # meshes' arrays are half as large as triangles
         arrays += [array for mesh in meshes for array in (mesh.vertices, mesh.faces)]
         same = names == self._names and all(map(np.array_equal, arrays, self._arrays))
         if not (self._tree and same):

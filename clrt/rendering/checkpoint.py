@@ -1,4 +1,4 @@
-"""Checkpoints of a render: when they are written, and which of them it may go on from."""
+"""Checkpoints of a render: when they are written, and which of them it may be resumed from."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from .choices import Choices
 from .identity import differences, facts_of
 from .kept import KINDS, NO_SENSE, Kept, from_arrays, to_arrays
 
-#: Between two checkpoints passes at least this many times what writing one takes.
+#: Minimum time between two checkpoints, as a multiple of the time that writing one takes.
 COST = 50
 _log = logging.getLogger(__name__)
 
 
 class Checkpoints:
-    """The checkpoints of one render, in two generations at one path (checkpoint_file.py).
+    """Checkpoints of one render, in two generations at one path (checkpoint_file.py).
 
-    facts: see identity.facts_of; device: who renders; seconds: between two checkpoints, or longer where they cost much.
+    facts: see identity.facts_of; device: the rendering device; seconds: minimum interval, longer if writing is slow.
     """
 
     def __init__(self, path: Path, facts: dict[str, str], device: str, seconds: float) -> None:
@@ -38,27 +38,28 @@ class Checkpoints:
         self._writing: Callable[[], None] = lambda: None
 
     def warn_of_another(self) -> None:
-        """Warns where there is one already, which this render will replace. CheckpointError where it is none."""
+        """Warn that this render replaces an existing checkpoint. Raises CheckpointError if the file is something else.
+        """
         check_replaceable(self.path, FAMILY)
         if self.path.exists():
             _log.warning("%s: this checkpoint will be replaced; --resume goes on from it", self.path)
 
     @property
     def due(self) -> bool:
-        """Whether it is time for the next one."""
+        """Whether the next checkpoint is due."""
         return time.perf_counter() >= self._next
 
     def begin(self, kept: Kept) -> None:
-        """Begins to write one, of which nothing may change until `wait` has returned."""
+        """Start writing a checkpoint in the background; the state must not change until `wait` has returned."""
         self.wait()
         self._writing = beside(lambda: self.write(kept))
 
     def wait(self) -> None:
-        """Returns when what `begin` began has ended."""
+        """Wait for the write that `begin` started."""
         self._writing()
 
     def write(self, kept: Kept) -> None:
-        """Writes one; where that is not possible it warns, once, and what was written before stays."""
+        """Write a checkpoint; if that fails, warn once and keep the previous one."""
         start = time.perf_counter()
         header = {"facts": self._facts, "device": self._device, "planned_spp": kept.planned_spp,
                   "seconds": kept.seconds}
@@ -74,9 +75,9 @@ class Checkpoints:
         self._next = end + max(self._every, COST * (end - start))
 
     def read(self, size: tuple[int, int]) -> Kept | None:
-        """The last whole one, of a picture of (width, height); None where there is none yet.
+        """Return the newest intact state, of an image of (width, height), or None if there is no checkpoint yet.
 
-        CheckpointError where it is of another render, or none of the generations is whole.
+        Raises CheckpointError if it belongs to another render, or if no generation is intact.
         """
         problems: list[str] = []
         for path in (self.path, older(self.path)):
@@ -94,7 +95,7 @@ class Checkpoints:
             self._warn(path, header, problems)
             return kept
         if problems:
-            check_replaceable(self.path, FAMILY)    # else to begin anew would be refused, too
+            check_replaceable(self.path, FAMILY)    # else starting afresh would be refused, too
             raise CheckpointError(f"{'; '.join(problems)}; there is nothing to go on from: leave out --resume to begin "
                                   "anew")
         _log.warning("%s: there is no checkpoint yet, so the render begins", self.path)
@@ -117,7 +118,7 @@ class Checkpoints:
 
 def open_checkpoints(path: str | Path | None, resume: bool, seconds: float, scene: Scene, choices: Choices,
                      device: str) -> tuple[Checkpoints | None, Kept | None]:
-    """A render's checkpoints, if it is to have any, and what it goes on from, if there is something."""
+    """Return a render's checkpoints, if enabled, and the state to resume from, if there is one."""
     if path is None:
         if resume:
             raise UsageError("resume goes on from a checkpoint, and none is named; name its file, too")
@@ -130,6 +131,6 @@ def open_checkpoints(path: str | Path | None, resume: bool, seconds: float, scen
 
 
 def check_of_none(checkpoints: Checkpoints | None) -> None:
-    """UsageError where one is kept, before another picture is begun."""
+    """Raise UsageError if checkpoints are written, before another image is started."""
     if checkpoints is not None:
         raise UsageError("a checkpoint is of one picture, seen by one camera; make a renderer for each")

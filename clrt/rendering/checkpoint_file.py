@@ -1,12 +1,12 @@
-"""The file of a checkpoint: a header and arrays, with a checksum, in two generations.
+"""Checkpoint file: a header and arrays, with a checksum, in two generations.
 
     clrt checkpoint 3\\n
     JSON in one line: {"header": …, "shapes": {name: [rows, columns …], …}}\\n
     the arrays' bytes, one after the other
     SHA-256 of all that, 32 bytes
 
-A file is written beside its place and moved there when the disk has it; the one that was there stays as FILE~. Nothing
-that is read is executed, and no memory is asked for that the file itself does not fill.
+A file is written to a temporary file next to its destination and renamed once it is on disk; the previous one remains
+as FILE~. Nothing that is read is executed, and no more memory is allocated than the size of the file itself justifies.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from ..file_mode import keep_mode
 from ..threads import beside
 from .past_cache import write_past_cache
 
-#: How those of any version begin.
+#: First bytes of checkpoints of any version.
 FAMILY = b"clrt checkpoint "
 MAGIC = FAMILY + b"3\n"
-#: Bytes, more than any header has.
+#: Maximum header length in bytes, larger than any real header.
 LONGEST_HEADER = 1 << 16
 
 Arrays = dict[str, NDArray[Any]]
 
 
 def older(path: Path) -> Path:
-    """Where the generation before the one at `path` is."""
+    """Return the path of the previous generation of the checkpoint at `path`."""
     return Path(f"{path}~")
 
 
 def check_replaceable(path: Path, beginning: bytes) -> None:
-    """Raise CheckpointError where a file at `path` does not begin so, as far as it goes: it is something else."""
+    """Raise CheckpointError if a file at `path` does not start with `beginning` (or a prefix of it, if shorter)."""
     try:
         with open(path, "rb") as file:
             found = file.read(len(beginning))
@@ -57,10 +57,11 @@ def check_replaceable(path: Path, beginning: bytes) -> None:
 
 
 def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, keep_older: bool = True) -> None:
-    """Writes to `path`, on disk when it returns; what was there becomes the older generation unless told otherwise.
+    """Write a checkpoint to `path`, synced to disk on return; the existing one becomes the older generation if
+    `keep_older`.
 
-    A link stays a link, and the file that is replaced leaves its mode. OSError where it fails: then no generation is
-    lost, and nothing is left beside them.
+    A symbolic link stays a link, and the new file takes over the mode of the replaced one. Raises OSError if it fails:
+    then no generation is lost, and no temporary file remains.
     """
     target = Path(os.path.realpath(path))
     temporary = Path(f"{target}.new")
@@ -69,7 +70,7 @@ def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, k
     try:
         with open(temporary, "wb", buffering=0) as file:
             pieces: list[bytes | memoryview] = [MAGIC, line, *map(_bytes, arrays.values())]
-            digest = beside(lambda: _digest(pieces))    # both take their time, and neither needs Python's lock
+            digest = beside(lambda: _digest(pieces))    # both take long, and both release the GIL
             write_past_cache(file.fileno(), _followed_by(pieces, digest))
             os.fsync(file.fileno())
         keep_mode(target, temporary)
@@ -85,9 +86,10 @@ def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, k
 
 
 def read_checkpoint(path: Path, kinds: Mapping[str, np.dtype[Any]]) -> tuple[dict[str, Any], Arrays]:
-    """The header, and the arrays that `kinds` names with their dtypes.
+    """Return the header and the arrays named by `kinds`, with the dtypes given there.
 
-    ValueError, with the reason as the end of a sentence, unless the file is whole; OSError where it cannot be read.
+    Raises ValueError, with the reason as the end of a sentence, if the file is not intact; OSError if it cannot be
+    read.
     """
     with open(path, "rb") as file:
         size = os.fstat(file.fileno()).st_size
@@ -138,7 +140,7 @@ def _bytes(array: NDArray[Any]) -> memoryview:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Has the disk keep the names, too, where the system can do that."""
+    """Sync the directory entries to disk as well, if the system supports that."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:

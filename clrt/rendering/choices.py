@@ -1,4 +1,4 @@
-"""What a device or a user chooses about a scene's program, beside what the scene needs."""
+"""Program options that a device or a user chooses, in addition to what the scene requires."""
 
 from __future__ import annotations
 
@@ -12,25 +12,24 @@ from ..device.open import Device
 from ..errors import UsageError, check_choice
 from .records import PIXEL, PIXEL_WITH_DIRECT
 
-#: Where rays leave a surface.
+#: Kernel files of the methods to offset ray origins from surfaces.
 OFFSETS = {"bound": "offset/bound.cl", "ulp": "offset/ulp.cl", "fixed": "offset/fixed.cl"}
-#: How paths are followed, and with how many lanes in waves.
+#: Path modes ("lanes" is the megakernel, "waves" the wavefront), and the SIMD width that the wavefront needs.
 PATHS, WAVE_LANES = ("lanes", "waves"), 8
-#: Paths a work-item.
+#: SIMD widths: paths per work-item.
 LANES = (1, 8, 16)
 
 
 @dataclass(frozen=True)
 class Choices:
-    """lanes: see LANES; offset: see OFFSETS; direct_light: whether the film keeps it apart.
+    """Program options. lanes: see LANES; offset: see OFFSETS; direct_light: whether the film stores it separately.
 
-    paths: how they are followed: "lanes", each in its lane (kernels/path.cl), or "waves", many together edge by edge
-    (kernels/wave.cl); None for waves where there are 8 lanes, as they need.
-    layout: a name in TREES, or None for the one that fits the device and the scene. tree: False where every ray is to
-    meet all that there is one by one, True for a tree even where there is little; None for what is faster.
-    first_hits: whether beside the picture what rays meet first is asked for, as AOVs, by a denoiser or by a user: then
-    rays are followed whatever the integrator does.
-    Raises UsageError for what is unknown, or can't be chosen together.
+    paths: "lanes" for the megakernel, one path per lane (kernels/path.cl), or "waves" for the wavefront, which advances
+    many paths together by one vertex at a time (kernels/wave.cl); None for the wavefront if there are 8 lanes, as it
+    needs. layout: a name in TREES, or None for the one that fits the device and the scene. tree: False for brute force
+    (no BVH), True for a BVH even for few primitives; None for the faster one. first_hits: whether first hits are
+    requested along with the image, as AOVs, by a denoiser or by a user: then rays are traced whatever the integrator
+    does. Raises UsageError for unknown values and for options that exclude each other.
     """
 
     lanes: int = 8
@@ -57,15 +56,15 @@ class Choices:
 
     @property
     def waves(self) -> bool:
-        """Whether paths are followed in waves."""
+        """Whether paths are traced in wavefront mode."""
         return self.lanes == WAVE_LANES and self.paths != "lanes"
 
     @property
     def pixel(self) -> np.dtype[Any]:
-        """The record of a pixel of the film."""
+        """Record type of a film pixel."""
         return PIXEL_WITH_DIRECT if self.direct_light else PIXEL
 
 
 def choices_on(device: Device, asked: Choices, lanes: int | None) -> Choices:
-    """What was asked for, and for the rest what suits the device."""
+    """Return the requested options, with the device's preferences for those left open."""
     return replace(asked, lanes=lanes or device.lanes, paths=asked.paths or (None if device.packs else "lanes"))

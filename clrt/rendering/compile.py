@@ -1,4 +1,4 @@
-"""Scene → buffers and program text: what a device needs to render it."""
+"""Scene compilation: from a scene to the buffers and program text that a device needs to render it."""
 
 from __future__ import annotations
 
@@ -29,11 +29,12 @@ from .tiles import TILE_PIXELS
 
 @dataclass(frozen=True)
 class CompiledScene:
-    """What a device needs to render a scene. The buffers' order is the order of the kernel's arguments.
+    """Buffers and program of a scene, ready for a device. The order of the buffers is that of the kernel's arguments.
 
-    All points, the camera's too, are those of the scene in `frame` (see scene.scaling). instances: how many are in the
-    tree; others became meshes (see scene.instancing). part_bytes: the arrays are in parts of at most so many bytes, as
-    the device has no larger buffers (kernels/arrays.cl). clamps: of direct and of indirect light, infinite for none.
+    All points, including the camera's, are in the coordinates of `frame` (see scene.scaling). instances: the number of
+    instances in the BVH; others became meshes (see scene.instancing). part_bytes: maximum size of the parts into which
+    the arrays are split, as the device has no larger buffers (kernels/arrays.cl). clamps: of direct and of indirect
+    light, infinite for none.
     """
 
     buffers: Buffers
@@ -53,54 +54,56 @@ class CompiledScene:
 
     @cached_property
     def source(self) -> str:
-        """The program's text."""
+        """Text of the program."""
         return self.source_of(self.entry)
 
     def source_of(self, entry: str, *preamble: str, **files: list[str]) -> str:
-        """The text of the same scene's program with another kernel file as its entry.
+        """Return the program text of the same scene with another kernel file as its entry.
 
-        preamble, files: what that needs besides, before it and for its own `#include NAME`.
+        preamble, files: what this entry needs in addition: definitions before it, and files for its own `#include
+        NAME`.
         """
         return compose("\n".join([self.preamble, *preamble]), entry, {**self.chosen_files, **files})
 
     def seen_by(self, camera: Camera, file: str) -> CompiledScene:
-        """The same, seen by another camera of the scene, whose kernel file this is (see `camera_file`)."""
+        """Return the same scene with another camera, whose kernel file is `file` (see `camera_file`)."""
         return replace(self, camera=camera_in(camera, self.frame), chosen_files={**self.chosen_files, "CAMERA": [file]})
 
     def has_text_of(self, other: CompiledScene) -> bool:
-        """Whether both have the same program, in the same parts of arrays."""
+        """Return whether both have the same program, with arrays split into the same parts."""
         return all(getattr(self, name) == getattr(other, name)
                    for name in ("preamble", "chosen_files", "entry", "part_bytes"))
 
     @property
     def kernel(self) -> str:
-        """The name of the entry's kernel."""
+        """Name of the entry's kernel."""
         return self.entry.removesuffix(".cl")
 
     @property
     def pixels(self) -> int:
-        """How many a work-item of the entry takes."""
+        """Pixels per work-item of the entry's kernel."""
         whole = self.entry == "wave.cl" or (self.entry == "raster.cl" and self.choices.lanes > 1)
         return TILE_PIXELS if whole else self.choices.lanes
 
     @property
     def files(self) -> list[str]:
-        """The kernel files that the program is made of."""
+        """Kernel files that the program consists of."""
         return files_of(self.source)
 
     @property
     def bytes(self) -> int:
-        """Device memory of the scene."""
+        """Device memory of the scene in bytes."""
         return sum(array_bytes(array, self.part_bytes) for _, array in self.buffers.values())
 
 
 def compile_scene(scene: Scene, choices: Choices, entry: str | None = None,
                   device: Device | None = None, carried: Carried | None = None,
                   ahead: bool = False) -> CompiledScene:
-    """Validates and packs `scene` for the kernel file `entry`; SceneError lists all that is wrong with it.
+    """Validate and pack `scene` for the kernel file `entry`. Raises SceneError listing everything that is wrong with
+    it.
 
-    entry: None for the scene's integrator; device: where large trees are built, if given; carried: what
-    was made for the scene before; ahead: whether its program will be built on that device.
+    entry: None for the scene's integrator; device: where large BVHs are built, if given; carried: results that can be
+    reused from the previous scene; ahead: whether its program will be built on that device.
     """
     validate(scene)
     if ahead and device is not None:

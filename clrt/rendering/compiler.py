@@ -1,4 +1,4 @@
-"""Compiles scenes for devices, one after another: what a scene shares with the one before is not made again."""
+"""Scene compiler for a set of devices; what consecutive scenes have in common is not compiled again."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .choices import Choices
 from .compile import CompiledScene, compile_scene
 from .identity import parts_of
 
-#: Settings that change neither buffers nor programs.
+#: Settings that affect neither buffers nor programs.
 PASSING = ("size", "spp", "max_depth", "seed", "adaptive")
 
 
 class Compiler:
-    """For so many devices. What it compiled is of no use any more once it compiles another scene."""
+    """Compiler for several devices. A compiled scene must not be used any more once another one is compiled."""
 
     def __init__(self, devices: Sequence[Device]) -> None:
         self.devices = list(devices)
@@ -30,13 +30,13 @@ class Compiler:
 
     @classmethod
     def after(cls, last: Compiler | None, devices: Sequence[Device]) -> Compiler:
-        """The last one, if it is for these devices, or another."""
+        """Return the last compiler if it is for the same devices, else a new one."""
         return last if last and last.devices == devices else cls(devices)
 
     def compile(self, scene: Scene, choices: list[Choices], ahead: bool = False) -> list[CompiledScene]:
-        """The scene for each device with its choices; ahead: see `compile_scene`.
+        """Return the scene compiled for each device with its choices; ahead: see `compile_scene`.
 
-        Where all but the camera and PASSING settings are the very same objects as before, only these are looked at.
+        If everything but the camera and PASSING settings is the identical object as before, only these are updated.
         """
         if self._last and choices == self._last[1] and _differs_in_passing(scene, self._last[0]):
             validate(Scene(camera=scene.camera, render=scene.render))
@@ -49,7 +49,7 @@ class Compiler:
         return compiled
 
     def _anew(self, scene: Scene, choices: list[Choices], ahead: bool) -> list[CompiledScene]:
-        """Once for those devices that agree, unless trees were built on a device."""
+        """Compile once for devices with equal properties, unless BVHs were built on a device."""
         compiled: list[CompiledScene] = []
         for choice, device, carried in zip(choices, self.devices, self._carried):
             alike = [done for done, other, chosen in zip(compiled, self.devices, choices) if chosen == choice
@@ -61,7 +61,7 @@ class Compiler:
 
 
 def _differs_in_passing(scene: Scene, last: Scene) -> bool:
-    """Whether no more than the camera and PASSING settings differ."""
+    """Return whether at most the camera and PASSING settings differ."""
     passing = {name: getattr(last.render, name) for name in PASSING}
     return (all(getattr(scene, name) is getattr(last, name) for name in parts_of(scene) if name != "camera")
             and replace(scene.render, **passing) == last.render)

@@ -1,4 +1,4 @@
-"""How a picture converges: its states as it grows, their estimated errors, and their history."""
+"""Convergence of an image: its states over time, their estimated errors, and their history."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from .tiles import mean_samples
 
 
 class Convergence:
-    """Of one picture. history: entries of "spp", "seconds", "noise" and, with a reference, "relmse"; last: the newest
-    state. planned_spp: see `NoiseEstimate`; percentile: see `State.tile_noise`."""
+    """Convergence of one image. history: entries of "spp", "seconds", "noise" and, with a reference, "relmse"; last:
+    the newest state. planned_spp: see `NoiseEstimate`; percentile: see `State.tile_noise`."""
 
     last: State
 
@@ -29,13 +29,13 @@ class Convergence:
         self.history: list[dict[str, Any]] = []
 
     def restore(self, kept: Kept) -> None:
-        """Goes on from what was kept."""
+        """Resume from a saved state."""
         self.noise, self.history = kept.noise, kept.history
 
     def state(self, film: Film, tile_samples: NDArray[np.int64], seconds: float, reference: NDArray[np.float32] | None,
               in_haste: bool) -> State:
-        """Of the film, with samples (rows, columns) of each tile, after so many seconds; in haste the estimate leaves
-        out what it does not know yet."""
+        """Return the state of the film, given the samples (rows, columns) of each tile and the elapsed seconds. If
+        `in_haste`, the error estimate is not updated with this film."""
         if not in_haste:
             self.noise.add(film, tile_samples)
         noise = self.noise.at(self.last.film if in_haste and self.history else film, tile_samples)
@@ -46,7 +46,7 @@ class Convergence:
 
     def record(self, film: Film, tile_samples: NDArray[np.int64], seconds: float,
                reference: NDArray[np.float32] | None = None, in_haste: bool = False) -> State:
-        """The state, which enters the history unless it was made in haste."""
+        """Return the state, and append it to the history unless `in_haste`."""
         state = self.state(film, tile_samples, seconds, reference, in_haste)
         entry = {"spp": state.spp, "seconds": state.seconds, "noise": state.noise}
         if not in_haste:
@@ -55,21 +55,21 @@ class Convergence:
 
     def record_if_wanted(self, film: Film, tile_samples: NDArray[np.int64], seconds: float,
                          reference: NDArray[np.float32] | None, unwanted: Callable[[], bool]) -> State | None:
-        """Like `record`; None as soon as it is unwanted."""
+        """Like `record`, but return None as soon as `unwanted` returns True."""
         film.unwanted = unwanted
         try:
             return self.record(film, tile_samples, seconds, reference)
         except Unwanted:
             return None
         finally:
-            del film.unwanted   # each would keep the other
+            del film.unwanted   # avoids a reference cycle
 
     def tiles_to_double(self, tile_samples: NDArray[np.int64], spp: int | None) -> NDArray[np.intp]:
-        """See `adaptive.tiles_to_double`; of the newest state."""
+        """Return `adaptive.tiles_to_double` for the newest state."""
         return tiles_to_double(self.last.film, tile_samples, self.noise.tile_errors(tile_samples), spp)
 
     def catch_up(self, picture: Accumulation, seconds: float) -> None:
-        """Records what a picture has that was last seen in haste, unless it is in the middle of a pass."""
+        """Record an image whose last state was computed in haste, unless it is in the middle of a pass."""
         done = picture.samples_done
         if done and not picture.work.parts and done != (self.history[-1]["spp"] if self.history else 0):
             self.record(picture.film(), picture.tile_samples, seconds)

@@ -1,4 +1,4 @@
-"""Packs what triangles have at their corners beside positions and normals: for what reads it, of all triangles."""
+"""Packing of further per-corner attributes of triangles: texture coordinates, colours and tangents."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from .records import COLORS, TANGENTS, TEXCOORDS
 
 
 def pack_corners(meshes: Sequence[Mesh], uv_sets: int, normal_maps: bool) -> dict[str, tuple[str, NDArray[Any]]]:
-    """The buffers texcoords (a record a triangle and set), colors and tangents, as far as they are needed.
+    """Return the buffers texcoords (a record per triangle and UV set), colors and tangents, as far as they are needed.
 
-    What a mesh lacks is 0, or white.
+    Attributes that a mesh lacks are 0, or white for colors.
     """
     count = sum(len(mesh.faces) for mesh in meshes)
     texcoords = np.zeros((count, uv_sets), TEXCOORDS)

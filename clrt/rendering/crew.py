@@ -1,4 +1,4 @@
-"""A picture rendered by several devices (team.py), or by one where its film has no room. The film lies on the host."""
+"""Accumulation with the film on the host: on several devices (team.py), or on one that has no room for the film."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from .tiles import TILE_PIXELS, row_by_row, tile_by_tile, tiles_of
 from .work import Work
 from .worker import Worker
 
-#: Launches of a pass on each device, about: at its end some wait for others.
+#: Approximate number of launches per pass and device: at the end of a pass some devices wait for others.
 PASS_LAUNCHES = 12
 
 
 class Crew(Accumulation):
-    """Renders samples of the picture of a team's scene, or of a band of it: `size` then is the band's, as wide as the
-    picture, and `first_tile` the first of its tiles."""
+    """Accumulation of the image of a team's scene, or of a band of it: then `size` is the band's, as wide as the image,
+    and `first_tile` is its first tile."""
 
     def __init__(self, team: Team, size: tuple[int, int], first_tile: int = 0) -> None:
         super().__init__(size)
@@ -40,26 +40,26 @@ class Crew(Accumulation):
 
     @property
     def workers(self) -> list[Worker]:
-        """Those that are still there."""
+        """Workers that are still in use."""
         return self.team.workers
 
     @property
     def scene(self) -> SceneOnDevice:
-        """The scene on the first device that is still there."""
+        """The scene on the first device that is still in use."""
         return self.workers[0].scene
 
     @property
     def scenes(self) -> list[SceneOnDevice]:
-        """The scene on every device that is still there."""
+        """The scene on every device that is still in use."""
         return [worker.scene for worker in self.workers]
 
     def shares(self) -> list[dict[str, Any]]:
-        """What each device did, for the report."""
+        """Return what each device rendered, for the report."""
         return self.team.shares()
 
     @property
     def longest_launch(self) -> float:
-        """Seconds of the launch that took longest, with its transfers."""
+        """Duration of the longest launch in seconds, including its transfers."""
         return max(worker.launches.longest for worker in self.team.everyone)
 
     @property
@@ -73,18 +73,18 @@ class Crew(Accumulation):
         self._film.fill(0)
 
     def wait(self) -> None:
-        """Waits for the launches in flight, and for none that is still in hand."""
+        """Wait for the launches in flight, without starting pending work."""
         with self._tearing():
             self.team.drain(self.work, self._film)
             self._settle()
 
     def pass_limit(self) -> int:
-        """As many samples a pixel as keep all busy for some launches."""
+        """Return the samples per pixel that keep all devices busy for some launches."""
         work = sum(worker.launches.size for worker in self.workers)
         return max(1, PASS_LAUNCHES * work // (self.size[0] * self.size[1]))
 
     def film(self) -> Film:
-        """The film so far; waits for the launches in flight."""
+        """Return the current film; waits for the launches in flight."""
         self.wait()
         film = Film(row_by_row(self._film, self.size))
         for worker in self.workers:
@@ -92,14 +92,14 @@ class Crew(Accumulation):
         return film
 
     def restore(self, film: Film, work: Work) -> None:
-        """Goes on from a film of this size and the work that it was rendered by."""
+        """Resume from a film of this size and the work that produced it."""
         self.work, self._film = work, tile_by_tile(film.pixels)
 
 
 def make_team(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
               seed: int, planned_spp: int | None, tiles: int | None = None,
               before: Sequence[SceneOnDevice] = ()) -> Team:
-    """A team for the picture of this size; tiles: as many as it will be asked for at a time at most, or all; before:
+    """Return a team for the image of this size; tiles: the maximum number of tiles of a film, all by default; before:
     see `SceneOnDevice`."""
     rows, columns = tiles_of(size)
     launches = [first_launch(scene, size, max_depth, seed, planned_spp) for scene in compiled]
@@ -108,7 +108,7 @@ def make_team(devices: Sequence[Device], compiled: Sequence[CompiledScene], size
 
 def make_picture(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
                  seed: int, planned_spp: int | None, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
-    """A session where there is one device with room for the film, else a crew; before: see `SceneOnDevice`."""
+    """Return a Session if there is one device with room for the film, else a Crew; before: see `SceneOnDevice`."""
     if len(devices) == 1:
         with suppress(NoRoomError):
             return Session(devices[0], compiled[0], size, max_depth, seed, planned_spp, before)

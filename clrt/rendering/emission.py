@@ -1,4 +1,4 @@
-"""How bright triangles are whose emission is a texture: what they are chosen by as lights."""
+"""Mean emission of triangles with an emission texture, which determines how they are sampled as lights."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ Doubles = NDArray[np.float64]
 
 
 def mean_emission(mesh: Mesh) -> Doubles:
-    """(m, 3) of each triangle the mean, from 0 to 1, of its emission's texels over the box of its texture coordinates.
+    """Return (m, 3), for each triangle the mean, in [0, 1], of its emission texels over the bounding box of its UVs.
 
-    A texel wider, as filtering reads; of the whole picture where the box leaves it. 0 only where nothing shines, and 1
-    without a texture.
+    The box is one texel wider on each side, as filtering reads these; if it leaves the image, the mean is that of the
+    whole image. It is 0 only if nothing is emitted, and 1 without a texture.
     """
     texture = mesh.material.emission
     uv = mesh.uv1 if isinstance(texture, Texture) and texture.uv_set else mesh.uv
@@ -26,7 +26,7 @@ def mean_emission(mesh: Mesh) -> Doubles:
 
 
 def mean_texels(texture: Texture, uv: Doubles) -> Doubles:
-    """(m, 3) for texture coordinates (m, corners, 2)."""
+    """Return (m, 3), the same for texture coordinates (m, corners, 2)."""
     encoded = texture.picture.texels[..., :3].astype(np.float32) / np.float32(255)
     linear = linear_from_srgb(encoded).astype(np.float64)
     clamped = np.array([wrap == "clamp" for wrap in texture.wrap])
@@ -45,6 +45,6 @@ def mean_texels(texture: Texture, uv: Doubles) -> Doubles:
     sums[1:, 1:] = linear.cumsum(axis=0).cumsum(axis=1)
     (left, top), (right, bottom) = low.T, high.T
     inside = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
-    # Differences of long sums may miss 0 by rounding; one level of one texel is 3e-4.
+    # Differences of long sums may deviate from 0 by rounding; one level of one texel is 3e-4.
     mean = inside / ((right - left) * (bottom - top))[:, None]
     return np.asarray(np.where(inside > 1e-5, mean, 0.0))

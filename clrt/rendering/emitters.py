@@ -1,4 +1,4 @@
-"""Packs the lights: records by type, numbered type by type, and what one of them is chosen by."""
+"""Packing of lights: records by type, numbered type by type, and the data for choosing one of them."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ from .records import DIRECTIONAL_LIGHT, POINT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT, S
 from .textures import Textures
 from .triangle_lights import pack_triangle_lights
 
-#: The types in the order of their lights' numbers, infinite ones last; the kernel file is light/<name>.cl, the sky's is
-#: chosen by pack_sky.
+#: Light types in the order of their numbers, infinite ones last; the kernel file is light/<name>.cl, except for the
+#: sky, whose file pack_sky chooses.
 TYPES = ("triangle", "sphere", "point", "spot", "directional", "sun", "sky")
 SURFACES = ("triangle", "sphere")
-#: A directional light of a smaller angle is a delta light: float32 has too few directions inside its disc.
+#: Directional lights of a smaller angle are delta lights: float32 has too few directions inside their disc.
 SMALLEST_DEGREES = 1e-4
-#: Over no less does a spot fall off in its cosine, or a range in its square: its inverse is a number of float32.
+#: Minimum width of a spot's falloff in the cosine, and minimum square of a range: the inverse must fit in float32.
 STEEPEST = 1e-30
 
 
 @dataclass(frozen=True)
 class Emitters:
-    """buffers: name → (C type, records). counts: lights by type. triangle, sphere: each one's light, or −1."""
+    """Packed lights. buffers: name → (C type, records). counts: lights by type. triangle, sphere: light of each, or −1.
+    """
 
     buffers: dict[str, tuple[str, NDArray[Any]]]
     counts: dict[str, int]
@@ -40,17 +41,17 @@ class Emitters:
 
     @property
     def types(self) -> list[str]:
-        """Those in use, in the order of TYPES."""
+        """Light types in use, in the order of TYPES."""
         return list(self.counts)
 
     @property
     def count(self) -> int:
-        """All lights."""
+        """Number of all lights."""
         return sum(self.counts.values())
 
 
 def pack_emitters(scene: Scene, sky: Sky, textures: Textures) -> Emitters:
-    """All lights of the scene that are not black."""
+    """Pack all lights of the scene that are not black."""
     flat = pack_triangle_lights(scene.meshes, textures)
     shines = np.array([any(sphere.material.radiance) for sphere in scene.spheres], bool)
     of_sphere = np.where(shines, len(flat.records) + np.cumsum(shines) - 1, -1).astype(np.int32)
@@ -76,7 +77,7 @@ def pack_emitters(scene: Scene, sky: Sky, textures: Textures) -> Emitters:
 
 
 def light_type(light: Light) -> str | None:
-    """Return which of TYPES a light without a surface is packed as; None where it is black."""
+    """Return the type in TYPES as which a light without a surface is packed; None if it is black."""
     if isinstance(light, DirectionalLight):
         return ("sun" if light.angle_degrees >= SMALLEST_DEGREES else "directional") if any(light.irradiance) else None
     return light.kernel if any(light.intensity) else None
@@ -106,7 +107,7 @@ def _spot_lights(scene: Scene) -> NDArray[Any]:
     lamps = [light for light in scene.lights if isinstance(light, SpotLight) and light_type(light)]
     records = np.zeros(len(lamps), SPOT_LIGHT)
     for record, lamp in zip(records, lamps):
-        # 1 − cos x = 2 sin² (x/2), which small angles keep their digits in.
+        # 1 − cos x = 2 sin² (x/2), which is accurate for small angles.
         inner, outer = 2 * np.sin(np.radians([lamp.inner_degrees, lamp.outer_degrees]) / 2) ** 2
         record["position"], record["intensity"] = lamp.position, lamp.intensity
         record["axis"] = np.asarray(lamp.direction) / np.linalg.norm(lamp.direction)
@@ -132,7 +133,7 @@ def _suns(scene: Scene) -> NDArray[Any]:
     records = np.zeros(len(suns), SUN_LIGHT)
     for record, sun in zip(records, suns):
         record["towards"], record["radiance"] = _towards(sun), sun.radiance
-        record["height"] = 2 * np.sin(np.radians(sun.angle_degrees) / 4) ** 2   # 1 − cos x, as of spots
+        record["height"] = 2 * np.sin(np.radians(sun.angle_degrees) / 4) ** 2   # 1 − cos x, as for spots
     return records
 
 
@@ -145,9 +146,9 @@ def _towards(light: DirectionalLight) -> Doubles:
 
 
 def _irradiance_of_suns(records: NDArray[Any]) -> Doubles:
-    """Return (n, 4), as `_irradiance`: an upper bound that is 0 only where the whole disc is below the horizon.
+    """Return (n, 4) like `_irradiance`: an upper bound that is 0 only where the whole disc is below the horizon.
 
-    The highest point of a disc has the elevation h + a, where h is that of its centre and a half its angle, and
+    The highest point of a disc has elevation h + a, where h is the elevation of its centre and a half its angle, and
     sin(h + a) <= sin h + sin a.
     """
     height = _doubles(records, "height")
@@ -156,7 +157,7 @@ def _irradiance_of_suns(records: NDArray[Any]) -> Doubles:
 
 
 def _irradiance(records: NDArray[Any], least: Doubles, luminance: Doubles) -> Doubles:
-    """Return (n, 4), for `pack_choice`: a scalar and a vector of each of n infinite lights whose irradiance at a normal
+    """Return (n, 4) for `pack_choice`: a scalar and a vector for each of n infinite lights whose irradiance at a normal
     is about luminance·(least + normal·towards)."""
     return np.asarray(np.column_stack([least, _doubles(records, "towards")]) * luminance[:, None])
 

@@ -1,4 +1,4 @@
-"""Packs the sky: its radiance, and for a picture with bright parts the table by which directions to them are drawn."""
+"""Packing of the environment: its radiance, and the sampling table of environment maps with bright regions."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from .steps import steps
 
 Doubles = NDArray[np.float64]
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-#: A sky is sampled if more than this part of its light is above its mean. Of the default sky it is 0.31.
+#: An environment map is sampled if more than this fraction of its light is above its mean. For the default sky it is
+#: 0.31.
 UNEVEN = 1 / 3
-#: Of the irradiance from all around, at most what may depend on the direction, so that no surface is taken for dark.
+#: Maximum directional fraction of the irradiance estimate, so that no surface is considered dark.
 MOST_DIRECTED = 0.9
 
 
 @dataclass(frozen=True)
 class Sky:
-    """What the kernels get of the environment: a file (None: a black sky) and buffers.
+    """The environment for the kernels: a kernel file (None for a black sky) and buffers.
 
-    irradiance: of what is sampled, about (luminance): a scalar and a vector, (4,), for a normal n scalar + n·vector;
-    None where the sky is left to the surfaces' own directions.
+    irradiance: approximate irradiance (luminance) due to the sampled part: a scalar and a vector, (4,), meaning scalar
+    + n·vector for a normal n; None if the sky is left to BSDF sampling.
     """
 
     kernel: str | None
@@ -35,11 +36,11 @@ class Sky:
 
 
 def pack_sky(environment: Environment) -> Sky:
-    """The sky of an Environment.
+    """Pack the sky of an Environment.
 
-    What is sampled is the light above the sky's mean: the rest comes from everywhere alike, and for that directions
-    drawn from the surface are never worse (Karlík et al. 2019, "MIS Compensation"). So a constant sky is not sampled,
-    and neither is a smooth one, where shadow rays cost more than they save.
+    Only the radiance above the mean is sampled: the rest arrives uniformly from all directions, for which BSDF sampling
+    is never worse (Karlík et al. 2019, "MIS Compensation"). Hence constant skies are not sampled, and neither are
+    smooth ones, for which shadow rays cost more than they save.
     """
     record = np.zeros(1, ENVIRONMENT)
     image = environment.image
@@ -66,7 +67,7 @@ def pack_sky(environment: Environment) -> Sky:
     if of_rows.sum() <= UNEVEN * total:
         return Sky("light/image_sky.cl", buffers)
     irradiance = _irradiance(weights, angle)
-    weights[of_rows == 0] = 1       # never drawn
+    weights[of_rows == 0] = 1       # never sampled
     table = np.empty(height * width + height, SKY_STEP)
     density = steps(weights, table[:height * width].reshape(height, width))
     density *= steps(of_rows[None], table[height * width:][None]).T
@@ -76,7 +77,7 @@ def pack_sky(environment: Environment) -> Sky:
 
 
 def _fill_radiance(texels: NDArray[np.void], image: NDArray[np.float32], strength: float) -> Doubles:
-    """Fills in the texels' radiance, and returns (h, w): the mean of the bilinear luminance over each.
+    """Fill in the texels' radiance, and return (h, w): the mean of the bilinear luminance over each texel.
 
     Between texel centres the bilinear weights average to 1/8, 3/4, 1/8 over a texel, in each direction.
     """
@@ -95,15 +96,15 @@ def _fill_radiance(texels: NDArray[np.void], image: NDArray[np.float32], strengt
 
 
 def _solid_angles(height: int, width: int) -> Doubles:
-    """(h, 1): of a texel of each row."""
+    """Return (h, 1), the solid angle of a texel in each row."""
     edges = np.cos(np.pi * np.arange(height + 1) / height)
     return np.asarray((edges[:-1] - edges[1:])[:, None] * (2 * np.pi / width))
 
 
 def _irradiance(weights: Doubles, angle: float) -> Doubles:
-    """(4,): see Sky. The first two bands of spherical harmonics (Ramamoorthi and Hanrahan 2001), kept positive.
+    """Return (4,), see Sky: the first two bands of spherical harmonics (Ramamoorthi and Hanrahan 2001), kept positive.
 
-    weights: (h, w), radiance times solid angle; angle: by which the picture is turned.
+    weights: (h, w), radiance times solid angle; angle: rotation of the image.
     """
     height, width = weights.shape
     theta = np.pi * (np.arange(height) + 0.5) / height

@@ -1,4 +1,4 @@
-"""What is expected of a pixel, as far as a noisy picture tells: errors are divided by it (Film.relative_to)."""
+"""Estimate of the expected pixel values of a noisy image, which errors are divided by (Film.relative_to)."""
 
 from __future__ import annotations
 
@@ -9,25 +9,26 @@ from numpy.typing import NDArray
 
 Doubles = NDArray[np.float64]
 Floats = NDArray[np.floating[Any]]
-#: Pixels on each side of the narrower and of the wider of two windows: powers of two.
+#: Radii in pixels of the smaller and the larger of two windows: powers of two.
 NEAR, REACH = 2, 8
-#: The pixels around one in the narrower.
+#: Number of neighbours in the smaller window.
 NEAREST = (2 * NEAR + 1) ** 2 - 1
-#: Of so much light single precision holds the sum of the squares over a window.
+#: Maximum radiance for which single precision holds the sum of squares over a window.
 SINGLE_MOST = 1e18
 
 
 def expected(mean: Doubles, variance: Doubles) -> Doubles:
-    """(height, width, 3): of pixels whose surroundings are there, too.
+    """Return (height, width, 3), estimates for the pixels that have a full neighbourhood.
 
     mean, variance: (height + 2 REACH, width + 2 REACH, 3), of the pixels and of those around them.
 
-    It is the mean of the 288 pixels around it, from there on towards that of the 24 nearest and then towards its own,
-    each as far as variance cannot explain the difference (James and Stein 1961). So a pixel that is bright by chance
-    does not count itself, nor do its neighbours alone, and one beside an edge is not mixed with what is behind that.
+    The estimate is the mean of the 288 surrounding pixels, moved towards that of the nearest 24 and then towards the
+    pixel's own value, each time by the part of the difference that variance does not explain (James and Stein 1961). So
+    a pixel that is bright by chance does not count itself, nor do its neighbours alone, and a pixel at an edge is not
+    mixed with what lies beyond it.
 
-    The windows are in single precision, of which half as much goes through the caches. The last step is not: a pixel
-    that is bright by a single sample differs from those around it by hardly more than that explains.
+    The windows are in single precision, which halves the cache traffic. The last step is not: a pixel that is bright
+    due to a single sample differs from its neighbours by hardly more than its variance explains.
     """
     scale = max(float(mean.max()) / SINGLE_MOST, 1.0)
     means, variances = (mean / scale).astype(np.float32), (variance / scale**2).astype(np.float32)
@@ -39,8 +40,9 @@ def expected(mean: Doubles, variance: Doubles) -> Doubles:
 
 
 def _around(values: Floats, reach: int) -> Floats:
-    """Means of the windows around each pixel, without the pixel itself. It is never added, and there is no running
-    sum: what is taken away again leaves its rounding, more than all light around a pixel a million times as bright."""
+    """Return the means of the windows around each pixel, excluding the pixel itself. It is never added, and there is no
+    running sum: subtracting it again would leave a rounding error larger than all light around a pixel that is a
+    million times as bright."""
     column = _beside(values, reach)
     window = _beside((column + values[REACH:-REACH]).swapaxes(0, 1), reach).swapaxes(0, 1)
     window += column[:, REACH:-REACH]
@@ -49,7 +51,7 @@ def _around(values: Floats, reach: int) -> Floats:
 
 
 def _beside(values: Floats, reach: int) -> Floats:
-    """Sums of the `reach` rows above and below each but the REACH first and last."""
+    """Return sums of the `reach` rows above and below each row, except for the first and last REACH rows."""
     sums, count = values, 1
     while count < reach:
         sums = sums[:-count] + sums[count:]
@@ -59,7 +61,7 @@ def _beside(values: Floats, reach: int) -> Floats:
 
 
 def _towards(start: Floats, end: Floats, variance: Floats) -> Any:
-    """From `start` towards `end`, of which `variance` is known; not at all where it is NaN."""
+    """Shrink `end`, of known variance, towards `start`; return `start` where the variance is NaN."""
     with np.errstate(divide="ignore", invalid="ignore"):
         by_chance = np.fmin(variance / (end - start) ** 2, 1)
     return by_chance * start + (1 - by_chance) * end

@@ -1,4 +1,4 @@
-"""What a packed scene has compiled in: features, preamble and files. A program contains what its scene needs."""
+"""Compile-time features, preamble and files of a packed scene: a program contains only what its scene needs."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from .pack import Packed
 from .records import COUNTS, GUIDE, LAUNCH, OUTLINE
 from .tiles import TILE
 
-#: Integrators that follow paths, and the kernel files of those of light; others show what is seen first
+#: Path-tracing integrators, and the kernel files of the integrators that compute light; others show first hits
 #: (kernels/picture.cl).
 WITH_LIGHT = ("path", "direct")
 INTEGRATORS = {"path": "path.cl", "direct": "path.cl", "local": "whitted.cl", "raster": "whitted.cl"}
 
 
 def biased_by(settings: RenderSettings) -> list[str]:
-    """Names of the settings that make the mean of the samples darker than the picture, whatever their number."""
+    """Return the names of the settings that darken the image however many samples it has."""
     clamps = ("clamp_direct", "clamp_indirect") if settings.integrator in WITH_LIGHT else ()
     return [name for name in clamps if getattr(settings, name)]
 
 
 def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
-    """The names that are defined while compiling: what the scene has, and the parts of materials that it uses.
+    """Return the macros that are defined for compilation: features of the scene and of the materials that it uses.
 
-    loop_limit: whether the device ends loops (see device.loops).
+    loop_limit: whether the device limits loop iterations (see device.loops).
     """
     scene, emitters, materials = packed.scene, packed.emitters, packed.materials
     local = scene.render.integrator in ("local", "raster")
@@ -62,9 +62,9 @@ def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
 
 
 def preamble_of(packed: Packed, choices: Choices, features: set[str], part_bytes: int | None) -> str:
-    """What is defined before all kernel files. part_bytes: see CompiledScene."""
+    """Return the definitions that precede all kernel files. part_bytes: see CompiledScene."""
     emitters, materials = packed.emitters, packed.materials
-    # Only programs that know lengths of the scene's know its unit: others are shared whatever it is.
+    # Only programs that use lengths in scene units depend on the unit: all others are shared between units.
     lengths = choices.offset != "bound" or packed.scene.render.integrator == "depth"
     unit = {"SCENE_UNIT": packed.frame.unit} if lengths else {}
     surfaces = [t for t in emitters.types if t in SURFACES]
@@ -90,7 +90,7 @@ def preamble_of(packed: Packed, choices: Choices, features: set[str], part_bytes
 
 
 def files_for(packed: Packed, choices: Choices, features: set[str]) -> dict[str, list[str]]:
-    """What each `#include NAME` of the kernels stands for."""
+    """Return the files that each `#include NAME` in the kernels is replaced by."""
     scene, emitters, sky = packed.scene, packed.emitters, packed.sky
     integrator, lights = scene.render.integrator, [f"light/{t}.cl" for t in emitters.types if t != "sky"]
     parts = sorted({part for kind in packed.materials.used for part in kind.parts})

@@ -1,4 +1,4 @@
-"""The accumulated picture on the host: mean, noise estimate and counts from the device's sums (kernels/film.cl)."""
+"""Accumulated image on the host: mean, error estimate and counts from the device's sums (kernels/film.cl)."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .bands import in_bands
 from .expected import REACH, expected
 from .tiles import TILE, tile_sums
 
-#: Added to the squared reference in relMSE, so that black pixels do not divide by zero.
+#: Added to the squared reference in relMSE, so that black pixels do not cause a division by zero.
 RELATIVE_FLOOR = 0.01
 
 
 def _in_planes(values: NDArray[Any]) -> NDArray[Any]:
-    """(3, height, width) as (height, width, 3), colour by colour in memory still: numpy's loops are then as long as a
-    row, not three values."""
+    """Return (3, height, width) as a view of shape (height, width, 3), keeping the planar memory layout: numpy's inner
+    loops then run over rows instead of three values."""
     return np.moveaxis(values, 0, -1)
 
 
@@ -30,13 +30,13 @@ def _sums(pixels: NDArray[Any], name: str) -> NDArray[np.float64]:
 
 
 def _padded(values: NDArray[np.float64], rows: tuple[int, int]) -> NDArray[np.float64]:
-    """With REACH columns on both sides, and so many rows above and below, as those at the edge."""
+    """Pad with REACH columns on both sides and `rows` rows above and below, replicating the edge."""
     return _in_planes(np.pad(np.moveaxis(values, -1, 0), [(0, 0), rows, (REACH, REACH)], "edge"))
 
 
 class Film:
-    """A copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT; `unwanted` is asked
-    while its error is estimated, which ends with `Unwanted` where that is so."""
+    """Host copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT; `unwanted` is polled
+    during error estimation, which raises `Unwanted` once it returns True."""
 
     unwanted: Callable[[], bool] = staticmethod(lambda: False)
 
@@ -51,16 +51,16 @@ class Film:
 
     @cached_property
     def mean(self) -> NDArray[np.float64]:
-        """(height, width, 3): mean of the samples kept; 0 where there are none."""
+        """(height, width, 3): mean of the accepted samples; 0 where there are none."""
         return self._mean_of("sum")
 
     @property
     def direct(self) -> NDArray[np.float64]:
-        """(height, width, 3): what of the mean came with two path edges at most; only of a film that keeps it apart."""
+        """(height, width, 3): part of the mean due to path depths 1 and 2; only if the film stores it separately."""
         return self._mean_of("direct")
 
     def picture(self) -> NDArray[np.float32]:
-        """(height, width, 3): the mean as it is shown and written, row by row in memory."""
+        """Return (height, width, 3): the mean as displayed and written, row by row in memory."""
         picture = np.empty((*self.pixels.shape, 3), np.float32)
         self._fill_with_mean(picture, "sum")
         return picture
@@ -79,28 +79,29 @@ class Film:
 
     @property
     def variance(self) -> NDArray[np.float64]:
-        """(height, width, 3): of the mean, the sample variance over n; NaN of fewer than two samples."""
+        """(height, width, 3): variance of the mean, i.e. the sample variance over n; NaN below two samples."""
         return np.concatenate(in_bands(self.mean.shape, self._variance))
 
     def _variance(self, rows: slice) -> NDArray[np.float64]:
-        """Where squares were too large to be summed (kernels/film.cl) it is taken as mean², the most it can be."""
+        """Return `variance` for these rows; mean², its upper bound, where squares were too large to be summed
+        (film.cl)."""
         pixels, most = self.pixels[rows], self.mean[rows] ** 2
         count = pixels["count"].astype(np.float64)[..., None]
         with np.errstate(divide="ignore", invalid="ignore"):
             squares = _sums(pixels, "square") / count
-            summed = squares >= (1 - 1e-6) * most    # false for NaN, too
+            summed = squares >= (1 - 1e-6) * most    # also false for NaN
             variance = np.where(summed, np.maximum(squares - most, 0) / (count - 1), most)
         return np.where(count < 2, np.nan, variance)
 
     @property
     def relative_to(self) -> NDArray[np.float32]:
-        """(height, width, 3): what errors are divided by in relMSE, √(expected² + 0.01), as far as it is known
-        (rendering/expected.py)."""
+        """(height, width, 3): denominator of errors in relMSE, √(expected² + 0.01), with an estimate of the expected
+        value (rendering/expected.py)."""
         return self._judged[0]
 
     @cached_property
     def noise(self) -> float | None:
-        """√relMSE that independent samples would have: sqrt(mean(Var[mean] / (expected² + 0.01))) over all values.
+        """√relMSE for independent samples: sqrt(mean(Var[mean] / (expected² + 0.01))) over all values.
 
         None before every pixel has two samples.
         """
@@ -111,12 +112,12 @@ class Film:
 
     @property
     def tile_limits(self) -> NDArray[np.float64]:
-        """(rows, columns): Var[mean] / (expected² + 0.01), summed over a tile's values: NaN below two samples."""
+        """(rows, columns): Var[mean] / (expected² + 0.01), summed over a tile's values; NaN below two samples."""
         return self._judged[1]
 
     @cached_property
     def _judged(self) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-        """`relative_to` and `tile_limits`: the same is needed for both."""
+        """`relative_to` and `tile_limits`, computed together since they share intermediate results."""
         mean, height = self.mean, len(self.mean)
         relative = np.empty_like(mean, np.float32)
 
@@ -132,35 +133,36 @@ class Film:
 
     @property
     def clamped_part(self) -> float:
-        """The part of all light that clamping took away, the mean over the picture; 0 where it is black."""
+        """Fraction of all light that clamping removed, as a mean over the image; 0 if it is black."""
         clamped = float(np.mean(self.pixels["clamped"] / np.maximum(self.pixels["count"], 1), dtype=np.float64))
         return clamped / whole if (whole := clamped + float(self.mean.mean())) else 0.0
 
     @property
     def samples(self) -> int:
-        """Samples in the film, dropped ones included."""
+        """Number of samples in the film, including dropped ones."""
         return self._totals["count"] + self.nonfinite_samples
 
     @property
     def tile_samples(self) -> NDArray[np.int64]:
-        """(rows, columns): those of each tile's pixels, of its first one's."""
+        """(rows, columns): samples per pixel of each tile, taken from its first pixel."""
         pixels = self.pixels[::TILE, ::TILE]
         return np.asarray(pixels["count"] + pixels["dropped"], np.int64)
 
     @property
     def nonfinite_samples(self) -> int:
-        """How many samples were dropped because they were NaN or infinite."""
+        """Number of samples that were dropped because they were NaN or infinite."""
         return self._totals["dropped"]
 
     @property
     def rays(self) -> int:
-        """Rays traced; each counter wraps at 2³², long after its picture has converged. A tile's may all be
-        counted with its first pixel (kernels/wave.cl)."""
+        """Number of rays traced; each counter wraps at 2³², long after its image has converged. All rays of a tile may
+        be counted in its first pixel (kernels/wave.cl)."""
         return self._totals["rays"]
 
     @cached_property
     def _totals(self) -> dict[str, int]:
-        """The counts over all pixels, which lie so far apart that one way through them all takes as long as for one."""
+        """Sums of the counters over all pixels, which lie so far apart that one pass over them takes as long as for
+        one."""
         names = ("count", "dropped", "rays")
         sums = in_bands(self.pixels.shape, lambda rows: [self.pixels[name][rows].sum(dtype=np.int64) for name in names])
         return dict(zip(names, map(int, np.sum(sums, axis=0))))

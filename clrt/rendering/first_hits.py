@@ -1,4 +1,4 @@
-"""Pictures of what each pixel's camera rays meet first (kernels/first_hit.cl)."""
+"""First-hit AOVs: what each pixel's camera rays hit first (kernels/first_hit.cl)."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from .accumulation import Accumulation
 from .compile import CompiledScene
 from .pixels import render_pixels
 
-#: Means over each pixel's rays, and what belongs to the ray through its middle.
+#: AOVs averaged over each pixel's rays, and AOVs of the ray through its centre.
 MEANS = ("albedo", "normal", "geometric_normal")
 OF_THE_MIDDLE = ("position", "depth", "primitive", "object", "material")
-#: Camera rays a pixel.
+#: Camera rays per pixel.
 SAMPLES = 16
 
 
 def first_hits(session: Accumulation, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
-    """Those of MEANS and OF_THE_MIDDLE that `names` has, of the scene that the session renders.
+    """Return the AOVs of MEANS and OF_THE_MIDDLE in `names`, for the scene that the session renders.
 
-    As docs/aovs.md says: (height, width, 3) float32, but depth (height, width) float32 and ids (height, width) int32.
-    KernelError and DeviceError where the device fails.
+    As in docs/aovs.md: (height, width, 3) float32, but depth (height, width) float32 and ids (height, width) int32.
+    Raises KernelError and DeviceError if the device fails.
     """
     means = [name for name in MEANS if name in names]
     source, kind = first_hit_program(session.compiled, names)
@@ -42,7 +42,7 @@ def first_hits(session: Accumulation, scene: Scene, names: Collection[str]) -> d
 
 
 def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[str, np.dtype[Any]]:
-    """The program's text, with nothing that `names` does not need, and the record that it writes."""
+    """Return the program text, with only what `names` needs, and the record that it writes."""
     lists = {"SEEN_MEANS": [name for name in MEANS if name in names],
              "SEEN_MIDDLE": ["position"] if {"position", "depth"} & set(names) else []}
     fields = {"primitive": "i4", "instance": "i4", "pad": "2i4"}
@@ -58,7 +58,7 @@ def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[
 
 def _places(session: Accumulation, seen: NDArray[np.float64],
             missed: NDArray[np.bool_]) -> dict[str, NDArray[np.generic]]:
-    """Position and depth of points (height, width, 3) in the compiled scene's frame."""
+    """Return position and depth of points (height, width, 3) given in the compiled scene's frame."""
     camera, frame = session.compiled.camera, session.compiled.frame
     axis = np.subtract(camera.look_at, camera.position, dtype=np.float64)
     ahead = seen - camera.position
@@ -71,7 +71,7 @@ def _places(session: Accumulation, seen: NDArray[np.float64],
 
 
 def _ids(session: Accumulation, scene: Scene, seen: NDArray[Any]) -> dict[str, NDArray[np.int64]]:
-    """What is met at first hits: which object of the scene, which primitive of that, and which material."""
+    """Return the ids at first hits: the scene's object, its primitive, and its material."""
     which, primitive = session.compiled.objects.met(seen["primitive"], seen["instance"])
     distinct: dict[Material, int] = {}
     users = [mesh.material for mesh in scene.meshes]

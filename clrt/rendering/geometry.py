@@ -1,4 +1,4 @@
-"""Packs triangles, their normals, and spheres: what surfaces are made of (kernels/surface.cl)."""
+"""Packing of triangles, their normals, and spheres (kernels/surface.cl)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .records import NORMALS, SPHERE, TRIANGLE
 
 
 class Corners:
-    """The corners of all meshes' triangles, (m, 3, 3) float32, made anew whenever numpy asks for them: they take twice
-    the memory of the meshes, and only as long as somebody holds them."""
+    """Corners of all meshes' triangles, (m, 3, 3) float32, computed on each conversion to a numpy array: they take
+    twice the memory of the meshes, and only as long as the array is referenced."""
 
     def __init__(self, meshes: Sequence[Mesh]) -> None:
         self._meshes = meshes
@@ -23,13 +23,13 @@ class Corners:
         return sum(len(mesh.faces) for mesh in self._meshes)
 
     def __array__(self, dtype: None = None, copy: bool | None = None) -> NDArray[np.float32]:
-        # take: as vertices[faces], in a quarter of the time.
+        # take: like vertices[faces], in a quarter of the time.
         each = [np.take(mesh.vertices, mesh.faces, axis=0) for mesh in self._meshes]
         return each[0] if len(each) == 1 else np.concatenate([np.zeros((0, 3, 3), np.float32), *each])
 
 
 def triangle_records(meshes: Sequence[Mesh], materials: NDArray[np.int32], lights: NDArray[np.int32]) -> NDArray[Any]:
-    """TRIANGLE records of the meshes' triangles. materials: (meshes,) codes; lights: (m,) numbers."""
+    """Return TRIANGLE records of the meshes' triangles. materials: (meshes,) codes; lights: (m,) numbers."""
     records = np.zeros(len(lights), TRIANGLE)
     records["light"], records["normals"] = lights, -1
     first = smooth = 0
@@ -46,7 +46,7 @@ def triangle_records(meshes: Sequence[Mesh], materials: NDArray[np.int32], light
 
 
 def normal_records(meshes: Sequence[Mesh]) -> NDArray[Any]:
-    """NORMALS records of the smooth meshes' triangles, in order."""
+    """Return NORMALS records of the smooth meshes' triangles, in order."""
     records = np.zeros(sum(len(mesh.faces) for mesh in meshes if mesh.normals is not None), NORMALS)
     first = 0
     for mesh in meshes:
@@ -57,14 +57,14 @@ def normal_records(meshes: Sequence[Mesh]) -> NDArray[Any]:
 
 
 def put_corners(records: NDArray[Any], name: str, values: NDArray[np.float32], faces: NDArray[np.int32]) -> None:
-    """The values (n, 3) at each corner into the fields name0 … name2."""
+    """Store the values (n, 3) at each corner in the fields name0 … name2."""
     for corner in range(3):
         records[f"{name}{corner}"] = np.take(values, faces[:, corner], axis=0)
 
 
 def sphere_records(spheres: NDArray[np.float32], materials: NDArray[np.int32],
                    lights: NDArray[np.int32]) -> NDArray[Any]:
-    """SPHERE records of spheres (s, 4). materials, lights: (s,) codes and numbers."""
+    """Return SPHERE records of spheres (s, 4). materials, lights: (s,) codes and numbers."""
     records = np.zeros(len(spheres), SPHERE)
     records["center"], records["radius"] = spheres[:, :3], spheres[:, 3]
     records["material"], records["light"] = materials, lights

@@ -1,4 +1,4 @@
-"""Pictures that guide a denoiser: what the camera sees without its light, through mirrors and glass, too."""
+"""Guide images for a denoiser: albedo and normal of what the camera sees, also through mirrors and glass."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from .accumulation import Accumulation
 from .pixels import render_pixels
 from .records import GUIDE
 
-#: Camera rays a pixel. More cost a denoiser's user more than they bring (docs/denoise.md).
+#: Camera rays per pixel. More cost more than they improve the denoised image (docs/denoise.md).
 SAMPLES = 8
 
 
 def render_guides(session: Accumulation, samples: int = SAMPLES) -> dict[str, NDArray[np.float32]]:
-    """The guides of the session's picture by name, each a mean over `samples` camera rays a pixel.
+    """Return the guides of the session's image by name, each a mean over `samples` camera rays per pixel.
 
-    - albedo (height, width, 3) float32 in [0, 1]: what part of white light the first surface reflects, linear Rec. 709
-    - normal (height, width, 3) float32 in [-1, 1]: its shading normal on the camera's side, in the world's frame
+    - albedo (height, width, 3) float32 in [0, 1]: albedo of the first surface under white light, linear Rec. 709
+    - normal (height, width, 3) float32 in [-1, 1]: its shading normal on the camera's side, in world space
 
-    Of mirrors and glass it is what they show. The sky has its radiance, up to 1, for albedo, and no normal. KernelError
-    and DeviceError where the device fails.
+    At mirrors and glass they are those of what is seen in them. The sky's albedo is its radiance, up to 1; it has no
+    normal. Raises KernelError and DeviceError if the device fails.
     """
     values = render_pixels(session, session.compiled.source_of("guides.cl"), "guides", GUIDE, samples)
     return {name: np.ascontiguousarray(values[name]) for name in GUIDE.names or () if not name.startswith("pad")}

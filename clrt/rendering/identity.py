@@ -1,8 +1,8 @@
-"""What makes a picture the one it is: facts by name, which two renders must share if one is to go on with the other.
+"""Identity of an image: facts by name, which two renders must share for one to resume the other.
 
-These are all fields of the scene, its settings and the choices but those that are named here, so what is added later
-counts by itself: names, what a scene holds beside what is seen, where to stop, and what changes no more than rounding
-(lanes and trees; the device, too).
+These are all fields of the scene, its settings and the choices, except for those listed here, so that new fields are
+included automatically. Excluded are names, contents of a scene that are not visible, stop conditions, and what affects
+only rounding (lanes and BVHs; also the device).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..scene.instancing import prototypes
 from ..scene.model import RenderSettings, Scene
 from .choices import Choices
 
-#: What is left out of a Scene, of its settings, of Choices, and of all that is in a scene.
+#: Fields excluded from a Scene, from its settings, from Choices, and from everything in a scene.
 UNSEEN = {"name", "render", "cameras", "animation", "materials", "source"}
 ENDS = {"spp"}
 ROUNDING = {"lanes", "layout", "builder", "paths", "tree", "first_hits"}
@@ -28,7 +28,7 @@ NAMES = {"name", "material_name"}
 
 
 def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:
-    """Each setting as text, each part of the scene and the kernels as the SHA-256 of what they are."""
+    """Return each setting as text, and the SHA-256 of each part of the scene and of the kernels."""
     width, height = scene.render.size
     values = {**values_of(scene.render, choices), "size": f"{width}x{height}"}
     return {"version": version("clrt"), "kernels": kernel_digest(),
@@ -37,7 +37,7 @@ def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:
 
 
 def values_of(settings: RenderSettings, choices: Choices) -> dict[str, Any]:
-    """The settings and choices that make a picture, by name; of the hit tests each."""
+    """Return the settings and choices that determine an image, by name; hit tests one by one."""
     values = {field.name: getattr(settings, field.name) for field in fields(settings) if field.name not in ENDS}
     for field in fields(choices):
         value = getattr(choices, field.name)
@@ -49,17 +49,17 @@ def values_of(settings: RenderSettings, choices: Choices) -> dict[str, Any]:
 
 
 def parts_of(scene: Scene) -> list[str]:
-    """The names of what is seen of a scene."""
+    """Return the names of the visible parts of a scene."""
     return [field.name for field in fields(scene) if field.name not in UNSEEN]
 
 
 def scene_hash(scene: Scene) -> str:
-    """SHA-256 of all that shines, reflects or is seen in the scene."""
+    """Return the SHA-256 of everything that emits, reflects or is visible in the scene."""
     return _digest([_part(scene, part) for part in parts_of(scene)])
 
 
 def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:
-    """What differs between two renders' facts, each in a few words, settings with both values."""
+    """Return the differences between two renders' facts, each in a few words, settings with both values."""
     told = []
     for name in {**wanted, **found}:
         if (other := found.get(name)) == (value := wanted.get(name)):
@@ -73,7 +73,7 @@ def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:
 
 
 def _part(scene: Scene, name: str) -> object:
-    """A part of the scene; of instances their meshes once each, and where those stand."""
+    """Return a part of the scene; for instances each mesh once, and the transforms."""
     if name != "instances":
         return getattr(scene, name)
     meshes, which = prototypes(scene.instances)
@@ -88,7 +88,7 @@ def _digest(value: object) -> str:
 
 
 def _pieces(value: object) -> Iterator[bytes | memoryview]:
-    """Bytes that tell `value` from any other: an array's with its type and shape, numbers as floats."""
+    """Yield bytes that identify `value` uniquely: of an array with its dtype and shape, of numbers as floats."""
     match value:
         case np.ndarray():
             yield f"{value.dtype.str}{value.shape}".encode()

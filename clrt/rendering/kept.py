@@ -1,4 +1,4 @@
-"""What is kept of a render, and how it becomes arrays for a file and comes back."""
+"""Saved state of a render, and its conversion to and from arrays for a file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .records import DIRECT, PIXEL, PIXEL_WITH_DIRECT
 from .tiles import tiles_of
 from .work import Part, Work
 
-#: The columns of a history, NaN where an entry has none of it.
+#: Columns of a history, NaN for values that an entry lacks.
 HISTORY = ("spp", "seconds", "noise", "relmse")
 KINDS: dict[str, np.dtype[Any]] = {
     "film": PIXEL, "direct": DIRECT, "samples": np.dtype(np.int64), "then": np.dtype(np.int64),
@@ -27,7 +27,7 @@ NO_SENSE = "is damaged: its parts do not fit each other"
 
 @dataclass(frozen=True)
 class Kept:
-    """A render between two launches. planned_spp: what its sampler was told (session.block_bits)."""
+    """Saved state of a render between two launches. planned_spp: the sampler's planned samples (session.block_bits)."""
 
     planned_spp: int | None
     seconds: float
@@ -38,7 +38,7 @@ class Kept:
 
 
 def to_arrays(kept: Kept) -> Arrays:
-    """As KINDS says. parts: (k, 4); history: (n, 4), see HISTORY; the others as Work and NoiseEstimate say."""
+    """Return arrays as in KINDS. parts: (k, 4); history: (n, 4), see HISTORY; others: see Work and NoiseEstimate."""
     work, (mean, changes, level) = kept.work, kept.noise.arrays()
     rows = [[np.nan if entry.get(name) is None else entry[name] for name in HISTORY] for entry in kept.history]
     arrays = {**_film_parts(kept.film), "samples": work.samples, "then": work.then, "tiles": work.tiles,
@@ -48,7 +48,7 @@ def to_arrays(kept: Kept) -> Arrays:
 
 
 def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -> Kept:
-    """What was kept of a picture of (width, height); ValueError where the parts do not fit each other."""
+    """Return the saved state of an image of (width, height). Raises ValueError if the parts are inconsistent."""
     planned, seconds = header.get("planned_spp"), header.get("seconds")
     if not (planned is None or type(planned) is int and planned > 0) or type(seconds) is not float or not (
             0 <= seconds < np.inf and _film_fits(header, arrays, size) and _work_fits(arrays, size)
@@ -71,20 +71,20 @@ def from_arrays(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -
 
 
 def _film_parts(film: Film) -> Arrays:
-    """Its pixels without, and where it has that, with their direct light alone."""
+    """Return its pixels without direct light, and the direct light separately, if the film has it."""
     names = film.pixels.dtype.names or ()
     direct = film.pixels[list(DIRECT.names or ())] if "direct" in names else np.zeros((0, 0), DIRECT)
     return {"film": film.pixels[list(PIXEL.names or ())], "direct": direct}
 
 
 def _film_fits(header: dict[str, Any], arrays: Arrays, size: tuple[int, int]) -> bool:
-    """Whether the film is of this size, and keeps direct light apart as the render does."""
+    """Return whether the film has this size, and stores direct light separately exactly if the render does."""
     direct = size[::-1] if header["facts"].get("direct_light") == "True" else (0, 0)
     return bool(arrays["film"].shape == size[::-1] and arrays["direct"].shape == direct)
 
 
 def _work_fits(arrays: Arrays, size: tuple[int, int]) -> bool:
-    """Whether the work is of this size, and no launch would reach beyond the film or 2³² samples."""
+    """Return whether the work has this size, and no launch would exceed the film or 2³² samples."""
     samples, then, tiles, parts = (arrays[name] for name in ("samples", "then", "tiles", "parts"))
     return bool(samples.shape == then.shape == tiles_of(size)
                 and np.all((0 <= samples) & (samples <= then) & (then <= MOST_SAMPLES))
@@ -94,7 +94,7 @@ def _work_fits(arrays: Arrays, size: tuple[int, int]) -> bool:
 
 
 def _noise_fits(arrays: Arrays, size: tuple[int, int]) -> bool:
-    """Whether estimate and history are of this size; there is no estimate before the first picture."""
+    """Return whether estimate and history have this size; there is no estimate before the first image."""
     mean, changes, level = (arrays[name] for name in ("noise_mean", "noise_changes", "noise_level"))
     shapes = [(*size[::-1], 3), tiles_of(size)] if mean.size else [(0, 0, 3), (0, 0)]
     history = arrays["history"]

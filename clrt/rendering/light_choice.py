@@ -1,4 +1,4 @@
-"""Packs what one light of several is chosen by (kernels/light/choice.cl): groups of lights, and a tree of many."""
+"""Packing of the data for light sampling (kernels/light/choice.cl): light bounds, and a light BVH over many lights."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ from .light_groups import Doubles, LightGroups
 from .light_tree import group_records, light_tree
 from .records import LIGHT_GROUP, LIGHT_PLACE
 
-#: Lights of finite extent that are looked at one by one; where there are more, so many groups of them are.
+#: Maximum number of finite lights that are evaluated one by one; if there are more, this many groups of them are.
 FEW = 32
 
 
 @dataclass(frozen=True)
 class LightChoice:
-    """choices: from how many one is chosen, the last `infinite` of them infinite lights. tree: whether more follows.
-
-    Without lights there are no choices; one is none.
+    """Light sampling data. choices: number of entries to choose from, the last `infinite` of them infinite lights; 0
+    without lights, and 1 if there is nothing to choose. tree: whether a light BVH is traversed below the chosen entry.
     """
 
     choices: int
@@ -30,20 +29,21 @@ class LightChoice:
 
     @property
     def files(self) -> list[str]:
-        """The kernel file that chooses."""
+        """Kernel file that implements the choice."""
         return ["light/choice.cl" if self.choices > 1 else "light/only.cl"] if self.choices else []
 
 
 def pack_choice(lights: LightGroups, infinite: Doubles) -> LightChoice:
-    """lights: n of finite extent, numbered 0 to n − 1. infinite: (k, 4), what comes after them.
+    """Pack the data for n finite lights, numbered 0 to n − 1, and for the infinite ones after them, (k, 4).
 
-    A scalar and a vector each: where the normal is n, their irradiance is about scalar + vector·n, or 0 if below.
+    Each infinite light is a scalar and a vector: for a normal n, its irradiance is about scalar + vector·n, or 0 if
+    negative.
     """
     first = min(len(lights), FEW)
     choices = first + len(infinite)
     if choices < 2:
         return LightChoice(choices)
-    # Whatever the unit of radiance is, importances then stay in the range of floats.
+    # Keeps importances in the range of floats, whatever the unit of radiance is.
     scale = max(lights.intensity.sum(), np.abs(infinite).max(initial=0))
     lights = replace(lights, intensity=lights.intensity / scale)
     buffers: dict[str, tuple[str, NDArray[Any]]] = {}

@@ -1,4 +1,4 @@
-"""What is known of lights when one of them is to be chosen: where they are, where they shine, and how brightly."""
+"""Light bounds for light sampling: where lights are, in which directions they emit, and how brightly."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from ..accel.tree import Tree
 
 Doubles = NDArray[np.float64]
 
-#: By how much the cones of spots are widened, in radians and in the cosine, since float32 rounds what they are compared
-#: with.
+#: Margins by which the cones of spots are widened, in radians and in the cosine, since float32 rounds what they are
+#: compared with.
 WIDER, LESS = 1e-3, 2e-6
-#: By how much balls are made smaller, over the size of their coordinates: by more than what rounding adds to them.
+#: Margin by which spheres are shrunk, relative to the size of their coordinates: more than what rounding adds to them.
 SMALLER = 2.0**-20
 
 
 @dataclass(frozen=True, eq=False)
 class LightGroups:
-    """n groups of one or more lights each, as kernels/light/importance.cl sees them.
+    """Bounds of n groups of one or more lights each, as used by kernels/light/importance.cl.
 
-    low, high: (n, 3), the boxes around them. radius: (n,), of a sphere around the box's middle that holds them. axis:
-    (n, 3), unit, or 0. cos_cone: (n,), the cosine of the angle from the axis within which all their normals lie, −1
-    where these point everywhere. intensity: (n,), luminance of radiance times area, or of W/sr, all together.
-    cos_reach: (n,), the cosine of the angle from the nearest normal up to which they shine, 0 for surfaces.
+    low, high: (n, 3), bounding boxes. radius: (n,), of a bounding sphere around the box's centre. axis: (n, 3), unit,
+    or 0. cos_cone: (n,), the cosine of the angle around the axis that contains all their normals, −1 if these point in
+    all directions. intensity: (n,), total of luminance of radiance times area, or of W/sr. cos_reach: (n,), the cosine
+    of the maximum emission angle from the nearest normal, 0 for surfaces.
     """
 
     low: Doubles
@@ -42,19 +42,19 @@ class LightGroups:
 
 
 def flat_lights(corners: Doubles, normal: Doubles, intensity: Doubles, both: NDArray[np.bool_]) -> LightGroups:
-    """Flat lights with corners (n, k, 3) that shine on the side of their unit normals (n, 3), or on both (n,): these
-    are bounded as if they shone everywhere."""
+    """Return the bounds of flat lights with corners (n, k, 3) that emit on the side of their unit normals (n, 3), or on
+    both (n,): the latter are bounded as if they emitted in all directions."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     axis, cos_cone = np.where(both[:, None], 0.0, normal), np.where(both, -1.0, 1.0)
     return LightGroups(low, high, _half_diagonal(low, high), axis, cos_cone, intensity, 0 * cos_cone)
 
 
 def round_lights(center: Doubles, radius: Doubles, intensity: Doubles) -> LightGroups:
-    """Balls, (n, 3) and (n,), that shine everywhere, or points.
+    """Return the bounds of spheres, (n, 3) and (n,), or of points, that emit in all directions.
 
-    A ball brings nothing to its own surface. There that hangs on the last digit of a difference, which compilers round
-    in their own ways, so balls are taken for a little smaller: where one rises above the horizon by no more than that,
-    its light is left to paths that meet it by chance.
+    A sphere does not illuminate its own surface. There this depends on the last digit of a difference, which compilers
+    round differently, so spheres are considered slightly smaller: where one rises above the horizon by no more than
+    that, its light is left to BSDF sampling.
     """
     around = radius[:, None]
     everywhere = -np.ones(len(center))
@@ -64,21 +64,22 @@ def round_lights(center: Doubles, radius: Doubles, intensity: Doubles) -> LightG
 
 
 def spot_lights(place: Doubles, axis: Doubles, cos_outer: Doubles, intensity: Doubles) -> LightGroups:
-    """Points (n, 3) that shine in cones around unit axes (n, 3), whose angles have the cosines (n,)."""
+    """Return the bounds of points (n, 3) that emit in cones around unit axes (n, 3), given the cosines of their angles
+    (n,)."""
     ones = np.ones(len(place))
     reach = np.cos(np.minimum(np.arccos(np.clip(cos_outer, -1, 1)) + WIDER, np.pi / 2)) - LESS
     return LightGroups(place, place, 0 * ones, axis, ones, intensity, np.maximum(reach, 0))
 
 
 def joined(parts: Sequence[LightGroups]) -> LightGroups:
-    """All groups of the parts."""
+    """Return all groups of the parts."""
     return LightGroups(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(LightGroups)))
 
 
 def groups_of_nodes(tree: Tree, lights: LightGroups) -> LightGroups:
-    """The groups that the nodes of a tree over `lights`, one a leaf, stand for.
+    """Return the light bounds of the nodes of a binary BVH over `lights`, with one light per leaf.
 
-    The axis is the mean of the normals, weighted by intensity; the cone around it is as narrow as can be.
+    The axis is the mean of the normals, weighted by intensity; the cone around it is as narrow as possible.
     """
     levels, leaf = list(tree.levels()), tree.leaf
     own = tree.order[tree.left_first[leaf]]

@@ -1,4 +1,4 @@
-"""A tree over many lights, in nodes of eight groups (kernels/light/tree.cl)."""
+"""Light BVH over many lights, with nodes of eight groups (kernels/light/tree.cl)."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from ..accel.tree import Tree
 from .light_groups import Doubles, LightGroups, groups_of_nodes
 from .records import LIGHT_GROUP
 
-#: Groups of a node, as in light/tree.cl.
+#: Groups per node, as in light/tree.cl.
 NODE = 8
 
 Integers = NDArray[np.int64]
 
 
 def light_tree(lights: LightGroups, first: int, others: int) -> tuple[NDArray[Any], Integers]:
-    """LIGHT_GROUPs over n > `first` lights, and each light's own (n,).
+    """Return LIGHT_GROUPs over n > `first` lights, and each light's own (n,).
 
-    `first` groups, which hold all lights; then `others` that are left to the caller; then those of the nodes, level by
-    level.
+    The order is: `first` groups, which contain all lights; then `others` that the caller fills in; then those of the
+    nodes, level by level.
 
-    A binary tree is split at the middle of the longest extent: the error was within 4 % of that with the surface area
-    orientation heuristic (Conty Estevez and Kulla 2018, 4.4). In it, the groups whose intensity times radius is
-    greatest are divided first.
+    The binary BVH is split at the middle of the longest extent: its error was within 4 % of that with the surface area
+    orientation heuristic (Conty Estevez and Kulla 2018, 4.4). It is collapsed by splitting the groups with the greatest
+    intensity times radius first.
     """
     tree = midpoint(lights.low.astype(np.float32), lights.high.astype(np.float32), 1)
     groups = groups_of_nodes(tree, lights)
@@ -54,7 +54,7 @@ def light_tree(lights: LightGroups, first: int, others: int) -> tuple[NDArray[An
 
 
 def _divided(tree: Tree, size: Doubles, nodes: Integers, width: int) -> Integers:
-    """(k·width,): the parts into which k nodes of the binary tree are divided, the largest first; −1 for none."""
+    """Return (k·width,): the parts into which k nodes of the binary BVH are divided, the largest first; −1 for none."""
     parts = np.full((len(nodes), width), -1, np.int64)
     parts[:, 0] = nodes
     rows = np.arange(len(nodes))
@@ -68,7 +68,7 @@ def _divided(tree: Tree, size: Doubles, nodes: Integers, width: int) -> Integers
 
 
 def group_records(groups: LightGroups, below: Integers) -> NDArray[Any]:
-    """LIGHT_GROUPs, `above` left out."""
+    """Return LIGHT_GROUPs without `above`."""
     records = np.zeros(len(groups), LIGHT_GROUP)
     records["center"], records["radius"] = (groups.low + groups.high) / 2, groups.radius
     records["axis"], records["cos_cone"] = groups.axis, groups.cos_cone

@@ -1,4 +1,4 @@
-"""Renders on devices whose driver ends loops early (device/loops.py): few samples a launch, and none may be missing."""
+"""Support for devices whose driver ends loops early (device/loops.py): few samples per launch, none of them missing."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from .film import Film
 from .tiles import tile_pixels
 from .work import Work
 
-#: Turns that an edge of a path takes beside its two rays, and a ray takes in a large tree, both on the high side.
+#: Upper estimates of the loop iterations of a path vertex besides its two rays, and of a ray in a large BVH.
 EDGE_TURNS, RAY_TURNS = 64, 1000
-#: The part of a limit that a launch may use: work-items that run as one vector wait for each other in every loop.
+#: Fraction of the limit that a launch may use, as a divisor: work-items that run as one vector wait for each other in
+#: every loop.
 MARGIN = 4
-#: A byte; four of them are no number that a record begins with.
+#: Byte that marks records not written yet; no record begins with four of them.
 MARK = 0xFE
 
 
 def most_samples(device: Device, tree: Layout, primitives: int, max_depth: int) -> int | None:
-    """Samples of a pixel in one launch, at least 1; None where the device's driver ends no loops."""
+    """Return the maximum samples per pixel in one launch, at least 1; None if the driver does not end loops."""
     turns = loop_turns(device)
     if turns is None:
         return None
@@ -34,7 +35,7 @@ def most_samples(device: Device, tree: Layout, primitives: int, max_depth: int) 
 
 
 def check_samples(device: Device, film: Film, work: Work, size: tuple[int, int]) -> None:
-    """DeviceError where loops of work-items that are done were ended: the film then lacks their samples."""
+    """Raise DeviceError if loops of finished work-items were ended: the film then lacks their samples."""
     turns = loop_turns(device)
     if turns is None or work.parts:
         return
@@ -44,13 +45,13 @@ def check_samples(device: Device, film: Film, work: Work, size: tuple[int, int])
 
 
 def mark_pixels(device: Device, pixels: DeviceArray) -> None:
-    """Puts MARK where a kernel is to store a record for each pixel, and does not if its loops were ended."""
+    """Fill the buffer with MARK, which remains where a kernel does not store a record because its loops were ended."""
     if loop_turns(device) is not None:
         pixels.write(device, np.full(pixels.nbytes, MARK, np.uint8).view(pixels.dtype))
 
 
 def check_pixels(device: Device, pixels: NDArray[Any]) -> None:
-    """DeviceError where records still begin with marks."""
+    """Raise DeviceError if records still begin with marks."""
     turns = loop_turns(device)
     if turns is None:
         return
@@ -60,7 +61,7 @@ def check_pixels(device: Device, pixels: NDArray[Any]) -> None:
 
 
 def check_paths(device: Device, unfinished: int, paths: int) -> None:
-    """DeviceError where loops that followed `unfinished` of so many paths were ended."""
+    """Raise DeviceError if loops that traced `unfinished` of `paths` paths were ended."""
     if unfinished:
         raise _refusal(device, loop_turns(device) or 0, f"{unfinished} of {paths} paths")
 

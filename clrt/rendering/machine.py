@@ -1,4 +1,4 @@
-"""What rendered a picture, and what it built for that: the part of a report that tells of devices."""
+"""Device section of a report: what rendered an image, and what was built for it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .compile import CompiledScene
 
 
 def machine_report(devices: Sequence[Device], picture: Accumulation) -> dict[str, Any]:
-    """The report's fields on the devices that were to render a picture, their programs, trees and memory."""
+    """Return the report's fields on the devices that were to render an image, their programs, BVHs and memory."""
     infos = [device.info for device in devices]
     return {
         "platform": " + ".join(dict.fromkeys(info.platform for info in infos)),
@@ -24,7 +24,7 @@ def machine_report(devices: Sequence[Device], picture: Accumulation) -> dict[str
 
 
 def tree_report(compiled: CompiledScene) -> dict[str, Any]:
-    """The tree's part of the report."""
+    """Return the report's BVH section."""
     tree, counts = compiled.tree, compiled.counts[0]
     return {"triangles": int(counts["triangles"]), "spheres": int(counts["spheres"]), "instances": compiled.instances,
             "nodes": tree.nodes, "bytes": tree.bytes, "build_seconds": tree.build_seconds, "sah_cost": tree.sah_cost,

@@ -1,4 +1,4 @@
-"""Packs the materials: an array of records for each type in use."""
+"""Packing of materials: an array of records for each type in use."""
 
 from __future__ import annotations
 
@@ -21,10 +21,9 @@ Number = float | tuple[float, ...] | int
 
 @dataclass(frozen=True)
 class Materials:
-    """codes: (users,) int32, each user's type | index << 4. buffers: the records of each type in use, by its kernel.
-
-    reads: by `kernel_parameter`, whether some material of the type reads that from a texture. features: of each type's.
-    """
+    """Packed materials. codes: (users,) int32, each user's type | index << 4. buffers: records of each type, by kernel.
+    reads: by `kernel_parameter`, whether some material of the type reads it from a texture. features: those of each
+    type."""
 
     codes: NDArray[np.int32]
     buffers: dict[str, tuple[str, NDArray[Any]]]
@@ -33,39 +32,39 @@ class Materials:
     features: dict[type[Material], frozenset[str]]
 
     def featured(self, feature: str) -> list[type[Material]]:
-        """The types in use of which some material has the feature."""
+        """Return the types in use of which some material has the feature."""
         return [kind for kind in self.used if feature in self.features[kind]]
 
     def with_value(self, parameter: str) -> list[type[Material]]:
-        """The types in use that have the parameter."""
+        """Return the types in use that have the parameter."""
         return [kind for kind in self.used if f"{kind.kernel}_{parameter}" in self.reads]
 
     def mapped(self, parameter: str) -> list[type[Material]]:
-        """The types in use that read the parameter from a texture."""
+        """Return the types in use that read the parameter from a texture."""
         return [kind for kind in self.used if self.reads.get(f"{kind.kernel}_{parameter}")]
 
     @property
     def normal_maps(self) -> bool:
-        """Whether there are any, on surfaces or on their coats."""
+        """Whether there are normal maps, on surfaces or on their coats."""
         return bool(self.mapped("normal_map") or self.mapped("clearcoat_normal_map"))
 
 
 class Tables:
-    """Those of all materials, equal ones once."""
+    """Tables of all materials, without duplicates."""
 
     def __init__(self) -> None:
         self._first: dict[Table, int] = {}
         self._entries = 0
 
     def first(self, table: Table) -> int:
-        """The number of its first entry."""
+        """Return the index of its first entry."""
         if table not in self._first:
             self._first[table] = self._entries
             self._entries += len(table) // ENTRY
         return self._first[table]
 
     def buffers(self) -> dict[str, tuple[str, NDArray[Any]]]:
-        """The buffer of all entries, if there is any."""
+        """Return the buffer of all entries, if there are any."""
         if not self._first:
             return {}
         entries = np.concatenate([np.array(table, np.float32) for table in self._first]).reshape(-1, ENTRY)
@@ -73,8 +72,8 @@ class Tables:
 
 
 def pack_materials(users: Iterable[Material], textures: Textures, tables: Tables, culling: Culling) -> Materials:
-    """The materials of these users, equal ones packed once, with their textures added to `textures`, and their tables
-    to `tables`; culling: of back faces."""
+    """Pack the materials of these users without duplicates, adding their textures to `textures` and their tables to
+    `tables`; culling: back-face culling mode."""
     distinct: dict[type[Material], dict[Material, int]] = {}
     codes = []
     for material in users:
@@ -90,7 +89,7 @@ def pack_materials(users: Iterable[Material], textures: Textures, tables: Tables
             if name.endswith("_texture"):
                 records[name] = -1
         for i, (material, named) in enumerate(zip(distinct[kind], values)):
-            plain = material.without_textures()     # what it does not read itself is a number
+            plain = material.without_textures()     # fallback values, without textures
             for name in records.dtype.names or ():
                 if name in named or getattr(plain, name, None) is not None:
                     value = named.get(name, getattr(plain, name, 0))
@@ -107,7 +106,7 @@ def pack_materials(users: Iterable[Material], textures: Textures, tables: Tables
 
 
 def _values(material: Material, textures: Textures, tables: Tables, culling: Culling) -> dict[str, Number]:
-    """What its record holds: of a texture its factor, and its number as NAME_texture; of a table its first entry's."""
+    """Return the values of its record: a texture's factor, and its number as NAME_texture; a table's first entry."""
     parameters = material.parameters()
     parameters |= material.surface_parameters(culling)
     colors = {field.name for field in fields(material) if isinstance(field.default, tuple)}

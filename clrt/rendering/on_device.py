@@ -1,4 +1,4 @@
-"""A compiled scene on a device: its program built, its buffers uploaded, ready to take pixels."""
+"""Compiled scene on a device: program built and buffers uploaded, ready to render pixels."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from .compile import CompiledScene
 from .loop_limit import most_samples
 from .raster import Bins
 
-#: Defined in programs whose film is the pixels of a launch.
+#: Defined in programs whose film holds only the pixels of a launch.
 WINDOWS = "#define FILM_WINDOWS 1\n"
-#: Bytes of their pixels on the device, at most.
+#: Maximum size of such a film on the device, in bytes.
 WINDOW = 64 << 20
-#: Bytes of a kernel's parameters beside pointers to the scene's arrays and its counts: two pointers.
+#: Bytes of a kernel's parameters besides pointers to the scene's arrays and its counts: two pointers.
 OTHER_PARAMETERS = 16
 
 
 def largest_film(device: Device, compiled: CompiledScene) -> int:
-    """Bytes that a film may take there."""
+    """Return the maximum size of a film on the device, in bytes."""
     pixel = compiled.choices.pixel.itemsize
     if compiled.part_bytes is None:
         return device.info.max_alloc_bytes
@@ -43,11 +43,11 @@ def largest_film(device: Device, compiled: CompiledScene) -> int:
 
 
 class SceneOnDevice:
-    """launch: the LAUNCH record, whose ranges are for its user to set; film_bytes: what the film will take there;
-    windows: whether that is for the pixels of a launch, not the picture's. before: scenes of no use any more, whose
-    program and buffers are taken over where they are the same.
+    """Scene on a device. launch: the LAUNCH record, whose ranges its user sets; film_bytes: size of the film on the
+    device; windows: whether the film holds only the pixels of a launch. before: scenes no longer needed, whose program
+    and buffers are reused where they are the same.
 
-    Raises DeviceError, with the numbers, where scene and film do not fit, and KernelError.
+    Raises DeviceError, with the numbers, if scene and film do not fit, and KernelError.
     """
 
     def __init__(self, device: Device, compiled: CompiledScene, launch: NDArray[Any], film_bytes: int,
@@ -56,7 +56,7 @@ class SceneOnDevice:
         self._bins: Bins | None = None
         self._check_memory()
         primitives = int(compiled.counts["triangles"][0] + compiled.counts["spheres"][0])
-        #: Of a pixel, in one launch; None where it does not matter.
+        #: Maximum samples per pixel in one launch; None if unlimited.
         self.most_samples = most_samples(device, compiled.tree, primitives, int(launch["max_depth"][0]))
         self._windows = windows
         last = next((each for each in before if each.device is device), None)
@@ -67,7 +67,7 @@ class SceneOnDevice:
             self._buffers = {name: last and last._buffer(name, array) or self._uploaded(array)
                              for name, (_, array) in compiled.buffers.items()}
         self._kernel = make_kernel(device, self.program, compiled.kernel)
-        #: What every kernel of the scene takes first (SCENE_PARAMETERS).
+        #: Leading arguments of every kernel of the scene (SCENE_PARAMETERS).
         self.scene_arguments = [*sum(self._buffers.values(), []), compiled.counts[0]]
         if compiled.entry == "raster.cl":
             self._bins = Bins(device, compiled, self.scene_arguments)
@@ -80,7 +80,7 @@ class SceneOnDevice:
         return [lent(self.device, part) for part in parts(values, self.compiled.part_bytes)]
 
     def _buffer(self, name: str, array: Any) -> list[cl.Buffer] | None:
-        """The buffer of this name, if it holds the same as an array."""
+        """Return the buffer of this name if its content equals an array."""
         own = self.compiled.buffers.get(name, (None, None))[1]
         kept = isinstance(array, np.ndarray) or self.compiled.part_bytes is None    # parts are copies
         return self._buffers[name] if kept and same_content(own, array) else None
@@ -92,7 +92,7 @@ class SceneOnDevice:
 
     @property
     def _needs(self) -> dict[str, int]:
-        """Bytes there, by what takes them, but for a camera's bins."""
+        """Device memory in bytes by purpose, except for the raster bins."""
         arrays = self.compiled.buffers.items()
         return {**{name: array_bytes(array, self.compiled.part_bytes) for name, (_, array) in arrays},
                 "film": self.film_bytes}
@@ -106,7 +106,8 @@ class SceneOnDevice:
 
     @contextmanager
     def allocating(self) -> Iterator[None]:
-        """Around what takes memory there: NoRoomError where the device has not enough, DeviceError where it fails."""
+        """Context for device allocations. Raises NoRoomError if memory is exhausted, and DeviceError if the device
+        fails."""
         try:
             with driver_errors():
                 yield
@@ -114,7 +115,7 @@ class SceneOnDevice:
             raise NoRoomError(f"{self.device.info.name}: {size(self.device_bytes)} do not fit: {error}") from error
 
     def look(self, camera: Camera) -> None:
-        """What is launched from now on is seen by this camera, whose kernel file is that of the one before."""
+        """Use this camera for subsequent launches; its kernel file must be that of the previous one."""
         self.compiled = self.compiled.seen_by(camera, *self.compiled.chosen_files["CAMERA"])
         width, height = int(self.launch["width"][0]), int(self.launch["height"][0])
         record = launch_record(self.compiled.camera, (width, height))
@@ -122,7 +123,7 @@ class SceneOnDevice:
             self.launch[name] = record[name]
 
     def warm_up(self, film: cl.Buffer, tiles: cl.Buffer) -> None:
-        """Launches no work: some drivers compile, or take memory, at the first launch. It belongs to the build."""
+        """Launch an empty range, because some drivers compile or allocate at the first launch; counts as build time."""
         if self._warm:
             return
         start = time.perf_counter()
@@ -132,15 +133,15 @@ class SceneOnDevice:
         self.build_seconds += time.perf_counter() - start
 
     def enqueue_pixels(self, film: cl.Buffer, tiles: cl.Buffer) -> cl.Event:
-        """Enqueues the integrator for the range in the launch record, of the picture's tiles in `tiles`."""
+        """Enqueue the integrator for the range in the launch record, of the image's tiles in `tiles`."""
         bins = self._bins.of(self.launch, self._needs) if self._bins else []
         self._kernel.set_args(*self.scene_arguments, film, tiles, self.launch[0], *bins)
         return self.enqueue(self._kernel, int(self.launch["pixel_count"][0]), self.compiled.pixels)
 
     def enqueue(self, kernel: cl.Kernel, pixel_count: int, share: int | None = None) -> cl.Event:
-        """Enqueues a kernel of the scene, whose arguments are set, for as many pixels.
+        """Enqueue a kernel of the scene, whose arguments are set, for `pixel_count` pixels.
 
-        share: how many a work-item takes; None for one a lane.
+        share: pixels per work-item; None for one per lane.
         """
         local = self.device.local_size
         groups = max(1, -(-pixel_count // ((share or self.compiled.choices.lanes) * local)))

@@ -1,4 +1,4 @@
-"""Scene → buffers. The only code that packs a scene for the device."""
+"""Scene packing: from a scene to device buffers. All packing goes through this module."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ from .textures import Textures
 
 
 class Shapes:
-    """The scene in its frame, with those meshes first that only its instances show.
+    """The scene in its frame, starting with the meshes that only its instances show.
 
-    triangles: of all meshes; spheres: (s, 4) float32, center and radius; lone: whether these are so few that no tree
-    holds them.
+    triangles: of all meshes; spheres: (s, 4) float32, center and radius; lone: whether there are so few spheres that
+    they are not in the BVH.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -52,19 +52,19 @@ class Shapes:
 
     @cached_property
     def users(self) -> list[Material]:
-        """The materials of meshes, spheres and instances."""
+        """Materials of meshes, spheres and instances."""
         return [*(mesh.material for mesh in self.scene.meshes), *(sphere.material for sphere in self.scene.spheres),
                 *self.placements.materials]
 
     def _follows_rays(self, choices: Choices) -> bool:
-        """Whether rays are: the integrator `raster` has no others than those of shadows, mirrors, glass and holes."""
+        """Return whether rays are traced: `raster` traces only shadow rays and those of mirrors, glass and cut-outs."""
         render = self.scene.render
         return (render.integrator != "raster" or render.shadows or choices.first_hits
                 or any(user.is_specular or "TRANSMISSION" in user.features()
                        or "opacity" in user.surface_parameters(render.back_face_culling) for user in self.users))
 
     def tree(self, choices: Choices, device: Device | None, carried: Carried) -> Layout:
-        """The tree over all but lone spheres; NO_RAYS where none is needed."""
+        """Return the BVH over everything but lone spheres; NO_RAYS if none is needed."""
         if not self._follows_rays(choices):
             return NO_RAYS
         in_tree, test = self.spheres[:0] if self.lone else self.spheres, choices.tests.triangle
@@ -75,7 +75,7 @@ class Shapes:
 
     def buffers(self, codes: NDArray[np.int32], emitters: Emitters, normals: NDArray[Any],
                 rays: bool) -> dict[str, tuple[str, Any]]:
-        """What surfaces are made of; codes: of the users' materials; rays: whether any is followed."""
+        """Return the buffers of the surfaces; codes: of the users' materials; rays: whether any are traced."""
         meshes, spheres = self.scene.meshes, self.spheres
         of_meshes, of_spheres, of_instances = np.split(codes, np.cumsum([len(meshes), len(spheres)]))
         buffers: dict[str, tuple[str, Any]] = {}
@@ -96,7 +96,7 @@ class Shapes:
 
 @dataclass(frozen=True)
 class Packed:
-    """A scene for a device, as yet without its program. counts: a COUNTS record; uv_sets: how many its textures use."""
+    """Packed scene, without its program. counts: a COUNTS record; uv_sets: number of UV sets that its textures use."""
 
     shapes: Shapes
     tree: Layout
@@ -109,23 +109,23 @@ class Packed:
 
     @property
     def scene(self) -> Scene:
-        """See `Shapes`."""
+        """The scene, see `Shapes`."""
         return self.shapes.scene
 
     @property
     def frame(self) -> Frame:
-        """See `Shapes`."""
+        """The frame, see `Shapes`."""
         return self.shapes.frame
 
 
 def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: Carried) -> Packed:
-    """Packs a valid scene; device: where large trees are built, if given; carried: from the scene before."""
+    """Pack a valid scene; device: where large BVHs are built, if given; carried: cache from the previous scene."""
     shapes = Shapes(scene)
-    packing = beside(lambda: carried.sky(scene.environment))    # takes as long as a tree; neither needs all cores
+    packing = beside(lambda: carried.sky(scene.environment))    # takes as long as a BVH build; neither uses all cores
     try:
         tree = shapes.tree(choices, device, carried)
         normals = normal_records(shapes.scene.meshes)
-    finally:    # else it could replace the sky of the next scene
+    finally:    # else it could replace the next scene's environment
         sky = packing()
     textures, tables = Textures(), Tables()
     emitters = pack_emitters(shapes.scene, sky, textures)

@@ -1,7 +1,7 @@
-"""Large files are written past the system's memory for files, where it allows that.
+"""Direct I/O for large files: writing that bypasses the system's page cache, where supported.
 
-What is written once and seldom read needs none of that memory: to find it takes longer than a fast disk does to write,
-and other programs would have to give theirs up.
+Data that is written once and seldom read does not need the page cache: allocating its pages takes longer than a fast
+disk needs for writing, and evicts the data of other programs.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ import mmap
 import os
 from collections.abc import Iterable, Iterator
 
-#: Written at a time: a multiple of every disk's blocks, and some milliseconds of a fast one.
+#: Bytes per write: a multiple of every disk's block size, and some milliseconds of a fast disk.
 CHUNK = 4 << 20
 
 
 def write_past_cache(handle: int, pieces: Iterable[bytes | memoryview]) -> None:
-    """Writes the pieces, of bytes, one after another to an open file, which is at its beginning. OSError where that
-    fails; not all of it is on disk before `os.fsync`."""
+    """Write the pieces of bytes one after another to an open file, positioned at its beginning. Raises OSError if that
+    fails; the data is on disk only after `os.fsync`."""
     direct = _set_direct(handle, True)
-    with mmap.mmap(-1, CHUNK) as memory, memoryview(memory) as chunk:    # which begins with a page, as a disk wants it
+    with mmap.mmap(-1, CHUNK) as memory, memoryview(memory) as chunk:    # page-aligned, as O_DIRECT requires
         for size in _filled(chunk, pieces):
             if direct and size < CHUNK:    # the last one
                 direct = _set_direct(handle, False)
@@ -30,11 +30,11 @@ def write_past_cache(handle: int, pieces: Iterable[bytes | memoryview]) -> None:
                 except OSError as error:
                     if not direct or error.errno != errno.EINVAL:
                         raise
-                    direct = _set_direct(handle, False)    # some systems only refuse now
+                    direct = _set_direct(handle, False)    # some systems refuse only now
 
 
 def _filled(chunk: memoryview, pieces: Iterable[bytes | memoryview]) -> Iterator[int]:
-    """How many bytes of the pieces are in the chunk, each time that it is full, and at the end."""
+    """Yield the number of bytes in the chunk each time that it is full, and at the end of the pieces."""
     there = 0
     for piece in pieces:
         done = 0
@@ -50,7 +50,7 @@ def _filled(chunk: memoryview, pieces: Iterable[bytes | memoryview]) -> Iterator
 
 
 def _set_direct(handle: int, wanted: bool) -> bool:
-    """Asks for writing past that memory, or for writing as usual; whether it will be past it."""
+    """Switch direct I/O on or off; return whether it is on afterwards."""
     if not hasattr(os, "O_DIRECT"):
         return False
     import fcntl

@@ -14,7 +14,7 @@ from .film import Film
 
 #: Linear radiance below which a .png of 8 bits is black: half a level of sRGB's straight part.
 BLACK = 0.5 / 255 / 12.92
-#: The cause of a black picture where no other is known.
+#: Cause of a black image if no other is known.
 DARK = "no light reaches what the camera sees"
 _log = logging.getLogger(__name__)
 
@@ -26,8 +26,7 @@ def nonfinite_warnings(dropped: int, samples: int) -> list[str]:
 
 
 def bias_warnings(settings: RenderSettings, removed: float | None) -> list[str]:
-    """Return one warning if a setting biases the picture, else none. removed: the part of the light, where it is
-    known."""
+    """Return one warning if a setting biases the image, else none. removed: the fraction of the light, if known."""
     if not (names := biased_by(settings)):
         return []
     part = "" if removed is None else f": {removed:.2%} of the light was removed"
@@ -35,8 +34,8 @@ def bias_warnings(settings: RenderSettings, removed: float | None) -> list[str]:
 
 
 def black_warnings(settings: RenderSettings, features: Iterable[str], brightest: float, cause: str) -> list[str]:
-    """Return one warning if a picture of light is black although something emits: its brightest value is below BLACK.
-    cause: the likely one where that is 0."""
+    """Return one warning if an image of light is black although something emits: its brightest value is below BLACK.
+    cause: the likely cause if that value is 0."""
     if brightest >= BLACK or not _shows_light(settings) or _is_dark(features):
         return []
     if brightest > 0:
@@ -61,11 +60,11 @@ class PictureWarnings:
             _log.warning("%s: %s", scene.name, text)
 
     def of(self, film: Film) -> list[str]:
-        """Return all of them for the picture so far, a line each; for a band of a picture those of the scene alone."""
+        """Return all warnings for the image so far, one line each; for a band of an image only those of the scene."""
         return [*self._of_scene, *self._of_film(film)]
 
     def log(self, film: Film) -> None:
-        """Log those that a finished picture adds to the scene's and to those of pictures before it."""
+        """Log the warnings of a finished image that were not logged for the scene or for previous images."""
         for text in self._of_film(film):
             if text not in self._logged:
                 _log.warning("%s: %s", self._scene.name, text)
@@ -79,7 +78,7 @@ class PictureWarnings:
                 *black_warnings(settings, self._features, float(film.mean.max()), self._cause(film))]
 
     def _cause(self, film: Film) -> str:
-        """The likely cause of a picture without any light."""
+        """Return the likely cause of an image without any light."""
         if film.nonfinite_samples == film.samples:
             return "none of its samples was finite"
         if self._scene.render.max_depth == 1:

@@ -1,4 +1,4 @@
-"""Runs a kernel once over all pixels of a picture, beside its render."""
+"""Execution of a kernel over all pixels of an image, independent of its samples."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ from .tiles import TILE_PIXELS, row_by_row, scattered
 
 
 def render_pixels(session: Accumulation, source: str, name: str, record: np.dtype[Any], samples: int) -> NDArray[Any]:
-    """(height, width) records of the session's picture that kernel `name` of a program writes, in bounded launches.
+    """Return (height, width) records of the session's image, written by kernel `name` of a program in bounded launches.
 
-    The kernel takes the scene, the records of a launch, the tiles and the launch, as `path` does. samples: what the
-    launch says. KernelError and DeviceError where the device fails. UsageError where the renderer was not told.
+    The kernel takes the scene, the records of a launch, the tiles and the launch, like `path`. samples: sample count in
+    the launch record. Raises KernelError and DeviceError if the device fails, and UsageError if the renderer was made
+    without `first_hits` and traces no rays.
     """
     if session.compiled.tree is NO_RAYS:
         raise UsageError("nothing of this picture takes rays, so there is no tree for them: what they meet first must "

@@ -1,4 +1,4 @@
-"""Packs instances: their tree of two levels, and where each stands (kernels/placement.cl)."""
+"""Packing of instances: their two-level BVH, and their transforms (kernels/placement.cl)."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ from .records import PLACEMENT
 Doubles = NDArray[np.float64]
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int64]
-#: Of a coordinate's way from the world to the mesh's frame (the matrix's entry, a product, three sums) and back.
+#: Relative rounding error of a coordinate transformed from the world to the mesh's frame (the matrix's entry, a
+#: product, three sums) and back.
 ROUNDINGS = 12 * 2.0**-24
 
 
 class Placements:
-    """Which meshes stand where. First comes the rest: what stands in the world as it is, if there is such.
+    """Instances of meshes, after the rest: everything placed directly in the world, if there is any.
 
-    meshes: those that instances show; their triangles are stored one mesh after another, the rest's behind them.
-    before: how many come before the rest's. materials: (k,), each instance's. starts: where each mesh's begin. mesh,
-    to_world: which one stands where, and how, the rest first.
+    meshes: those that instances show; their triangles are stored one mesh after another, followed by those of the rest.
+    before: number of triangles before the rest's. materials: (k,), each instance's. starts: first triangle of each
+    mesh. mesh, to_world: mesh and transform of each placement, the rest first.
     """
 
     def __init__(self, instances: list[Instance], rest: bool) -> None:
@@ -42,12 +43,12 @@ class Placements:
 
     def levels(self, device: Device | None, layout: str, builder: str | None, triangles: Triangles,
                spheres: FloatArray, test: str) -> TwoLevels:
-        """The trees over triangles, stored as above, and spheres (s, 4), which belong to the rest."""
+        """Return the BVHs over triangles, stored as above, and spheres (s, 4), which belong to the rest."""
         meshes = np.split(np.asarray(triangles), self.starts[1:])
         return TwoLevels(device, layout, builder, meshes, self.mesh, test, spheres)
 
     def records(self, codes: NDArray[np.int32]) -> NDArray[Any]:
-        """PLACEMENT records. codes: (k,) int32, of the instances' materials."""
+        """Return PLACEMENT records. codes: (k,) int32, of the instances' materials."""
         linear = self.to_world[..., :3]
         records = np.zeros(len(self.mesh), PLACEMENT)
         records["to_world"] = self.to_world
@@ -62,10 +63,11 @@ class Placements:
 
 @dataclass(frozen=True)
 class Objects:
-    """What the objects of a scene became. faces: (m,) how many triangles each mesh of the rest has; spheres: how many.
+    """Mapping from packed primitives to a scene's objects. faces: (m,) triangle counts of the meshes of the rest;
+    spheres: their number.
 
-    meshes, instances: (m,) and (k,), which objects those of the rest and the placements are. They are numbered: first
-    the scene's meshes, then its instances, then its spheres.
+    meshes, instances: (m,) and (k,), object numbers of the meshes of the rest and of the placements. Objects are
+    numbered in the order: the scene's meshes, its instances, its spheres.
     """
 
     faces: Sequence[int]
@@ -74,7 +76,7 @@ class Objects:
     instances: Sequence[int]
 
     def met(self, primitive: NDArray[np.int32], instance: NDArray[np.int32]) -> tuple[IntArray, IntArray]:
-        """The object, and which triangle of it, at hits as the kernels have them, both of one shape; −1 at misses."""
+        """Return the object and its triangle at hits as stored by the kernels, both of the same shape; −1 at misses."""
         counts = np.array([*self.faces, *[1] * self.spheres], np.int64)
         starts, rest = np.cumsum(counts) - counts, len(counts)
         others = len(self.meshes) + len(self.instances)

@@ -1,4 +1,4 @@
-"""What a camera sees, sorted into the bins of its picture for the integrator `raster` (kernels/raster)."""
+"""Binning of visible primitives for the integrator `raster` (kernels/raster)."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from .compile import CompiledScene
 from .records import OUTLINE
 from .tiles import tiles_of
 
-#: As in kernels/raster/bins.cl: sizes of bins, and how many times as wide each is as the one before.
+#: As in kernels/raster/bins.cl: number of bin sizes, and the ratio between successive sizes.
 LEVELS, WIDER = 3, 8
-#: What of a LAUNCH record says what is seen where.
+#: Fields of a LAUNCH record that determine which primitives are visible where.
 VIEW = ("position", "right", "up", "forward", "width", "height")
-#: Numbers of entries and outlines are uint32.
+#: Maximum number of entries and outlines, which are numbered with uint32.
 MOST = 2**32 - 1
 
 
 def bin_count(picture: tuple[int, int]) -> int:
-    """How many bins of all sizes a picture of (width, height) has."""
+    """Return the number of bins of all sizes for an image of (width, height)."""
     rows, columns = tiles_of(picture)
     count = 0
     for _ in range(LEVELS):
@@ -37,7 +37,7 @@ def bin_count(picture: tuple[int, int]) -> int:
 
 
 def drawn_before(compiled: CompiledScene) -> NDArray[np.int64]:
-    """(k + 1,): how many triangles are drawn in the instances before each, or k = 1, and in all."""
+    """Return (k + 1,): the triangles drawn in the instances before each (k = 1 without instances), and the total."""
     total = int(compiled.counts["triangles"][0])
     if "placements" not in compiled.buffers:
         return np.array([0, total])
@@ -48,9 +48,9 @@ def drawn_before(compiled: CompiledScene) -> NDArray[np.int64]:
 
 
 class Bins:
-    """The bins of one camera at a time, on a device. scene_arguments: what every kernel of the scene takes first.
+    """Bins of one camera at a time, on a device. scene_arguments: leading arguments of every kernel of the scene.
 
-    NoRoomError where more primitives are to be drawn than can be numbered.
+    Raises NoRoomError if more primitives are to be drawn than can be numbered.
     """
 
     def __init__(self, device: Device, compiled: CompiledScene, scene_arguments: list[Any]) -> None:
@@ -67,13 +67,14 @@ class Bins:
 
     @property
     def bytes(self) -> int:
-        """Memory of the bins and of what is in them."""
+        """Memory of the bins and of their entries."""
         return sum(buffer.size for buffer in self._held)
 
     def of(self, launch: NDArray[Any], needs: Mapping[str, int]) -> list[cl.Buffer]:
-        """What the raster kernel takes last, for the camera of a LAUNCH record; NoRoomError where it sees too much.
+        """Return the last arguments of the raster kernel for the camera of a LAUNCH record. Raises NoRoomError if it
+        sees too much.
 
-        needs: bytes of what else is on the device, by name.
+        needs: bytes of everything else on the device, by name.
         """
         view = b"".join(launch[name].tobytes() for name in VIEW)
         if view != self._view:

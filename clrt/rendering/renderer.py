@@ -1,4 +1,4 @@
-"""Progressive rendering: passes over the whole picture until a stop condition is met, with noise and history."""
+"""Progressive renderer: passes over the whole image until a stop condition is met, with error estimate and history."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ from .turns import Turns
 
 
 class Renderer:
-    """A scene on a device, ready to render. Everything not given is taken from `scene.render`.
+    """Progressive renderer of a scene on one or more devices. Options that are not given are taken from `scene.render`.
 
-    device: see `clrt devices`, or one that is open; several render one picture together. size: (width, height);
-    triangle, box, sphere: see `HitTests`; offset, builder, layout, tree, lanes, paths: see `choices.Choices`. spp: how
-    many samples a pixel are planned: the sampler then makes neighbouring pixels' errors differ for that many, and later
-    ones begin anew (kernels/sampler); `passes` ends there unless told otherwise. adaptive: whether tiles get samples by
-    their error, from the pictures so far. on_phase hears "build" (packing, tree) and "compile" (program, upload) as
-    they begin. checkpoint: a file that is kept up to date while rendering, about every `checkpoint_seconds` and at the
-    end; resume: go on from it, with the `spp` planned then, unless there is none yet (docs/checkpoints.md).
-    error_percentile: a wanted error is reached where so many per cent of the tiles of 8 x 8 pixels have it. before: one
-    that is of no use any more; what it has on the devices is taken over as far as its scene is of the same objects,
-    which must not have been changed in place. aovs: names of pictures made beside (docs/aovs.md). first_hits: whether
-    its session will be asked for a denoiser's guides, or for what is seen first. Raises ClrtErrors of all kinds.
+    device: see `clrt devices`, or an open device; several render one image together. size: (width, height); triangle,
+    box, sphere: see `HitTests`; offset, builder, layout, tree, lanes, paths: see `choices.Choices`. spp: planned
+    samples per pixel: the sampler makes neighbouring pixels' errors differ at this count and starts afresh after it
+    (kernels/sampler); `passes` stops there by default. adaptive: distribute samples over tiles by estimated error.
+    on_phase is called with "build" (packing, BVH build) and "compile" (program build, upload) as each begins.
+    checkpoint: a file updated while rendering, about every `checkpoint_seconds` and at the end; resume: continue from
+    it, with the `spp` planned then, or start afresh if it does not exist yet (docs/checkpoints.md). error_percentile: a
+    target error counts as reached once this percentage of the 8 x 8 pixel tiles has reached it. before: a renderer no
+    longer needed; its device resources are reused as far as its scene consists of the same objects, which must not have
+    been modified in place. aovs: names of AOVs to render as well (docs/aovs.md). first_hits: whether denoiser guides or
+    first-hit AOVs will be requested later. Raises subclasses of ClrtError.
     """
 
     @with_default_errors
@@ -93,7 +93,7 @@ class Renderer:
 
     def _open(self, device: Selectors, lanes: int | None, on_phase: Callable[[str], None],
               before: Renderer | None) -> None:
-        """Opens the devices, and compiles the scene for them; without `lanes` with as many as suit each."""
+        """Open the devices and compile the scene for them; without `lanes` each uses its preferred SIMD width."""
         self.device, *_ = self.devices = open_devices(device)
         on_phase("build")
         self._compiler: Compiler = Compiler.after(before._compiler if before else None, self.devices)
@@ -107,11 +107,11 @@ class Renderer:
 
     @property
     def name(self) -> str:
-        """Of all that render."""
+        """Names of all devices that render."""
         return name_of(self.devices)
 
     def _begin(self) -> None:
-        """A picture without any samples."""
+        """Reset to an image without samples."""
         self._convergence = Convergence(self._planned_spp, self._percentile)
         self._aovs.begin(self.session, self.scene)
         self.stop_reason: str | None = None
@@ -119,24 +119,24 @@ class Renderer:
 
     @property
     def history(self) -> list[dict[str, Any]]:
-        """See `Convergence`."""
+        """History of the convergence, see `Convergence`."""
         return self._convergence.history
 
     @property
     def compiled(self) -> CompiledScene:
-        """The scene as it was compiled for the first device."""
+        """The scene as compiled for the first device."""
         return self._compiled[0]
 
     @property
     def settings(self) -> RenderSettings:
-        """The scene's settings with what was given."""
+        """The scene's render settings, overridden by the options given."""
         return self.scene.render
 
     def look(self, camera: Camera) -> None:
-        """Begins another picture: the scene as this camera sees it, to the last bit as a new renderer would draw it.
+        """Start a new image from this camera, bit-identical to the one that a new renderer would produce.
 
-        Tree and buffers stay; so does the program, unless a lens or another projection comes in. SceneError where the
-        camera is wrong, UsageError where a checkpoint is kept, which is of one picture.
+        BVH and buffers are reused; so is the program, unless the camera model changes (projection, thin lens). Raises
+        SceneError if the camera is invalid, and UsageError if a checkpoint is written, as it belongs to one image.
         """
         check_of_none(self._checkpoints)
         validate(Scene(camera=camera, render=self.settings))
@@ -145,7 +145,7 @@ class Renderer:
             self._see()
 
     def _see(self) -> None:
-        """Turns to the camera asked for; whoever is next does where that was interrupted."""
+        """Switch to the requested camera; if that is interrupted, the next turn does it."""
         if self._asked_for is not None:
             self._turn_to(self._asked_for)
             self._begin()
@@ -162,11 +162,11 @@ class Renderer:
 
     def passes(self, *, spp: int | None = None, time: float | None = None, error: float | None = None,
                reference: NDArray[np.float32] | None = None) -> Iterator[State]:
-        """Renders, yielding a State at powers of two of the samples, from time to time between them, and at the end.
+        """Render, yielding a State at powers of two of the sample count, at intervals between them, and at the end.
 
-        It ends at `spp` samples a pixel, after `time` seconds or at a noise of `error` (√relMSE), whatever comes
-        first; without any at the renderer's `spp`, or the scene's. Call it again to go on, in another thread, too. Left
-        early (`break`, Ctrl-C) it writes a checkpoint, or else is a launch ahead. reference: (height, width, 3).
+        Stops at `spp` samples per pixel, after `time` seconds or at an estimated error of `error` (√relMSE), whichever
+        is first; without any, at the renderer's `spp` or the scene's. Call it again to continue, also in another
+        thread. Left early (`break`, Ctrl-C) it writes a checkpoint or is a launch ahead. reference: (height, width, 3).
         """
         check_reference(reference, self.session.size)
         try:
@@ -202,7 +202,7 @@ class Renderer:
             self.seconds = watch.seconds
             film, tile_samples = self.session.film(), self.session.tile_samples
             if self.stop_reason is None and not (looks or self.settings.adaptive or self._checkpoints):
-                begun = self.session.advance_ahead(limits.room)    # runs while the state is made
+                begun = self.session.advance_ahead(limits.room)    # runs while the state is computed
             state = None if self._in_haste else self._convergence.record_if_wanted(
                 film, tile_samples, self.seconds, reference,
                 lambda: self._abandoned.is_set() or self._interrupted and self.stop_reason is None)
@@ -219,33 +219,33 @@ class Renderer:
             pace.made()
             before = self.stop_reason, self.session.samples_done
             yield state
-            if (self.stop_reason, self.session.samples_done) != before:    # another call went on meanwhile
+            if (self.stop_reason, self.session.samples_done) != before:    # another call rendered meanwhile
                 watch.set(self.seconds)
                 begun = None
                 if self._catch_up(limits):
                     yield self.state(reference)
 
     def interrupt(self) -> None:
-        """Has `passes` end after the launches in flight, with a state and a checkpoint; for signal handlers, too."""
+        """Make `passes` stop after the launches in flight, with a state and a checkpoint; safe in signal handlers."""
         self._interrupted = True
 
     def abandon(self) -> None:
-        """Has `passes` end after the launch that is being made, with nothing: nobody wants the picture any more."""
+        """Make `passes` stop after the current launch without a state or checkpoint, because the image is discarded."""
         self._abandoned.set()
 
     def state(self, reference: NDArray[np.float32] | None = None) -> State:
-        """The picture as it is now, also in the middle of a pass that was interrupted."""
+        """Return the current state of the image, also in the middle of an interrupted pass."""
         with self._turns.one():
             self._see()
             film, tile_samples = self.session.film(), self.session.tile_samples
             return self._convergence.state(film, tile_samples, self.seconds, reference, self._in_haste)
 
     def aovs(self, state: State) -> dict[str, NDArray[np.generic]]:
-        """The pictures beside the state's, by the names and in the order that they were asked for."""
+        """Return the AOVs of a state by name, in the order in which they were requested."""
         return self._aovs.of(state.film)
 
     def _catch_up(self, limits: Limits) -> bool:
-        """Whether an earlier call, or the render this goes on with, came so far already; records what is new of it."""
+        """Record what history lacks; return whether an earlier call or the resumed checkpoint met a stop condition."""
         self._convergence.catch_up(self.session, self.seconds)
         done = self.session.samples_done
         self.stop_reason = limits.reached(done, self.seconds)
@@ -255,8 +255,8 @@ class Renderer:
         return self.stop_reason is not None
 
     def _next_pass(self, limits: Limits) -> Iterator[None]:
-        """Over the whole picture; or one that doubles the samples of those tiles where that takes most error away,
-        which ends the render where none are left."""
+        """Return a pass over the whole image, or an adaptive one that doubles the samples of the tiles where that
+        reduces the error most. Stop the render if no tile is left."""
         if not limits.adapts(self.session.samples_done):
             return self.session.advance(limits.room)
         if not len(tiles := self._convergence.tiles_to_double(self.session.tile_samples, limits.spp)):
@@ -264,7 +264,7 @@ class Renderer:
         return self.session.double(tiles)
 
     def _run_pass(self, launches: Iterator[None], limits: Limits, watch: AwakeClock) -> None:
-        """One pass; sets the stop reason where `time` is over or it is interrupted, maybe inside the pass."""
+        """Run one pass; set the stop reason if `time` is over or the render is interrupted, even inside the pass."""
         for _ in launches:
             self.seconds = watch.seconds
             self._heed_interrupt()
@@ -282,19 +282,19 @@ class Renderer:
 
     @property
     def _in_haste(self) -> bool:
-        """Whether it was interrupted: estimate and history have nothing of the last pass until it is gone on with."""
+        """Whether the render was interrupted: estimate and history exclude the last pass until it is resumed."""
         return self.stop_reason == "interrupted"
 
     def _keep(self, film: Film | None = None, last: bool = False) -> None:
-        """Writes a checkpoint where one is due, or begins to write the last one; film: as it is now, if it is known."""
+        """Write a checkpoint if one is due, or start writing the last one; film: the current film, if known."""
         if self._checkpoints is not None and (last or self._checkpoints.due):
             write = self._checkpoints.begin if last else self._checkpoints.write
             write(Kept(self._planned_spp, self.seconds, self.history, film or self.session.film(),
                        self.session.work_left(), self._convergence.noise))
 
     def _keep_unfinished(self) -> None:
-        """Writes a checkpoint where `passes` is left before its end, unless nobody wants it or the device fails now."""
-        if self._checkpoints is None or self._abandoned.is_set() or sys.is_finalizing():    # threads have ended then
+        """Write a checkpoint if `passes` is left before its end, unless the render is abandoned or the device fails."""
+        if self._checkpoints is None or self._abandoned.is_set() or sys.is_finalizing():    # threads have ended by then
             return
         with self._turns.one(), suppress(DeviceError):
             self._keep(self.session.whole_film(), last=True)

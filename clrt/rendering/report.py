@@ -1,4 +1,4 @@
-"""What a render did, as the JSON object of `--report`."""
+"""Report of a render, as the JSON object of `--report`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .renderer import Renderer, State
 
 
 def render_report(renderer: Renderer, state: State) -> dict[str, Any]:
-    """The report's fields, as listed in docs/report.md. `state` is the last one."""
+    """Return the report's fields, as listed in docs/report.md. `state` is the last one."""
     settings = renderer.settings
     width, height = settings.size
     samples = state.film.samples

@@ -1,4 +1,4 @@
-"""A picture whose film lies on one device: samples are rendered into it on demand."""
+"""Accumulation on a single device, with the film in device memory."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from .on_device import SceneOnDevice, largest_film
 from .tiles import TILE_PIXELS
 from .work import Work
 
-#: Tiles of a launch, at least.
+#: Minimum number of tiles per launch.
 FEWEST_TILES = 16
-#: Launches of a pass, about, unless a single sample a pixel takes more.
+#: Approximate number of launches per pass, unless a single sample per pixel needs more.
 PASS_LAUNCHES = 4
-#: Of the first launch, before any has been timed: slow devices take a tenth of a second for twice as many.
+#: Samples of the first launch, before any has been timed: slow devices take a tenth of a second for twice as many.
 FIRST_LAUNCH_SAMPLES = 1 << 10
-#: Pixels of all kinds are whole numbers of it.
+#: Fill pattern for a black film; the size of every pixel record is a multiple of its size.
 BLACK = np.zeros(8, np.uint32)
-#: Primitives that a ray meets without a tree in about the time that it takes with one.
+#: Number of primitives whose brute-force intersection takes about as long as a BVH traversal.
 QUICKLY_MET = 128
 
 
 class _Tiles:
-    """Numbers of tiles, and a buffer of them: another one for others, as this one may be in use."""
+    """Tile numbers and a device buffer of them. New numbers get a new buffer, since the old one may be in use."""
 
     def __init__(self, device: Device, numbers: NDArray[np.uint32]) -> None:
         with calling():
@@ -48,7 +48,7 @@ class _Tiles:
 
 
 class Session(Accumulation):
-    """Renders samples of one compiled scene at one size. Raises NoRoomError where scene or film do not fit."""
+    """Accumulation of one compiled scene at one size, on one device. Raises NoRoomError if scene or film do not fit."""
 
     def __init__(self, device: Device, compiled: CompiledScene, size: tuple[int, int], max_depth: int,
                  seed: int, planned_spp: int | None = None, before: Sequence[SceneOnDevice] = ()) -> None:
@@ -58,7 +58,7 @@ class Session(Accumulation):
             raise NoRoomError(f"{device.info.name}: a film of {size[0]}x{size[1]} has no room in a buffer")
         launch = first_launch(compiled, size, max_depth, seed, planned_spp)
         self._scene = SceneOnDevice(device, compiled, launch, film_bytes, before=before)
-        self._copies = HostMemory(size[::-1], compiled.choices.pixel)   # all else has found room
+        self._copies = HostMemory(size[::-1], compiled.choices.pixel)   # everything else has been allocated
         self._launches = Launches(first_launch_samples(compiled))
         with self._scene.allocating():
             self._film = on_device(device, np.zeros(size[0] * size[1], compiled.choices.pixel))
@@ -67,16 +67,16 @@ class Session(Accumulation):
 
     @property
     def scene(self) -> SceneOnDevice:
-        """The scene on the session's device."""
+        """The scene on this session's device."""
         return self._scene
 
     @property
     def longest_launch(self) -> float:
-        """Seconds of the launch that took longest."""
+        """Duration of the longest launch in seconds."""
         return self._launches.longest
 
     def advance_ahead(self, room: Callable[[int], int]) -> Iterator[None] | None:
-        """See Accumulation; only while no launch is in flight."""
+        """See Accumulation; call it only if no launch is in flight."""
         launches = self.advance(room)
         next(launches)
         return chain((None,), launches)
@@ -88,12 +88,12 @@ class Session(Accumulation):
             self.launch["first_pixel"], self.launch["pixel_count"] = share.first * TILE_PIXELS, pixels
             self.launch["first_sample"], self.launch["sample_count"] = share.samples, share.more
             event = self._launch()
-            self.work.settle()    # before it is waited for, which Ctrl-C may end
+            self.work.settle()    # before waiting, which Ctrl-C may interrupt
             self._launches.add(event, pixels * share.more)
             yield
 
     def _launch(self) -> cl.Event:
-        """Enqueues the kernel for the range in the launch record."""
+        """Enqueue the kernel for the range in the launch record."""
         if self._tiles.numbers is not self.work.tiles:
             self._tiles = _Tiles(self.device, self.work.tiles)
         return self._scene.enqueue_pixels(self._film, self._tiles.buffer)
@@ -103,16 +103,16 @@ class Session(Accumulation):
             cl.enqueue_fill_buffer(self.device.queue, self._film, BLACK, 0, self._film.size)
 
     def wait(self) -> None:
-        """Waits for the launches in flight."""
+        """Wait for the launches in flight."""
         self._launches.wait()
 
     def pass_limit(self) -> int:
-        """The most samples a pixel that one pass should add, so that ending inside a pass leaves an even picture."""
+        """Return the maximum samples per pixel for one pass, so that stopping inside a pass leaves an even image."""
         pixels, work = self.size[0] * self.size[1], self._launches.size
         return max(1, min(PASS_LAUNCHES * work // pixels, work // min(pixels, FEWEST_TILES * TILE_PIXELS)))
 
     def film(self) -> Film:
-        """The film so far; waits for the launches in flight."""
+        """Return the current film; waits for the launches in flight."""
         self.wait()
         pixels = self._copies.array()
         with calling():
@@ -123,7 +123,7 @@ class Session(Accumulation):
         return film
 
     def restore(self, film: Film, work: Work) -> None:
-        """Goes on from a film of this size and the work that it was rendered by."""
+        """Resume from a film of this size and the work that produced it."""
         self.work = work
         with calling():
             copied = begin_copy(self.device, self._film, film.pixels)
@@ -132,7 +132,7 @@ class Session(Accumulation):
 
 def first_launch(compiled: CompiledScene, size: tuple[int, int], max_depth: int, seed: int,
                  planned_spp: int | None) -> NDArray[Any]:
-    """The LAUNCH record of a picture, without any range of pixels and samples."""
+    """Return the LAUNCH record of an image, without a range of pixels and samples."""
     launch = launch_record(compiled.camera, size)
     launch["max_depth"], launch["seed"], launch["block_bits"] = max_depth, seed, block_bits(planned_spp)
     launch["clamp_direct"], launch["clamp_indirect"] = compiled.clamps
@@ -140,20 +140,21 @@ def first_launch(compiled: CompiledScene, size: tuple[int, int], max_depth: int,
 
 
 def first_launch_samples(compiled: CompiledScene) -> int:
-    """Samples of the first launch, before any has been timed: few where each ray meets all that there is."""
+    """Return the samples of the first launch, before any has been timed: fewer if rays are intersected by brute force.
+    """
     primitives = int(compiled.counts["triangles"][0] + compiled.counts["spheres"][0])
     slow = compiled.tree.name in TREELESS and primitives > QUICKLY_MET
     return FIRST_LAUNCH_SAMPLES * QUICKLY_MET // primitives if slow else FIRST_LAUNCH_SAMPLES
 
 
 def block_bits(planned_spp: int | None) -> int:
-    """log2 of the samples that a pixel takes from one block of its sampler's sequence (kernels/sampler.cl).
+    """Return log2 of the samples that a pixel takes from one block of its sampler's sequence (kernels/sampler.cl).
 
-    The least power of two for all `planned_spp`; 32, without an end, where it is not known how many there will be.
+    This is the smallest power of two that covers `planned_spp`; 32, i.e. unlimited, if the sample count is not known.
     """
     return 32 if planned_spp is None else (planned_spp - 1).bit_length()
 
 
 def depth_of(settings: RenderSettings) -> int:
-    """Edges of a path, as the integrator counts them."""
+    """Return the maximum path depth, as the integrator counts it."""
     return min(settings.max_depth, 2) if settings.integrator == "direct" else settings.max_depth

@@ -1,4 +1,4 @@
-"""What a render shows of itself on its way."""
+"""State that a render yields while it progresses."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from .film import RELATIVE_FLOOR, Film
 
 @dataclass(frozen=True)
 class State:
-    """The picture so far. spp: samples a pixel, the mean where sampling is adaptive; noise: estimated √relMSE, None
-    below 2 samples; relmse: against the reference, if given; tile_noise: what the renderer's percentile of tiles have
-    at most, if it has one."""
+    """Image so far. spp: samples per pixel, the mean if sampling is adaptive; noise: estimated √relMSE, None below 2
+    samples; relmse: against the reference, if given; tile_noise: the renderer's percentile of the tiles' estimated
+    √relMSE, if it has one."""
 
     spp: int
     seconds: float
@@ -32,12 +32,12 @@ class State:
 
     @property
     def stops_by(self) -> float | None:
-        """What is compared with a wanted error."""
+        """The error that is compared with the target error."""
         return self.noise if self.tile_noise is None else self.tile_noise
 
     @property
     def noise_ratio(self) -> float | None:
-        """The noise over the true √relMSE, where both are known."""
+        """Estimated over true √relMSE, if both are known."""
         return self.noise / sqrt(self.relmse) if self.noise is not None and self.relmse else None
 
     @cached_property
@@ -48,7 +48,7 @@ class State:
 
 
 def check_reference(reference: object, size: tuple[int, int]) -> None:
-    """UsageError unless it is None, or what a picture of (width, height) can be compared with."""
+    """Raise UsageError unless it is None, or comparable with an image of (width, height)."""
     if reference is None:
         return
     if isinstance(reference, (str, PathLike)):
@@ -63,7 +63,7 @@ def check_reference(reference: object, size: tuple[int, int]) -> None:
 
 
 def relmse(film: Film, reference: NDArray[np.float32] | None) -> float | None:
-    """Of the film's mean against a reference (height, width, 3), if there is one."""
+    """Return the relMSE of the film's mean against a reference (height, width, 3), if there is one."""
     if reference is None:
         return None
     expected = reference.astype(np.float64)

@@ -1,4 +1,4 @@
-"""Tables of steps: a choice with given probabilities that keeps the order of the random numbers it is made by."""
+"""Tables of piecewise-constant distributions, sampled by inversion, which preserves the order of the random numbers."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from numpy.typing import NDArray
 
 from .bands import bands_of
 
-#: Of the kernels' random numbers, which are multiples of its inverse.
+#: The kernels' random numbers are multiples of 1/LEVELS.
 LEVELS = 1 << 24
 
 
 def steps(weights: NDArray[np.float64], table: NDArray[np.void]) -> NDArray[np.float64]:
-    """Fills a table of SKY_STEPs (rows, n) for weights (rows, n) >= 0, each row with a positive sum; returns their
+    """Fill a table of SKY_STEPs (rows, n) for weights (rows, n) >= 0, each row with a positive sum; return their
     probabilities (rows, n).
 
-    Step i ends at `top`, the share of all weights up to its own, rounded to 1/LEVELS: then numbers of 24 bits fall into
-    it exactly as often as its probability says, the difference of two tops. `start`: the step into which i/n falls
-    (Chen and Asau 1974, "On Generating Random Variates from an Empirical Distribution").
+    Step i ends at `top`, the share of all weights up to its own, rounded to 1/LEVELS: then random numbers of 24 bits
+    select it exactly with its probability, the difference of two tops. `start`: the step that contains i/n (Chen and
+    Asau 1974, "On Generating Random Variates from an Empirical Distribution").
     """
     probabilities = np.empty(weights.shape)
     for rows in bands_of(weights.shape):
@@ -32,9 +32,9 @@ def steps(weights: NDArray[np.float64], table: NDArray[np.void]) -> NDArray[np.f
 
 
 def _starts(tops: NDArray[np.float64]) -> NDArray[np.intp]:
-    """(rows, n): for each i the step into which i/n falls."""
+    """Return (rows, n): for each i the step that contains i/n."""
     count, n = tops.shape
-    # The first i/n at or beyond each step's end; 1/LEVELS more, since the kernels' product u·n may be rounded up.
+    # The first i/n at or after each step's end; 1/LEVELS more, since the kernels' product u·n may be rounded up.
     first = np.minimum(np.ceil((tops + 1) * (n / LEVELS)).astype(np.intp), n)
     first += np.arange(count)[:, None] * (n + 1)
     before = np.bincount(first.ravel(), minlength=count * (n + 1)).reshape(count, n + 1)

@@ -1,11 +1,12 @@
-"""Devices that render work together into a film on the host.
+"""Scheduler for several devices that render into one film on the host.
 
-A worker that has nothing to do is given a share: some tiles, the pixels of these as they are, and which samples to add.
-It gives the pixels back, and they replace those of the film. No tile is in two shares at a time, so each pixel's
-samples are added one after another, as on one device, whoever adds them: of devices of one kind the picture is the same
-bit for bit, however the work was divided. Devices that round differently differ by that much.
+An idle worker gets a share: some tiles, their current pixels, and which samples to add. It returns the pixels, which
+replace those of the film. A tile is never in two shares at a time, so each pixel's samples are added one after another,
+as on a single device, whichever device adds them: on devices of one kind the image is the same bit for bit, however the
+work was divided. Devices that round differently differ by that much.
 
-Where a worker fails nothing of its shares has come into the film. It is left out, and others get its shares.
+If a worker fails, nothing of its unfinished shares has entered the film. It is removed, and others take over its
+shares.
 """
 
 from __future__ import annotations
@@ -28,16 +29,16 @@ from .tiles import TILE_PIXELS
 from .work import Work
 from .worker import Share, Worker
 
-#: The smallest share is such a part of what fills a launch.
+#: Divisor that gives the smallest share from the size of a full launch.
 SMALLEST = 16
 PAUSE = 5e-4
 _log = logging.getLogger(__name__)
 
 
 class Team:
-    """Renders a scene, compiled for each device. DeviceError, or the last one's KernelError, where none is left.
+    """Workers for a scene compiled for each device. Raises DeviceError, or the last one's KernelError, if none is left.
 
-    launch: see `session.first_launch`; tiles: the most that a film will have; before: see `SceneOnDevice`.
+    launch: see `session.first_launch`; tiles: maximum number of tiles of a film; before: see `SceneOnDevice`.
     """
 
     def __init__(self, devices: Sequence[Device], compiled: Sequence[CompiledScene], launches: Sequence[NDArray[Any]],
@@ -57,23 +58,23 @@ class Team:
 
     @property
     def everyone(self) -> list[Worker]:
-        """Its workers, also those that were left out."""
+        """All workers, including those that were removed."""
         return [*self.workers, *self.lost]
 
     def shares(self) -> list[dict[str, Any]]:
-        """What each device did, for the report."""
+        """Return what each device rendered, for the report."""
         return [{"device": worker.name, "platform": worker.scene.device.info.platform, "samples": worker.samples,
                  "longest_launch_seconds": worker.launches.longest, "lost": worker in self.lost}
                 for worker in self.everyone]
 
     @property
     def at(self) -> list[Share]:
-        """What it is at."""
+        """Shares in flight."""
         return [share for worker in self.workers for share in worker.at]
 
     def run(self, work: Work, film: NDArray[Any], numbers: NDArray[np.uint32]) -> Iterator[None]:
-        """Renders what is in hand into the film (tiles, TILE_PIXELS), whose tiles have these numbers in the picture;
-        yields from time to time. If it is left before its end, `drain` must follow, or the same once more."""
+        """Render the pending work into the film (tiles, TILE_PIXELS), whose tiles have these numbers in the image;
+        yield after each collection. If it is left before its end, call `drain`, or `run` again."""
         while work.parts or self.at:
             for worker in [*self.workers] * IN_FLIGHT:
                 self._feed(worker, work, film, numbers)
@@ -84,13 +85,13 @@ class Team:
         work.settle()
 
     def drain(self, work: Work, film: NDArray[Any]) -> None:
-        """Waits for the launches in flight, and for none that is still in hand."""
+        """Wait for the launches in flight, without starting pending work."""
         while self.at:
             if not self._collect(work, film):
                 time.sleep(PAUSE)
 
     def _feed(self, worker: Worker, work: Work, film: NDArray[Any], numbers: NDArray[np.uint32]) -> None:
-        """Gives a worker that has too little in flight a share, smaller near the end, so that all end together."""
+        """Give a share to a worker with too little in flight, smaller near the end, so that all finish together."""
         if worker in self.lost or worker.launches.full:
             return
         size = worker.launches.size / TILE_PIXELS
@@ -108,14 +109,14 @@ class Team:
             self._leave_out(worker, work, error)
 
     def _collect(self, work: Work, film: NDArray[Any]) -> int:
-        """Takes what has been rendered into the film, and tells how many shares that were."""
+        """Store finished shares in the film, and return their number."""
         count = 0
         for worker in list(self.workers):
             try:
                 while share := worker.ended():
                     film[share.rows] = share.pixels
                     count += 1
-                if worker.at and worker.launches.idle:    # Ctrl-C came between a launch and the note of its share
+                if worker.at and worker.launches.idle:    # Ctrl-C came between a launch and the record of its share
                     self._take_back(worker, work)
                     worker.at.clear()
             except DeviceError as error:
@@ -123,7 +124,7 @@ class Team:
         return count
 
     def _leave_out(self, worker: Worker, work: Work, error: DeviceError) -> None:
-        """Has others do what it was at; it is kept, as giving it up might wait for it."""
+        """Remove a worker and return its shares to the others; it stays in `lost`, as releasing it might block."""
         self.workers.remove(worker)
         self.lost.append(worker)
         self._take_back(worker, work)
@@ -132,6 +133,6 @@ class Team:
         _log.warning("%s is left out: %s; the others do its work again", worker.name, error)
 
     def _take_back(self, worker: Worker, work: Work) -> None:
-        """What it is at is in hand again; nothing of that has come into the film."""
+        """Return a worker's shares in flight to the pending work; nothing of them has entered the film."""
         for share in reversed(worker.at):
             work.give_back(share.part)

@@ -1,4 +1,4 @@
-"""Packs textures: the texels of all pictures in one buffer, and a record for each use of one (kernels/texture.cl)."""
+"""Packing of textures: the texels of all images in one buffer, and a record for each texture (kernels/texture.cl)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .records import LINEAR, TEXEL, TEXTURE
 
 
 class Textures:
-    """Those of one scene, numbered as they are first asked for."""
+    """Textures of one scene, numbered in the order of their first use."""
 
     def __init__(self) -> None:
         self._numbers: dict[Texture, int] = {}
@@ -22,7 +22,7 @@ class Textures:
         self._count = 0
 
     def number(self, texture: Texture) -> int:
-        """Its number in the buffer of textures."""
+        """Return its index in the buffer of textures."""
         if texture.picture not in self._first:
             texels = np.ascontiguousarray(texture.picture.texels).view("<u4").ravel()
             self._first[texture.picture] = self._count
@@ -32,11 +32,11 @@ class Textures:
 
     @property
     def uv_sets(self) -> int:
-        """How many sets of texture coordinates they use."""
+        """Number of UV sets that the textures use."""
         return max((texture.uv_set + 1 for texture in self._numbers), default=0)
 
     def buffers(self) -> dict[str, tuple[str, NDArray[Any]]]:
-        """textures, texels, and the table that decodes these; nothing where there are no textures."""
+        """Return the buffers textures, texels, and the sRGB decoding table; none if there are no textures."""
         if not self._numbers:
             return {}
         records = np.zeros(len(self._numbers), TEXTURE)

@@ -1,4 +1,4 @@
-"""Packs emissive triangles. Two that make a parallelogram, as most lamps are made of, become one light."""
+"""Packing of emissive triangles. Two that form a parallelogram, as in most area lights, become one light."""
 
 from __future__ import annotations
 
@@ -17,14 +17,15 @@ from .light_groups import Doubles, LightGroups, flat_lights
 from .records import TRIANGLE_LIGHT
 from .textures import Textures
 
-#: By how many roundings of their largest coordinate four corners may miss a parallelogram.
+#: Tolerance for parallelograms, in roundings of the largest coordinate of the four corners.
 ROUNDINGS = 4
 
 Integers = NDArray[np.int64]
 
 
 class TriangleLights(NamedTuple):
-    """records: of n lights. groups: what they are chosen by. light: (m,) int32, of each triangle, or −1."""
+    """Packed triangle lights. records: of n lights. groups: light bounds. light: (m,) int32, of each triangle, or −1.
+    """
 
     records: NDArray[Any]
     groups: LightGroups
@@ -32,9 +33,9 @@ class TriangleLights(NamedTuple):
 
 
 def pack_triangle_lights(meshes: list[Mesh], textures: Textures) -> TriangleLights:
-    """Of the meshes' triangles, in order. What is black, or has no area in float32, is no light.
+    """Pack the emissive triangles of the meshes, in order, except for those that are black or have no area in float32.
 
-    Those with a texture are never joined, and are chosen by what it holds around them.
+    Textured ones are never joined, and are sampled according to the texels they cover.
     """
     mesh = np.repeat(np.arange(len(meshes)), [len(each.faces) for each in meshes])
     emission = np.array([each.material.radiance for each in meshes], np.float64).reshape(-1, 3)
@@ -62,9 +63,9 @@ def pack_triangle_lights(meshes: list[Mesh], textures: Textures) -> TriangleLigh
 
 def _packed(corners: Doubles, whole: NDArray[np.bool_], radiance: Doubles,
             share: Doubles, both: NDArray[np.bool_]) -> tuple[NDArray[Any], LightGroups]:
-    """Of triangles with corners (n, 3, 3) or, where `whole` (n,), the parallelograms that have these three.
+    """Pack triangles with corners (n, 3, 3) or, where `whole` (n,), the parallelograms with these three corners.
 
-    share: (n, 3), what part of the radiance leaves them on average. both: (n,), which emit from both sides.
+    share: (n, 3), average fraction of the radiance that they emit. both: (n,), which emit from both sides.
     """
     e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal, area = _normals(corners)
@@ -79,7 +80,7 @@ def _packed(corners: Doubles, whole: NDArray[np.bool_], radiance: Doubles,
 
 
 def _normals(corners: Doubles) -> tuple[Doubles, Doubles]:
-    """Unit normals (k, 3), 0 where there is none, and twice the areas (k,) of triangles (k, 3, 3)."""
+    """Return unit normals (k, 3), 0 if undefined, and twice the areas (k,) of triangles (k, 3, 3)."""
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     norm = np.linalg.norm(cross, axis=1)
     return cross / np.where(norm > 0, norm, 1)[:, None], norm
@@ -87,10 +88,10 @@ def _normals(corners: Doubles) -> tuple[Doubles, Doubles]:
 
 def _joined(corners: Doubles, mesh: Integers, face: Integers,
             plain: NDArray[np.bool_]) -> tuple[Doubles, NDArray[np.bool_]]:
-    """Which of k triangles make a parallelogram with the next one, (k,), none of them with two.
+    """Return which of k triangles form a parallelogram with the next one, (k,); no triangle is in two of them.
 
-    Their corners, (k, 3, 3), are turned so that they begin with the one that is not the other's. mesh, face: (k,);
-    plain: (k,), which may be joined.
+    Their corners, (k, 3, 3), are rotated to begin with the one that is not shared. mesh, face: (k,); plain: (k,), which
+    may be joined.
     """
     following = np.roll(corners, -1, axis=0)
     error = ROUNDINGS * 2.0**-24 * np.abs(corners).max(axis=(1, 2), initial=0)
@@ -103,7 +104,7 @@ def _joined(corners: Doubles, mesh: Integers, face: Integers,
             missed = np.abs(a[:, 0] + b[:, 0] - a[:, 1] - a[:, 2]).max(axis=1, initial=0)
             apex[shared & (missed <= error)] = i
     joined = (apex >= 0) & plain & (np.roll(face, -1) == face + 1) & (np.roll(mesh, -1) == mesh)
-    # Where each of several in a row could be joined with the next, every other one is.
+    # If several in a row could each be joined with the next, every other one is.
     here = np.arange(len(joined))
     since = here - np.maximum.accumulate(np.where(joined, -1, here))
     joined &= since % 2 == 1

@@ -1,4 +1,4 @@
-"""Threads that share a renderer take turns: a step of one never runs beside a step of another."""
+"""Mutual exclusion of threads that share a renderer: steps of different threads never run concurrently."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ T = TypeVar("T")
 
 
 class Turns:
-    """Those of one renderer. The thread whose turn it is may take another one in it."""
+    """Reentrant lock of one renderer."""
 
     def __init__(self) -> None:
         self._lock = RLock()
 
     @contextmanager
     def one(self) -> Iterator[None]:
-        """A turn, for which this may wait."""
+        """Context for one turn; waits for the lock."""
         with self._lock, default_errors():
             yield
 
     def of(self, steps: Iterator[T]) -> Iterator[T]:
-        """The steps, a turn each."""
+        """Run each of the steps in a turn of its own, yielding their values between turns."""
         while True:
             with self._lock, default_errors():  # not `one`: an exception in contextlib could leave the lock held
                 try:

@@ -1,4 +1,4 @@
-"""Which tiles get which samples next: the work in hand, which is cut into launches. Knows nothing of devices."""
+"""Work queue of an image: which tiles get which samples next, cut into launches. Independent of devices."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .tiles import scattered
 
 
 class Part(NamedTuple):
-    """Tiles first … end − 1 of those in hand get `more` samples beside the `samples` they have."""
+    """Tiles first … end − 1 of the pending ones, which get `more` samples in addition to the `samples` they have."""
 
     first: int
     end: int
@@ -20,13 +20,12 @@ class Part(NamedTuple):
     more: int
 
     def meets(self, other: Part) -> bool:
-        """Whether a tile is in both."""
+        """Return whether a tile is in both."""
         return self.first < other.end and other.first < self.end
 
 
 class _Now(NamedTuple):
-    """What `Work` knows, in one value: an exception out of a signal's handler leaves all of it as it was, or as it is
-    to be."""
+    """State of `Work` in a single value: an exception from a signal handler leaves either the old or the new state."""
 
     samples: NDArray[np.int64]
     then: NDArray[np.int64]
@@ -35,10 +34,10 @@ class _Now(NamedTuple):
 
 
 class Work:
-    """What has been rendered, and what is to be rendered before anything else is chosen.
+    """Samples rendered so far, and the pending work, which must be rendered before more is chosen.
 
-    samples: (rows, columns) that the pixels of each tile have, or had before the work in hand; then: what they will
-    have after it. tiles: uint32 numbers of those in hand, in their order on the device. parts: what is left in hand.
+    samples: (rows, columns) samples per pixel of each tile, or those before the pending work; then: the same after it.
+    tiles: uint32 numbers of the pending tiles, in their order on the device. parts: what is still pending.
     """
 
     def __init__(self, samples: NDArray[np.int64], then: NDArray[np.int64] | None = None,
@@ -48,38 +47,38 @@ class Work:
 
     @property
     def samples(self) -> NDArray[np.int64]:
-        """See above."""
+        """See `Work`."""
         return self._now.samples
 
     @property
     def then(self) -> NDArray[np.int64]:
-        """See above."""
+        """See `Work`."""
         return self._now.then
 
     @property
     def tiles(self) -> NDArray[np.uint32]:
-        """See above."""
+        """See `Work`."""
         return self._now.tiles
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """See above."""
+        """See `Work`."""
         return self._now.parts
 
     def take(self, tiles: NDArray[np.integer[Any]], parts: Iterable[Part]) -> None:
-        """Takes these tiles in hand; there must be none."""
+        """Add work for these tiles; none may be pending yet."""
         parts, then = tuple(parts), self.samples.copy()
         for part in parts:
             then.ravel()[tiles[part.first:part.end]] += part.more
         self._now = _Now(self.samples, then, tiles.astype(np.uint32), parts)
 
     def add_to_all(self, samples: int) -> None:
-        """Takes it in hand that every tile gets so many more; all must have as many."""
+        """Add `samples` more samples per pixel for every tile to the pending work; all must have the same number."""
         every = scattered(self.samples.size)
         self.take(every, [Part(0, len(every), int(self.samples[0, 0]), samples)])
 
     def double(self, tiles: NDArray[np.intp]) -> None:
-        """Takes it in hand that these tiles get as many samples as they have, by their number in `samples`."""
+        """Add a doubling of these tiles' samples to the pending work; tiles are numbered as in `samples`."""
         samples, places = self.samples.ravel()[tiles], np.argsort(scattered(self.samples.size))
         order = np.lexsort((places[tiles], samples))
         levels, firsts = (found.tolist() for found in np.unique(samples[order], return_index=True))
@@ -88,11 +87,11 @@ class Work:
 
     def cut(self, most: int, least_tiles: int, most_tiles: int | None = None, most_samples: int | None = None,
             busy: Sequence[Part] = ()) -> Part | None:
-        """Takes out of hand what is next, about `most` samples of a tile's pixels: of `least_tiles` tiles at least, of
-        `most_tiles` and `most_samples` a pixel at most, and of none that are among the `busy`. None where there is
-        nothing left for now.
+        """Remove and return the next part of the pending work, of about `most` tiles times samples per pixel: at least
+        `least_tiles` tiles, at most `most_tiles` and `most_samples` per pixel, and none among the `busy`. Return None
+        if nothing is left for now.
 
-        What few tiles of many samples leave comes last, so that all tiles come along together.
+        The rest of few tiles with many samples is put last, so that all tiles progress together.
         """
         found = self._first_free(busy)
         if found is None:
@@ -110,7 +109,7 @@ class Work:
         return share
 
     def _first_free(self, busy: Sequence[Part]) -> tuple[int, int, int] | None:
-        """The place in hand of a part, and the first stretch of its tiles, none of which is busy or comes before."""
+        """Return the index of a pending part, and its first range of tiles that are not busy or in an earlier part."""
         taken = np.zeros(len(self.tiles) + 1, bool)
         taken[-1] = True
         for part in busy:
@@ -123,17 +122,17 @@ class Work:
         return None
 
     def give_back(self, share: Part) -> None:
-        """Takes a share in hand again, which was not rendered."""
+        """Return a share that was not rendered to the pending work."""
         self._now = self._now._replace(parts=(share, *self.parts))
 
     def settle(self) -> None:
-        """Once all that was cut is rendered: where nothing is left in hand, all tiles have their samples."""
+        """Update `samples` once everything that was cut is rendered, if nothing is pending."""
         if not self.parts:
             self._now = self._now._replace(samples=self.then)
 
     def take_stock(self, found: NDArray[np.int64]) -> None:
-        """Has in hand what is not among the samples found, (rows, columns) of each tile's pixels, whatever became of
-        what was cut; nothing may be in flight."""
+        """Set the pending work to the samples missing from those found, (rows, columns) of each tile's pixels,
+        regardless of what was cut; nothing may be in flight."""
         has, then = found.ravel()[self.tiles], self.then.ravel()[self.tiles]
         ends = [*(np.flatnonzero((np.diff(has) != 0) | (np.diff(then) != 0)) + 1).tolist(), len(has)]
         parts = [Part(first, end, int(has[first]), int(then[first] - has[first]))
@@ -143,10 +142,10 @@ class Work:
 
     @property
     def left(self) -> int:
-        """Samples of a tile's pixels that are in hand."""
+        """Pending work, as the sum of tiles times samples per pixel."""
         return sum((part.end - part.first) * part.more for part in self.parts)
 
 
 def _put_last(parts: list[Part], rest: Part) -> None:
-    """Behind all in hand but what the same tiles get after it, which is there where a share was given back."""
+    """Insert after all parts, but before later ones of the same tiles, which exist if a share was given back."""
     parts.insert(next((i for i, part in enumerate(parts) if part.meets(rest)), len(parts)), rest)

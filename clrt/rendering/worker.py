@@ -1,4 +1,4 @@
-"""One of the devices that render a picture together. It has no film, only the pixels of what it is at."""
+"""Worker: one of several devices that render an image together. It stores the pixels of its shares, but no film."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from .work import Part
 
 
 class Window(NamedTuple):
-    """Room on the device for the pixels of a launch, in the order of its tiles, and for their numbers."""
+    """Device buffers for the pixels of a launch, in the order of its tiles, and for the tiles' numbers."""
 
     film: cl.Buffer
     tiles: cl.Buffer
 
 
 class Share(NamedTuple):
-    """What a worker is at: tiles of the picture, and the rows that they are of the film.
+    """Unit of a worker's work: tiles of the image, and their rows in the film.
 
-    pixels: (tiles, TILE_PIXELS), as they were before it, and once it has ended after it.
+    pixels: (tiles, TILE_PIXELS), the state before the share, and once it has ended the one after it.
     """
 
     part: Part
@@ -41,7 +41,7 @@ class Share(NamedTuple):
 
 
 class Worker:
-    """Renders shares of a picture of so many tiles. DeviceError where it cannot, or not any more."""
+    """Renders shares of an image of `tiles` tiles. Raises DeviceError if it cannot, or fails later."""
 
     def __init__(self, device: Device, compiled: CompiledScene, launch: NDArray[Any], tiles: int,
                  before: Sequence[SceneOnDevice] = ()) -> None:
@@ -56,11 +56,11 @@ class Worker:
 
     @property
     def name(self) -> str:
-        """The device's."""
+        """Name of the device."""
         return self.scene.device.info.name
 
     def _make_windows(self) -> deque[Window]:
-        """Of half the size as long as there is no room for them."""
+        """Allocate the windows, halving their size until they fit."""
         context, flags = self.scene.device.context, cl.mem_flags.READ_WRITE
         while True:
             try:
@@ -77,7 +77,7 @@ class Worker:
                 self.scene.film_bytes = IN_FLIGHT * self.window_tiles * self._tile_bytes
 
     def begin(self, share: Share) -> None:
-        """Enqueues a share of at most `window_tiles` tiles; its arrays belong to the device until it has ended."""
+        """Enqueue a share of at most `window_tiles` tiles; its arrays must not be used until it has ended."""
         part, device, window = share.part, self.scene.device, self._windows[0]
         self._windows.rotate(1)
         pixels, launch = len(share.tiles) * TILE_PIXELS, self.scene.launch
@@ -93,7 +93,7 @@ class Worker:
         self.launches.begin(event, last, pixels * part.more)
 
     def ended(self) -> Share | None:
-        """The first share that it is at, if that has ended."""
+        """Return the oldest share in flight if it has ended, else None."""
         if not self.launches.poll():
             return None
         share = self.at.popleft()
