@@ -14,16 +14,16 @@ class Limit:
 
 
 class Ge(Limit):
-    """At least."""
+    """Inclusive lower bound."""
 
 
 class Gt(Limit):
-    """More than."""
+    """Exclusive lower bound."""
 
 
 class Le(Limit):
-    """At most."""
+    """Inclusive upper bound."""
 
 
 class Lt(Limit):
-    """Less than."""
+    """Exclusive upper bound."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 Triple = tuple[float, float, float]
 
-#: At about 589 nm and room temperature (Hecht, Optics, 4th edition, 2002).
+#: Dielectrics, at about 589 nm and room temperature (Hecht, Optics, 4th edition, 2002).
 DIELECTRICS = {
     "vacuum": 1.0, "helium": 1.000036, "hydrogen": 1.000132, "air": 1.000277, "carbon dioxide": 1.00045,
     "water": 1.3330, "acetone": 1.36, "ethanol": 1.361, "carbon tetrachloride": 1.461, "glycerol": 1.4729,

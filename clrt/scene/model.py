@@ -60,11 +60,11 @@ class Mesh:
     """Triangle mesh with one material.
 
     vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front; lists and arrays of other
-    dtypes are converted. normals: (n, 3) float32, interpolated over each face, or None for flat shading. uv, uv1: (n,
-    2) float32, the two sets of texture coordinates (scene.textures). colors: (n, 3) or (n, 4) float32, linear, from 0
-    to 1; they multiply the material's color, and the fourth component its opacity unless that is 1. tangents: (n, 4)
-    float32, for normal maps, w the sign of the bitangent as in glTF; computed if missing. material_name: the material's
-    name in the model file.
+    dtypes are converted. normals: (n, 3) float32, interpolated over each face, or None for flat shading.
+    uv, uv1: (n, 2) float32, the two sets of texture coordinates (scene.textures). colors: (n, 3) or (n, 4) float32,
+    linear, from 0 to 1; they multiply the material's color, and the fourth component its opacity unless that is 1.
+    tangents: (n, 4) float32, for normal maps, w the sign of the bitangent as in glTF; computed if missing.
+    material_name: the material's name in the model file.
     """
 
     vertices: FloatArray

@@ -1,4 +1,4 @@
-"""4x4 float64 matrices that act on column vectors: p' = M p. `A @ B` does B first."""
+"""4x4 float64 matrices that act on column vectors: p' = M p. `A @ B` applies B first."""
 
 from __future__ import annotations
 
