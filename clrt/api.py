@@ -44,8 +44,8 @@ def animate(scene: Scene | str | Path, *, frames: Iterable[int] | None = None, s
             **options: Any) -> Iterator[tuple[int, Image]]:
     """Render a scene with camera animation, all `frames` or the given numbers; yields each frame's number and image.
 
-    The other arguments apply to each frame as in `render`. Raises SceneError if the scene has no animation, and
-    subclasses of ClrtError.
+    The other arguments are as in `render`, per frame. Raises SceneError if the scene has no animation, and subclasses
+    of ClrtError.
     """
     denoiser = Denoiser() if denoise else None
     scene = scene if isinstance(scene, Scene) else load(scene)

@@ -70,8 +70,7 @@ class InstancedRayQuery(TreeQuery):
         self._use(*self._placed(_matrices(transforms, len(self._mesh))))
 
     def _placed(self, to_world: Doubles) -> tuple[Layout, Frame]:
-        """Build the BVH over the instances, and return it with the world's frame. Each mesh has its own unit of
-        length."""
+        """Build the BVH over the instances, and return it with the world's frame; each mesh has its own length unit."""
         reach = np.einsum("kij,kj->ki", np.abs(to_world[..., :3]), self._extents[self._mesh])
         low, high = to_world[..., 3] - reach, to_world[..., 3] + reach
         frame = frame_around(low.min(axis=0, initial=np.inf), high.max(axis=0, initial=-np.inf))

@@ -102,8 +102,7 @@ class RayQuery(TreeQuery):
 
 
 def _bounds(triangles: NDArray[np.floating], spheres: NDArray[np.float32]) -> tuple[NDArray[np.floating], ...]:
-    """Return the corners (3,) of the bounding box of triangles (m, k, 3) and spheres (s, 4); inverted if there are
-    none."""
+    """Return the bounding box, corners (3,), of triangles (m, k, 3) and spheres (s, 4); inverted if there are none."""
     points, balls = triangles.reshape(-1, 3), spheres.astype(np.float64)
     ends = np.concatenate([points, balls[:, :3] - balls[:, 3:], balls[:, :3] + balls[:, 3:]])
     return ends.min(axis=0, initial=np.inf), ends.max(axis=0, initial=-np.inf)

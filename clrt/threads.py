@@ -39,8 +39,7 @@ class Bell:
             self._lock.release()
 
     def wait(self, seconds: float) -> None:
-        """Wait until it rings, or for this many seconds. Unlike a queue, it does not raise, which could keep frames
-        alive."""
+        """Wait until it rings, or for this many seconds. Raises no exception that would keep frames alive."""
         self._lock.acquire(timeout=seconds)
 
 
@@ -121,8 +120,7 @@ def beside(work: Callable[[], T], *, daemon: bool = False) -> Callable[[], T]:
 def in_parallel(work: Callable[[U], T], items: Iterable[U]) -> list[T]:
     """Return what `work` returns for each item, in order, using as many threads as there are cores, including this one.
 
-    If any item raises an exception, no further items are started; the first such item's exception is raised once all
-    threads have ended.
+    After an exception no further items are started; that of the first such item is raised once all threads are done.
     """
     todo = list(enumerate(items))
     left, results, errors = iter(todo), dict[int, T](), dict[int, BaseException]()

@@ -35,13 +35,11 @@ COUNTS = record(triangles="i4", spheres="i4", pad="2i4")
 CHUNK = 1 << 20
 #: Rays of the first launch, and minimum of any; later ones are sized to take device.launch.TARGET_SECONDS.
 FIRST, FEWEST = 1 << 15, 1 << 12
-#: Traversals of the layout bvh8: ray by ray, packets of eight coherent rays (kernels/traverse/packet.cl), or a pool of
-#: interleaved rays.
+#: Traversals of bvh8: single rays, packets of eight coherent ones (kernels/traverse/packet.cl), interleaved pools.
 TRAVERSALS = ("single", "packet", "pool")
 #: Rays in a work-item's pool (kernels/traverse/pool.cl), and rays that a work-item traces in total.
 POOL, SHARE = 32, 512
-#: Rays are coherent if the mean cosine between consecutive ones is above this, as for camera rays but not reflected
-#: ones.
+#: Rays are coherent if the mean cosine between consecutive ones exceeds this; camera rays are, reflected ones are not.
 COHERENT, PAIRS = 0.9, 1024
 QUERIES = ("closest_hit", "any_hit", "next_hit")
 #: Attributes of a query that a copy creates anew.
@@ -125,8 +123,7 @@ class TreeQuery:
     @with_default_errors
     def all_hits(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf, *,
                  max_hits: int = 100) -> tuple[NDArray[np.int64], NDArray[Any]]:
-        """Return all hits at 0 < t < t_max, up to `max_hits` per ray: (k,) ray indices, and (k,) records of
-        `closest_hit`.
+        """Return all hits at 0 < t < t_max, up to `max_hits` per ray: ray indices (k,), `closest_hit` records (k,).
 
         Sorted by ray, then t, then primitive. Each hit is found from the one before by comparing (t, primitive), not by
         moving the origin, so touching or coincident surfaces all count once each; but none behind a hit whose t exceeds

@@ -90,8 +90,7 @@ class RayMeshIntersector:
     @with_default_errors
     def intersects_id(self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True,
                       max_hits: int | None = None, return_locations: bool = False) -> tuple[Any, ...]:
-        """Return index_tri (m,) int64, index_ray (m,) int64, sorted along each ray; optionally locations (m, 3)
-        float64.
+        """Return index_tri, index_ray (m,) int64, sorted along each ray; optionally locations (m, 3) float64.
 
         Returns one triangle per location where a ray hits the mesh; an edge, a vertex and coincident surfaces are one
         location. multiple_hits: all locations, or `max_hits` if given; otherwise the first one.
@@ -125,8 +124,7 @@ class RayMeshIntersector:
 
     @with_default_errors
     def contains_points(self, points: ArrayLike) -> Bools:
-        """Return (n,) bool: whether points (n, 3) are inside, by trimesh's rule: an odd number of hits in both
-        directions."""
+        """Return (n,) bool: whether points (n, 3) are inside, by trimesh's rule: an odd number of hits both ways."""
         places = real_array("points", points)
         if places.ndim != 2 or places.shape[1] != 3:
             raise UsageError(f"points {places.shape} must have the shape (n, 3)")

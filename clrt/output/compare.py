@@ -25,8 +25,7 @@ FLIP_MIN = 1e-5
 
 
 def compare_files(image: Path, reference: Path) -> dict[str, Any]:
-    """Run `compare` on two image files; FLIP is HDR-FLIP if either is .exr or .hdr. Raises SceneError naming the
-    files."""
+    """Run `compare` on two image files, with HDR-FLIP if either is .exr or .hdr. Raises SceneError naming the files."""
     pixels, truth = read_picture(image), read_picture(reference)
     _check_sizes(pixels, truth, str(image), str(reference))
     return _measures(pixels, truth, bool({image.suffix.lower(), reference.suffix.lower()} & {".exr", ".hdr"}))

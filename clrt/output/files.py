@@ -52,8 +52,7 @@ def check_unprotected(path: Path, force: bool) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Provide a temporary path next to `path`, with its extension, to write to; then rename that file to `path`
-    atomically.
+    """Provide a temporary path next to `path`, with its extension; then atomically rename the file there to `path`.
 
     If the block fails, `path` is unchanged and no temporary file is left; an OSError is raised as OutputError. The file
     keeps the mode of the one that it replaces, and its owner and group if the user may set them. A symbolic link is

@@ -18,8 +18,8 @@ from .report import header_of
 
 @dataclass(frozen=True)
 class Image:
-    """Rendered image. pixels: (height, width, 3) float32, linear Rec. 709; report: how it was rendered, see `clrt
-    render --report`; raw: the pixels before denoising, None if not denoised; aovs: arbitrary output variables by name
+    """Rendered image. pixels: (height, width, 3) float32, linear Rec. 709; report: how it was rendered, see
+    `clrt render --report`; raw: the pixels before denoising, None if not denoised; aovs: AOVs by name
     (docs/aovs.md)."""
 
     pixels: NDArray[np.float32]

@@ -95,8 +95,7 @@ def _tell_flaws(path: Path, pixels: FloatArray) -> None:
 
 
 def _write_png(path: Path, samples: NDArray[np.uint8], metadata: Mapping[str, str]) -> None:
-    # sRGB is the default color space; setting it explicitly takes 25 ms, in which OpenImageIO loads all its color
-    # spaces.
+    # sRGB is the default; setting it explicitly takes 25 ms, in which OpenImageIO loads all its color spaces.
     _write(path, samples, {**metadata, **ATTRIBUTES[".png"]})
 
 
@@ -120,8 +119,7 @@ def rgbe_rounded(pixels: FloatArray) -> FloatArray:
 
 def _write(path: Path, samples: NDArray[Any], attributes: Mapping[str, str | int],
            channels: Sequence[str] = ("R", "G", "B")) -> None:
-    """Write uint8 or float32 samples unchanged, atomically; raises OutputError with the writer's reason if that
-    fails."""
+    """Write uint8 or float32 samples unchanged, atomically; raises OutputError with the writer's reason."""
     with replacing(path) as temporary:
         _write_file(temporary, samples, attributes, channels)
 

@@ -24,8 +24,7 @@ _log = logging.getLogger(__name__)
 
 
 def layered(pixels: FloatArray, aovs: Pictures) -> tuple[FloatArray, list[str]]:
-    """Return all in one array (height, width, n) float32, and the channel names: R, G, B, albedo.R, depth.Z and so
-    on."""
+    """Return all in one array (height, width, n) float32, and the channel names: R, G, B, albedo.R, depth.Z …"""
     for name, aov in aovs.items():
         if aov.dtype.kind in "iu" and aov.max(initial=0) > LARGEST_ID:
             _log.warning("%s: numbers beyond %d are rounded in an .exr; Image.aovs has them", name, LARGEST_ID)

@@ -66,8 +66,7 @@ def plot_errors(path: Path, panels: Mapping[str, Mapping[str, Curve]]) -> Path:
 
 
 def write_figure(path: Path, figure: Figure) -> Path:
-    """Write a figure atomically (see `replacing`) in the format of the path's extension. Returns the path; raises
-    OutputError."""
+    """Write a figure atomically (see `replacing`) in the extension's format. Returns the path; raises OutputError."""
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=DOTS_PER_INCH)
     return path

@@ -48,8 +48,7 @@ def raw(linear: FloatArray) -> FloatArray:
 
 
 def reinhard(linear: FloatArray) -> FloatArray:
-    """Compress luminance so that REINHARD_WHITE becomes 1, keeping the ratios of the channels; then apply the sRGB
-    curve.
+    """Compress luminance so that REINHARD_WHITE becomes 1, keeping the channels' ratios; then apply the sRGB curve.
 
     Reinhard et al. 2002, Photographic Tone Reproduction for Digital Images, eq. 4.
     """

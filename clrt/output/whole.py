@@ -1,5 +1,5 @@
-"""Completeness check of written image files: OpenImageIO does not report if the system refuses the last bytes, as on a
-full disk."""
+"""Completeness check of written image files: OpenImageIO does not report that the system refused the
+last bytes, as on a full disk."""
 
 from __future__ import annotations
 

@@ -44,8 +44,7 @@ class Keyframe:
 
 @dataclass(frozen=True, kw_only=True)
 class Animation:
-    """Animation of the camera. fps: frames per second. keyframes: at least two, by ascending time; frame 0 is at the
-    first one's time.
+    """Animation of the camera. fps: frames per second. keyframes: at least two, ascending, frame 0 at the first.
 
     turntable_seconds: replaces keyframes; the camera goes once around its `look_at` point, about its `up`, seen from
     there counter-clockwise, or clockwise if below 0. The frame after the last would equal the first.
@@ -85,8 +84,7 @@ def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
 
 def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[int, Scene]]:
     """Return the number and the static scene of all frames, or of the `chosen` ones. The scenes differ in their camera
-    alone. Raises SceneError if the scene has no animation or an invalid one, UsageError for a frame number out of
-    range.
+    alone. Raises SceneError if the scene has no animation or an invalid one, UsageError for an invalid number.
     """
     if scene.animation is None:
         raise SceneError(f"{scene.name}: nothing moves; write [[keyframe]] tables, or have it turned (--turntable, "
@@ -161,7 +159,7 @@ def _moving(camera: Camera, animation: Animation, numbers: Doubles) -> dict[str,
 
 
 def _around(camera: Camera, angles: Doubles) -> Doubles:
-    """Rotate the camera position by these angles about its up axis through its look_at point; (n, 3)."""
+    """Compute (n, 3) positions of the camera rotated by these angles about the axis `up` through its look_at point."""
     center, axis = np.array(camera.look_at, np.float64), np.array(camera.up, np.float64)
     axis /= np.linalg.norm(axis)
     arm = camera.position - center

@@ -16,7 +16,7 @@ def _table(text: str) -> Doubles:
     return np.array(text.split(), np.float64)
 
 
-#: Color matching functions x̄, ȳ and z̄.
+#: Color matching functions x, y and z.
 X = _table("""
     0.0001299 0.0002321 0.0004149 0.0007416 0.001368 0.002236 0.004243 0.00765 0.01431 0.02319 0.04351 0.07763
     0.13438 0.21477 0.2839 0.3285 0.34828 0.34806 0.3362 0.3187 0.2908 0.2511 0.19536 0.1421 0.09564 0.05795001

@@ -1,5 +1,5 @@
-"""Decodes images and compressed meshes in a child process, since the decoding libraries may crash, hang or exhaust
-memory if a file is damaged.
+"""Decoding of images and compressed meshes in a child process, since the libraries may crash, hang or exhaust memory if
+a file is damaged.
 
 The process starts with the first file, is reused for later ones, and exits after being idle for a while.
 """

@@ -72,9 +72,8 @@ class Side(NamedTuple):
 
 @lru_cache(128)
 def tables(ior: float, roughness: float | None, thin: bool) -> tuple[float, ...]:
-    """Build the table of one roughness, or one for each of ROWS roughnesses: for the outside, then the inside, STEPS +
-    1 pairs (loss, rest), then m/n² divided by the mean of grazing²/(grazing² + c²), and the fraction of rest leaving
-    there.
+    """Build the table of one roughness, or a row for each of ROWS roughnesses: for the outside, then the inside,
+    STEPS + 1 pairs (loss, rest), m/n² over the mean of grazing²/(grazing² + c²), and the fraction of rest on that side.
     """
     roughnesses = np.linspace(0, 1, ROWS)**2 if roughness is None else [roughness]
     lattice = COARSE if roughness is None else FINE
@@ -99,8 +98,7 @@ def sides(ior: float, alpha: float, thin: bool = False, lattice: tuple[int, int]
 
 
 def grazing(ior: float, alpha: float, thin: bool = False) -> float:
-    """Return the cosine below which the loss is large: alpha, or less if ior is near 1 and most light passes
-    straight."""
+    """Return the cosine below which the loss is large: alpha, or less for ior near 1, with little deflection."""
     return alpha if thin else min(alpha, float(np.sqrt(alpha * abs(ior - 1 / ior))))
 
 
@@ -171,7 +169,7 @@ def _seen(cos_o: Doubles, cos_i: Doubles, alpha: float) -> Doubles:
 
 
 def _mean(rest: Doubles, near: float) -> float:
-    """Integrate ∫ rest·2c dc, with rest linear in t between the table's angles."""
+    """Compute ∫ rest·2c dc, with rest linear in t between the table's angles."""
     t = (np.arange(16 * STEPS) + 0.5) / (16 * STEPS)
     q, width = t**2 / (1 + 4 * near), 4 * near
     slope = width / (1 - q)**2 * 2 * t / (1 + width)    # dc/dt

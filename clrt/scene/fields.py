@@ -27,8 +27,8 @@ MOST = 12
 
 
 def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[str]:
-    """Return what is wrong with `values` as the fields of the dataclass `kind`: one "where.field: value ..." per
-    problem.
+    """Return what is wrong with `values` as the fields of the dataclass `kind`: each as
+    "where.field: value ...".
 
     Finds missing and unknown fields, wrong types, values outside the limits of the type, and numbers that float32
     cannot represent (NaN, Inf and out of range). Numbers may be numpy scalars; sequences must be tuples.

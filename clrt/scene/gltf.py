@@ -62,8 +62,7 @@ def _read(path: Path, normals: Normals) -> Model:
 
 
 def _nodes(document: gltf.Document) -> Iterator[Placed]:
-    """Yield each node of the scene with its matrix to the world. In a file without nodes each mesh gets the
-    identity."""
+    """Yield each node of the scene with its matrix to the world. Without nodes each mesh gets the identity."""
     if not document.nodes:
         yield from ((gltf.Node(mesh=index), np.eye(4)) for index in range(len(document.meshes)))
         return
@@ -109,8 +108,7 @@ def _places(data: GltfData, nodes: list[Placed], normals: Normals) -> Iterator[t
 
 def _primitives(data: GltfData, materials: Materials, index: int, weights: Sequence[float],
                 normals: Normals) -> Iterator[Mesh]:
-    """Yield the primitives of a mesh that have triangles, in the mesh's frame, with the weighted morph targets
-    applied."""
+    """Yield a mesh's primitives with triangles, in its own frame, with the weighted morph targets applied."""
     source = gltf.entry(data.document.meshes, index, "mesh", "a node")
     for number, primitive in enumerate(source.primitives):
         name = source.name or f"mesh {index}"
@@ -146,8 +144,7 @@ def _vectors(data: GltfData, accessor: int, user: str) -> NDArray[np.float32]:
 
 def _attribute(data: GltfData, primitive: gltf.Primitive, key: str, kind: str, n: int,
                user: str) -> NDArray[np.float32] | None:
-    """Return a per-vertex attribute (n, k) of a primitive with `n` vertices; non-finite values other than normals are
-    0."""
+    """Return the values (n, k) of an attribute of `n` vertices; those not finite become 0, except in normals."""
     if key not in primitive.attributes:
         return None
     values = np.ascontiguousarray(data.array(primitive.attributes[key], kind, user), np.float32)

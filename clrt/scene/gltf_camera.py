@@ -40,8 +40,7 @@ def read_cameras(path: Path, document: gltf.Document, nodes: Iterable[tuple[gltf
 
 
 def _placed(source: gltf.Camera, matrix: Matrix, middle: NDArray[np.float64]) -> Camera | None:
-    """Return a camera that looks along its node's −Z with +Y up (specification 3.10); None if the node is
-    degenerate."""
+    """Return a camera along its node's −Z with +Y up (specification 3.10); None if the node is degenerate."""
     position = matrix[:3, 3]
     forward, up = unit(-matrix[:3, 2]), unit(matrix[:3, 1])
     if not np.cross(forward, up).any():

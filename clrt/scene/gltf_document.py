@@ -199,8 +199,7 @@ def parse_document(text: bytes) -> Document:
 
 
 def entry(items: Sequence[Item], index: int, name: str, user: str) -> Item:
-    """Return items[index]; raises SceneError if there is no such entry. `name`: the kind of item, such as
-    "accessor"."""
+    """Return items[index]; raises SceneError if it does not exist. `name`: the kind of item, such as "accessor"."""
     if index >= len(items):
         raise SceneError(f"{user} uses {name} {index}, but the file has {len(items)}; export the file again")
     return items[index]

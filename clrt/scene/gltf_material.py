@@ -147,7 +147,7 @@ class Materials:
 
 def _colored(factor: tuple[float, float, float], texture: Texture | None, info: looks.TextureInfo | None,
              missing: float) -> tuple[float, float, float] | Texture:
-    """Return a color times its texture, or times `missing` if that could not be read."""
+    """Return a color times its texture, or times `missing` if the texture is unavailable."""
     if texture is not None:
         return replace(texture, factor=factor)
     red, green, blue = (value * (1.0 if info is None else missing) for value in factor)

@@ -64,8 +64,7 @@ class InstanceReader:
 
     def read(self, table: InstanceTable, repeats: Sequence[Repeat], material: Material | None, where: str,
              ) -> list[Instance]:
-        """Return one instance per mesh that the table's mesh shows, and their copies. Raises SceneError for invalid
-        transforms."""
+        """Return the instances of what the mesh shows, and their copies; raises SceneError for invalid transforms."""
         if (count := prod(repeat.count for repeat in repeats)) > MOST_INSTANCES:
             raise SceneError(f"{where}.repeat: makes {count} copies; write counts of at most {MOST_INSTANCES} in all")
         matrices = table.to_world(where)[None]
@@ -90,8 +89,7 @@ def repeated(matrices: NDArray[np.float64], step: Matrix, count: int) -> NDArray
 
 
 def placed(model: Model, matrix: Matrix, material: Material | None, others: dict[str, Material]) -> Model:
-    """Apply an affine matrix to a model. material: replaces its own; others: replacements by the material's own
-    name."""
+    """Apply an affine matrix to a model. material: replaces its own; others: replacements by their own names."""
     meshes = [transform_mesh(replace(mesh, material=others.get(mesh.material_name, material or mesh.material)), matrix)
               for mesh in model.meshes]
     instances = [replace(moved(each, matrix), material=others.get(each.mesh.material_name, material or each.material))

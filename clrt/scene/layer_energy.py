@@ -25,8 +25,7 @@ Roughnesses = tuple[float, ...]
 
 
 class Table(tuple[float, ...]):
-    """Entries of ENTRY numbers each, stored once for all materials with an equal table; a material holds the index of
-    the first one."""
+    """Entries of ENTRY numbers each, stored once for all materials with an equal table."""
 
 
 #: Intervals of the angle axis, uniform in √cos.

@@ -44,8 +44,7 @@ class DirectionalLight:
 
     @property
     def radiance(self) -> Radiance:
-        """Return the radiance of its disc: irradiance over the projected solid angle, pi sin²(angle/2), not for angle
-        0."""
+        """Return the disc's radiance, irradiance over projected solid angle, pi sin²(angle/2); not for angle 0."""
         solid_angle = pi * sin(radians(self.angle_degrees) / 2) ** 2
         red, green, blue = (value / solid_angle for value in self.irradiance)
         return red, green, blue

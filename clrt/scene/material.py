@@ -54,11 +54,9 @@ class Material:
         tuples_for_lists(self)
 
     def parameters(self) -> dict[str, Parameter]:
-        """Return the values its kernel reads: numbers, triples, rows of a multiple of four, or a texture in place of
-        these.
+        """Return the values its kernel reads: numbers, triples, rows of a multiple of four, or textures in their place.
 
-        Materials that lack a parameter that others of their type return use the field of that name, or 0 if there is
-        none.
+        A parameter that only others of its type return is the field of that name, or 0 if there is no such field.
         """
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in SHARED}
 
@@ -82,8 +80,7 @@ class Material:
 
     @property
     def is_culled(self) -> bool:
-        """Whether back-face culling applies to it; not to transmissive materials, whose back faces light inside must
-        hit."""
+        """Whether back-face culling applies; not to transmissive materials, whose back faces light inside must hit."""
         return not (self.double_sided or "TRANSMISSION" in self.features())
 
     @property
@@ -123,8 +120,7 @@ class Material:
         return self
 
     def features(self) -> frozenset[str]:
-        """Return the names to define when compiling, for parts of the kernel that only some materials of this type
-        need."""
+        """Return the macros to define, for parts of the kernel that only some materials of this type need."""
         return frozenset()
 
 

@@ -13,8 +13,7 @@ Points = NDArray[np.float32] | NDArray[np.float64]
 
 
 def mesh_arrays(vertices: ArrayLike, faces: ArrayLike) -> tuple[Points, NDArray[np.int32]]:
-    """Return vertices (n, 3) float32 or float64 and a copy of faces (m, 3) int32; raises SceneError for invalid
-    ones."""
+    """Return vertices (n, 3) float32 or float64 and a copy of faces (m, 3) int32; SceneError if they are invalid."""
     points, indices = finite_points(vertices), whole_array("faces", faces, SceneError)
     if indices.ndim != 2 or indices.shape[1] != 3:
         raise SceneError(f"faces {indices.shape} must have the shape (m, 3)")

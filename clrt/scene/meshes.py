@@ -76,8 +76,7 @@ def _parse(path: Path, suffix: str) -> dict[str, Any]:
     except SceneError:
         raise
     except Exception as error:  # a damaged file may make trimesh's parsers raise anything
-        # For undecodable bytes trimesh raises ImportError, asking for a library that detects encodings: no help to the
-        # user.
+        # On undecodable bytes trimesh raises an ImportError about an encoding detector: no help to the user.
         detail = "" if isinstance(error, ImportError) else f" ({type(error).__name__}: {error})"
         raise SceneError(f"cannot be read as {suffix[1:].upper()}{detail}; export the model again") from error
 

@@ -36,8 +36,7 @@ class MetallicRoughness(Material):
     and Conty 2017); "fresnel", (1 − F(cos wi))(1 − F(cos wo)), which loses some; or "half_vector", 1 − F(wi·h) of the
     theses and glTF, which gains some. `multiple_scattering` compensates what single scattering between microfacets
     loses: white metal then reflects all light, and colored metal becomes more saturated. By default both conserve
-    energy with the height-correlated term, and follow the theses with the other terms: "fresnel", without multiple
-    scattering.
+    energy with the height-correlated term; with the others they are as in the theses: "fresnel" and single scattering.
 
     The rest are glTF's extensions, with their names. `ior`, `specular` and `specular_color`: F0 of the dielectric part,
     ((ior − 1)/(ior + 1))²·specular·specular_color, and F at grazing angles, `specular`. `clearcoat`: a clear film,
@@ -121,8 +120,7 @@ class MetallicRoughness(Material):
         layers = {"CLEARCOAT": self.clearcoat != 0, "SHEEN": self.sheen_color != (0, 0, 0),
                   "THROUGH": self.transmission != 0}
         further = self.coupled_by == "albedo" if self.multiple_scattering is None else self.multiple_scattering
-        # With the albedo coupling the diffuse lobe reflects all that the specular lobe does not, so only metal loses
-        # energy.
+        # With the albedo coupling the diffuse lobe reflects what the specular one does not, so only metal loses energy.
         further &= metallic != 0 or self.coupled_by != "albedo" or layers["THROUGH"]
         above = layers["CLEARCOAT"] or layers["SHEEN"]
         coupled = metallic != 1 or above    # the coupled lobe also carries what layers take from the gloss

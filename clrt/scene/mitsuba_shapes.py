@@ -148,8 +148,7 @@ def _between(plugin: Plugin) -> Doubles:
 
 
 def _sphere(to_world: Doubles, look: Look, name: str) -> Sphere | None:
-    """Return the transformed sphere of radius 1; None if it becomes an ellipsoid, or is textured, so has an
-    orientation."""
+    """Return the transformed sphere of radius 1; None if it becomes an ellipsoid, or if it is textured."""
     linear = to_world[:3, :3]
     squares = linear.T @ linear
     radius = float(np.cbrt(abs(np.linalg.det(linear))))

@@ -99,8 +99,7 @@ class TextureReader:
         return self._pictures[file, curve]
 
     def _checkerboard(self, plugin: Plugin, *, encoded: bool) -> Texture:
-        """Return two by two texels, with factors that make the brighter color exact and the other as close as 8 bits
-        allow."""
+        """Return 2x2 texels, with factors that make the brighter color exact and the other as close as 8 bits allow."""
         first, second = (rgb(plugin.color(name, value), bounded=True)
                          for name, value in (("color0", 0.4), ("color1", 0.2)))
         if not encoded:  # Mitsuba 3 swaps the two for numbers

@@ -199,8 +199,7 @@ class _Document:
         return self._by_id[name]
 
     def file(self, name: str) -> Path:
-        """Return the path of a file named in the scene: next to it, or in a folder given by <path>, the last one
-        first."""
+        """Return the path of a file named in the scene: next to it, or in a <path> folder, the last one first."""
         found = (folder / name for folder in self._folders)
         return next((path for path in found if path.exists()), self._path.parent / name)
 

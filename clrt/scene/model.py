@@ -37,9 +37,8 @@ class Camera:
     """Camera. `look_at` is at the image center; the image's right is cross(forward, up).
 
     perspective: pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
-    `look_at`); `fov_degrees`: vertical, full angle. orthographic: parallel rays, an image `view_height` high (None: the
-    height of the perspective view at `look_at`). equirectangular: all directions, in the mapping of Environment for a
-    view along +Z.
+    `look_at`); `fov_degrees`: vertical, full angle. orthographic: parallel rays, an image `view_height` high (None: as
+    the perspective view at `look_at`). equirectangular: all directions, in Environment's mapping for a view along +Z.
     """
 
     position: Vector = (0.0, 0.0, 5.0)
@@ -90,8 +89,7 @@ class Mesh:
 
 @dataclass(eq=False)
 class Instance:
-    """An instance of a mesh, which shares the mesh's memory. The mesh itself is rendered only if it is in the scene's
-    `meshes`, too.
+    """An instance, which shares its mesh's memory. The mesh itself is rendered only if the scene's `meshes` contain it.
 
     to_world: (3, 4), or (4, 4) with the last row 0, 0, 0, 1: an affine matrix that acts on column vectors and takes the
     mesh's points to the world; it may mirror, but must not be singular. material: replaces the mesh's own.
@@ -135,8 +133,7 @@ class Sphere:
 
 @dataclass(eq=False, kw_only=True)
 class Environment:
-    """Light from infinitely far away: a constant `color`, or an environment map, `image` (h, w, 3) float32 in
-    latitude–longitude form.
+    """Environment light: a constant `color`, or an environment map, `image` (h, w, 3) float32, equirectangular.
 
     Direction to texel: u = atan2(x, −z)/2π mod 1, v = acos(y)/π, row 0 on top; `rotation_degrees` rotates the
     environment about +Y, counter-clockwise seen from above. Radiance = strength · (color or texel).

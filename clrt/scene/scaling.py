@@ -58,9 +58,7 @@ def frame_around(low: NDArray[np.floating], high: NDArray[np.floating]) -> Frame
 
 
 def unit_for(largest: float) -> float:
-    """Return the power of two (a normal float32) that scales the largest coordinate to about 1; 1 if scaling is not
-    needed.
-    """
+    """Return the power of two (a normal float32) that scales the largest coordinate to about 1; 1 if not needed."""
     exponent = max(-MOST, min(MOST, frexp(largest)[1]))
     return 1.0 if largest == 0 or abs(exponent) <= COMFORTABLE else 2.0**-exponent
 

@@ -75,8 +75,7 @@ class SceneReader:
         return self._source
 
     def _camera(self, values: Any, where: str) -> Camera:
-        """Return the camera; if other fields are invalid, one with valid position, look_at and up, so that it is
-        checked."""
+        """Return the camera; if it is invalid, one with its position, look_at and up, so that these are checked."""
         if not isinstance(values, dict):
             self.problems.append(f"{where}: {show(values)} is not a table; write its keys below [{where}]")
             return Camera()

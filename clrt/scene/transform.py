@@ -29,8 +29,7 @@ def scaling(factors: Vector) -> Matrix:
 
 
 def rotation(degrees: Vector) -> Matrix:
-    """Return the rotation about the fixed x axis, then the fixed y axis, then the fixed z axis (extrinsic XYZ): Rz Ry
-    Rx.
+    """Return the rotation about the fixed x axis, then the fixed y axis, then the fixed z axis: Rz Ry Rx.
 
     Positive angles are counter-clockwise looking against the axis.
     """

@@ -184,8 +184,7 @@ class _Writer:
                   if (theirs := [name for name in kept if name]) else [])]
 
     def _own_objects(self) -> Iterator[str]:
-        """Yield the objects without a table: each mesh in a file of its own, hidden if only its instances are
-        rendered."""
+        """Yield the objects without a table: each mesh in its own file, hidden if only its instances are rendered."""
         left = [part for parts in self._left.values() for part in parts]
         meshes = [part for part in left if isinstance(part, Mesh)]
         instances = [part for part in left if isinstance(part, Instance)]

@@ -29,8 +29,7 @@ class App:
     """A window on a live session of its own. `params`: the parameters of Dear ImGui's runner."""
 
     def __init__(self, scene: Scene, settings: Settings = Settings(), look: Look = Look()) -> None:
-        # Before any OpenGL is loaded: Mesa's LLVM would be used by all libraries loaded later, and PoCL aborts with
-        # another's.
+        # Before OpenGL is loaded: libraries loaded later would get Mesa's LLVM, and PoCL aborts with a foreign one.
         devices = [info for info, _ in find_devices() if info.usable]
         self.live = Live(scene, settings=settings)
         self.editor, self.viewport = Editor(self.live, look, devices), Viewport()

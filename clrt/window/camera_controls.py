@@ -23,8 +23,8 @@ LONGEST = 0.1
 
 @dataclass
 class CameraControls:
-    """mode: the effect of dragging, "look" or "orbit"; pace: walking speed per second, as a fraction of the distance to
-    the look_at point."""
+    """mode: the effect of dragging, "look" or "orbit"; pace: walking speed per second, relative to
+    the distance to the look_at point."""
 
     mode: str = "look"
     pace: float = 0.5

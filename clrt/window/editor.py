@@ -102,8 +102,7 @@ class Editor:
         self.attempt(lambda: self.live.choose(settings))
 
     def pick(self, x: float, y: float) -> None:
-        """Select what is visible at a position of the image (see `Live.pick`) for editing, once the result is
-        available."""
+        """Select what is visible at a position of the image (see `Live.pick`) for editing, once it is known."""
         self._picked = self.live.pick(x, y)
 
     def _choose_picked(self) -> None:

@@ -14,8 +14,7 @@ LINES = 6
 
 
 def pick(label: str, names: Sequence[str], chosen: int) -> int:
-    """Show a list box, and return the index of the selected line. Only visible lines are drawn, so lists may be
-    long."""
+    """Show a list box, and return the selected line's index. Only visible lines are drawn, so lists may be long."""
     height = (min(max(len(names), 1), LINES) + 0.5) * imgui.get_text_line_height_with_spacing()
     if imgui.begin_list_box(label, (-1, height)):
         clipper = imgui.ListClipper()
