@@ -1,4 +1,4 @@
-"""Energy that clearcoat (film) and sheen (fibres) absorb from the specular lobe (gloss) below, as a table for kernels.
+"""Excess energy that clearcoat (film) and sheen (fibres) take from the specular lobe (gloss) below, as a table.
 
 A layer transmits the fraction T(c) of light at a cosine c to what lies below. The gloss is scaled by min(T(wo), T(wi)),
 which is reciprocal, and exact if it is smooth. For rough gloss this removes more than the layers reflect;
@@ -25,7 +25,8 @@ Roughnesses = tuple[float, ...]
 
 
 class Table(tuple[float, ...]):
-    """Entries of ENTRY numbers each, stored once for all materials with an equal table."""
+    """Entries of ENTRY numbers each, stored once for all materials with an equal table; these hold the index of
+    its first entry."""
 
 
 #: Intervals of the angle axis, uniform in √cos.
