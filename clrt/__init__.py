@@ -1,10 +1,10 @@
-"""clrt: a path tracer on any OpenCL device that says how far its picture is from the truth.
+"""clrt: a path tracer for any OpenCL device that estimates the error of its images.
 
     import clrt
     image = clrt.render(clrt.load("scenes/cornell.toml"), spp=256)
     image.save("cornell.png")
 
-Names are imported when first used, so `import clrt` loads nothing.
+Names are imported on first use, so `import clrt` itself loads nothing.
 """
 
 from __future__ import annotations

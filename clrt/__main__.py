@@ -1,4 +1,4 @@
-"""`python -m clrt`, and `clrt`, are the command line."""
+"""Entry point of `python -m clrt` and `clrt`, the command line."""
 
 import atexit
 import os
@@ -7,9 +7,9 @@ from contextlib import suppress
 
 
 def main() -> None:
-    """Runs it; one that is interrupted before it has begun ends as quietly as later."""
+    """Run the command line; an interrupt during startup ends it as quietly as a later one."""
     code: list[int] = []
-    atexit.register(_end, code)     # before all others are, so it is called after them
+    atexit.register(_end, code)     # registered before all others, so called after them
     try:
         from .cli import main as run
         from .device import background
@@ -25,14 +25,14 @@ def main() -> None:
 
 
 def _end(code: list[int]) -> None:
-    """Ends the process where that is all that is left to do: Python takes its modules apart first, which takes a
-    thirtieth of a short render, and some drivers crash as they are unloaded, when all work is done."""
-    with suppress(OSError, ValueError, AttributeError):     # Python tells of output that is not there
+    """Exit the process at once: interpreter shutdown takes a thirtieth of a short render, and some drivers crash when
+    they are unloaded, after all work is done."""
+    with suppress(OSError, ValueError, AttributeError):     # standard output may be missing or closed
         sys.stdout.flush()
         sys.stderr.flush()
         if code:
             os._exit(code[0])
 
 
-if __name__ == "__main__":  # workers of a farm on this machine import it, too
+if __name__ == "__main__":  # workers on this machine import this module, too
     main()

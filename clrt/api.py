@@ -1,4 +1,4 @@
-"""The one-call functions of the package."""
+"""The package's top-level functions."""
 
 from __future__ import annotations
 
@@ -23,17 +23,16 @@ from .scene.model import Scene
 
 @with_default_errors
 def load(path: str | Path, camera: str | None = None) -> Scene:
-    """The scene in a .toml file or a bare model (.glb .gltf .obj .ply .stl .off), seen by a camera of the model file
-    if one is named; SceneError lists all its mistakes."""
+    """Load the scene in a .toml file or a bare model (.glb .gltf .obj .ply .stl .off). camera: the name of one of the
+    model file's cameras to use. Raises SceneError, which lists all problems."""
     return _load(path, camera)
 
 
 @with_default_errors
 def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | None = None, error: float | None = None,
            reference: NDArray[np.float32] | None = None, denoise: bool = False, **options: Any) -> Image:
-    """Renders a scene, or the scene in a file, to the end: see `Renderer.passes` for the stop conditions and
-    `Renderer` for `options`. denoise: see docs/denoise.md; the image keeps its `raw` pixels. Raises ClrtError
-    subclasses."""
+    """Render a scene, or the scene in a file, until a stop condition: see `Renderer.passes` for these and `Renderer`
+    for `options`. denoise: see docs/denoise.md; the image keeps its `raw` pixels. Raises subclasses of ClrtError."""
     denoiser = Denoiser() if denoise else None
     scene = scene if isinstance(scene, Scene) else load(scene)
     renderer = Renderer(scene, spp=planned_spp(scene.render, spp, time, error), first_hits=denoise, **options)
@@ -43,9 +42,10 @@ def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | N
 def animate(scene: Scene | str | Path, *, frames: Iterable[int] | None = None, spp: int | None = None,
             time: float | None = None, error: float | None = None, denoise: bool = False,
             **options: Any) -> Iterator[tuple[int, Image]]:
-    """Renders a scene whose camera moves, all `frames` or those with these numbers: yields each one's number and image.
+    """Render a scene with camera animation, all `frames` or the given numbers; yields each frame's number and image.
 
-    All is as of `render`, frame by frame. Raises SceneError where nothing moves, and ClrtError subclasses.
+    The other arguments are as in `render`, per frame. Raises SceneError if the scene has no animation, and subclasses
+    of ClrtError.
     """
     denoiser = Denoiser() if denoise else None
     scene = scene if isinstance(scene, Scene) else load(scene)

@@ -1,7 +1,7 @@
-"""Time in which this process runs: that in which it is suspended (SIGSTOP, a batch system, a laptop's lid) is left out.
+"""Clock that does not count the time in which the process is suspended (SIGSTOP, a batch system, a laptop's lid).
 
-No clock of the system's tells that. But who looks at a clock often knows that a long time between two looks was none in
-which it could look.
+No system clock provides that. But if a thread reads the clock often, a long interval between two readings means that
+the process could not run.
 """
 
 from __future__ import annotations
@@ -12,35 +12,35 @@ from contextlib import contextmanager
 
 from .threads import BEAT, Event, beside
 
-#: Seconds between two looks that count at most: a busy machine may delay a look.
+#: Seconds that count at most between two readings; a busy machine may delay a reading.
 LONGEST = 1.0
 
 
 class AwakeClock:
-    """Seconds since it was made, and `seconds` before; LONGEST at most count from a look to the next."""
+    """Seconds since it was created, plus `seconds`; each interval between `look` calls counts LONGEST at most."""
 
     def __init__(self, seconds: float = 0.0) -> None:
         self.set(seconds)
 
     def set(self, seconds: float) -> None:
-        """It goes on from there."""
+        """Set the clock to this value."""
         self._last = seconds, time.perf_counter()
 
     @property
     def seconds(self) -> float:
-        """What it shows now."""
+        """Return the current value."""
         seconds, looked = self._last
         return seconds + min(time.perf_counter() - looked, LONGEST)
 
     def look(self) -> float:
-        """What it shows now, from where the next look counts."""
+        """Return the current value, and start a new interval."""
         self.set(self.seconds)
         return self._last[0]
 
 
 @contextmanager
 def watched_clock(seconds: float = 0.0) -> Iterator[AwakeClock]:
-    """A clock that a thread looks at, so that nobody else has to."""
+    """Provide a clock that a thread reads regularly, so that callers need not."""
     clock, over = AwakeClock(seconds), Event()
 
     def watch() -> None:
@@ -55,7 +55,7 @@ def watched_clock(seconds: float = 0.0) -> Iterator[AwakeClock]:
 
 
 def wait_awake(event: Event, seconds: float) -> bool:
-    """Whether the event is set within so many seconds; waits for that."""
+    """Wait until the event is set or this many seconds have passed; return whether it is set."""
     clock = AwakeClock()
     while not event.wait(min(BEAT, seconds)):
         if clock.look() >= seconds:

@@ -1,17 +1,17 @@
-"""What can go wrong because of the user's input or machine.
+"""Errors caused by the user's input or machine.
 
     ClrtError
     ├── UsageError    a wrong option or combination of options        exit code 2
-    ├── SceneError    a scene, model or picture file, or its content  exit code 3
-    ├── CheckpointError  a checkpoint to go on from                   exit code 3
+    ├── SceneError    a scene, model or image file, or its content    exit code 3
+    ├── CheckpointError  a checkpoint that cannot be resumed          exit code 3
     ├── DeviceError   no such device, or the device failed            exit code 4
-    │   ├── NoRoomError  not enough memory there                      exit code 4
-    │   └── HungError    it does not answer any more                  exit code 4
-    ├── KernelError   the device's compiler refused the program       exit code 5
-    └── OutputError   a picture or report could not be written        exit code 6
-        └── KeptBesideError  it is beside the file to be replaced     exit code 6
+    │   ├── NoRoomError  the device has not enough memory             exit code 4
+    │   └── HungError    the device has stopped responding            exit code 4
+    ├── KernelError   the device's compiler rejected the program      exit code 5
+    └── OutputError   an image or report could not be written         exit code 6
+        └── KeptBesideError  written next to the file to be replaced  exit code 6
 
-Everything public raises only these for users' mistakes; any other exception is a defect of clrt.
+The public interface raises only these for users' mistakes; any other exception is a bug in clrt.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from collections.abc import Iterable
 
 
 class ClrtError(Exception):
-    """Base of all errors that clrt raises on purpose; `exit_code` is what the command line returns."""
+    """Base class of all errors that clrt raises deliberately; `exit_code` is the command line's exit status."""
 
     exit_code = 1
 
 
 class UsageError(ClrtError):
-    """An option has a wrong value, or options contradict each other."""
+    """An option has an invalid value, or options contradict each other."""
 
     exit_code = 2
 
 
 class SceneError(ClrtError):
-    """A scene cannot be used. `problems` lists every mistake found, one sentence each."""
+    """A scene cannot be used. `problems` lists everything that is wrong, one sentence each."""
 
     exit_code = 3
 
@@ -42,27 +42,27 @@ class SceneError(ClrtError):
 
 
 class CheckpointError(ClrtError):
-    """A checkpoint is damaged, or of another render."""
+    """A checkpoint is damaged, or belongs to a different render."""
 
     exit_code = 3
 
 
 class DeviceError(ClrtError):
-    """A device cannot be found, chosen or used."""
+    """A device cannot be found, selected or used."""
 
     exit_code = 4
 
 
 class NoRoomError(DeviceError):
-    """A device has not enough memory."""
+    """A device does not have enough memory."""
 
 
 class HungError(DeviceError):
-    """A device does not answer: whoever waits for it, waits for ever."""
+    """A device has stopped responding; waiting for it would never end."""
 
 
 class KernelError(ClrtError):
-    """A kernel does not compile on the chosen device; the message holds the build log."""
+    """A kernel does not compile on the selected device; the message contains the build log."""
 
     exit_code = 5
 
@@ -74,11 +74,11 @@ class OutputError(ClrtError):
 
 
 class KeptBesideError(OutputError):
-    """A result cannot replace a file, and is beside it under another name."""
+    """A result cannot replace a file, and was saved next to it under another name."""
 
 
 def check_choice(name: str, value: object, known: Iterable[object]) -> None:
-    """UsageError unless the value is one of those known; None, which is for a default, goes unnamed."""
+    """Raise UsageError unless the value is one of `known`; None, which selects a default, is not listed."""
     values = tuple(known)
     if not isinstance(value, str | int | None) or value not in values:
         named = ", ".join(str(each) for each in values if each is not None)

@@ -1,4 +1,4 @@
-"""Permissions of a file that is replaced, kept by the one that takes its place."""
+"""Permissions of a replaced file, applied to its replacement."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pathlib import Path
 
 
 def keep_mode(old: Path, new: Path) -> None:
-    """Give `new` the permission bits of `old`, if that is there, and its owner and group where the user may set them.
+    """Give `new` the permission bits of `old`, if that exists, and its owner and group if the user may set them.
 
-    Bits of a group go to no other group. Windows and file systems without modes are left as they are.
+    Group bits are not granted to a different group. Does nothing on Windows and on file systems without modes.
     """
     if sys.platform == "win32":
         return

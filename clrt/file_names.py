@@ -1,4 +1,4 @@
-"""File names that are not UTF-8: on Linux they may be any bytes, which Python keeps as surrogates (PEP 383)."""
+"""File names that are not UTF-8: on Linux they may be any bytes, which Python represents as surrogates (PEP 383)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-#: Error handlers of encodings. What an encoding lacks is written as in "\\u65e5"; bytes of file names as they are, for
-#: programs that read the names, or as in "\\xe8", for people.
+#: Encoding error handlers. Characters missing from an encoding become escapes such as "\\u65e5"; bytes of file names
+#: are kept for programs that read the names, or become escapes such as "\\xe8" for people.
 AS_BYTES, SHOWN = "clrt.as_bytes", "clrt.shown"
 
 
@@ -31,13 +31,13 @@ codecs.register_error(SHOWN, _shown)
 
 
 def printable(text: str) -> str:
-    """Return the text with bytes that are not UTF-8 as in "\\xe8": what every encoding of Unicode and JSON can hold."""
+    """Return the text with bytes that are not UTF-8 as escapes such as "\\xe8", valid in all of Unicode and JSON."""
     return text.encode("utf-8", AS_BYTES).decode("utf-8", "backslashreplace")
 
 
 @contextmanager
 def utf8_path(path: Path) -> Iterator[Path]:
-    """Lend a path of the same file or folder, which is there, for libraries that take paths in UTF-8 alone."""
+    """Provide a UTF-8 path of the same existing file or folder, for libraries that only accept such paths."""
     if printable(str(path)) == str(path) or not hasattr(os, "O_PATH"):
         yield path
         return

@@ -1,6 +1,6 @@
-"""Floating-point errors in clrt's own use of numpy: as numpy has them by default, whatever a caller sets elsewhere.
+"""numpy's default floating-point error handling inside clrt, whatever the caller has set.
 
-Among many small numbers some underflow, which np.seterr(all="raise") would make an error of.
+Some of many small numbers underflow, which np.seterr(all="raise") would turn into an error.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def default_errors() -> np.errstate:
-    """The context in which they are."""
+    """Return a context with numpy's default error handling."""
     return np.errstate(divide="warn", over="warn", under="ignore", invalid="warn")
 
 
 def with_default_errors(function: F) -> F:
-    """The function in that context."""
+    """Decorate the function to run in that context."""
     @wraps(function)
     def inside(*arguments: Any, **named: Any) -> Any:
         with default_errors():

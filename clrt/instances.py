@@ -1,4 +1,4 @@
-"""Ray queries on instances: meshes that stand in the world many times, in the memory of one."""
+"""Ray queries on instances of meshes that share the meshes' memory."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ Doubles = NDArray[np.float64]
 
 
 class InstancedRayQuery(TreeQuery):
-    """Instances to shoot rays at, as in `TreeQuery`, with the hit's `instance` (int32, −1) beside the others.
+    """Instanced meshes to intersect with rays, as in `TreeQuery`; hits also have an `instance` (int32, −1 for a miss).
 
-    meshes: a list of pairs, vertices (n, 3) float32 and faces (m, 3) int32. mesh: (k,) which of them each instance is.
-    transforms: (k, 3, 4), rows of an affine map from the mesh's frame to the world; mirrored and non-uniform ones too.
-    device, layout, builder, triangle, box: as in `RayQuery`; the layout list has no instances.
-    `primitive` counts in the instance's mesh. Of hits at the same t the lowest instance comes first.
+    meshes: a list of pairs, vertices (n, 3) float32 and faces (m, 3) int32. mesh: (k,) each instance's index into it.
+    transforms: (k, 3, 4), rows of an affine map from the mesh's frame to the world, which may mirror and scale axes
+    differently. device, layout, builder, triangle, box: as in `RayQuery`; the layout list does not support instances.
+    `primitive` is an index into the instance's mesh. Of hits at the same t the lowest instance comes first.
     Raises SceneError for other shapes, indices out of range and transforms that are not finite or singular, and
     UsageError for other choices.
     """
@@ -38,7 +38,7 @@ class InstancedRayQuery(TreeQuery):
     def __init__(self, meshes: Sequence[tuple[ArrayLike, ArrayLike]], mesh: ArrayLike, transforms: ArrayLike, *,
                  device: str | int | None = None, layout: str | None = None, builder: str | None = None,
                  triangle: str = "watertight", box: str = "robust", traversal: str | None = None) -> None:
-        """Builds the trees: see the class."""
+        """Build the BVHs; see the class."""
         triangles = _meshes(meshes)
         self._mesh = _indices(mesh, len(triangles))
         self._extents = np.array([np.abs(mesh_corners).reshape(-1, 3).max(axis=0, initial=0)
@@ -63,14 +63,14 @@ class InstancedRayQuery(TreeQuery):
 
     @with_default_errors
     def move(self, transforms: ArrayLike) -> None:
-        """Puts the same instances elsewhere: transforms (k, 3, 4) as before, SceneError likewise.
+        """Move the instances to other transforms (k, 3, 4); raises SceneError as before.
 
-        The trees of the meshes stay; what is built anew is the small one over the instances.
+        The meshes' BVHs are kept; only the small one over the instances is rebuilt.
         """
         self._use(*self._placed(_matrices(transforms, len(self._mesh))))
 
     def _placed(self, to_world: Doubles) -> tuple[Layout, Frame]:
-        """The tree, and the frame of the world. The lengths of each mesh have a unit of their own."""
+        """Build the BVH over the instances, and return it with the world's frame; each mesh has its own length unit."""
         reach = np.einsum("kij,kj->ki", np.abs(to_world[..., :3]), self._extents[self._mesh])
         low, high = to_world[..., 3] - reach, to_world[..., 3] + reach
         frame = frame_around(low.min(axis=0, initial=np.inf), high.max(axis=0, initial=-np.inf))
@@ -82,7 +82,7 @@ class InstancedRayQuery(TreeQuery):
 
 
 def _meshes(meshes: Sequence[tuple[ArrayLike, ArrayLike]]) -> list[NDArray[np.floating]]:
-    """The corners (m, 3, 3) of each."""
+    """Return each mesh's triangle corners (m, 3, 3)."""
     if not isinstance(meshes, list | tuple):
         raise SceneError(f"meshes is a {type(meshes).__name__}; write a list of pairs, [(vertices, faces), …]")
     triangles = []

@@ -1,8 +1,8 @@
-"""Threads, and waiting for them, without a lock that an exception could leave held.
+"""Threads, events and conditions without a lock that an exception could leave held.
 
-Those of `threading` and `concurrent.futures` are written in Python: an exception out of a signal's handler that comes
-between two of their lines leaves a lock held, and all threads that need it hang. Here every step that changes something
-is one call of a function written in C, and who waits looks again every BEAT: a wake-up that is lost delays by that.
+Those of `threading` and `concurrent.futures` are written in Python: if a signal handler raises an exception between
+two of their lines, a lock may stay held, and all threads that need it hang. Here every state change is a single call of
+a C function, and waiting threads poll every BEAT, so that a lost wake-up only causes that delay.
 """
 
 from __future__ import annotations
@@ -20,44 +20,44 @@ from weakref import finalize, ref
 
 T = TypeVar("T")
 U = TypeVar("U")
-#: Seconds between two looks, and those that a process at its end waits for threads, at most.
+#: Polling interval in seconds, and the maximum time that an exiting process waits for threads.
 BEAT, LAST_WAIT = 0.1, 15.0
-#: The threads that a process waits for at its end, as (process, thread).
+#: Threads that an exiting process waits for, as (process, thread).
 _running: set[tuple[int, int]] = set()
 
 
 class Bell:
-    """Wakes up the one thread that waits for it."""
+    """Wake-up signal for a single waiting thread."""
 
     def __init__(self) -> None:
         self._lock = allocate_lock()
         self._lock.acquire()
 
     def ring(self) -> None:
-        """Ends the wait, or the next one."""
-        with suppress(RuntimeError):    # it rang already
+        """End the current wait, or the next one."""
+        with suppress(RuntimeError):    # already rung
             self._lock.release()
 
     def wait(self, seconds: float) -> None:
-        """Returns when it rings, or after so many seconds; raises nothing, as a queue would, that could hold frames."""
+        """Wait until it rings, or for this many seconds. Raises no exception that would keep frames alive."""
         self._lock.acquire(timeout=seconds)
 
 
 class Condition:
-    """Wakes up threads as something changes that they wait for."""
+    """Condition variable that wakes up all waiting threads."""
 
     def __init__(self) -> None:
-        #: Of each thread that waits, as long as it does.
+        #: One per waiting thread, for as long as it waits.
         self._waiters: set[ref[Bell]] = set()
 
     def notify(self) -> None:
-        """Has all threads that wait look again."""
+        """Make all waiting threads check their condition."""
         for waiter in list(self._waiters):
             if (bell := waiter()) is not None:
                 bell.ring()
 
     def wait_for(self, holds: Callable[[], bool], seconds: float | None = None) -> bool:
-        """Returns true as soon as `holds` does, which is called without any lock, or false after so many seconds."""
+        """Return True as soon as `holds` does, which is called without any lock, or False after this many seconds."""
         bell = Bell()
         self._waiters.add(ref(bell, self._waiters.discard))
         end = inf if seconds is None else time.monotonic() + seconds
@@ -67,30 +67,30 @@ class Condition:
 
 
 class Event:
-    """Something that happens once, and can be waited for."""
+    """Event that is set once and can be waited for."""
 
     def __init__(self) -> None:
         self._happened, self._changed = False, Condition()
 
     def is_set(self) -> bool:
-        """Whether it has happened."""
+        """Return whether it is set."""
         return self._happened
 
     def set(self) -> None:
-        """It has happened."""
+        """Set it, and wake up the waiting threads."""
         self._happened = True
         self._changed.notify()
 
     def wait(self, seconds: float | None = None) -> bool:
-        """Whether it has happened; waits for that, for at most so many seconds."""
+        """Wait until it is set, or for this many seconds at most; return whether it is set."""
         return self._changed.wait_for(self.is_set, seconds)
 
 
 def beside(work: Callable[[], T], *, daemon: bool = False) -> Callable[[], T]:
-    """Begins `work` in a thread of its own. What is returned waits for its end, and returns or raises what it did.
+    """Start `work` in a new thread. The returned function waits for its end, and returns or raises what it did.
 
-    At its end the process waits LAST_WAIT seconds at most for threads that are no daemons: one that comes back from a
-    library while Python ends could abort it.
+    At exit the process waits at most LAST_WAIT seconds for non-daemon threads: a thread that returns from a library
+    call during interpreter shutdown could abort the process.
     """
     results, errors, ended = list[T](), list[BaseException](), Condition()
 
@@ -99,7 +99,7 @@ def beside(work: Callable[[], T], *, daemon: bool = False) -> Callable[[], T]:
             if not daemon:
                 _running.add((os.getpid(), get_ident()))
             results.append(work())
-        except BaseException as error:  # whatever it is, it belongs to who waits
+        except BaseException as error:  # passed on to the thread that waits
             errors.append(error)
         finally:
             _running.discard((os.getpid(), get_ident()))
@@ -118,9 +118,9 @@ def beside(work: Callable[[], T], *, daemon: bool = False) -> Callable[[], T]:
 
 
 def in_parallel(work: Callable[[U], T], items: Iterable[U]) -> list[T]:
-    """What `work` returns for each item, in order, from as many threads as there are cores, this one among them.
+    """Return what `work` returns for each item, in order, using as many threads as there are cores, including this one.
 
-    Raises the exception of the first item that has one, once no thread works any more; none begins another item then.
+    After an exception no further items are started; that of the first such item is raised once all threads are done.
     """
     todo = list(enumerate(items))
     left, results, errors = iter(todo), dict[int, T](), dict[int, BaseException]()
@@ -145,8 +145,8 @@ def in_parallel(work: Callable[[U], T], items: Iterable[U]) -> list[T]:
     return [results[number] for number in range(len(todo))]
 
 
-# What threads hold, temporary folders among it, lives until they have ended: a process at its end calls functions in
-# reverse order, and weakref registers its own with the first of its objects.
+# Objects used by threads, such as temporary folders, must live until these have ended: exit functions are called in
+# reverse order, and weakref registers its own with the first finalizer.
 finalize(Condition, bool).detach()
 
 

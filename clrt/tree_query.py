@@ -1,4 +1,4 @@
-"""Rays on numpy arrays through a tree that is on a device: the traversal of the renderer as a library."""
+"""Ray queries on numpy arrays against a BVH on a device: the renderer's traversal as a library."""
 
 from __future__ import annotations
 
@@ -31,41 +31,41 @@ from .scene.scaling import Frame
 HIT = record(t="f4", primitive="i4", u="f4", v="f4")
 INSTANCE_HIT = record(t="f4", primitive="i4", u="f4", v="f4", instance="i4", pad="3i4")
 COUNTS = record(triangles="i4", spheres="i4", pad="2i4")
-#: Rays that are on the device at once: 44 bytes each.
+#: Maximum number of rays on the device at once, at 44 bytes each.
 CHUNK = 1 << 20
-#: Rays of the first launch, and of any at least; the others are as many as take device.launch.TARGET_SECONDS.
+#: Rays of the first launch, and minimum of any; later ones are sized to take device.launch.TARGET_SECONDS.
 FIRST, FEWEST = 1 << 15, 1 << 12
-#: Ways through the layout bvh8: ray by ray, eight coherent ones together (kernels/traverse/packet.cl), many in turns.
+#: Traversals of bvh8: single rays, packets of eight coherent ones (kernels/traverse/packet.cl), interleaved pools.
 TRAVERSALS = ("single", "packet", "pool")
-#: Rays that a work-item has in its pool (kernels/traverse/pool.cl), and how many it answers in all.
+#: Rays in a work-item's pool (kernels/traverse/pool.cl), and rays that a work-item traces in total.
 POOL, SHARE = 32, 512
-#: Rays are coherent if the mean cosine between one and the next is above this: a camera's are, reflected ones are not.
+#: Rays are coherent if the mean cosine between consecutive ones exceeds this; camera rays are, reflected ones are not.
 COHERENT, PAIRS = 0.9, 1024
 QUERIES = ("closest_hit", "any_hit", "next_hit")
-#: Attributes of a query that are made anew where it is copied.
+#: Attributes of a query that a copy creates anew.
 ON_DEVICE = ("device", "_lock", "_kernels", "_scene")
 
 
 class TreeQuery:
-    """A tree on a device to shoot rays at. The answers do not depend on the device, the tree or the order of the rays.
+    """A BVH on a device to intersect with rays. Results do not depend on the device, the BVH or the order of the rays.
 
-    traversal, of the layout bvh8: "single", "packet" (eight coherent rays together; single ones where that is not to be
-    had: on GPUs, and among spheres and instances) or "pool" (many rays in turns). None takes what was fastest for such
-    rays: the pool, but packets where rays are coherent and the processor's cache holds the tree; single rays with other
-    layouts and on GPUs, and on a CPU whose driver does not tell its cache.
-    kernel_seconds: the time of all kernels so far, without uploads and downloads; longest_launch: of one, at most.
+    traversal, for the layout bvh8: "single", "packet" (eight coherent rays together; single rays if unsupported: on
+    GPUs, and for spheres and instances) or "pool" (many interleaved rays). None selects what was measured to be
+    fastest: packets if the rays are coherent and the BVH fits the processor's cache, otherwise the pool; single rays
+    with other layouts, on GPUs, and on CPUs whose driver does not report a cache size. kernel_seconds: the time of all
+    kernels so far, without uploads and downloads; longest_launch: that of the longest.
 
-    Of a ray, origins and directions are (n, 3), or (3,) for all; t_max is (n,) or one number, and t counts lengths of
-    the direction. Of hits at the same t the lowest primitive comes first. A ray whose direction is zero, or that holds
-    a NaN or infinity, meets nothing; t_max may be infinite. UsageError where the arrays do not fit. Threads may share
-    a query, but not while its tree changes; a process forked from one that has used OpenCL gets a UsageError. A copy,
-    or what was pickled and comes back, opens its device by the same selector, and answers the same.
+    Origins and directions of rays are (n, 3), or (3,) for all; t_max is (n,) or one number, and t is in units of the
+    direction's length. Of hits at the same t the lowest primitive comes first. A ray with a zero direction, NaN or
+    infinity misses; t_max may be infinite. Raises UsageError if the shapes do not match. Threads may share a query, but
+    not while its BVH changes; a process forked from one that has used OpenCL gets a UsageError. A copied or unpickled
+    query opens its device by the same selector, and returns the same results.
     """
 
     def __init__(self, device: Device, tree: Layout, counts: tuple[int, int], frame: Frame, tests: HitTests,
                  traversal: str | None, selector: str | int | None = None) -> None:
-        """Of a tree over so many triangles and spheres, whose points are those of the rays in `frame`. selector: what
-        the device was opened by."""
+        """Create a query for a BVH over `counts`, the numbers of triangles and spheres, in `frame`. selector: the
+        argument that opened the device."""
         self.device, self._selector = device, selector
         self.kernel_seconds = self.longest_launch = 0.0
         self._sizes = {name: LaunchSize(FIRST) for name in QUERIES}
@@ -85,49 +85,49 @@ class TreeQuery:
         return f"<{type(self).__name__}: {counts}; {self.tree.name} on {self.device.info.name}>"
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is not of the device, and its buffers as arrays."""
+        """Return the state that does not belong to the device, and the buffers as arrays."""
         state = {name: value for name, value in vars(self).items() if name not in ON_DEVICE}
         buffers = {name: on_host(self.device, array) for name, array in self.tree.buffers.items()}
         return {**state, "tree": replace(self.tree, buffers=buffers, work=self.tree.sah_cost)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """DeviceError where the device is not there."""
+        """Restore the query on its device; raises DeviceError if that is not available."""
         vars(self).update(state)
         self.device, self._lock, self._kernels = open_device(self._selector), threading.Lock(), {}
         self._use(self.tree, self.frame)
 
     def _use(self, tree: Layout, frame: Frame) -> None:
-        """Takes the rays to this tree from now on, which is uploaded."""
+        """Upload a BVH and use it from now on."""
         buffers = {name: resident(self.device, array) for name, array in tree.buffers.items()}
         tree, scene = replace(tree, buffers=buffers), [array.buffer for array in buffers.values()]
         hit = INSTANCE_HIT if "instances" in buffers else HIT
-        self.tree, self.frame, self._hit, self._scene = tree, frame, hit, scene    # all or none, if it is interrupted
+        self.tree, self.frame, self._hit, self._scene = tree, frame, hit, scene    # all or none, if interrupted
 
     @with_default_errors
     def closest_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[Any]:
-        """(n,) records of t float32, primitive int32, u, v float32: the first at 0 < t < t_max; of a miss t inf and
-        primitive −1.
+        """Intersect rays, and return (n,) records of t float32, primitive int32, u, v float32: the first hit at 0 < t <
+        t_max; for a miss t is inf and primitive −1.
 
-        The hit point is origin + t·direction = (1 − u − v)·p0 + u·p1 + v·p2. Ask primitive >= 0 for a hit: its t, too,
-        is inf where it is beyond float32, as in lengths of 1e-40.
+        The hit point is origin + t·direction = (1 − u − v)·p0 + u·p1 + v·p2. Test for hits by primitive >= 0: the t of
+        a hit is inf, too, if it exceeds float32, as with directions of length 1e-40.
         """
         rays = ray_arrays(origins, directions, t_max)
         return _shown(self._ask("closest_hit", rays, np.empty(len(rays[2]), self._hit)))
 
     @with_default_errors
     def any_hit(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf) -> NDArray[np.bool_]:
-        """(n,) bool: whether anything lies at 0 < t < t_max."""
+        """Return (n,) bool: whether anything is hit at 0 < t < t_max."""
         rays = ray_arrays(origins, directions, t_max)
         return self._ask("any_hit", rays, np.empty(len(rays[2]), np.bool_))
 
     @with_default_errors
     def all_hits(self, origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike = np.inf, *,
                  max_hits: int = 100) -> tuple[NDArray[np.int64], NDArray[Any]]:
-        """Every hit at 0 < t < t_max, up to `max_hits` a ray: (k,) indices of rays, and (k,) records of `closest_hit`.
+        """Return all hits at 0 < t < t_max, up to `max_hits` per ray: ray indices (k,), `closest_hit` records (k,).
 
-        Sorted by ray, then t, then primitive. Each hit is found from the one before by comparing (t, primitive), not
-        by moving the origin, so surfaces that touch or coincide all count, once each; but none behind one whose t is
-        beyond float32, which is inf.
+        Sorted by ray, then t, then primitive. Each hit is found from the one before by comparing (t, primitive), not by
+        moving the origin, so touching or coincident surfaces all count once each; but none behind a hit whose t exceeds
+        float32 and is inf.
         """
         if not isinstance(max_hits, int | np.integer) or max_hits < 1:
             raise UsageError(f"max_hits is {max_hits!r}; it must be a whole number, at least 1")
@@ -149,7 +149,7 @@ class TreeQuery:
         return np.concatenate(indices)[order], _shown(np.concatenate(hits)[order])
 
     def _ask(self, name: str, rays: Rays, answers: NDArray[Any]) -> NDArray[Any]:
-        """`answers`, with what kernel query_`name` writes over it for the rays."""
+        """Return `answers`, which the kernel query_`name` overwrites for the rays."""
         for part in self._parts(name, len(answers)):
             origins, directions, t_max = (array[part] for array in rays)
             if any(self.frame.center):
@@ -161,7 +161,7 @@ class TreeQuery:
         return answers
 
     def _check_loops(self, answers: NDArray[Any]) -> None:
-        """DeviceError where the driver ended loops before they had an answer (kernels/query.cl)."""
+        """Raise DeviceError if the driver ended loops before they had a result (kernels/query.cl)."""
         turns = loop_turns(self.device)
         if turns is None:
             return
@@ -172,7 +172,7 @@ class TreeQuery:
                               f"need more in the layout {self.tree.name}; use another device or layout")
 
     def _parts(self, name: str, n: int) -> Iterator[slice]:
-        """Parts of n rays, each for a launch."""
+        """Yield slices of n rays, one per launch."""
         first = 0
         while first < n:
             size = min(CHUNK, max(FEWEST, self._sizes[name].units))
@@ -180,14 +180,14 @@ class TreeQuery:
             first += size
 
     def _ask_chunk(self, name: str, inputs: list[NDArray[np.float32]], answers: NDArray[Any]) -> None:
-        """Writes over `answers`; a CPU works on the arrays themselves."""
+        """Overwrite `answers`; a CPU works on the arrays in place."""
         n = len(answers)
         buffers, output = [lent(self.device, array) for array in inputs], lent(self.device, answers, writable=True)
         traversal = self._way(name, inputs[1])
         kernel, local = self._kernel(name, traversal), self.device.local_size
         groups = -(-n // ((SHARE if traversal == "pool" else self.device.lanes) * local))
         start = time.perf_counter()
-        with self._lock:  # another thread's arguments must not come between
+        with self._lock:  # another thread must not set arguments in between
             kernel.set_args(*self._scene, self._counts[0], *buffers, output, np.float32(self.frame.unit), np.uint32(n))
             launched = cl.enqueue_nd_range_kernel(self.device.queue, kernel, (groups * local,), (local,))
         wait_for(launched)
@@ -199,7 +199,7 @@ class TreeQuery:
         take_back(*buffers, output)
 
     def _way(self, name: str, directions: NDArray[np.float32]) -> str:
-        """The traversal for these rays."""
+        """Return the traversal for these rays."""
         packets = (self.device.lanes == LANES and self._tests.triangle == "watertight" and self._hit is HIT
                    and not self._counts["spheres"])
         if name == "next_hit" or loop_turns(self.device) is not None or (self._traversal == "packet" and not packets):
@@ -212,7 +212,7 @@ class TreeQuery:
         return "packet" if packets and self.tree.bytes < cache and _coherent(directions) else "pool"
 
     def _kernel(self, name: str, traversal: str) -> cl.Kernel:
-        """The kernel that answers `name`, built when it is first asked for."""
+        """Return the kernel for `name`, built on first use."""
         key = name, traversal, tree_defines(self.tree)["STACK_SIZE"]
         if key not in self._kernels:
             program = build(self.device, self.source(name, traversal), self.tree.bytes)
@@ -221,7 +221,7 @@ class TreeQuery:
         return self._kernels[key]
 
     def source(self, name: str, traversal: str) -> str:
-        """The program that answers `name`, one of QUERIES, by a traversal of TRAVERSALS."""
+        """Return the source of the program for `name`, one of QUERIES, and a traversal of TRAVERSALS."""
         check_choice("query", name, QUERIES)
         check_choice("traversal", traversal, TRAVERSALS)
         triangles, spheres = bool(self._counts["triangles"]), bool(self._counts["spheres"])
@@ -240,12 +240,12 @@ class TreeQuery:
 
 
 def _shown(hits: NDArray[Any]) -> NDArray[Any]:
-    """Records without the padding that the device wants."""
+    """Return the records without padding."""
     return hits[[name for name in hits.dtype.names or () if name != "pad"]]
 
 
 def _coherent(directions: NDArray[np.float32]) -> bool:
-    """Whether rays (n, 3) run much like the ones before them, by a sample of pairs."""
+    """Return whether consecutive rays (n, 3) have similar directions, from a sample of pairs."""
     first = np.linspace(0, max(0, len(directions) - 2), PAIRS).astype(np.intp)[:len(directions) - 1]
     with np.errstate(all="ignore"):
         one, other = directions[first].astype(np.float64), directions[first + 1].astype(np.float64)

@@ -22,30 +22,30 @@ __all__ = ["RayMeshIntersector"]
 Bools = NDArray[np.bool_]
 Doubles = NDArray[np.float64]
 Indices = NDArray[np.int64]
-#: Hits of a ray are one location if they are closer than this part of the mesh's size.
+#: Hits of a ray count as one location if they are closer than this fraction of the mesh's size.
 _SAME = 1e-8
-#: So are, closer than this part of it and of their distance, those on triangles that share a corner and face alike:
-#: float32 takes a ray through an edge to meet both, though in float64 it may meet the plane of one beside the edge.
+#: Hits on triangles that share a vertex and face the same way count as one if closer than this fraction of size and
+#: distance: in float32 a ray through an edge hits both, though in float64 it may cross a plane outside its triangle.
 _NEAR = 1e-6
-#: Rays begin so much of the mesh's size, or of their distance, before their origins, which may lie on the mesh.
+#: Rays start this fraction of the mesh's size, or of their distance, before their origins, which may lie on the mesh.
 _BACK = 1e-6
-#: Sine of the angle to a plane below which a ray grazes it.
+#: Sine of the angle to a plane below which a ray is grazing.
 _GRAZING = 1e-4
 
 
 class _Rays(NamedTuple):
-    """origins, directions (n, 3); in lengths of a direction: the size (n,) of the mesh or, if larger, how far it is."""
+    """origins, directions (n, 3); size (n,): mesh size or distance, if larger, in units of the direction's length."""
 
     origins: Doubles
     directions: Doubles
     size: Doubles
 
     def of(self, chosen: Indices) -> _Rays:
-        """Some of them."""
+        """Return a selection of the rays."""
         return _Rays(self.origins[chosen], self.directions[chosen], self.size[chosen])
 
     def begins(self) -> Doubles:
-        """(n, 3) of the rays on the device."""
+        """Return the origins (n, 3) used on the device."""
         return np.asarray(self.origins - _BACK * self.size[:, None] * np.nan_to_num(self.directions))
 
 
@@ -57,21 +57,21 @@ class _Hits(NamedTuple):
     t: Doubles
 
     def chosen(self, by: NDArray[Any]) -> _Hits:
-        """Those, or in that order."""
+        """Return a selection or reordering of the hits."""
         return _Hits(self.triangle[by], self.ray[by], self.t[by])
 
 
 class RayMeshIntersector:
-    """Answers for one mesh as it is when it is asked: the first call, and the first after a change, builds a tree.
+    """Ray queries on one mesh in its current state: the first call, and the first after a change, builds a BVH.
 
-    mesh: a trimesh.Trimesh. scale_to_box: of trimesh's Embree engine, which loses hits without; rays and meshes are
-    always moved and scaled for float32, so either will do. device: see `clrt devices`. Rays are as in `RayQuery`:
-    origins and directions are (n, 3), or (3,) for all. UsageError for what is no mesh and for rays and points that do
-    not fit.
+    mesh: a trimesh.Trimesh. scale_to_box: for compatibility with trimesh's Embree engine, which loses hits without it;
+    ignored, as rays and meshes are always translated and scaled for float32. device: see `clrt devices`. Rays are as in
+    `RayQuery`: origins and directions are (n, 3), or (3,) for all. Raises UsageError if `mesh` is not a mesh, and if
+    the shapes of rays or points do not match.
     """
 
     def __init__(self, mesh: Any, scale_to_box: bool = True, *, device: str | int | None = None) -> None:
-        """Builds nothing yet: a primitive has no faces before it is asked for them."""
+        """Build nothing yet: a trimesh primitive creates its faces on first access."""
         if not (hasattr(type(mesh), "vertices") and hasattr(type(mesh), "faces")):
             raise UsageError(f"mesh is a {type(mesh).__name__} and has no faces; give a trimesh.Trimesh, of a Scene "
                              "scene.to_mesh()")
@@ -81,7 +81,7 @@ class RayMeshIntersector:
 
     @property
     def query(self) -> RayQuery:
-        """The query that answers, of the mesh as it is now."""
+        """Return the query for the mesh in its current state."""
         now = hash(self.mesh)
         if self._built is None or self._built[0] != now:
             self._built = now, RayQuery(self.mesh.vertices, self.mesh.faces, device=self._device)
@@ -90,10 +90,10 @@ class RayMeshIntersector:
     @with_default_errors
     def intersects_id(self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True,
                       max_hits: int | None = None, return_locations: bool = False) -> tuple[Any, ...]:
-        """index_tri (m,) int64, index_ray (m,) int64, along each ray; if asked for, locations (m, 3) float64.
+        """Return index_tri, index_ray (m,) int64, sorted along each ray; optionally locations (m, 3) float64.
 
-        One triangle of each place where a ray meets the mesh, an edge, a corner and surfaces that coincide being one,
-        and up to `max_hits` of them if that is given; or of the first place alone.
+        Returns one triangle per location where a ray hits the mesh; an edge, a vertex and coincident surfaces are one
+        location. multiple_hits: all locations, or `max_hits` if given; otherwise the first one.
         """
         rays = self._rays(ray_origins, ray_directions)
         hits = self._all(rays, max_hits) if multiple_hits else self._first(rays)
@@ -104,14 +104,14 @@ class RayMeshIntersector:
 
     def intersects_location(self, ray_origins: ArrayLike, ray_directions: ArrayLike, multiple_hits: bool = True,
                             max_hits: int | None = None) -> tuple[Doubles, Indices, Indices]:
-        """locations (m, 3) float64, index_ray (m,) int64, index_tri (m,) int64: see `intersects_id`."""
+        """Return locations (m, 3) float64, index_ray (m,) int64, index_tri (m,) int64: see `intersects_id`."""
         triangle, ray, locations = self.intersects_id(ray_origins, ray_directions, multiple_hits=multiple_hits,
                                                       max_hits=max_hits, return_locations=True)
         return locations, ray, triangle
 
     @with_default_errors
     def intersects_first(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> Indices:
-        """(n,) int64: the first triangle that each ray meets, −1 where it meets none."""
+        """Return (n,) int64: the first triangle that each ray hits, −1 for a miss."""
         rays = self._rays(ray_origins, ray_directions)
         hits = self._first(rays)
         found = np.full(len(rays.size), -1, np.int64)
@@ -119,22 +119,22 @@ class RayMeshIntersector:
         return found
 
     def intersects_any(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> Bools:
-        """(n,) bool: whether each ray meets anything."""
+        """Return (n,) bool: whether each ray hits anything."""
         return self.intersects_first(ray_origins, ray_directions) >= 0
 
     @with_default_errors
     def contains_points(self, points: ArrayLike) -> Bools:
-        """(n,) bool: whether points (n, 3) are inside, by trimesh's own rule: an odd number of places both ways."""
+        """Return (n,) bool: whether points (n, 3) are inside, by trimesh's rule: an odd number of hits both ways."""
         places = real_array("points", points)
         if places.ndim != 2 or places.shape[1] != 3:
             raise UsageError(f"points {places.shape} must have the shape (n, 3)")
-        # Here, not above: the module that is imported is of the same name as this one.
+        # A local import, since the imported module has the same name as this one.
         from trimesh.ray.ray_util import contains_points
 
         return np.asarray(contains_points(self, places), np.bool_)
 
     def __getstate__(self) -> dict[str, Any]:
-        """A copy for another process builds its own tree there."""
+        """Return the state without the query, which a copy in another process builds anew."""
         return self.__dict__ | {"_built": None}
 
     def _rays(self, ray_origins: ArrayLike, ray_directions: ArrayLike) -> _Rays:
@@ -147,10 +147,10 @@ class RayMeshIntersector:
         return _Rays(origins, directions, np.where(np.isfinite(lengths), lengths, 0.0))
 
     def _first(self, rays: _Rays) -> _Hits:
-        """Of each ray that meets the mesh."""
+        """Return the first hit of each ray that hits the mesh."""
         found = self.query.closest_hit(rays.begins(), rays.directions)
         t = found["t"] - _BACK * rays.size
-        met, close = found["primitive"] >= 0, t < 2 * _BACK * rays.size      # maybe before the origin
+        met, close = found["primitive"] >= 0, t < 2 * _BACK * rays.size      # perhaps before the origin
         ray, others = np.flatnonzero(met & ~close), np.flatnonzero(met & close)
         hits = self._located(rays, found["primitive"][ray], ray, t[ray])
         if not len(others):
@@ -160,7 +160,7 @@ class RayMeshIntersector:
         return both.chosen(np.argsort(both.ray))
 
     def _all(self, rays: _Rays, most: int | None) -> _Hits:
-        """Of each place that a ray meets, up to `most` of them."""
+        """Return one hit per location along each ray, up to `most` of them."""
         ray, found = self.query.all_hits(rays.begins(), rays.directions, max_hits=len(self.mesh.faces) or 1)
         hits = self._located(rays, found["primitive"], ray, found["t"] - _BACK * rays.size[ray])
         hits = hits.chosen(np.lexsort((hits.t, hits.ray)))
@@ -171,9 +171,9 @@ class RayMeshIntersector:
         return hits.chosen(np.arange(len(hits.ray)) - np.searchsorted(hits.ray, hits.ray) < most)
 
     def _located(self, rays: _Rays, triangle: NDArray[np.int32], ray: Indices, near: Doubles) -> _Hits:
-        """At t where rays pass the planes of the triangles they meet, in float64; `near` is what float32 says.
+        """Compute hits with t in float64, at the planes of the triangles that rays hit; `near` is the float32 t.
 
-        That stays where a ray grazes: moved by the rounding of float32, it would pass the plane somewhere else.
+        That is kept for grazing rays: the rounding to float32 would move their intersection with the plane far away.
         """
         corners = np.asarray(self.mesh.vertices, np.float64)[np.asarray(self.mesh.faces)[triangle]]
         origins, directions, _ = rays.of(ray)
@@ -184,7 +184,7 @@ class RayMeshIntersector:
         return _Hits(triangle.astype(np.int64), ray, t)
 
     def _places(self, rays: _Rays, hits: _Hits) -> Bools:
-        """(m,) which hits are not where the one before is."""
+        """Return (m,) which hits are at a different location than the one before."""
         new, apart, size = np.ones(len(hits.ray), np.bool_), np.diff(hits.t), rays.size[hits.ray[1:]]
         corners = np.asarray(self.mesh.faces)[hits.triangle]
         normals = np.asarray(self.mesh.face_normals)[hits.triangle]

@@ -1,1 +1,1 @@
-"""Pictures and numbers that leave the program: image files, view transforms, comparison, reports."""
+"""Output: image files, view transforms, comparison, reports."""

@@ -1,4 +1,4 @@
-"""How far a picture is from its reference."""
+"""Error measures of an image against a reference."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ FloatArray = NDArray[np.float32]
 Picture = FloatArray | Image | str | PathLike[str]
 #: Keeps relMSE finite where the reference is dark.
 RELMSE_FLOOR = 0.01
-#: HDR-FLIP sees values up to the largest of float16: the brighter the reference, the more exposures it tries.
+#: Limit for HDR-FLIP, the largest float16: the brighter the reference, the more exposures it evaluates.
 FLIP_MAX = 65504.0
-#: Below this HDR-FLIP finds no exposure that shows the reference, and ends the whole process.
+#: If the reference's maximum is below this, HDR-FLIP finds no exposure for it and terminates the process.
 FLIP_MIN = 1e-5
 
 
 def compare_files(image: Path, reference: Path) -> dict[str, Any]:
-    """`compare` for two picture files; FLIP is HDR-FLIP when either is .exr or .hdr. SceneError names the files."""
+    """Run `compare` on two image files, with HDR-FLIP if either is .exr or .hdr. Raises SceneError naming the files."""
     pixels, truth = read_picture(image), read_picture(reference)
     _check_sizes(pixels, truth, str(image), str(reference))
     return _measures(pixels, truth, bool({image.suffix.lower(), reference.suffix.lower()} & {".exr", ".hdr"}))
@@ -33,16 +33,16 @@ def compare_files(image: Path, reference: Path) -> dict[str, Any]:
 
 @with_default_errors
 def compare(image: Picture, reference: Picture, *, hdr: bool = True) -> dict[str, Any]:
-    """Measures of the image x against the reference r, both (h, w, 3) float32 linear, computed in float64; an `Image`,
-    or the path of a picture file, stands for its pixels.
+    """Return measures of the image x against the reference r, both (h, w, 3) float32 linear, computed in float64; each
+    may also be an `Image`, or the path of an image file.
 
     - relmse: mean((x − r)² / (r² + 0.01)); rmse: √mean((x − r)²); max_abs: max |x − r|
-    - mean_ratio: mean(x) / mean(r) of each channel; None where mean(r) is 0
+    - mean_ratio: mean(x) / mean(r) of each channel; None if mean(r) is 0
     - flip: mean HDR-FLIP (if `hdr`) or LDR-FLIP; None if flip-evaluator is not installed or HDR-FLIP's reference black
-    - nonfinite, nonfinite_reference: how many values of x and of r are NaN or Inf. Where either is, the value is left
-      out of all the measures above (for FLIP it is 0 in both); a measure without any value left is None.
+    - nonfinite, nonfinite_reference: the number of values of x and of r that are NaN or Inf. Where either is, the value
+    is excluded from all the measures above (for FLIP it is 0 in both); a measure without any value left is None.
 
-    Raises SceneError for a file that cannot be read and if the sizes differ, and UsageError for what is no picture.
+    Raises SceneError if a file cannot be read or the sizes differ, and UsageError if an argument is not an image.
     """
     x, r = _pixels(image, "the image"), _pixels(reference, "the reference")
     _check_sizes(x, r, "the image", "the reference")
@@ -50,7 +50,7 @@ def compare(image: Picture, reference: Picture, *, hdr: bool = True) -> dict[str
 
 
 def _pixels(picture: Picture, name: str) -> FloatArray:
-    """(h, w, 3)."""
+    """Return the pixels (h, w, 3) of an image in any of the accepted forms."""
     if isinstance(picture, str | PathLike):
         return read_picture(Path(picture))
     pixels = picture.pixels if isinstance(picture, Image) else picture
@@ -76,21 +76,21 @@ def _measures(image: FloatArray, reference: FloatArray, hdr: bool) -> dict[str, 
 
 
 def relmse(image: FloatArray, reference: FloatArray) -> float | None:
-    """`compare`'s relmse alone, fast enough to follow a render; both arrays of one shape."""
+    """Compute the relmse of `compare` alone, fast enough to use during a render; both arrays of one shape."""
     valid = np.isfinite(image) & np.isfinite(reference)
     x, r = image[valid].astype(np.float64), reference[valid].astype(np.float64)
     return float(np.mean((x - r) ** 2 / (r**2 + RELMSE_FLOOR))) if x.size else None
 
 
 def mean_ratios(image: FloatArray, reference: FloatArray) -> list[float | None]:
-    """`compare`'s mean_ratio alone; both arrays of one shape."""
+    """Compute the mean_ratio of `compare` alone; both arrays of one shape."""
     valid = np.isfinite(image) & np.isfinite(reference)
     means = [np.where(valid, picture, 0).mean((0, 1), np.float64) for picture in (image, reference)]
     return [float(x) / float(r) if r else None for x, r in zip(*means)]
 
 
 def _flip(image: FloatArray, reference: FloatArray, hdr: bool) -> float | None:
-    """Mean FLIP at 67 pixels a degree (Andersson et al. 2020, 2021); negative values count as 0."""
+    """Compute mean FLIP at 67 pixels per degree (Andersson et al. 2020, 2021); negative values count as 0."""
     try:
         import flip_evaluator
     except ImportError:

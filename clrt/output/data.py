@@ -1,4 +1,4 @@
-"""How a .png shows pictures whose values are no light: normals and depths. An .exr has the values themselves."""
+"""Display in a .png of images that are not radiance: normals and depths. An .exr contains the values themselves."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ FloatArray = NDArray[np.float32]
 
 
 def _normals(pixels: FloatArray) -> FloatArray:
-    """½ + ½·n, as normal maps are stored; black where there is none."""
+    """Map normals to ½ + ½·n, as in normal maps; black where there is none."""
     return np.where(pixels.any(axis=2, keepdims=True), np.float32(0.5) + np.float32(0.5) * pixels, np.float32(0))
 
 
 def _depth(pixels: FloatArray) -> FloatArray:
-    """The nearest depth over each, so white is nearest; black where there is nothing."""
+    """Map depths to the nearest depth over each, so white is nearest; black where nothing was hit."""
     seen = pixels > 0
     nearest = pixels.min(where=seen, initial=np.inf)
     return np.asarray(np.divide(nearest, pixels, out=np.zeros_like(pixels), where=seen))
@@ -28,11 +28,11 @@ _SHOWN: dict[str, Callable[[FloatArray], FloatArray]] = {"normals": _normals, "d
 
 
 def shown_data(integrator: str, pixels: FloatArray) -> FloatArray | None:
-    """What a .png shows of (height, width, 3) pixels, without any view or exposure; None for pictures of colours."""
+    """Return what a .png shows of (height, width, 3) pixels, without view or exposure; None for color images."""
     return _SHOWN[integrator](pixels) if integrator in _SHOWN else None
 
 
 def check_denoisable(integrator: str) -> None:
-    """Raise UsageError unless pictures of this integrator are colours, which is all that denoisers know."""
+    """Raise UsageError unless images of this integrator are colors, which denoisers require."""
     if integrator in _SHOWN:
         raise UsageError(f"denoising is for colours, and the integrator is {integrator}; leave one of them out")

@@ -1,7 +1,7 @@
 """Denoising with Intel Open Image Denoise (Áfra et al., openimagedenoise.org), by the package pyoidn.
 
-Its network was trained on pictures: it takes noise for what pictures do not have, guided by what was seen, and returns
-a likely picture. That is biased, and by how much the report says; the raw picture is kept.
+Its network was trained on images, and returns a likely image given the noisy one and auxiliary features of the first
+hits. That is biased; the report gives an estimate of the bias, and the raw image is kept.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ FloatArray = NDArray[np.float32]
 
 
 class Denoiser:
-    """Open Image Denoise on all cores, started. `name`: its version and device.
+    """Open Image Denoise on all cores, initialized. `name`: its version and device.
 
-    UsageError where it is not installed, DeviceError where it fails.
+    Raises UsageError if it is not installed, DeviceError if it fails.
     """
 
     def __init__(self) -> None:
@@ -46,15 +46,15 @@ class Denoiser:
         self.name = f"Open Image Denoise {major}.{minor}.{patch}, CPU"
 
     def __call__(self, color: FloatArray, albedo: FloatArray, normal: FloatArray) -> FloatArray:
-        """The denoised picture. All arrays are (height, width, 3) float32.
+        """Return the denoised image. All arrays are (height, width, 3) float32.
 
-        color: linear, in any unit; what is not finite counts as 0. albedo in [0, 1] and normal in [-1, 1] are
-        taken to be free of noise. DeviceError where it fails, as for want of memory.
+        color: linear, in any unit; values that are not finite count as 0. albedo in [0, 1] and normal in [-1, 1] are
+        assumed to be noise-free. Raises DeviceError if it fails, for example for lack of memory.
         """
         import pyoidn
 
         finite = np.nan_to_num(color, nan=0, posinf=0, neginf=0)
-        # It takes less than 1e-8 for black, so the picture is brought to a mean near 1 by a power of two.
+        # Values below 1e-8 count as black, so the image is scaled by a power of two to a mean near 1.
         exponent = -int(np.frexp(np.mean(finite, dtype=np.float64))[1])
         images = {name: np.ascontiguousarray(image, np.float32)
                   for name, image in {"color": np.ldexp(finite, exponent), "albedo": albedo, "normal": normal}.items()}
@@ -77,9 +77,9 @@ class Denoiser:
 
 def denoised(image: Image, denoiser: Denoiser, guides: Mapping[str, FloatArray],
              reference: FloatArray | None = None) -> Image:
-    """The image with denoised pixels, its own as `raw`, and in its report `denoise` (docs/report.md).
+    """Return the image with denoised pixels, the original ones as `raw`, and `denoise` in its report (docs/report.md).
 
-    guides: `albedo` and `normal` of rendering.guides; reference: what the picture should be; all of the image's shape.
+    guides: `albedo` and `normal` of rendering.guides; reference: the ground truth; all of the image's shape.
     """
     start = time.perf_counter()
     pixels = denoiser(image.pixels, guides["albedo"], guides["normal"])
@@ -91,7 +91,7 @@ def denoised(image: Image, denoiser: Denoiser, guides: Mapping[str, FloatArray],
 
 
 def raw_path(path: Path) -> Path:
-    """Where the raw picture is kept beside the denoised one at `path`: <stem>.raw<suffix>."""
+    """Return the path of the raw image next to the denoised one at `path`: <stem>.raw<suffix>."""
     return path.with_name(f"{path.stem}.raw{path.suffix}")
 
 

@@ -1,4 +1,4 @@
-"""Write files so that a reader sees the old one or the new one, never half of one."""
+"""Atomic file writing: a reader sees the old file or the new one, never a part of it."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..errors import KeptBesideError, OutputError
 from ..file_mode import keep_mode
 from ..file_names import utf8_path
 
-#: Seconds after each attempt to replace a file that another program has open.
+#: Seconds to pause after each failed attempt to replace a file that another program has open.
 PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
 
 
 def check_target(path: Path) -> None:
-    """Raise OutputError unless a file can be written at `path`; for use before the work that fills it."""
+    """Raise OutputError unless a file can be written at `path`; to be called before the work that produces it."""
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; name a file in it")
     _check_kind(path)
@@ -32,7 +32,7 @@ def check_target(path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Makes a folder and those that it is in, unless they are there; raises OutputError."""
+    """Create a folder and its parents, unless they exist; raises OutputError."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -45,19 +45,19 @@ def _check_kind(path: Path) -> None:
 
 
 def check_unprotected(path: Path, force: bool) -> None:
-    """Raise OutputError where there is a read-only file at `path`, unless `force`; its mode decides, also for root."""
+    """Raise OutputError if `path` is a read-only file, unless `force`; its mode decides, also for root."""
     if not force and path.is_file() and not path.stat().st_mode & 0o222:
         raise OutputError(f"{path}: is read-only; name another file, make it writable, or replace it with --force")
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Lend a path beside `path`, with its extension, to write to; then move that file onto `path` in one step.
+    """Provide a temporary path next to `path`, with its extension; then atomically rename the file there to `path`.
 
-    If the block fails, `path` is as it was and nothing is left beside it; an OSError comes out as OutputError. The file
-    keeps the mode of the one that it replaces, and its owner and group where the user may set them.
-    A link stays a link: the file it points to is replaced. What is no regular file never is: OutputError.
-    Where the old file cannot be replaced, the new one stays beside it, and the OutputError names it.
+    If the block fails, `path` is unchanged and no temporary file is left; an OSError is raised as OutputError. The file
+    keeps the mode of the one that it replaces, and its owner and group if the user may set them. A symbolic link is
+    kept: the file it points to is replaced. Raises OutputError if `path` is not a regular file. If the old file cannot
+    be replaced, the new one stays next to it, and the OutputError names it.
     """
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".clrt-{os.urandom(8).hex()}{path.suffix.lower()}")
@@ -76,8 +76,8 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def _move(new: Path, target: Path) -> None:
-    """Moves a file onto another, which Windows refuses while a program has that open: a viewer, or a virus scanner for
-    a moment."""
+    """Rename a file over another, retrying: Windows refuses while a program, such as a viewer or, briefly, a virus
+    scanner, has that open."""
     for pause in PAUSES:
         try:
             os.replace(new, target)

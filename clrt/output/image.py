@@ -1,4 +1,4 @@
-"""A finished picture."""
+"""A finished image."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from .report import header_of
 
 @dataclass(frozen=True)
 class Image:
-    """pixels: (height, width, 3) float32, linear Rec. 709; report: what made it, see `clrt render --report`; raw: the
-    pixels before they were denoised, None where they were not; aovs: pictures beside it, by name (docs/aovs.md)."""
+    """Rendered image. pixels: (height, width, 3) float32, linear Rec. 709; report: how it was rendered, see
+    `clrt render --report`; raw: the pixels before denoising, None if not denoised; aovs: AOVs by name
+    (docs/aovs.md)."""
 
     pixels: NDArray[np.float32]
     report: dict[str, Any] = field(default_factory=dict)
@@ -28,9 +29,9 @@ class Image:
 
     @with_default_errors
     def save(self, path: str | Path, *, view: str = "srgb", exposure: float = 0.0) -> Path:
-        """Writes .exr, .hdr (linear) or .png (through `view` after 2^exposure; normals and depths by `shown_data`).
+        """Write .exr, .hdr (linear) or .png (through `view` after 2^exposure; normals and depths by `shown_data`).
 
-        The AOVs become layers of an .exr, and .png files beside a .png. OutputError where that fails.
+        The AOVs become layers of an .exr, and separate .png files for a .png. Raises OutputError if that fails.
         """
         pixels, data = self.pixels, shown_data(self.report.get("integrator", "path"), self.pixels)
         if data is not None and Path(path).suffix.lower() == ".png":
@@ -39,11 +40,11 @@ class Image:
         return Path(path)
 
     def metadata(self) -> dict[str, str]:
-        """The report's plain values, for the file's header."""
+        """Return the report's scalar values, for the file's header."""
         return header_of(self.report)
 
     def _repr_png_(self) -> bytes:
-        """How a notebook shows the picture."""
+        """Return the image as notebooks display it."""
         import tempfile
 
         with tempfile.TemporaryDirectory() as folder:
@@ -51,6 +52,6 @@ class Image:
 
 
 def save_side_by_side(path: Path, images: Iterable[NDArray[np.float32]]) -> None:
-    """Write images (height, width, 3) of one height, float32, linear Rec. 709, as one; makes the folder."""
+    """Write images (height, width, 3) of one height, float32, linear Rec. 709, as one; creates the folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     Image(np.concatenate([*images], axis=1)).save(path)

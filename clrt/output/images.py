@@ -1,4 +1,4 @@
-"""Write pictures: .exr (float32, linear), .hdr (Radiance RGBE, linear) and .png (8 bits through a view transform)."""
+"""Image writing: .exr (float32, linear), .hdr (Radiance RGBE, linear) and .png (8 bits through a view transform)."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from .whole import check_whole
 FloatArray = NDArray[np.float32]
 
 EXTENSIONS = (".png", ".exr", ".hdr")
-#: How each is packed. A .png at level 1 over differences to the row above (libpng's filter 32) takes 0.12 s for a noisy
-#: 1920x1080 picture, level 3 with the filters that the library chooses 0.22 s and 3 % less room.
+#: Compression settings. A .png at level 1 with differences to the row above (libpng's filter 32) takes 0.12 s for a
+#: noisy 1920x1080 image, level 3 with the library's choice of filters 0.22 s, for a 3 % smaller file.
 ATTRIBUTES: dict[str, dict[str, str | int]] = {".exr": {"compression": "zip"},
                                                ".png": {"png:compressionLevel": 1, "png:filter": 32}}
-#: The largest value that RGBE can hold: mantissa 255 of 256, exponent 127.
+#: The largest value in RGBE: mantissa 255 of 256, exponent 127.
 RGBE_MAX = 255 / 256 * 2.0**127
 
 _log = logging.getLogger(__name__)
 
-#: A picture that was written is read like any other.
+#: Reads images that were written, or any others.
 read_image = read_picture
 
 
 def metadata_of(path: Path, name: str) -> str | None:
-    """What `write_image` was told by a name; None where there is no such file, or nothing of that name in it."""
+    """Return an entry of `write_image`'s metadata; None if the file or the entry does not exist."""
     import OpenImageIO as oiio
 
     if not path.is_file():
@@ -47,7 +47,7 @@ def metadata_of(path: Path, name: str) -> str | None:
 
 
 def check_writable(path: Path) -> None:
-    """Raise OutputError unless a picture can be written at `path`; ask before rendering, not after."""
+    """Raise OutputError unless an image can be written at `path`; to be called before rendering."""
     check_target(path)
     extension = path.suffix.lower()
     if extension not in EXTENSIONS:
@@ -59,14 +59,13 @@ def check_writable(path: Path) -> None:
 
 def write_image(path: Path, pixels: FloatArray, *, metadata: Mapping[str, str] | None = None,
                 exposure: float = 0.0, view: str = "srgb", aovs: Pictures | None = None) -> None:
-    """Write (h, w, 3) float32 linear pixels in the format that the extension names, in one step (see `replacing`).
+    """Write (h, w, 3) float32 linear pixels in the format of the extension, atomically (see `replacing`).
 
-    `aovs`, if any, are layers of an .exr and files beside a .png (see `layers`); an .hdr has none.
+    `aovs`, if any, become layers of an .exr and separate files for a .png (see `layers`); an .hdr omits them.
 
-    `exposure` (stops) and `view` apply to .png alone. An .exr keeps every bit; an .hdr is rounded to RGBE, with
-    NaN and negative values as 0. `metadata` is kept in .exr and .png; names with a colon, such as "clrt:spp", meet
-    none of the formats' own. Raises OutputError, and UsageError for an unknown view or an exposure that is
-    not finite.
+    `exposure` (stops) and `view` apply to .png only. An .exr is lossless; an .hdr is rounded to RGBE, with NaN and
+    negative values as 0. `metadata` is stored in .exr and .png; names with a colon, such as "clrt:spp", do not collide
+    with the formats' own. Raises OutputError, and UsageError for an unknown view or an exposure that is not finite.
     """
     check_writable(path)
     check_view(view, exposure)
@@ -87,7 +86,7 @@ def write_image(path: Path, pixels: FloatArray, *, metadata: Mapping[str, str] |
 
 
 def _tell_flaws(path: Path, pixels: FloatArray) -> None:
-    """Warns of values that are no light, which formats other than .exr cannot hold."""
+    """Log a warning about values that are not valid radiance, which formats other than .exr cannot hold."""
     flaws = (np.isnan(pixels), pixels < 0, np.isposinf(pixels))
     nan, negative, infinite = map(np.count_nonzero, flaws)
     if nan or negative or infinite:
@@ -96,20 +95,19 @@ def _tell_flaws(path: Path, pixels: FloatArray) -> None:
 
 
 def _write_png(path: Path, samples: NDArray[np.uint8], metadata: Mapping[str, str]) -> None:
-    # That the colours are sRGB is written by default; to say so takes 25 ms, in which OpenImageIO loads all colour
-    # spaces that it knows.
+    # sRGB is the default; setting it explicitly takes 25 ms, in which OpenImageIO loads all its color spaces.
     _write(path, samples, {**metadata, **ATTRIBUTES[".png"]})
 
 
 def write_texels(path: Path, texels: NDArray[np.uint8]) -> None:
-    """Write (h, w, 4) samples of a texture, alpha not multiplied in, as a .png that holds the same."""
+    """Write (h, w, 4) samples of a texture, with unassociated alpha, as a lossless .png."""
     _write(path, texels, {"oiio:UnassociatedAlpha": 1}, ("R", "G", "B", "A"))
 
 
 def rgbe_rounded(pixels: FloatArray) -> FloatArray:
-    """The nearest colours that RGBE can hold: 8 bits a channel at the scale of the brightest one (Ward 1991).
+    """Round to the nearest colors in RGBE: 8 bits per channel at the scale of the brightest one (Ward 1991).
 
-    The file writer cuts off what lies below the last bit, which would darken every picture by 0.3 % on average.
+    The file writer truncates instead, which would darken every image by 0.3 % on average.
     """
     bounded = np.clip(np.nan_to_num(pixels, nan=0.0, posinf=RGBE_MAX), 0, RGBE_MAX).astype(np.float64)
     # A mantissa of 255.5 rounds up to 256, which belongs to the next exponent.
@@ -121,7 +119,7 @@ def rgbe_rounded(pixels: FloatArray) -> FloatArray:
 
 def _write(path: Path, samples: NDArray[Any], attributes: Mapping[str, str | int],
            channels: Sequence[str] = ("R", "G", "B")) -> None:
-    """Write uint8 or float32 samples as they are, in one step; OutputError with the writer's reason if that fails."""
+    """Write uint8 or float32 samples unchanged, atomically; raises OutputError with the writer's reason."""
     with replacing(path) as temporary:
         _write_file(temporary, samples, attributes, channels)
 
@@ -137,9 +135,9 @@ def _write_file(path: Path, samples: NDArray[Any], attributes: Mapping[str, str 
         spec.attribute(name, value)
     output = oiio.ImageOutput.create(str(path))
     done = (output is not None and output.open(str(path), spec)
-            # OpenImageIO misreads strides: it gets rows that follow each other.
+            # OpenImageIO misreads strides, so it gets contiguous rows.
             and output.write_image(np.ascontiguousarray(samples)) and output.close())
-    # A full disk shows in some formats only as a message after a "successful" close.
+    # For some formats a full disk is only reported as a message after a "successful" close.
     complaint = (output or oiio).geterror()
     if complaint or not done:
         raise OSError(complaint.splitlines()[0] if complaint else "the writer gave no reason")

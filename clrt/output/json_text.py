@@ -1,4 +1,4 @@
-"""JSON that programs in any language can read."""
+"""JSON that programs in any language can parse."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ..file_names import printable
 
 
 def json_text(value: Any, *, indent: int | None = None, ascii_only: bool = True) -> str:
-    """Return `value` as JSON: numpy's numbers and arrays as Python's, paths as text, file names as `printable` has
-    them, and null for NaN and Inf, which JSON lacks."""
+    """Return `value` as JSON: numpy's numbers and arrays as Python's, paths as strings, file names through `printable`,
+    and null for NaN and Inf, which JSON lacks."""
     return json.dumps(_plain(value), indent=indent, ensure_ascii=ascii_only, allow_nan=False)
 
 
 def _plain(value: Any) -> Any:
-    """The same value in JSON's types."""
+    """Return the same value in JSON's types."""
     match value:
         case str() | Path():
             return printable(str(value))

@@ -1,4 +1,4 @@
-"""Pictures beside the picture (AOVs) in files: the layers of an .exr, or .png files of their own."""
+"""AOVs in image files: layers of an .exr, or separate .png files."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from .view import to_display
 FloatArray = NDArray[np.float32]
 Pictures = Mapping[str, NDArray[np.generic]]
 
-#: What an AOV's channels are called: colours, vectors, distances along the view, numbers.
+#: Channel names of the AOVs: colors, vectors, distances along the view, numbers.
 CHANNELS = {"albedo": "RGB", "normal": "XYZ", "geometric_normal": "XYZ", "position": "XYZ", "depth": "Z",
             "primitive": "X", "object": "X", "material": "X", "direct": "RGB", "indirect": "RGB", "variance": "RGB",
             "samples": "X"}
-#: Up to here float32 has all whole numbers.
+#: Largest integer up to which float32 represents all integers.
 LARGEST_ID = 1 << 24
 _log = logging.getLogger(__name__)
 
 
 def layered(pixels: FloatArray, aovs: Pictures) -> tuple[FloatArray, list[str]]:
-    """All in one array (height, width, n) float32, and its channels' names: R, G, B, albedo.R, depth.Z and so on."""
+    """Return all in one array (height, width, n) float32, and the channel names: R, G, B, albedo.R, depth.Z …"""
     for name, aov in aovs.items():
         if aov.dtype.kind in "iu" and aov.max(initial=0) > LARGEST_ID:
             _log.warning("%s: numbers beyond %d are rounded in an .exr; Image.aovs has them", name, LARGEST_ID)
@@ -34,13 +34,13 @@ def layered(pixels: FloatArray, aovs: Pictures) -> tuple[FloatArray, list[str]]:
 
 
 def files_beside(path: Path, names: Iterable[str]) -> dict[str, Path]:
-    """Where the AOVs of a picture at `path` are written: <stem>.<name>.png beside a .png; else in it, or nowhere."""
+    """Return the AOVs' paths for an image at `path`: <stem>.<name>.png for a .png; none for other formats."""
     png = path.suffix.lower() == ".png"
     return {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in names if png}
 
 
 def drawn(name: str, aov: NDArray[np.generic], view: str, exposure: float) -> NDArray[np.uint8]:
-    """An AOV as 8-bit colours (height, width, 3), for eyes: docs/aovs.md says how each is drawn."""
+    """Return a visualization of an AOV as 8-bit colors (height, width, 3); see docs/aovs.md."""
     values = aov.astype(np.float32).reshape(*aov.shape[:2], -1)
     match name:
         case "direct" | "indirect":
@@ -64,7 +64,7 @@ def drawn(name: str, aov: NDArray[np.generic], view: str, exposure: float) -> ND
 
 
 def _colors_of(ids: NDArray[np.generic]) -> NDArray[np.floating]:
-    """A colour for each number, far from those of the numbers near it (hues a golden section apart); −1 is black."""
+    """Map each id to a color that differs from those of nearby ids (hues a golden ratio apart); −1 is black."""
     numbers = ids.astype(np.float64)[..., None]
     hues = numbers * ((np.sqrt(5) - 1) / 2) + np.arange(3) / 3
     return np.where(numbers < 0, 0, 0.6 + 0.4 * np.cos(2 * np.pi * hues))

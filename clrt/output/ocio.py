@@ -1,4 +1,4 @@
-"""Views of OpenColorIO (opencolorio.org), as part of OpenImageIO: ACES, and those of the user's own config."""
+"""View transforms of OpenColorIO (opencolorio.org), as part of OpenImageIO: ACES, and those of the user's config."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ..errors import UsageError
 
 FloatArray = NDArray[np.float32]
 
-#: A config that OpenColorIO has built in, and its view of ACES 2.0 for plain displays.
+#: A built-in config of OpenColorIO, and its view of ACES 2.0 for SDR displays.
 ACES = ("ocio://cg-config-v4.0.0_aces-v2.0_ocio-v2.5", "sRGB - Display/ACES 2.0 - SDR 100 nits (Rec.709)")
-#: Where $OCIO names none.
+#: Used if $OCIO is not set.
 DEFAULT = "ocio://default"
-#: What configs call linear Rec. 709.
+#: Names of linear Rec. 709 in configs.
 REC709 = ("lin_rec709_scene", "lin_rec709", "lin_srgb", "Linear Rec.709", "Linear BT.709", "Utility - Linear - sRGB")
 
 
 def ocio_view(config: str, view: str) -> Callable[[FloatArray], FloatArray]:
-    """A view of a config: VIEW of its default display, DISPLAY/VIEW, or with an empty `view` the default one.
+    """Return a view of a config: VIEW of its default display, DISPLAY/VIEW, or the default one if `view` is empty.
 
-    config: a file or ocio://NAME; if empty the one that the environment variable OCIO names, or OpenColorIO's default.
-    UsageError where there is no such config or view, or it has no colour space of linear Rec. 709.
+    config: a file or ocio://NAME; if empty, the one in the environment variable OCIO, or OpenColorIO's default.
+    Raises UsageError if there is no such config or view, or it has no color space for linear Rec. 709.
     """
     import OpenImageIO as oiio
 
@@ -62,7 +62,7 @@ def _config(config: str) -> Any:
 
 
 def _display_view(config: str, colors: Any, name: str) -> tuple[str, str]:
-    """The display and view that are meant."""
+    """Return the display and view that `name` selects."""
     display = colors.getDefaultDisplayName()
     views = colors.getViewNames(display)
     if name in views or not name:

@@ -1,4 +1,4 @@
-"""Error against time, drawn by matplotlib, which is an extra."""
+"""Plots of error against time, drawn by matplotlib, an optional dependency."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Seconds, and the error (√relMSE) after them.
+#: Points of seconds, and the error (√relMSE) after them.
 Curve = Sequence[tuple[float, float]]
 
 EXTENSIONS = (".png", ".svg", ".pdf")
 MARKERS = "osD^vP*X"
-#: Inches: of a panel.
+#: Size of a panel in inches.
 PANEL = (5.0, 3.8)
 DOTS_PER_INCH = 150
 
 
 def check_plot(path: Path) -> None:
-    """Raise OutputError unless a plot can be written at `path`, UsageError where matplotlib is not installed."""
+    """Raise OutputError unless a plot can be written at `path`, UsageError if matplotlib is not installed."""
     check_target(path)
     if path.suffix.lower() not in EXTENSIONS:
         raise OutputError(f"{path}: plots are written as {', '.join(EXTENSIONS[:-1])} or {EXTENSIONS[-1]}; "
@@ -37,7 +37,7 @@ def check_plot(path: Path) -> None:
 
 
 def plot_history(path: Path, title: str, history: Iterable[Mapping[str, Any]]) -> Path:
-    """A render's `history` as `plot_errors` draws it: its own estimate and, where it has them, true errors."""
+    """Plot a render's `history` with `plot_errors`: its own error estimate and, if recorded, the true errors."""
     entries = list(history)
     estimate = [(entry["seconds"], entry["noise"]) for entry in entries if entry["noise"] is not None]
     true = [(entry["seconds"], sqrt(entry["relmse"])) for entry in entries if "relmse" in entry]
@@ -45,10 +45,10 @@ def plot_history(path: Path, title: str, history: Iterable[Mapping[str, Any]]) -
 
 
 def plot_errors(path: Path, panels: Mapping[str, Mapping[str, Curve]]) -> Path:
-    """Error against time on logarithmic axes: a panel by its title, in it a curve by its name. Returns `path`.
+    """Plot error against time on logarithmic axes: panels by title, in each the curves by name. Returns `path`.
 
-    A dotted line falls as errors of independent samples do, with the square root of time. Points that are no positive
-    numbers are left out, and curves without points. Raises OutputError.
+    A dotted line shows the slope of independent samples, an error that falls with the square root of time. Points that
+    are not positive are omitted, and curves without points. Raises OutputError.
     """
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator, NullFormatter
@@ -66,7 +66,7 @@ def plot_errors(path: Path, panels: Mapping[str, Mapping[str, Curve]]) -> Path:
 
 
 def write_figure(path: Path, figure: Figure) -> Path:
-    """Writes it in one step (see `replacing`) as the path's extension says. Returns the path; raises OutputError."""
+    """Write a figure atomically (see `replacing`) in the extension's format. Returns the path; raises OutputError."""
     with replacing(path) as temporary:
         figure.savefig(temporary, dpi=DOTS_PER_INCH)
     return path

@@ -1,4 +1,4 @@
-"""Write what a render measured: as JSON, and in the headers of its pictures."""
+"""Writing of a render's report: as JSON, and in the headers of its images."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .json_text import json_text
 
 
 def write_report(path: Path, report: Mapping[str, Any]) -> Path:
-    """Write `report` as `json_text` has it, in UTF-8 and in one step (see `replacing`). Returns `path`.
+    """Write `report` by `json_text`, in UTF-8 and atomically (see `replacing`). Returns `path`.
 
     Raises OutputError.
     """
@@ -24,6 +24,6 @@ def write_report(path: Path, report: Mapping[str, Any]) -> Path:
 
 
 def header_of(report: Mapping[str, Any]) -> dict[str, str]:
-    """The report's plain values, for the header of a picture's file."""
+    """Return the report's scalar values, for an image file's header."""
     return {f"clrt:{key}": printable(str(value)) for key, value in report.items()
             if isinstance(value, (str, int, float))}

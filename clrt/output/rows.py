@@ -1,4 +1,4 @@
-"""Pictures larger than memory, written some rows at a time from top to bottom."""
+"""Writing of images larger than memory, in blocks of rows from top to bottom."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .images import ATTRIBUTES, check_writable, rgbe_rounded
 from .view import check_view, to_display
 from .whole import check_whole
 
-#: Rows of a block of an .exr that is packed as a whole: every piece but the last must have a multiple of it.
+#: Rows that an .exr compresses together; the rows of every piece but the last must be a multiple of this.
 BLOCK_ROWS = 16
 
 
 def write_rows(path: Path, size: tuple[int, int], pieces: Iterable[NDArray[np.float32]], *,
                metadata: Mapping[str, str] | None = None, view: str = "srgb", exposure: float = 0.0) -> None:
-    """Writes a picture of (width, height) whose pieces (rows, width, 3) follow each other, as `write_image` would, in
-    one step. All pieces but the last have a multiple of BLOCK_ROWS rows. Raises OutputError."""
+    """Write an image of size (width, height) from consecutive pieces (rows, width, 3), as `write_image` would,
+    atomically. The rows of all pieces but the last are a multiple of BLOCK_ROWS. Raises OutputError."""
     import OpenImageIO as oiio
 
     check_writable(path)
@@ -49,7 +49,7 @@ def write_rows(path: Path, size: tuple[int, int], pieces: Iterable[NDArray[np.fl
 
 
 def _samples(piece: NDArray[np.float32], kind: str, view: str, exposure: float) -> NDArray[Any]:
-    """The piece as the file of this kind has it."""
+    """Return the piece as samples for this file format."""
     if kind == ".png":
         return to_display(piece, view, exposure)
     return np.ascontiguousarray(rgbe_rounded(piece) if kind == ".hdr" else piece)

@@ -1,4 +1,4 @@
-"""Save scenes as scene files, with what belongs beside them."""
+"""Saving of scenes as scene files, with the files that they refer to."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .images import write_image, write_texels
 
 
 def save_scene(scene: Scene, path: str | Path, *, force: bool = True) -> list[Path]:
-    """Writes the scene file `path`, last, and what it needs beside it (scene.writing); returns all these files.
+    """Write the files that the scene needs (scene.writing), then the scene file `path`; return all these paths.
 
-    Raises OutputError where one cannot be written, or is read-only, unless `force`.
+    Raises OutputError if one cannot be written, or is read-only, unless `force`.
     """
     path = Path(path)
     if path.suffix.lower() != ".toml":

@@ -1,4 +1,4 @@
-"""Videos of pictures that are files already: .gif by pillow, .mp4 and .webm by ffmpeg, which is an extra."""
+"""Videos from image files: .gif by pillow, .mp4 and .webm by ffmpeg, an optional dependency."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from numpy.typing import NDArray
 from ..errors import OutputError, UsageError
 from .files import check_target, replacing
 
-#: What ffmpeg is told: pictures near the eye's limit, and that colours are sRGB's, by the matrix of Rec. 709.
+#: ffmpeg's options: nearly lossless quality, and sRGB colors with the matrix of Rec. 709.
 CODECS: dict[str, tuple[str, list[str]]] = {
     ".mp4": ("libx264", ["-crf", "17", "-movflags", "+faststart"]),
     ".webm": ("libvpx-vp9", ["-crf", "24", "-b:v", "0", "-row-mt", "1"])}
 COLORS = ["-vf", "scale=out_color_matrix=bt709:out_range=tv,"
           "setparams=colorspace=bt709:color_primaries=bt709:color_trc=iec61966-2-1:range=tv"]
 VIDEOS = (".gif", *CODECS)
-#: Frames a second: browsers show faster ones at 10.
+#: Maximum frames per second; browsers show faster ones at 10.
 FASTEST_GIF = 50.0
-#: Seconds that a frame lasts: 16 bits, in hundredths.
+#: Maximum duration of a frame in seconds: 16 bits, in hundredths.
 LONGEST_GIF = 655.35
 
 
 def is_video(path: Path) -> bool:
-    """Whether its name is a video's."""
+    """Return whether the path has the suffix of a video."""
     return path.suffix.lower() in VIDEOS
 
 
@@ -59,11 +59,11 @@ def check_video(path: Path, size: tuple[int, int], fps: float) -> None:
 
 
 def write_video(path: Path, pictures: Sequence[Path], fps: float) -> Path:
-    """Joins .png files of one size to a video, in one step (see `replacing`). Returns `path`; raises OutputError."""
+    """Join .png files of one size to a video, atomically (see `replacing`). Returns `path`; raises OutputError."""
     with replacing(path) as temporary:
         try:
             (_write_gif if path.suffix.lower() == ".gif" else _write_by_ffmpeg)(temporary, pictures, fps)
-        except (RuntimeError, ValueError, SyntaxError) as error:   # what imageio, ffmpeg and pillow raise
+        except (RuntimeError, ValueError, SyntaxError) as error:   # raised by imageio, ffmpeg and pillow
             raise OutputError(f"{path}: the video could not be made: {error}") from error
     return path
 
@@ -76,9 +76,9 @@ def _frames(pictures: Sequence[Path]) -> Iterator[NDArray[np.uint8]]:
 
 
 def _write_gif(path: Path, pictures: Sequence[Path], fps: float) -> None:
-    """Frames last whole hundredths of a second, such that none begins more than half of one late or early.
+    """Write a .gif. Frame durations are whole hundredths of a second, with each start rounded to the nearest one.
 
-    It is encoded in memory: imageio tries a second time where a file cannot be written, and prints that error.
+    It is encoded in memory, since imageio retries if a file cannot be written, and prints the error.
     """
     from imageio.v3 import imopen
 
@@ -92,7 +92,7 @@ def _write_gif(path: Path, pictures: Sequence[Path], fps: float) -> None:
 
 
 def _write_by_ffmpeg(path: Path, pictures: Sequence[Path], fps: float) -> None:
-    """OSError with what ffmpeg says where it fails, which imageio's writer does not tell."""
+    """Write a video by ffmpeg. Raises OSError with ffmpeg's error message, which imageio's writer does not report."""
     from imageio_ffmpeg import get_ffmpeg_exe
 
     codec, options = CODECS[path.suffix.lower()]
@@ -105,7 +105,7 @@ def _write_by_ffmpeg(path: Path, pictures: Sequence[Path], fps: float) -> None:
     with TemporaryFile() as errors:
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=errors) as ffmpeg:
             assert ffmpeg.stdin is not None
-            with suppress(BrokenPipeError):    # it has ended
+            with suppress(BrokenPipeError):    # ffmpeg has exited
                 for frame in chain([first], frames):
                     ffmpeg.stdin.write(frame.tobytes())
         if ffmpeg.returncode:

@@ -1,6 +1,6 @@
 """View transforms: linear Rec. 709 radiance to the 8 bits of a display (docs/colour.md).
 
-Every view takes (h, w, 3) float32 in [0, 1e15] and returns the display's signal, which is then cut to [0, 1].
+Every view takes (h, w, 3) float32 in [0, 1e15] and returns the display's signal, which is then clamped to [0, 1].
 To add one: write its function and list it in VIEWS.
 """
 
@@ -19,36 +19,36 @@ from .ocio import ACES, ocio_view
 FloatArray = NDArray[np.float32]
 View = Callable[[FloatArray], FloatArray]
 
-#: The luminance that "reinhard" shows as white: four stops above 1.
+#: The luminance that "reinhard" maps to white: four stops above 1.
 REINHARD_WHITE = 16.0
-#: Brighter is shown as this: far beyond any display, and its square still fits into float32.
+#: Upper clamp of the input: far beyond any display, and its square still fits float32.
 BRIGHTEST = 1e15
-#: So many are shown at a time: what is made of more comes anew from the system each time, which takes longer.
+#: Rows processed at a time; larger temporary arrays are allocated from the system each time, which is slower.
 ROWS = 16
-#: "agx": Rec. 709 with its primaries drawn towards white, and what becomes 0 and 1 of it, as binary logarithms.
+#: "agx": Rec. 709 with its primaries moved towards white, and the values that map to 0 and 1, as binary logarithms.
 AGX_INSET = np.array([[0.842479062253094, 0.0784335999999992, 0.0792237451477643],
                       [0.0423282422610123, 0.878468636469772, 0.0791661274605434],
                       [0.0423756549057051, 0.0784336, 0.879142973793104]], np.float32)
 AGX_DARKEST, AGX_BRIGHTEST = -12.47393, 4.026069
-#: Its curve's steepest place, middle grey, 10 stops below and 6.5 above; its slope there; what bends toe and shoulder.
+#: The curve's pivot, its steepest point: middle grey, 10 stops below and 6.5 above; its slope; toe and shoulder power.
 AGX_PIVOT, AGX_SLOPE, AGX_TOE, AGX_SHOULDER = (10 / 16.5, 0.5), 2.0, 3.0, 3.25
-#: "pbr_neutral": below this nothing is compressed; how fast what is brighter loses its colour; Fresnel's offset.
+#: "pbr_neutral": start of the compression; how fast brighter colors desaturate; Fresnel offset.
 NEUTRAL_START, NEUTRAL_DESATURATION, NEUTRAL_OFFSET = 0.8 - 0.04, 0.15, 0.04
 
 
 def srgb(linear: FloatArray) -> FloatArray:
-    """The sRGB curve (IEC 61966-2-1), linear near black."""
+    """Apply the sRGB curve (IEC 61966-2-1), linear near black."""
     linear = np.minimum(linear, np.float32(1))
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
 def raw(linear: FloatArray) -> FloatArray:
-    """No curve: for masks, normals and other data."""
+    """Apply no curve: for masks, normals and other data."""
     return linear
 
 
 def reinhard(linear: FloatArray) -> FloatArray:
-    """Compress luminance so that REINHARD_WHITE becomes 1, keeping the ratios of the channels; then the sRGB curve.
+    """Compress luminance so that REINHARD_WHITE becomes 1, keeping the channels' ratios; then apply the sRGB curve.
 
     Reinhard et al. 2002, Photographic Tone Reproduction for Digital Images, eq. 4.
     """
@@ -58,9 +58,9 @@ def reinhard(linear: FloatArray) -> FloatArray:
 
 
 def agx(linear: FloatArray) -> FloatArray:
-    """AgX Base: what is bright fades to white along the way of film (Sobotka, github.com/sobotka/AgX).
+    """Apply AgX Base: bright colors desaturate to white as on film (Sobotka, github.com/sobotka/AgX).
 
-    The published config has the curve as a table of 4096 values; this is what the table was made from.
+    The published config contains the curve as a table of 4096 values; this is the function that generated it.
     """
     stops = np.log2(np.maximum(linear @ AGX_INSET.T, np.float32(2**AGX_DARKEST)))
     x = np.clip((stops - AGX_DARKEST) / (AGX_BRIGHTEST - AGX_DARKEST), 0, 1).astype(np.float32)
@@ -69,14 +69,14 @@ def agx(linear: FloatArray) -> FloatArray:
 
 
 def _agx_half(away: FloatArray, width: float, height: float, power: float) -> FloatArray:
-    """How far the curve has come `away` from the pivot: a hyperbola that is `height` at `width`."""
+    """Evaluate the curve at a distance `away` from the pivot: a hyperbola that is `height` at `width`."""
     scale = ((AGX_SLOPE * width) ** -power * ((AGX_SLOPE * width / height) ** power - 1)) ** (-1 / power)
     term = AGX_SLOPE * np.maximum(away, 0) / scale
     return np.asarray(scale * term / (1 + term**power) ** (1 / power), np.float32)
 
 
 def pbr_neutral(linear: FloatArray) -> FloatArray:
-    """Colours of surfaces as they are, brighter ones compressed towards white; then the sRGB curve.
+    """Keep base colors unchanged, compress brighter ones towards white; then apply the sRGB curve.
 
     Khronos PBR Neutral (github.com/KhronosGroup/ToneMapping).
     """
@@ -95,7 +95,7 @@ VIEWS: dict[str, View] = {"srgb": srgb, "agx": agx, "pbr_neutral": pbr_neutral, 
 
 
 def view_called(name: str) -> View:
-    """The view of this name: of VIEWS, `aces`, or one of OpenColorIO (see `ocio`); UsageError if there is none."""
+    """Return the view of this name: of VIEWS, `aces`, or of OpenColorIO (see `ocio`); raises UsageError if unknown."""
     if name in VIEWS:
         return VIEWS[name]
     kind, _, view = name.partition(":")
@@ -115,7 +115,7 @@ def check_view(name: str, exposure: float) -> None:
 
 
 def to_display(pixels: FloatArray, view: str = "srgb", exposure: float = 0.0) -> NDArray[np.uint8]:
-    """(h, w, 3) float32 linear to uint8 of the same shape, after a gain of 2**exposure.
+    """Convert (h, w, 3) float32 linear to uint8 of the same shape, after a gain of 2**exposure.
 
     NaN and negative values become 0, +Inf 255; the rest is rounded to nearest, halves up, without dithering.
     Raises UsageError for an unknown view.

@@ -1,19 +1,19 @@
-"""Whether an image file that was written is all there: OpenImageIO does not notice where the system refuses the last
-bytes, as on a full disk."""
+"""Completeness check of written image files: OpenImageIO does not report that the system refused the
+last bytes, as on a full disk."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
-#: What a .png ends with: a chunk without data, and its checksum.
+#: The end of every .png: a chunk without data, and its checksum.
 PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 
 
 def check_whole(path: Path) -> None:
-    """Raise OSError unless the end of the .png, .exr or .hdr file at `path`, a name in UTF-8, is there.
+    """Raise OSError unless the .png, .exr or .hdr file at `path`, a UTF-8 name, is complete.
 
-    The last row of an .exr or .hdr is read: of an .exr that takes one of its blocks, of an .hdr all.
+    The last row of an .exr or .hdr is read, which decodes one block of an .exr, but all of an .hdr.
     """
     if not (_ends_as_png(path) if path.suffix == ".png" else _has_last_row(path)):
         raise OSError("its end is missing")
@@ -30,7 +30,7 @@ def _has_last_row(path: Path) -> bool:
 
     opened = oiio.ImageInput.open(str(path))
     if opened is None:
-        oiio.geterror()     # or it would be printed as the process ends
+        oiio.geterror()     # fetched, or it would be printed at exit
         return False
     row = opened.read_scanline(opened.spec().height - 1, 0, "float")
     return row is not None and not opened.geterror()

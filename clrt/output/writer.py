@@ -1,4 +1,4 @@
-"""The library that writes pictures, loaded beside all else, so that nothing waits for it in the end."""
+"""Background loading of the library that writes images, so that saving does not wait for it."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from ..threads import beside
 
 
 def load_writer() -> None:
-    """Begins to load it.
+    """Start to load the library.
 
-    The best time is while modules are imported that are Python alone: whoever asks the system's loader for something
-    meanwhile waits, holding Python's lock. So do extension modules, and numpy where it finds out whether the memory of
-    a large intermediate result may be used again.
+    This is best done while pure-Python modules are being imported: anything that uses the system's loader meanwhile
+    waits, holding Python's lock. That includes extension modules, and numpy when it checks whether the memory of a
+    large temporary can be reused.
     """
     beside(_load)
 
 
 def _load() -> None:
-    """Most of it is for the system's loader, which is asked past Python's import: that would hold Python's lock."""
+    """Load most of it by the system's loader, without Python's import, which would hold Python's lock."""
     spec = find_spec("OpenImageIO")
     for folder in spec.submodule_search_locations or () if spec else ():
         for library in Path(folder).glob("OpenImageIO.*.so"):

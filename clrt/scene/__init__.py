@@ -1,1 +1,1 @@
-"""What is drawn: the scene's dataclasses, the scene file and the model readers. Numpy only, no OpenCL."""
+"""Scene description: the scene's dataclasses, the scene file and the model readers. Numpy only, no OpenCL."""

@@ -1,4 +1,4 @@
-"""A camera that moves, by keyframes or once around what it looks at, and the still scene of each frame."""
+"""Camera animation by keyframes or turntable, and the static scene of each frame."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 Vector = tuple[float, float, float]
 Positive = Annotated[float, Gt(0)]
-#: More are a slip of the keys.
+#: Upper limit on the number of frames; more are assumed to be a typing error.
 MOST_FRAMES = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
 class Keyframe:
-    """The camera's fields (see `Camera`) at a `time` in seconds. A field that is None is free: it moves between those
-    keyframes that have it, and is the camera's own where none has."""
+    """The camera's fields (see `Camera`) at a `time` in seconds. A field that is None is interpolated between the
+    keyframes that set it, and keeps the camera's own value if none does."""
 
     time: float
     position: Vector | None = None
@@ -44,10 +44,10 @@ class Keyframe:
 
 @dataclass(frozen=True, kw_only=True)
 class Animation:
-    """fps: frames a second. keyframes: two or more, by ascending times; the first one's is that of frame 0.
+    """Animation of the camera. fps: frames per second. keyframes: at least two, ascending, frame 0 at the first.
 
-    turntable_seconds: instead of them, the camera goes once around what it looks at, about its `up`, counter-clockwise
-    seen from there; below 0 clockwise. The frame after the last one would be the first again.
+    turntable_seconds: replaces keyframes; the camera goes once around its `look_at` point, about its `up`, seen from
+    there counter-clockwise, or clockwise if below 0. The frame after the last would equal the first.
     """
 
     fps: Positive = 24.0
@@ -59,22 +59,22 @@ class Animation:
 
     @property
     def seconds(self) -> float:
-        """How long it takes, at least 0."""
+        """Return the duration in seconds, at least 0."""
         if self.turntable_seconds is not None:
             return abs(self.turntable_seconds)
         return self.keyframes[-1].time - self.keyframes[0].time if self.keyframes else 0.0
 
     @property
     def frames(self) -> int:
-        """How many there are; of keyframes the last one's is among them, if it falls on a frame."""
+        """Return the number of frames; a frame that falls on the last keyframe is included."""
         if self.turntable_seconds is not None:
             return max(1, round(self.seconds * self.fps))
         return 1 + int(self.seconds * self.fps * (1 + 1e-9))
 
 
 def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
-    """The scene, its camera going once around in so many frames, at least one. UsageError for fewer, and unless `fps`
-    is above 0 and finite."""
+    """Return the scene with the camera going once around in this number of frames. Raises UsageError unless `frames`
+    is at least 1 and `fps` is above 0 and finite."""
     if not frames >= 1:
         raise UsageError(f"frames is {frames}; a turntable has at least 1")
     if not 0 < fps < np.inf:
@@ -83,9 +83,8 @@ def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
 
 
 def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[int, Scene]]:
-    """The numbers of all frames, or of those `chosen`, and for each the still scene that it shows, which differs from
-    the others by its camera alone. SceneError where there is no animation, or a wrong one, UsageError for a frame that
-    is none of it.
+    """Return the number and the static scene of all frames, or of the `chosen` ones. The scenes differ in their camera
+    alone. Raises SceneError if the scene has no animation or an invalid one, UsageError for an invalid number.
     """
     if scene.animation is None:
         raise SceneError(f"{scene.name}: nothing moves; write [[keyframe]] tables, or have it turned (--turntable, "
@@ -103,7 +102,7 @@ def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[
 
 
 def animation_problems(camera: Camera, animation: Animation) -> list[str]:
-    """What is wrong with an animation whose fields keep their limits: one sentence a problem."""
+    """Return what is wrong with an animation whose fields are within their limits, one sentence per problem."""
     keys, around = animation.keyframes, animation.turntable_seconds
     if around is not None and keys:
         return ["animation: has turntable_seconds and keyframes; keep one of them"]
@@ -122,7 +121,7 @@ def animation_problems(camera: Camera, animation: Animation) -> list[str]:
 
 
 def _view_problems(camera: Camera, animation: Animation) -> list[str]:
-    """The first frame whose camera looks nowhere."""
+    """Return a problem for the first frame whose camera has no valid view direction."""
     moving = _moving(camera, animation, np.arange(animation.frames, dtype=np.float64))
     position, look_at, up = (moving.get(name, np.array([getattr(camera, name)], np.float64))
                              for name in ("position", "look_at", "up"))
@@ -145,7 +144,7 @@ def _cameras(camera: Camera, animation: Animation, numbers: Doubles) -> Iterator
 
 
 def _moving(camera: Camera, animation: Animation, numbers: Doubles) -> dict[str, Doubles]:
-    """The fields that move: of each frame a row."""
+    """Compute the animated fields: name to an array with a row per frame."""
     if animation.turntable_seconds is not None:
         turn = np.copysign(2 * np.pi / animation.frames, animation.turntable_seconds)
         return {"position": _around(camera, turn * numbers)}
@@ -160,7 +159,7 @@ def _moving(camera: Camera, animation: Animation, numbers: Doubles) -> dict[str,
 
 
 def _around(camera: Camera, angles: Doubles) -> Doubles:
-    """(n, 3) where the camera has turned about its up, through what it looks at, by these angles."""
+    """Compute (n, 3) positions of the camera rotated by these angles about the axis `up` through its look_at point."""
     center, axis = np.array(camera.look_at, np.float64), np.array(camera.up, np.float64)
     axis /= np.linalg.norm(axis)
     arm = camera.position - center

@@ -1,4 +1,4 @@
-"""Colors of spectra: CIE 1931 2° observer and illuminant D65 (CIE 15:2004), from 360 to 830 nm in steps of 5 nm."""
+"""RGB colors of spectra: CIE 1931 2° observer and illuminant D65 (CIE 15:2004), 360 to 830 nm in steps of 5 nm."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def _table(text: str) -> Doubles:
     return np.array(text.split(), np.float64)
 
 
-#: Color matching functions.
+#: Color matching functions x, y and z.
 X = _table("""
     0.0001299 0.0002321 0.0004149 0.0007416 0.001368 0.002236 0.004243 0.00765 0.01431 0.02319 0.04351 0.07763
     0.13438 0.21477 0.2839 0.3285 0.34828 0.34806 0.3362 0.3187 0.2908 0.2511 0.19536 0.1421 0.09564 0.05795001
@@ -45,7 +45,7 @@ Z = _table("""
     0.00034 0.00024 0.00019 0.0001 4.999999e-05 3e-05 2e-05 1e-05 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0 0
     0 0 0 0 0 0 0 0 0 0 0 0 0 0
 """)
-#: Relative power of daylight, 100 at 560 nm.
+#: Relative spectral power of illuminant D65, 100 at 560 nm.
 D65 = _table("""
     46.6383 49.3637 52.0891 51.0323 49.9755 52.3118 54.6482 68.7015 82.7549 87.1204 91.486 92.4589 93.4318
     90.057 86.6823 95.7736 104.865 110.936 117.008 117.41 117.812 116.336 114.861 115.392 115.923 112.367
@@ -57,18 +57,19 @@ D65 = _table("""
     58.8765 60.3125
 """)
 WAVELENGTHS = np.linspace(SHORTEST, LONGEST, STEPS)
-#: From XYZ to linear Rec. 709 (ITU-R BT.709), with Y of a unit spectrum 1.
+#: Matrix from XYZ to linear Rec. 709 (ITU-R BT.709), where a unit spectrum has Y = 1.
 RGB_FROM_XYZ = np.array([[3.240479, -1.537150, -0.498535], [-0.969256, 1.875991, 0.041556],
                          [0.055648, -0.204043, 1.057311]])
-#: Samples that a spectrum is integrated by, nm apart.
+#: Wavelengths in nm at which spectra are sampled for integration.
 FINE = np.linspace(SHORTEST, LONGEST, 4701)
 
 
 def rgb_of_spectrum(wavelengths: Sequence[float], values: Sequence[float], *, lit: bool) -> tuple[float, float, float]:
-    """Linear Rec. 709 of a spectrum given at increasing wavelengths in nm, linear between them, 0 beyond; at least 0.
+    """Return linear Rec. 709 of a spectrum given at increasing wavelengths in nm, interpolated linearly and 0 outside.
+    Negative components are clamped to 0.
 
-    lit: of a reflectance under D65, which is (1, 1, 1) where it reflects all; else of a radiance, whose Y is 1 where it
-    is 1 at all wavelengths.
+    lit: the spectrum is a reflectance under D65, and a perfect reflector is (1, 1, 1); otherwise it is a radiance,
+    whose Y is 1 if it is 1 at all wavelengths.
     """
     spectrum = np.interp(FINE, wavelengths, values, 0, 0)
     light = np.interp(FINE, WAVELENGTHS, D65) if lit else np.ones_like(FINE)

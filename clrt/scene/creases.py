@@ -1,4 +1,4 @@
-"""Normals that are smooth over soft edges and leave sharp ones sharp, by the angle between faces."""
+"""Normals that are smooth over soft edges and keep sharp edges sharp, by the angle between faces."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from .model import Mesh
 from .normals import corner_normals, weld
 
-#: Where more triangles than these meet in a point, all of them count as soft: pairs of them would be too many.
+#: If more triangles than this share a point, all of them count as soft, since testing all pairs would take too long.
 MOST_AROUND = 256
 
 
 def creased(mesh: Mesh, degrees: float) -> Mesh:
-    """The mesh with smooth normals but at edges whose two faces' normals differ by more than `degrees`.
+    """Return the mesh with smooth normals, except at edges whose two faces' normals differ by more than `degrees`.
 
-    Each corner's normal is the mean of those faces around its point that differ from its own by no more, weighted by
-    their angles there. Corners share no vertices afterwards.
+    Each corner's normal is the mean of the normals of the faces around its point that differ from its own face's by at
+    most `degrees`, weighted by their angles there. Corners share no vertices afterwards.
     """
     corners = mesh.faces.ravel()
     arrays = {name: array[corners] for name in ("uv", "uv1", "colors", "tangents")
@@ -28,7 +28,7 @@ def creased(mesh: Mesh, degrees: float) -> Mesh:
 
 
 def _normals(mesh: Mesh, degrees: float) -> NDArray[np.float32]:
-    """(3m, 3) of unit length, by corner."""
+    """Compute (3m, 3) unit normals, one per corner."""
     points, count = weld(mesh.vertices)
     weighted = corner_normals(mesh.vertices, mesh.faces)
     own = weighted / np.maximum(np.linalg.norm(weighted, axis=1, keepdims=True), 1e-300)
@@ -39,12 +39,12 @@ def _normals(mesh: Mesh, degrees: float) -> NDArray[np.float32]:
     sums, first = weighted.copy(), np.flatnonzero(~crowded)
     for step in range(1, MOST_AROUND):
         first = first[first + step < len(order)]
-        first = first[at[order[first]] == at[order[first + step]]]   # those of smaller points have met all others
+        first = first[at[order[first]] == at[order[first + step]]]   # corners of lower-numbered points are finished
         if not len(first):
             break
         one, other = order[first], order[first + step]
         soft = np.einsum("ij,ij->i", own[one], own[other]) >= least
-        one, other = one[soft], other[soft]     # in each of them a corner stands once at most
+        one, other = one[soft], other[soft]     # each index occurs at most once in each of the two
         sums[one] += weighted[other]
         sums[other] += weighted[one]
     if crowded.any():

@@ -9,12 +9,12 @@ Doubles = NDArray[np.float64]
 
 
 def smooth(times: ArrayLike, values: ArrayLike, at: ArrayLike) -> Doubles:
-    """Values (m, n) at the times (m,), on a curve through `values` (k, n) at `times` (k,), k >= 1, ascending.
+    """Evaluate at the times (m,) a curve through `values` (k, n) at ascending `times` (k,), k >= 1; returns (m, n).
 
-    Cubic Hermite pieces; the slope at a value is that of the parabola through it and its neighbours, at an end that of
-    the first or last parabola, so that motion along a parabola is met exactly (Overhauser 1968; for even times that is
-    Catmull and Rom's spline). Between equal values the curve stands still. One number a time (n = 1) never leaves the
-    range of its two neighbours (Fritsch and Carlson 1980). Before the first time and after the last it stands still.
+    Piecewise cubic Hermite. The slope at a value is that of the parabola through it and its neighbours, at an end that
+    of the first or last parabola, so that motion along a parabola is reproduced exactly (Overhauser 1968; for evenly
+    spaced times this is the Catmull–Rom spline). The curve is constant between equal values, before the first time and
+    after the last. A scalar (n = 1) never leaves the range of its two neighbours (Fritsch and Carlson 1980).
     """
     knots, points, moments = (np.asarray(each, np.float64) for each in (times, values, at))
     if len(knots) == 1:
@@ -31,13 +31,13 @@ def smooth(times: ArrayLike, values: ArrayLike, at: ArrayLike) -> Doubles:
 
 
 def _slopes(lengths: Doubles, secants: Doubles) -> Doubles:
-    """(k, n) at the values; lengths (k − 1, 1), secants (k − 1, n): of the pieces between them."""
+    """Compute the slopes (k, n) at the values from the lengths (k − 1, 1) and secants (k − 1, n) of the pieces."""
     if len(secants) == 1:
         return np.repeat(secants, 2, axis=0)
     before, after = lengths[:-1], lengths[1:]
     inner = (after * secants[:-1] + before * secants[1:]) / (before + after)
     slopes = np.concatenate([2 * secants[:1] - inner[:1], inner, 2 * secants[-1:] - inner[-1:]])
-    # Both pieces that meet in a value; at an end its one piece twice.
+    # Secants of the pieces left and right of each value; the first and last value have one piece, used for both.
     left, right = np.concatenate([secants[:1], secants]), np.concatenate([secants, secants[-1:]])
     slopes[~left.any(axis=1) | ~right.any(axis=1)] = 0
     if slopes.shape[1] == 1:

@@ -1,7 +1,7 @@
-"""Decodes pictures and compressed meshes in a process of its own, for the libraries that do may crash, hang or take
-all memory where a file is damaged.
+"""Decoding of images and compressed meshes in a child process, since the libraries may crash, hang or exhaust memory if
+a file is damaged.
 
-The process starts with the first file, decodes those that follow, and ends when it has had nothing to do for a while.
+The process starts with the first file, is reused for later ones, and exits after being idle for a while.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from ..errors import SceneError
 from ..file_names import utf8_path
 from ..threads import Event, beside
 
-#: Seconds that one file may take. The largest picture that is read takes a tenth of it.
+#: Time limit per file in seconds. The largest supported image takes a tenth of it.
 LIMIT = 60.0
 Arrays = dict[str, NDArray[Any]]
 
@@ -33,7 +33,7 @@ _running: _Process | None = None
 
 
 def decode(kind: str, source: Path | bytes, suffix: str = "") -> tuple[Arrays, dict[str, Any]]:
-    """What is in a file, or in bytes that could be one with the name's ending `suffix`: arrays, and other facts.
+    """Decode a file, or bytes of a file with the name suffix `suffix`, and return its arrays and other facts.
 
     kind: a function of scene.decoding. Raises SceneError with its message, or with how the process ended.
     """
@@ -54,7 +54,7 @@ def _decoded(kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
     global _running
     with _lock:
         if _running is not None and _running.owner == os.getpid():
-            with suppress(_Ended):  # perhaps only because it had nothing to do
+            with suppress(_Ended):  # it may merely have exited after being idle
                 return _running.decode(kind, file)
         _running = _Process()
         try:
@@ -65,14 +65,14 @@ def _decoded(kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
 
 
 class _Ended(Exception):
-    """The process is no more; says how it ended."""
+    """The decoder process has ended; the message says how."""
 
 
 class _Process:
-    """A process that runs scene.decoding. `owner`: the process that started it; a forked one must not talk to it."""
+    """Child process that runs scene.decoding. `owner`: the pid that started it; a forked process must not use it."""
 
     def __init__(self) -> None:
-        import subprocess    # most scenes need none
+        import subprocess    # most scenes need no decoder
 
         path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
         self.owner = os.getpid()
@@ -83,7 +83,7 @@ class _Process:
         self._requests, self._replies = self._popen.stdin, self._popen.stdout
 
     def decode(self, kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
-        """See above; raises _Ended where the process ends or must be ended."""
+        """Decode a file, see `decode` of the module. Raises _Ended if the process ends or has to be killed."""
         ended, late = Event(), Event()
 
         def watch() -> None:
@@ -101,7 +101,7 @@ class _Process:
             arrays = {name: self._array(shape, dtype) for name, (shape, dtype) in reply["arrays"].items()}
         except (OSError, EOFError):
             raise _Ended(f"took more than {LIMIT:g} s" if late.is_set() else self._how_it_ended()) from None
-        except BaseException:  # an interrupt, say, after which no reply would match its request
+        except BaseException:  # e.g. KeyboardInterrupt: later replies would not match their requests
             self._popen.kill()
             raise
         finally:
@@ -121,7 +121,7 @@ class _Process:
         return array
 
     def _how_it_ended(self) -> str:
-        self._popen.kill()  # of one that has ended already its own end counts
+        self._popen.kill()  # no effect if it has already ended; the exit code then is its own
         with suppress(OSError):
             self._requests.close()
         self._replies.close()

@@ -1,7 +1,7 @@
-"""`python -m clrt.scene.decoding`: the process that scene.decoder starts.
+"""Decoder process that scene.decoder starts as `python -m clrt.scene.decoding`.
 
-It reads requests, [kind, file] in JSON, a line each. A reply is a line of JSON, {"error": ...} or {"arrays": {name:
-[shape, dtype]}, "facts": ...}, and the bytes of the arrays.
+It reads one request per line, [kind, file] in JSON. A reply is one line of JSON, {"error": ...} or {"arrays": {name:
+[shape, dtype]}, "facts": ...}, followed by the bytes of the arrays.
 """
 
 from __future__ import annotations
@@ -19,20 +19,21 @@ from numpy.typing import NDArray
 
 Found = tuple[dict[str, NDArray[Any]], dict[str, Any]]
 
-#: Bytes of memory that this process may have, and those of the largest picture: 16384 x 8192 in four floats.
+#: Memory limit of this process in bytes, and of the largest image: 16384 x 8192 pixels of four floats.
 MOST_MEMORY = 8 * 2**30
 MOST_BYTES = 2**31
-#: A picture beyond 8192 x 8192 must have a byte in its file for so many of its own: deflate reaches 1032.
+#: An image larger than FREE_BYTES (8192 x 8192) is rejected if it decodes to more than MOST_RATIO times its file's
+#: size; deflate reaches 1032.
 FREE_BYTES = 2**28
 MOST_RATIO = 2000
-#: Seconds without a request after which the process ends.
+#: Idle seconds after which the process exits.
 IDLE = 2.0
 
 
 def picture(file: str) -> Found:
-    """The pixels of a picture, (h, w, c) uint8, uint16 or float32 as they are stored, alpha not multiplied in.
+    """Return an image's pixels, (h, w, c) uint8, uint16 or float32 as stored, with unassociated alpha.
 
-    Facts: the names of its channels, and the size of the picture of which the pixels may be a part.
+    Facts: the channel names, and the size of the full image, of which the pixels may be a crop.
     """
     import OpenImageIO as oiio
 
@@ -54,7 +55,7 @@ def picture(file: str) -> Found:
 
 
 def _complaint(buffer: Any) -> str:
-    """OpenImageIO's message about a file; it quotes raw bytes of damaged headers, which are not always text."""
+    """Return OpenImageIO's error message; it quotes raw bytes of damaged headers, which may not be valid text."""
     try:
         return str(buffer.geterror()).splitlines()[0]
     except (UnicodeDecodeError, IndexError):
@@ -62,7 +63,7 @@ def _complaint(buffer: Any) -> str:
 
 
 def draco(file: str) -> Found:
-    """Of a compressed mesh the faces, (m, 3) uint32, and each attribute, (n, k), as "attribute" with its number."""
+    """Decode a Draco mesh: faces (m, 3) uint32, and each attribute (n, k) as "attribute ID"."""
     import DracoPy
 
     with open(file, "rb") as content:
@@ -76,7 +77,7 @@ KINDS: dict[str, Callable[[str], Found]] = {"picture": picture, "draco": draco}
 
 
 def main() -> None:
-    """Answers requests until there are no more. What the libraries print goes to standard error."""
+    """Answer requests until standard input ends. The libraries' own output is redirected to standard error."""
     with os.fdopen(os.dup(1), "wb") as replies:
         os.dup2(2, 1)
         _limit()
@@ -86,7 +87,7 @@ def main() -> None:
             line = sys.stdin.readline()
             idle.cancel()
             if not line:
-                os._exit(0)  # libraries may crash as they are unloaded
+                os._exit(0)  # skips unloading the libraries, which may crash
             _answer(replies, *json.loads(line))
 
 
@@ -98,7 +99,7 @@ def _answer(replies: Any, kind: str, file: str) -> None:
         reply: dict[str, Any] = {"facts": facts}
     except MemoryError:
         reply = {"error": "it needs too much memory"}
-    except Exception as error:  # libraries raise whatever the damage leads to
+    except Exception as error:  # a damaged file may make the libraries raise anything
         reply = {"error": str(error) or type(error).__name__}
     if sum(array.nbytes for array in arrays.values()) > MOST_BYTES:
         arrays, reply = {}, {"error": f"it holds more than {MOST_BYTES >> 30} GiB"}
@@ -111,7 +112,7 @@ def _answer(replies: Any, kind: str, file: str) -> None:
 
 
 def _limit() -> None:
-    """Bounds memory, where the system can, and leaves no core dumps behind."""
+    """Limit memory, if the system supports it, and disable core dumps."""
     if sys.platform != "win32":
         import resource
 

@@ -1,4 +1,4 @@
-"""Scenes made from others by a change. None is changed in place; what stays the same is shared."""
+"""Modified copies of scenes. Scenes are never changed in place; unchanged parts are shared."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from .model import Instance, Mesh, Scene, Sphere
 
 
 def materials_of(scene: Scene) -> dict[str, Material]:
-    """All materials, each once, by names: those of the scene file first, then what a model file calls its own, then
-    what it is on. Materials of equal values are different ones as long as they are different objects."""
+    """Return all materials by name, each once: the scene file's named ones first, then those named by a model file,
+    then the rest by the name of their object. Equal materials count as different if they are different objects."""
     named = dict(scene.materials)
     known = {id(material) for material in named.values()}
     meshes = [*scene.meshes, *meshes_by_id(scene.instances).values()]
@@ -28,7 +28,7 @@ def materials_of(scene: Scene) -> dict[str, Material]:
 
 
 def with_material(scene: Scene, old: Material, new: Material) -> Scene:
-    """The scene with `new` wherever `old` was, this very object, also among the scene's named ones."""
+    """Return the scene with `new` in place of this very object `old`, also among the scene's named materials."""
     meshes = {id(mesh): replace(mesh, material=new) if mesh.material is old else mesh
               for mesh in (*scene.meshes, *meshes_by_id(scene.instances).values())}
 
@@ -45,8 +45,8 @@ def with_material(scene: Scene, old: Material, new: Material) -> Scene:
 
 
 def free_name(name: str, taken: Container[str], numbers: dict[str, int] | None = None) -> str:
-    """The name, or with the first number behind it under which nothing is `taken`; numbers: those that were tried of
-    each name, where many are asked for."""
+    """Return the name, or the name followed by the first number from 2 that makes it not `taken`. numbers: the last
+    number tried per name; pass the same dict to many calls to save time."""
     number, free = 1, name
     while free in taken:
         number = max(number + 1, 2 if numbers is None else numbers.get(name, 2))

@@ -1,6 +1,6 @@
-"""Check plain values against a dataclass's field types and say in words what is wrong with them.
+"""Validation of plain values against a dataclass's field types, with problems as sentences.
 
-The scene file and scenes built in Python pass through here, so both meet the same limits and the same sentences.
+The scene file and scenes built in Python are both validated here, so the limits and messages are the same.
 """
 
 from __future__ import annotations
@@ -18,19 +18,20 @@ import numpy as np
 from .limits import Ge, Gt, Le, Limit, Lt
 from .textures import Texture
 
-#: Fields whose values are no plain data; whoever holds them checks them.
+#: Fields whose values are not plain data; the code that uses them validates them.
 ELSEWHERE = frozenset({"image", "material", "materials", "mesh", "picture", "to_world"})
 INT64_END = 2**63
 FLOAT32_MAX = float(np.finfo(np.float32).max)
-#: More mistakes than this in one object are counted, not listed.
+#: More problems than this in one object are counted, not listed.
 MOST = 12
 
 
 def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[str]:
-    """What is wrong with `values` as the fields of the dataclass `kind`: one "where.field: value ..." a mistake.
+    """Return what is wrong with `values` as the fields of the dataclass `kind`: each as
+    "where.field: value ...".
 
     Finds missing and unknown fields, wrong types, values outside the limits of the type, and numbers that float32
-    cannot hold (NaN, Inf and beyond). Numbers may be numpy scalars; sequences must be tuples.
+    cannot represent (NaN, Inf and out of range). Numbers may be numpy scalars; sequences must be tuples.
     """
     plain = {name: plain_value(value) for name, value in values.items()}
     hints = _hints(kind)
@@ -49,14 +50,14 @@ def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[st
 
 
 def usable(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
-    """`values` without problems for the fields of `kind`, where numpy can use them all: whole numbers of more than 64
-    bits, for which it has no type, become floats where these will do."""
+    """Return valid `values` for the fields of `kind` in a form that numpy can use: integers of more than 64 bits, for
+    which it has no type, become floats if the field accepts these."""
     hints = _hints(kind)
     return {name: _floats(hints[name], value) for name, value in values.items()}
 
 
 def unknown(name: object, known: Iterable[str]) -> str:
-    """What to say after a name that is not among the `known` ones, with the nearest of them."""
+    """Return the message that a name is not among the `known` ones, with the closest match."""
     import difflib
 
     known = sorted(known)
@@ -67,7 +68,7 @@ def unknown(name: object, known: Iterable[str]) -> str:
 
 
 def show(value: object) -> str:
-    """A value as the scene file would write it, shortened."""
+    """Format a value as in the scene file, shortened."""
     if isinstance(value, str):
         text = f'"{value}"'
     elif isinstance(value, bool):
@@ -77,21 +78,20 @@ def show(value: object) -> str:
     elif isinstance(value, dict):
         text = f"{{ {', '.join(f'{key} = {show(entry)}' for key, entry in value.items())} }}"
     else:
-        # Python writes no decimal numbers of more than 4300 digits.
+        # Python refuses to format integers of more than 4300 decimal digits.
         text = hex(value) if isinstance(value, int) and value.bit_length() > 1024 else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
 
 @lru_cache
 def _hints(kind: type) -> dict[str, Any]:
-    """The types of a dataclass's fields, with their limits."""
+    """Return the types of a dataclass's fields, with their limits."""
     hints = get_type_hints(kind, include_extras=True)
     return {field.name: Any if field.name in ELSEWHERE else hints[field.name] for field in fields(kind)}
 
 
 def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
-    """Where `value` is not what the type asks for: a number, text, words, a tuple, one of these within limits, or None.
-    """
+    """Yield the problems of a `value` of the type `hint`: a number, string, Literal, tuple, limits, texture or None."""
     origin, parts = get_origin(hint), get_args(hint)
     if origin is Annotated:
         yield from _problems(parts[0], value, path) if _fault(parts[0], value) else _outside(parts[1:], value, path)
@@ -121,7 +121,7 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
 
 
 def _floats(hint: Any, value: Any) -> Any:
-    """A value that is what the type asks for, with floats for long whole numbers where these will do."""
+    """Return a valid value with integers of more than 64 bits as floats if the type accepts these."""
     origin, parts = get_origin(hint), get_args(hint)
     if hint is float:
         return value if abs(value) < INT64_END else float(value)
@@ -136,19 +136,19 @@ def _floats(hint: Any, value: Any) -> Any:
 
 
 def _meant(parts: tuple[Any, ...], value: Any) -> Any:
-    """Which of a union's types a value is judged by: the one that it is of, or else the first."""
+    """Return the member of a union that a value is validated against: the one that it is of, else the first."""
     kinds = [(get_origin(part) or part, part) for part in parts]
     return next((part for kind, part in kinds if isinstance(kind, type) and isinstance(value, kind)), parts[0])
 
 
 def _factor(plain: Any, texture: Texture) -> Any:
-    """What a texture's factor is judged by, where a plain value is by `plain`: of colours one number will do."""
+    """Return the type of a texture's factor, given the type of the plain value; a color also accepts one number."""
     one = get_origin(plain) is tuple and not isinstance(texture.factor, tuple)
     return get_args(plain)[0] if one else plain
 
 
 def _outside(limits: Iterable[Limit], value: float, path: str) -> Iterator[str]:
-    """The limits that a number does not keep."""
+    """Yield the limits that a number violates."""
     for limit in limits:
         keeps, is_wrong, remedy = _LIMITS[type(limit)]
         if not keeps(value, limit.bound):
@@ -156,7 +156,7 @@ def _outside(limits: Iterable[Limit], value: float, path: str) -> Iterator[str]:
 
 
 def _fault(kind: Any, value: Any) -> str:
-    """Why a value is none of a plain type, and the remedy; empty where it is one."""
+    """Return why a value is not of a plain type, and the remedy; empty if it is."""
     if isinstance(value, _ACCEPTED[kind]) and isinstance(value, bool) == (kind is bool):
         finite = not isinstance(value, float) or math.isfinite(value)
         return "" if finite else "is not a finite number; write one"
@@ -177,7 +177,7 @@ _LIMITS: dict[type, tuple[Callable[[float, float], bool], str, str]] = {
 
 
 def plain_value(value: Any) -> Any:
-    """Numpy scalars as Python's, through tuples."""
+    """Convert numpy scalars to Python's, also inside tuples."""
     if isinstance(value, tuple):
         return tuple(map(plain_value, value))
     return value.item() if isinstance(value, np.generic) else value

@@ -1,4 +1,4 @@
-"""Read a scene: a TOML scene file, one of Mitsuba's XML, or a bare model under a default camera and sky."""
+"""Scene loading: a TOML scene file, a Mitsuba XML file, or a bare model with a default camera and sky."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from .validate import scene_problems
 
 
 log = logging.getLogger(__name__)
-#: A TOML scene on standard input, which names files from the working folder.
+#: Stands for a TOML scene on standard input; its file names are relative to the working directory.
 STDIN = Path("-")
 
 
 def load(path: str | Path, camera: str | None = None) -> Scene:
-    """The scene in a .toml or Mitsuba's .xml file, or a model file's meshes under a sky and a sun before a camera; that
-    on standard input for "-".
+    """Load a scene from a .toml file, a Mitsuba .xml file, a model file (whose meshes get a sky, a sun and a camera),
+    or from standard input for "-".
 
-    A glTF model's own first camera and lights are used if it has any. camera: the name of one in a model file instead.
-    Raises one SceneError with all mistakes in the file, each as "FILE: object: value is wrong; remedy".
+    A glTF model's first camera and its lights are used if it has any. camera: name of a camera in a model file to use
+    instead. Raises one SceneError with all problems of the file, each as "FILE: object: value is wrong; remedy".
     """
     if not isinstance(path, (str, PathLike)):
         raise SceneError(f"{path!r} is no path of a scene; name a file, such as \"scene.toml\"")
@@ -47,7 +47,7 @@ def load(path: str | Path, camera: str | None = None) -> Scene:
 
 
 def check_scene(path: Path) -> None:
-    """Raise SceneError unless there is a file at `path`, with the name of a scene or a model, or it is STDIN."""
+    """Raise SceneError unless `path` is STDIN or an existing file with the suffix of a scene or a model."""
     if path == STDIN:
         return
     is_model = path.suffix.lower() in SUFFIXES
@@ -57,7 +57,7 @@ def check_scene(path: Path) -> None:
 
 
 def _load_model(path: Path) -> tuple[Scene, list[str]]:
-    """A bare model under the default sky, with its lights or the sun, and its first camera or one that frames it."""
+    """Load a bare model with the default sky, its own lights or the sun, and its first camera or one that frames it."""
     model = read_model(path)
     camera = next(iter(model.cameras.values()), None) or frame(model.meshes, model.instances)
     return Scene(meshes=model.meshes, instances=model.instances, camera=camera, cameras=model.cameras,
@@ -66,11 +66,11 @@ def _load_model(path: Path) -> tuple[Scene, list[str]]:
 
 
 def _load_toml(path: Path) -> tuple[Scene, list[str]]:
-    """The scene, and what is wrong with its file."""
+    """Load a TOML scene, and return it with the problems of its file."""
     try:
         content = sys.stdin.buffer.read() if path == STDIN else path.read_bytes()
         document = tomllib.loads(content.decode())
-    except (ValueError, RecursionError) as error:  # also of text that is no UTF-8, and of numbers of 4300 digits
+    except (ValueError, RecursionError) as error:  # also for invalid UTF-8 and for numbers of 4300 digits
         raise SceneError(f"{path}: is not valid TOML: {error}") from None
     reader = SceneReader(path, document)
     scene = reader.scene()
@@ -78,7 +78,7 @@ def _load_toml(path: Path) -> tuple[Scene, list[str]]:
 
 
 def _load_mitsuba(path: Path) -> tuple[Scene, list[str]]:
-    """The scene, whose models that are near Mitsuba's and not the same are logged."""
+    """Load a Mitsuba scene, logging a warning per model that only approximates Mitsuba's."""
     from .mitsuba_reader import read_mitsuba
     try:
         scene, differences, _ = read_mitsuba(path)

@@ -1,4 +1,4 @@
-"""A camera that shows a whole model."""
+"""A camera that frames a whole model."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 from .instancing import meshes_by_id
 from .model import Camera, Instance, Mesh
 
-#: From the model to the camera: in front (+Z), 28° to the right and 17° above.
+#: Direction from the model to the camera: in front (+Z), 28° to the right and 17° above.
 THREE_QUARTER = (0.53, 0.34, 1.0)
 FOV_DEGREES = 30.0
-#: The part of a square picture's width or height, whichever is the tighter, that the model fills.
+#: Fraction of a square image's width or height, whichever is tighter, that the model fills.
 FILL = 0.92
-#: Rounds of the search for the centre of the looser side; it ends by itself after 3 to 6.
+#: Maximum number of iterations that center the model along the looser axis; it converges after 3 to 6.
 ROUNDS = 20
 
 Doubles = NDArray[np.float64]
 
 
 def frame(meshes: list[Mesh], instances: Sequence[Instance] = ()) -> Camera:
-    """The nearest three-quarter view that keeps every vertex inside a square picture, the model in its middle.
+    """Return the nearest three-quarter view that has every vertex inside a square image, with the model centered.
 
-    Only vertices that a face uses count; of instances the corners of a box around their mesh. The model fills FILL of
-    the picture's width or height, and its left and right margins are equal, as are those above and below.
+    Only vertices that faces use count; instances count by the corners of their mesh's bounding box. The model fills
+    FILL of the image's width or height, and its left and right margins are equal, as are the top and bottom ones.
     """
     back = np.array(THREE_QUARTER) / np.linalg.norm(THREE_QUARTER)
     right = np.cross([0.0, 1.0, 0.0], back) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], back))
@@ -34,7 +34,7 @@ def frame(meshes: list[Mesh], instances: Sequence[Instance] = ()) -> Camera:
     vertices = _extremes(meshes, instances)
     middle = vertices.min(axis=0) / 2 + vertices.max(axis=0) / 2
     x, y, z = axes @ (vertices - middle).T
-    # From (cx, cy, d) a vertex is seen at |x - cx| <= slope (d - z): cx + slope d and slope d - cx have lower bounds,
+    # From (cx, cy, d) a vertex is inside if |x - cx| <= slope (d - z): cx + slope d and slope d - cx have lower bounds,
     # whose sum bounds d alone.
     slope = FILL * math.tan(math.radians(FOV_DEGREES) / 2)
     distance = max(float(np.max(slope * z + s) + np.max(slope * z - s)) for s in (x, y)) / (2 * slope)
@@ -44,13 +44,13 @@ def frame(meshes: list[Mesh], instances: Sequence[Instance] = ()) -> Camera:
 
 
 def bounds(meshes: list[Mesh], instances: Sequence[Instance] = ()) -> tuple[Doubles, Doubles]:
-    """Lowest and highest coordinates, (3,) each, of the vertices that the faces use, or of the boxes of instances."""
+    """Return the bounding box, lowest and highest (3,), of the vertices that faces use and of instances' boxes."""
     vertices = _extremes(meshes, instances)
     return vertices.min(axis=0), vertices.max(axis=0)
 
 
 def _extremes(meshes: list[Mesh], instances: Sequence[Instance]) -> Doubles:
-    """The vertices that faces use, and the corners of boxes where instances put them, (n, 3)."""
+    """Return the vertices that faces use, and the corners of the instances' transformed bounding boxes, (n, 3)."""
     boxes = {}
     for key, mesh in meshes_by_id(instances).items():
         used = _used_vertices([mesh])
@@ -61,7 +61,7 @@ def _extremes(meshes: list[Mesh], instances: Sequence[Instance]) -> Doubles:
 
 
 def _used_vertices(meshes: list[Mesh]) -> Doubles:
-    """The vertices that faces use, (n, 3)."""
+    """Return the vertices that faces use, (n, 3)."""
     rows = []
     for mesh in meshes:
         used = np.zeros(len(mesh.vertices), bool)
@@ -71,10 +71,10 @@ def _used_vertices(meshes: list[Mesh]) -> Doubles:
 
 
 def _center(x: Doubles, z: Doubles, distance: float) -> float:
-    """Where the camera must be along x so that the model's two edges are equally far from the picture's middle.
+    """Return the camera's x for which the model's two edges are equally far from the image center.
 
-    Its half width in the picture is the greatest (x_i - x_j) / (2 distance - z_i - z_j) of all pairs. Each round takes
-    the best pair for the last ratio (Dinkelbach 1967): the ratio grows until the pair stays the same.
+    The model's half width in the image is the maximum of (x_i - x_j) / (2 distance - z_i - z_j) over all pairs. Each
+    iteration takes the best pair for the last ratio (Dinkelbach 1967); the ratio grows until the pair stays the same.
     """
     slope, pair = 0.0, (0, 0)
     for _ in range(ROUNDS):

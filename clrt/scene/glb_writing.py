@@ -1,4 +1,4 @@
-"""Write one mesh as a binary glTF file, all its arrays as they are: what a scene file cannot say of a mesh itself.
+"""Writing of one mesh as a binary glTF file, with all arrays unchanged, since a scene file cannot hold a mesh itself.
 
 Format: Khronos Group, glTF 2.0 specification, 2021.
 """
@@ -20,7 +20,7 @@ _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
 def mesh_glb(mesh: Mesh) -> bytes:
-    """The file's content. The mesh's material is left out."""
+    """Return the content of the .glb file. The mesh's material is not written."""
     views: list[dict[str, Any]] = []
     accessors: list[dict[str, Any]] = []
     binary = b""

@@ -1,6 +1,6 @@
-"""Read glTF 2.0 (.glb, .gltf): every triangle of its scene, its metallic-roughness materials, cameras and lights.
+"""Reader for glTF 2.0 (.glb, .gltf): the scene's triangles, metallic-roughness materials, cameras and lights.
 
-What is left out (skins, lines, ...) is named in one warning in the log.
+Unsupported features (skins, lines, ...) are listed in one logged warning.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ Placed = tuple[gltf.Node, Matrix]
 
 
 def read_gltf(path: Path, normals: Normals = "file") -> Model:
-    """The scene of a glTF file, one Mesh for each primitive of each node, in world coordinates, or an Instance.
+    """Read the scene of a glTF file: per primitive of each node a Mesh in world coordinates, or an Instance.
 
     Raises SceneError naming the file and the accessor, node or mesh that is wrong.
     """
     try:
-        with np.errstate(all="ignore"):  # what is not finite is refused in words
+        with np.errstate(all="ignore"):  # values that are not finite are reported below
             return _read(path, normals)
     except SceneError as error:
         raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
@@ -62,7 +62,7 @@ def _read(path: Path, normals: Normals) -> Model:
 
 
 def _nodes(document: gltf.Document) -> Iterator[Placed]:
-    """Each node of the scene with its matrix to the world. Files without nodes show each mesh as it is."""
+    """Yield each node of the scene with its matrix to the world. Without nodes each mesh gets the identity."""
     if not document.nodes:
         yield from ((gltf.Node(mesh=index), np.eye(4)) for index in range(len(document.meshes)))
         return
@@ -85,7 +85,7 @@ def _nodes(document: gltf.Document) -> Iterator[Placed]:
 
 
 def _local(node: gltf.Node, index: int) -> Matrix:
-    """The node's matrix to its parent."""
+    """Return the node's matrix to its parent."""
     if node.matrix is not None:
         return np.array(node.matrix).reshape(4, 4).T
     if not any(node.rotation):
@@ -94,7 +94,7 @@ def _local(node: gltf.Node, index: int) -> Matrix:
 
 
 def _places(data: GltfData, nodes: list[Placed], normals: Normals) -> Iterator[tuple[Mesh, Matrix]]:
-    """The meshes of all nodes, and where they stand; each mesh is read once, however many nodes show it alike."""
+    """Yield the meshes of all nodes with their matrices; a mesh is read once per set of morph weights."""
     materials = Materials(data)
     read: dict[tuple[int, tuple[float, ...]], list[Mesh]] = {}
     for node, matrix in nodes:
@@ -108,7 +108,7 @@ def _places(data: GltfData, nodes: list[Placed], normals: Normals) -> Iterator[t
 
 def _primitives(data: GltfData, materials: Materials, index: int, weights: Sequence[float],
                 normals: Normals) -> Iterator[Mesh]:
-    """The primitives of a mesh that have triangles, in the mesh's own coordinates, its morph targets with weights."""
+    """Yield a mesh's primitives with triangles, in its own frame, with the weighted morph targets applied."""
     source = gltf.entry(data.document.meshes, index, "mesh", "a node")
     for number, primitive in enumerate(source.primitives):
         name = source.name or f"mesh {index}"
@@ -144,7 +144,7 @@ def _vectors(data: GltfData, accessor: int, user: str) -> NDArray[np.float32]:
 
 def _attribute(data: GltfData, primitive: gltf.Primitive, key: str, kind: str, n: int,
                user: str) -> NDArray[np.float32] | None:
-    """What a primitive with `n` vertices has for each of them, (n, k); values that are not finite are 0."""
+    """Return the values (n, k) of an attribute of `n` vertices; those not finite become 0, except in normals."""
     if key not in primitive.attributes:
         return None
     values = np.ascontiguousarray(data.array(primitive.attributes[key], kind, user), np.float32)
@@ -154,7 +154,7 @@ def _attribute(data: GltfData, primitive: gltf.Primitive, key: str, kind: str, n
 
 
 def _colors(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> NDArray[np.float32] | None:
-    """Vertex colours, linear, with or without opacity."""
+    """Return linear vertex colors, with or without alpha."""
     if "COLOR_0" not in primitive.attributes:
         return None
     accessor = gltf.entry(data.document.accessors, primitive.attributes["COLOR_0"], "accessor", user)
@@ -164,7 +164,7 @@ def _colors(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> NDA
 
 
 def _corners(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> NDArray[np.int64]:
-    """The triangles, (m, 3), of a primitive with `n` vertices (specification 3.7.2.1)."""
+    """Return the triangles (m, 3) of a primitive with `n` vertices (specification 3.7.2.1)."""
     if primitive.indices is None:
         order = np.arange(n)
     else:
@@ -187,7 +187,7 @@ def _corners(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> ND
 
 
 def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
-    """One warning that names what the picture will lack."""
+    """Log one warning that lists what is not rendered."""
     primitives = [primitive for mesh in document.meshes for primitive in mesh.primitives]
     left_out = {
         "skins": any(node.skin is not None for node in document.nodes),

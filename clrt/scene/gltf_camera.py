@@ -1,4 +1,4 @@
-"""The cameras of a glTF file, by name."""
+"""Cameras of a glTF file, by name."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ log = logging.getLogger(__name__)
 
 def read_cameras(path: Path, document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix]],
                  middle: NDArray[np.float64]) -> dict[str, Camera]:
-    """The cameras in the scene, each under the name of its node, else its own, else "camera N".
+    """Return the cameras of the scene by name: that of the node, else the camera's own, else "camera N".
 
-    A name that is taken gets a number. Each looks at the depth of `middle`, (3,). One that shows nothing is left out
-    with a warning.
+    A number is appended to a name in use. The look_at point is as far away as `middle`, (3,). A camera without a view
+    angle or height is left out with a warning.
     """
     cameras: dict[str, Camera] = {}
     for node, matrix in nodes:
@@ -40,7 +40,7 @@ def read_cameras(path: Path, document: gltf.Document, nodes: Iterable[tuple[gltf
 
 
 def _placed(source: gltf.Camera, matrix: Matrix, middle: NDArray[np.float64]) -> Camera | None:
-    """A camera that looks along its node's −Z with +Y up (specification 3.10); None in a node without extent."""
+    """Return a camera along its node's −Z with +Y up (specification 3.10); None if the node is degenerate."""
     position = matrix[:3, 3]
     forward, up = unit(-matrix[:3, 2]), unit(matrix[:3, 1])
     if not np.cross(forward, up).any():

@@ -1,4 +1,4 @@
-"""A glTF file's bytes: its container (.gltf or .glb), its buffers, and the arrays that accessors describe in them."""
+"""Binary data of a glTF file: its container (.gltf or .glb), its buffers, and the arrays that accessors describe."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .paths import note_read
 
 COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-#: An accessor without a buffer view is all zeros; a larger one than this is taken for damage.
+#: An accessor without a buffer view is all zeros; one larger than this is rejected as malformed.
 MOST_ZEROS = 2**24
 
 Array = NDArray[Any]
@@ -26,19 +26,19 @@ Bytes = NDArray[np.uint8]
 
 
 class GltfData:
-    """The document and the bytes of one file. Every method raises SceneError for what lies out of bounds."""
+    """Document and bytes of one file. Every method raises SceneError for data that lies out of bounds."""
 
     def __init__(self, path: Path) -> None:
         content = path.read_bytes()
         text, self._chunk = split_glb(content) if content.startswith(b"glTF") else (content, None)
         self.document: Document = parse_document(text)
         self.path = path
-        #: The values of accessors that were compressed, (count, components); see scene.gltf_draco.
+        #: Decompressed values of accessors, (count, components), by index; see scene.gltf_draco.
         self.decoded: dict[int, Array] = {}
         self._buffers: dict[int, Bytes] = {}
 
     def resource(self, uri: str, user: str) -> bytes:
-        """What a URI names: data inside it, or a file beside the model."""
+        """Return the content of a URI: data embedded in it, or a file relative to the model."""
         if uri.startswith("data:"):
             try:
                 return base64.b64decode(uri.partition(",")[2], validate=True)
@@ -53,7 +53,7 @@ class GltfData:
             raise SceneError(f'{user}: cannot read the file "{unquote(uri)[:200]}"; put it beside the model') from None
 
     def view(self, index: int, user: str) -> Bytes:
-        """The bytes of a buffer view."""
+        """Return the bytes of a buffer view."""
         view = entry(self.document.bufferViews, index, "bufferView", user)
         data = self._buffer(view.buffer, f"bufferView {index}")
         end = view.byteOffset + view.byteLength
@@ -63,8 +63,8 @@ class GltfData:
         return data[view.byteOffset:end]
 
     def array(self, index: int, kind: str, user: str) -> Array:
-        """The values of an accessor of the type `kind`: (count, components), float32 where they are floats or
-        normalised integers, the file's integers elsewhere."""
+        """Return the values of an accessor of the type `kind`, (count, components): float32 if they are floats or
+        normalised integers, otherwise the file's integers."""
         accessor = entry(self.document.accessors, index, "accessor", user)
         if accessor.type != kind:
             raise SceneError(f"{user}: accessor {index} is {accessor.type}, not {kind}; export the file again")
@@ -88,7 +88,7 @@ class GltfData:
 
     def _strided(self, view: int, offset: int, component: int, shape: tuple[int, int], stride: int | None,
                  user: str) -> Array:
-        """(count, components) values from a buffer view, each element `stride` bytes after the last."""
+        """Return (count, components) values from a buffer view, each element `stride` bytes after the last."""
         data = self.view(view, user)
         dtype = np.dtype(DTYPES[component])
         step = stride or shape[1] * dtype.itemsize
@@ -100,7 +100,7 @@ class GltfData:
 
     def _replaced(self, values: Array, sparse: Sparse, accessor: Accessor, user: str,
                   ) -> Array:
-        """A copy of `values` with the elements that `sparse` replaces."""
+        """Return a copy of `values` with the elements that `sparse` replaces."""
         where, new = sparse.indices, sparse.values
         indices = self._strided(where.bufferView, where.byteOffset, where.componentType, (sparse.count, 1), None,
                                 f"{user} (sparse indices)")[:, 0].astype(np.int64)
@@ -129,7 +129,7 @@ class GltfData:
 
 
 def split_glb(content: bytes) -> tuple[bytes, bytes | None]:
-    """The JSON text and the binary chunk, if there is one, of a .glb file."""
+    """Split a .glb file into the JSON text and the binary chunk, if there is one."""
     chunks: dict[bytes, bytes] = {}
     version, length = struct.unpack_from("<II", content, 4) if len(content) >= 12 else (2, 12)
     if version != 2:
@@ -149,7 +149,7 @@ def split_glb(content: bytes) -> tuple[bytes, bytes | None]:
 
 
 def _normalised(values: Array) -> Array:
-    """Integers as floats: unsigned 0 … 1, signed −1 … 1 (specification 3.6.2.2)."""
+    """Convert integers to floats: unsigned 0 … 1, signed −1 … 1 (specification 3.6.2.2)."""
     if not np.issubdtype(values.dtype, np.integer):
         return values
     largest = np.iinfo(values.dtype).max

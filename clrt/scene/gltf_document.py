@@ -1,6 +1,6 @@
-"""The parts of a glTF 2.0 document that are read, by the names of the specification (Khronos 2021, section 5).
+"""Schema of the parts of a glTF 2.0 document that are read, with the specification's names (Khronos 2021, section 5).
 
-Imported only when a glTF file is read, since it needs pydantic. Unknown properties are passed over.
+Imported only when a glTF file is read, since it needs pydantic. Unknown properties are ignored.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Count = Annotated[int, Field(ge=1)]
 NonNegative = Annotated[float, Field(ge=0)]
 ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
-#: Extensions that this reader follows.
+#: Supported extensions.
 EXTENSIONS = frozenset(f"KHR_materials_{name}" for name in (
     "clearcoat", "emissive_strength", "ior", "sheen", "specular", "transmission", "volume")) | frozenset({
         "EXT_mesh_gpu_instancing", "EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual",
@@ -161,7 +161,7 @@ class Scene(Part):
 
 
 class Document(Part):
-    """A whole document."""
+    """A whole glTF document."""
 
     asset: Asset
     extensionsRequired: list[str] = []
@@ -182,8 +182,8 @@ class Document(Part):
 
 
 def parse_document(text: bytes) -> Document:
-    """The document in a JSON text. Raises SceneError with every property that the specification does not allow, for
-    a version other than 2, and for a required extension that is not in EXTENSIONS."""
+    """Parse a JSON text. Raises SceneError with every property that the specification does not allow, for a version
+    other than 2, and for a required extension that is not in EXTENSIONS."""
     try:
         document = Document.model_validate_json(text)
     except ValidationError as error:
@@ -199,14 +199,14 @@ def parse_document(text: bytes) -> Document:
 
 
 def entry(items: Sequence[Item], index: int, name: str, user: str) -> Item:
-    """items[index]; raises SceneError if the document has no such entry. `name`: one of the items, as "accessor"."""
+    """Return items[index]; raises SceneError if it does not exist. `name`: the kind of item, such as "accessor"."""
     if index >= len(items):
         raise SceneError(f"{user} uses {name} {index}, but the file has {len(items)}; export the file again")
     return items[index]
 
 
 def material_names(document: Document) -> list[str]:
-    """What each material is called; no two alike."""
+    """Return a unique name for each material."""
     names: dict[str, None] = {}
     for index, source in enumerate(document.materials):
         names[free_name(source.name or f"material {index}", names)] = None
@@ -214,6 +214,6 @@ def material_names(document: Document) -> list[str]:
 
 
 def _path(location: tuple[int | str, ...]) -> str:
-    """A place in the document, such as accessors[3].count."""
+    """Format a location in the document, such as accessors[3].count."""
     words = [f"[{part}]" if isinstance(part, int) else f".{part}" for part in location]
     return "".join(words).removeprefix(".") or "the document"

@@ -1,4 +1,4 @@
-"""Primitives compressed with Draco (KHR_draco_mesh_compression), through DracoPy where it is installed."""
+"""Primitives compressed with Draco (KHR_draco_mesh_compression), decoded by DracoPy if it is installed."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from .gltf_data import GltfData
 
 
 def decompress(data: GltfData, primitive: gltf.Primitive, user: str) -> None:
-    """Lets the primitive's accessors, if it is compressed, hold what its compressed data say.
+    """Decode a compressed primitive and store the values of its accessors in `data.decoded`.
 
-    Raises SceneError for damaged data, and where there is neither a decoder nor an uncompressed copy.
+    Raises SceneError for damaged data, and if there is neither a decoder nor an uncompressed copy.
     """
     compressed = primitive.extensions.KHR_draco_mesh_compression
     if compressed is None:

@@ -1,4 +1,4 @@
-"""Which glTF materials are solids that light passes through: those with a volume and nothing but its surface."""
+"""glTF materials that become a solid Dielectric: transmissive, not metallic, with a volume."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from .gltf_looks import MaterialExtensions
 from .materials import Dielectric, MetallicRoughness
 from .textures import Picture, Texture, Wrap
 
-#: Texels that JPEG made of black are up to about this.
+#: JPEG artifacts raise black texels up to about this value.
 NOISE = 0.05
 
 
 def glass(extensions: MaterialExtensions, made: MetallicRoughness, uv: list[NDArray[np.float32] | None],
           faces: NDArray[np.int32]) -> Dielectric | None:
-    """The material as a solid, where it has a volume and is a metal nowhere on these faces, (m, 3), with the two sets
-    of texture coordinates `uv`, (n, 2). One picture often holds the metals of several materials, each in its place."""
+    """Return the material as a solid, or None unless it has a volume, transmits fully and is not metallic anywhere on
+    these faces, (m, 3); `uv`: the two sets of texture coordinates, (n, 2). Only the faces' texels count, since a
+    texture is often an atlas of several materials."""
     volume = extensions.KHR_materials_volume
     if volume.thicknessFactor <= 0 or made.transmission != 1 or _largest(made.metallic, uv, faces) > NOISE:
         return None
@@ -28,7 +29,7 @@ def glass(extensions: MaterialExtensions, made: MetallicRoughness, uv: list[NDAr
 
 
 def _largest(value: float | Texture, uv: list[NDArray[np.float32] | None], faces: NDArray[np.int32]) -> float:
-    """Of a parameter in the middles of the faces."""
+    """Return the largest value of a parameter at the faces' centroids."""
     if not isinstance(value, Texture):
         return value
     coordinates = uv[value.uv_set]
@@ -43,7 +44,7 @@ def _largest(value: float | Texture, uv: list[NDArray[np.float32] | None], faces
 
 
 def _rows(at: NDArray[np.float64], wrap: Wrap, picture: Picture, axis: int) -> NDArray[np.int64]:
-    """The rows, or columns with axis 1, of the texels at these coordinates."""
+    """Return the row indices, or column indices for axis 1, of the texels at these coordinates."""
     size = picture.texels.shape[axis]
     if wrap == "clamp":
         inside = np.clip(at, 0, 1)

@@ -1,4 +1,4 @@
-"""Nodes of a glTF file that show a mesh more than once: those that share it, and EXT_mesh_gpu_instancing."""
+"""glTF nodes that instance a mesh: nodes that share it, and EXT_mesh_gpu_instancing."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from .instancing import baked, worth_it
 from .model import Instance, Mesh
 from .transform import Matrix, transform_faults
 
-#: More of one node are taken for damage.
+#: Maximum number of instances per node; more are taken for a damaged file.
 MOST = 2**20
 Doubles = NDArray[np.float64]
 
 
 def matrices(data: GltfData, node: gltf.Node, matrix: Matrix) -> list[Matrix]:
-    """Where a node shows its mesh: `matrix`, its own, or that times each of its instances'.
+    """Return the matrices at which a node shows its mesh: `matrix`, its own, or that times each of its instances'.
 
-    Raises SceneError for accessors of other types or lengths, and for what is not finite.
+    Raises SceneError for accessors of other types or lengths, and for values that are not finite.
     """
     own = node.extensions.EXT_mesh_gpu_instancing
     if own is None:
@@ -47,7 +47,7 @@ def matrices(data: GltfData, node: gltf.Node, matrix: Matrix) -> list[Matrix]:
 
 
 def turns(quaternions: Doubles) -> Doubles:
-    """(k, 3, 3) rotations of quaternions (k, 4), x, y, z, w; NaN for those of length zero."""
+    """Convert quaternions (k, 4), x, y, z, w, to rotations (k, 3, 3); NaN for quaternions of length zero."""
     with np.errstate(invalid="ignore", divide="ignore"):
         unit = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
     v, w, axes = unit[:, None, :3], unit[:, None, 3:], np.eye(3)[None]
@@ -56,9 +56,9 @@ def turns(quaternions: Doubles) -> Doubles:
 
 
 def shown(places: Iterable[tuple[Mesh, Matrix]]) -> tuple[list[Mesh], list[Instance]]:
-    """The same meshes and matrices as meshes in the world, and as instances where that saves memory.
+    """Split placed meshes into meshes in world coordinates, and instances where these save memory.
 
-    A matrix may flatten, by which exporters hide things.
+    A singular matrix is accepted, as exporters use it to hide objects; its mesh is not instanced.
     """
     every = [Instance(mesh, matrix[:3], name=mesh.name) for mesh, matrix in places]
     to_world = np.array([each.to_world for each in every]).reshape(-1, 3, 4)

@@ -1,6 +1,6 @@
-"""The lights of a glTF file (Khronos, KHR_lights_punctual).
+"""Lights of a glTF file (Khronos, KHR_lights_punctual).
 
-Its photometric units are taken for ours one to one, as its renderers do: candela for W/sr, lux for W/m².
+Photometric units are taken as radiometric ones, as glTF renderers do: candela for W/sr, lux for W/m².
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from . import gltf_document as gltf
 from .lights import DirectionalLight, Light, PointLight, SpotLight
 from .transform import Matrix, unit
 
-#: Of its outer cone's angle the most that a spot's inner one has: files have both alike, against the specification.
+#: A spot's inner cone angle is limited to this fraction of the outer; files have equal ones, against the specification.
 WIDEST_INNER = 0.9999
 
 
 def read_lights(document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix]]) -> Iterator[Light]:
-    """Those of the nodes, in the world: where a node is, and along its −Z; its scale does not matter."""
+    """Yield the nodes' lights in world space: at the node's position, along its −Z, independent of its scale."""
     sources = document.extensions.KHR_lights_punctual.lights
     for node, matrix in nodes:
         if (used := node.extensions.KHR_lights_punctual) is None:
@@ -30,7 +30,7 @@ def read_lights(document: gltf.Document, nodes: Iterable[tuple[gltf.Node, Matrix
         if source.type == "point":
             yield PointLight(position=(x, y, z), intensity=(red, green, blue), range=reach)
         elif not (to_x or to_y or to_z):
-            continue    # squeezed to nothing, it shines nowhere
+            continue    # scale 0 leaves no direction
         elif source.type == "directional":
             yield DirectionalLight(direction=(to_x, to_y, to_z), irradiance=(red, green, blue))
         else:

@@ -1,4 +1,4 @@
-"""The parts of a glTF 2.0 document that say how surfaces look, by the names of the specification (section 5)."""
+"""Material schema of glTF 2.0, with the specification's names (section 5)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Vec4 = tuple[float, float, float, float]
 
 
 class Part(BaseModel):
-    """Any object of the document: numbers are finite."""
+    """Base class of the document's objects; numbers must be finite."""
 
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 

@@ -1,4 +1,4 @@
-"""A glTF primitive's material: metallic and rough, with its textures where the primitive has coordinates for them."""
+"""Material of a glTF primitive: metallic-roughness, textured if the primitive has texture coordinates."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ log = logging.getLogger(__name__)
 
 WRAPS: dict[int, Wrap] = {10497: "repeat", 33648: "mirror", 33071: "clamp"}
 NEAREST = 9728
-#: Of the dielectric part; glTF's 0 stands for infinity.
+#: Upper limit of the ior; glTF's 0 stands for infinity.
 MOST_IOR = 4.0
-#: Opacity 1 would ignore the alpha of vertex colours.
+#: With an opacity of 1 the alpha of vertex colors would be ignored.
 BELOW_ONE = 1 - 2.0**-24
-#: A base colour texture that cannot be read counts by this.
+#: Value of a base color texture that cannot be read.
 GREY = 0.8
 
 
 class Materials:
-    """The materials of one file; reads each picture once."""
+    """Materials of one file; each image is read once."""
 
     def __init__(self, data: GltfData) -> None:
         self._data = data
@@ -41,11 +41,11 @@ class Materials:
 
     def material(self, primitive: gltf.Primitive, user: str, uv: list[NDArray[np.float32] | None],
                  faces: NDArray[np.int32]) -> Material:
-        """The primitive's material with all values cut to their limits; the specification's default if it has none.
-        uv, faces: its texture coordinates, both sets, and triangles.
+        """Return the primitive's material with all values clamped to their limits, or the specification's default if it
+        has none. uv, faces: its texture coordinates, both sets, and triangles.
 
-        A texture for which the primitive has no coordinates counts as white, as does one that cannot be read, but for
-        base colours, grey then, and emission, black.
+        A texture is replaced by white if the primitive has no coordinates for it or if it cannot be read; a base color
+        texture by grey, an emission texture by black.
         """
         if primitive.material is None:
             return MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=1.0)
@@ -70,12 +70,12 @@ class Materials:
         opacity = most if opacity == 1 else opacity
         if source.alphaMode == "BLEND":
             return replace(made, opacity=opacity)
-        if source.alphaCutoff > 1:    # nothing reaches it (specification 3.9.4)
+        if source.alphaCutoff > 1:    # no alpha reaches it (specification 3.9.4)
             return replace(made, opacity=0.0)
         return replace(made, opacity=opacity, alpha_cutoff=most * _unit(source.alphaCutoff))
 
     def _layers(self, extensions: looks.MaterialExtensions, primitive: gltf.Primitive, user: str) -> dict[str, Any]:
-        """The fields for the extensions in use."""
+        """Return the fields for the extensions in use."""
         coat, sheen = extensions.KHR_materials_clearcoat, extensions.KHR_materials_sheen
         specular, transmission = extensions.KHR_materials_specular, extensions.KHR_materials_transmission
 
@@ -109,7 +109,7 @@ class Materials:
         return _colored((red, green, blue), glow, source.emissiveTexture, 0.0)
 
     def _texture(self, info: looks.TextureInfo | None, primitive: gltf.Primitive, user: str) -> Texture | None:
-        """None without one, without coordinates, or where its picture cannot be read."""
+        """Return a texture; None if there is none, if its coordinates are missing, or if its image cannot be read."""
         if info is None:
             return None
         texture = gltf.entry(self._data.document.textures, info.index, "texture", user)
@@ -132,7 +132,7 @@ class Materials:
                        filter="nearest" if sampler.magFilter == NEAREST else "linear")
 
     def _picture(self, index: int, user: str) -> Picture | None:
-        """An image; None, with a warning, if it cannot be read."""
+        """Return an image; None, with a warning, if it cannot be read."""
         if index not in self._pictures:
             image = gltf.entry(self._data.document.images, index, "image", user)
             try:
@@ -147,7 +147,7 @@ class Materials:
 
 def _colored(factor: tuple[float, float, float], texture: Texture | None, info: looks.TextureInfo | None,
              missing: float) -> tuple[float, float, float] | Texture:
-    """A colour, times its texture; times `missing` where there should be one."""
+    """Return a color times its texture, or times `missing` if the texture is unavailable."""
     if texture is not None:
         return replace(texture, factor=factor)
     red, green, blue = (value * (1.0 if info is None else missing) for value in factor)

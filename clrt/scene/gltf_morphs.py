@@ -1,4 +1,4 @@
-"""Morph targets of a glTF primitive at the weights that the file gives them (specification 3.7.2.2)."""
+"""Morph targets of a glTF primitive, applied with the file's static weights (specification 3.7.2.2)."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ Floats = NDArray[np.float32]
 
 
 def weights_of(node: gltf.Node, mesh: gltf.Mesh) -> tuple[float, ...]:
-    """The node's weights, else the mesh's; none where all targets rest."""
+    """Return the node's weights, else the mesh's; empty if all are zero."""
     weights = node.weights or mesh.weights
     return tuple(weights) if any(weights) else ()
 
 
 def morphed(data: GltfData, primitive: gltf.Primitive, key: str, values: Floats, weights: Sequence[float],
             user: str) -> Floats:
-    """An attribute's values (n, k), plus the displacements of its first three components times `weights`.
+    """Return an attribute's values (n, k) with the targets' weighted displacements added to the first three components.
 
-    Raises SceneError for weights of another number than the targets, and displacements of another number than values.
+    Raises SceneError if the numbers of weights and targets, or of displacements and values, differ.
     """
     if not weights:
         return values

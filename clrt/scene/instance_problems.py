@@ -1,4 +1,4 @@
-"""What is wrong with the matrices of instances."""
+"""Validation of instances' matrices."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .transform import transform_faults
 
 
 def matrix_problems(placed: list[tuple[int, Instance]]) -> list[str]:
-    """Of instances, with their numbers, whose meshes and shapes are right; of many with the same fault the first."""
+    """Return problems of numbered instances with valid meshes and shapes; each fault is reported for its first one."""
     to_world = np.array([instance.to_world for _, instance in placed]).reshape(-1, 3, 4)
     meshes = meshes_by_id(instance for _, instance in placed)
     extents = {key: np.abs(mesh.vertices).max(axis=0).astype(np.float64) for key, mesh in meshes.items()}

@@ -1,4 +1,4 @@
-"""The [[instance]] tables of the scene file, which show again what [[mesh]] tables show."""
+"""The [[instance]] tables of the scene file, which repeat what [[mesh]] tables show."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from .placing import Placing
 from .transform import Matrix, transform_camera, transform_faults, transform_light, transform_mesh
 
 
-#: That one table may make.
+#: Maximum number of instances per table.
 MOST_INSTANCES = 2_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
 class Repeat(Placing):
-    """The keys of an entry of `repeat`: so many copies, each placed from the one before it."""
+    """Keys of an entry of `repeat`: `count` copies, each placed relative to the one before it."""
 
     count: Annotated[int, Ge(1), Le(MOST_INSTANCES)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class InstanceTable(Placing):
-    """The keys of [[instance]]; the entries of its `repeat` are read apart."""
+    """Keys of [[instance]]; the entries of its `repeat` are read separately."""
 
     mesh: str
     name: str | None = None
@@ -41,30 +41,30 @@ class InstanceTable(Placing):
 
 
 class InstanceReader:
-    """Knows what mesh tables show, by their names."""
+    """Instances by the names of the mesh tables that they refer to."""
 
     def __init__(self) -> None:
         self._shown: dict[str, list[list[Instance]]] = {}
 
     def add(self, name: str | None, shown: Model) -> None:
-        """A mesh table of this name, or of none, shows the model; an empty one if the table is wrong."""
+        """Register what a mesh table of this name, or of none, shows; an empty model if the table is invalid."""
         own = [Instance(mesh, name=mesh.name) for mesh in shown.meshes]
         if name is not None:
             self._shown.setdefault(name, []).append(own + shown.instances)
 
     def problems(self, mesh: object, where: str) -> list[str]:
-        """Whether there is not one table of the name `mesh`."""
+        """Return a problem unless exactly one table has the name `mesh`."""
         tables = self._shown.get(str(mesh), [])
         wrong = f"names {len(tables)} meshes; rename them" if tables else unknown(mesh, self._shown)
         return [] if len(tables) == 1 else [f"{where}.mesh: {show(mesh)} {wrong}"]
 
     def materials(self, table: InstanceTable) -> list[Material | None]:
-        """Those of what the table's mesh shows, without the table's own."""
+        """Return the materials of what the table's mesh shows, without the table's own."""
         return [each.material for each in self._shown.get(str(table.mesh), [[]])[0]]
 
     def read(self, table: InstanceTable, repeats: Sequence[Repeat], material: Material | None, where: str,
              ) -> list[Instance]:
-        """One for each mesh that the table's mesh shows, and their copies. SceneError for transforms that cannot be."""
+        """Return the instances of what the mesh shows, and their copies; raises SceneError for invalid transforms."""
         if (count := prod(repeat.count for repeat in repeats)) > MOST_INSTANCES:
             raise SceneError(f"{where}.repeat: makes {count} copies; write counts of at most {MOST_INSTANCES} in all")
         matrices = table.to_world(where)[None]
@@ -80,16 +80,16 @@ class InstanceReader:
 
 
 def repeated(matrices: NDArray[np.float64], step: Matrix, count: int) -> NDArray[np.float64]:
-    """(n, 4, 4) and count − 1 copies of them, each under one `step` more than those before it: (count·n, 4, 4)."""
+    """Return the matrices (n, 4, 4) and count − 1 copies of them, each `step` after the last: (count·n, 4, 4)."""
     copies = [matrices]
-    with np.errstate(all="ignore"):    # what grows beyond all numbers is found by the caller
+    with np.errstate(all="ignore"):    # the caller reports overflow
         for _ in range(count - 1):
             copies.append(step @ copies[-1])
     return np.concatenate(copies)
 
 
 def placed(model: Model, matrix: Matrix, material: Material | None, others: dict[str, Material]) -> Model:
-    """A model under an affine matrix: in the material, if there is one, or in `others` by its own's name."""
+    """Apply an affine matrix to a model. material: replaces its own; others: replacements by their own names."""
     meshes = [transform_mesh(replace(mesh, material=others.get(mesh.material_name, material or mesh.material)), matrix)
               for mesh in model.meshes]
     instances = [replace(moved(each, matrix), material=others.get(each.mesh.material_name, material or each.material))
@@ -100,5 +100,5 @@ def placed(model: Model, matrix: Matrix, material: Material | None, others: dict
 
 
 def moved(instance: Instance, matrix: Matrix) -> Instance:
-    """The instance under a further affine matrix."""
+    """Return the instance transformed by a further affine matrix."""
     return replace(instance, to_world=(matrix @ np.vstack([instance.to_world, [0.0, 0.0, 0.0, 1.0]]))[:3])

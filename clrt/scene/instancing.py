@@ -1,4 +1,4 @@
-"""Which instances are worth it: those that save memory. All others become meshes, since rays pass one tree faster."""
+"""Choice of the instances that save memory; the others become meshes, since a single BVH is traversed faster."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .model import Instance, Mesh, Scene
 from .transform import transform_mesh
 
 Stored = tuple[int, int | None]
-#: Up to so many triangles that would otherwise not be stored, all instances become meshes.
+#: If instancing saves at most this many triangles, all instances become meshes.
 FEW_TRIANGLES = 1 << 16
 
 
 class Arranged(NamedTuple):
-    """A scene, and which objects of the one it was made from its meshes and its instances are.
+    """A scene, and for each of its meshes and instances the number of its object in the original scene.
 
     Objects are numbered: first the meshes, then the instances, then the spheres.
     """
@@ -31,10 +31,10 @@ class Arranged(NamedTuple):
 
 
 def arranged(scene: Scene) -> Arranged:
-    """The same scene with instances only where they save memory; what else they show is among its meshes.
+    """Return the same scene with instances only if they save memory; the others become meshes.
 
-    A mesh that is drawn itself, too, becomes one more instance of it. Lamps become meshes, so that lights need not know
-    of instances.
+    A mesh that the scene also contains directly becomes one more instance. Emissive instances become meshes, so that
+    light sampling need not handle instances.
     """
     shown = meshes_by_id(scene.instances)
     itself = [i for i, mesh in enumerate(scene.meshes) if id(mesh) in shown]
@@ -50,7 +50,7 @@ def arranged(scene: Scene) -> Arranged:
 
 
 def worth_it(instances: list[Instance]) -> list[bool]:
-    """Which of the instances save memory; the others had better be meshes."""
+    """Return which instances save memory; the others should become meshes."""
     glows = [any(_material(each).radiance) for each in instances]
     copies = Counter(_stored(each) for each, glow in zip(instances, glows) if not glow)
     sizes = {_stored(each): len(each.mesh.faces) for each in instances}
@@ -59,35 +59,35 @@ def worth_it(instances: list[Instance]) -> list[bool]:
 
 
 def baked(instance: Instance) -> Mesh:
-    """The mesh that an instance shows, in the world."""
+    """Return an instance's mesh in world coordinates."""
     mesh = replace(painted(instance), name=instance.name)
     return transform_mesh(mesh, np.vstack([instance.to_world, [0.0, 0.0, 0.0, 1.0]]))
 
 
 def painted(instance: Instance) -> Mesh:
-    """The mesh that an instance shows, in its own frame, in the instance's material."""
+    """Return an instance's mesh in its own frame, with the instance's material."""
     return replace(instance.mesh, material=_material(instance))
 
 
 def meshes_by_id(instances: Iterable[Instance]) -> dict[int, Mesh]:
-    """The meshes that instances show, each once."""
+    """Return the distinct meshes of instances by `id`."""
     return {id(each.mesh): each.mesh for each in instances}
 
 
 def unfolded(scene: Scene) -> Scene:
-    """The same scene with a mesh for each instance."""
+    """Return the same scene with a mesh for each instance."""
     return replace(scene, instances=[], meshes=scene.meshes + [baked(each) for each in scene.instances])
 
 
 def prototypes(instances: list[Instance]) -> tuple[list[Mesh], NDArray[np.int32]]:
-    """What instances show, each mesh once and in the material of its first one; and which of them each shows, (k,)."""
+    """Return the distinct meshes of instances, with the material of the first use, and each instance's index (k,)."""
     first: dict[Stored, tuple[int, Instance]] = {}
     which = [first.setdefault(_stored(each), (len(first), each))[0] for each in instances]
     return [painted(each) for _, each in first.values()], np.array(which, np.int32)
 
 
 def _stored(instance: Instance) -> Stored:
-    """What instances must share to be stored once: the mesh, and tangents for a normal map."""
+    """Return the key of instances that can share storage: the mesh, and the uv set of its normal map's tangents."""
     bumps = _material(instance).bent_by
     return id(instance.mesh), None if bumps is None else bumps.uv_set
 

@@ -1,11 +1,11 @@
-"""What a film and fibres take from the gloss below them beyond their own share, as a table that a kernel looks up.
+"""Excess energy that clearcoat (film) and sheen (fibres) take from the specular lobe (gloss) below, as a table.
 
-Of light from an angle of cosine c a layer leaves T(c) to what lies below. Gloss is weighed by min(T(wo), T(wi)), which
-is reciprocal, and right where it is smooth. Of rough gloss it takes more than the layers reflect, which
-kernels/bsdf/layers.cl gives back:
+A layer transmits the fraction T(c) of light at a cosine c to what lies below. The gloss is scaled by min(T(wo), T(wi)),
+which is reciprocal, and exact if it is smooth. For rough gloss this removes more than the layers reflect;
+kernels/bsdf/layers.cl adds the difference back:
   taken(co) = ∫ gloss(wo, wi)·(T(co) − T(ci)) dwi  over the wi nearer the horizon, ci < co
 With T = (1 − film·E_film)·(1 − fibres·E_fibres) this is a sum over film, fibres and their product, each times the
-integral with its albedo E, for which T falls where E grows. The film takes from the fibres' light in the same way.
+integral with its albedo E; T decreases where E increases. The film takes from the fibres' reflection in the same way.
 """
 
 from __future__ import annotations
@@ -25,39 +25,39 @@ Roughnesses = tuple[float, ...]
 
 
 class Table(tuple[float, ...]):
-    """Entries of ENTRY numbers each, kept once for all materials whose table is equal: a material has the first one's
-    number."""
+    """Entries of ENTRY numbers each, stored once for all materials with an equal table; these hold the index of
+    its first entry."""
 
 
-#: Steps of a table's angles, even in √cos.
+#: Intervals of the angle axis, uniform in √cos.
 STEPS = 96
-#: Of an entry: what a film, fibres, and their product take, of f0 and of f90 each; what the film takes from fibres; and
-#: what fibres reflect, over the smaller of their unbounded albedo and 1.
+#: Numbers per entry: what film, fibres, and their product take from f0 and from f90 each; what the film takes from
+#: fibres; and the reflectance of fibres over the smaller of their unbounded albedo and 1.
 ENTRY = 8
-#: Rows for a roughness from a texture, even in its square root.
+#: Rows for a roughness from a texture, uniform in its square root.
 ROWS = 12
 GRID: Roughnesses = tuple((np.linspace(0, 1, ROWS)**2).tolist())
-#: Smoother fibres would shine at the horizon alone (kernels/bsdf/sheen.cl).
+#: Lower limit of fibres' roughness; smoother ones would reflect only at the horizon (kernels/bsdf/sheen.cl).
 SMOOTHEST = 0.1
-#: √cos where albedos are known, linear in between.
+#: √cos at which albedos are tabulated, linear in between.
 ROOTS = np.linspace(0, 1, 193)
-NEAREST = 1e-3    # the least √cos of an integral
+NEAREST = 1e-3    # lower limit of √cos in integrals
 LATTICE = (2584, 1597)
 
 
 def rows(roughness: float | Texture) -> Roughnesses:
-    """The number itself, or GRID."""
+    """Return the roughness itself, or GRID for a texture."""
     return GRID if isinstance(roughness, Texture) else (float(roughness),)
 
 
 @lru_cache(128)
 def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses,
            smith: str = "height_correlated") -> Table:
-    """For each roughness of the base, of the film (none: (0,)), and of the fibres (none: (1,)) entries of means over
-    the hemisphere, weighted by the cosine, and those of STEPS + 1 angles. smith: the gloss's form of masking.
+    """Build the table: for each roughness of the base, of the film (none: (0,)), and of the fibres (none: (1,)) entries
+    of cosine-weighted means over the hemisphere, then those of STEPS + 1 angles. smith: the masking term of the gloss.
 
-    The first entry is the mean one. The next two are the means of the albedo of the film, of fibres, and of their
-    product, each times 1, by_f0, by_f90 and lost of a bounce at the base (kernels/bsdf/ggx_albedo.cl).
+    The first entry is the mean of the others. The next two hold the means of the albedos of film, fibres, and their
+    product, each times 1, by_f0, by_f90 and lost of single scattering at the base (kernels/bsdf/ggx_albedo.cl).
     """
     films = np.array([film_albedo(ROOTS, r) for r in film])
     threads = [Fibres(r) for r in fibres]
@@ -76,7 +76,7 @@ def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses,
         for index, each in enumerate(threads):
             row[:, index, :, 6] = films @ each.taken.T
             row[:, index, :, 7] = each.part
-    # Within alpha of the horizon a film leaves more, not less, as its single bounces lose light.
+    # Within alpha of the horizon single scattering loses so much that the film would take a negative amount.
     table = np.maximum(table, 0)
     weights = _mean_weights(np.linspace(0, 1, STEPS + 1))
     table = np.concatenate([weights[None] @ table, means.reshape(*means.shape[:-1], 2, ENTRY), table], axis=-2)
@@ -84,26 +84,26 @@ def tables(base: Roughnesses, film: Roughnesses, fibres: Roughnesses,
 
 
 def _mean_weights(roots: Doubles) -> Doubles:
-    """(n,): what makes ∫ f·2c dc, c the cosine, of f at these roots of c, even from 0 to 1, and linear in between."""
+    """Return weights (n,) for f at `roots`, √c uniform from 0 to 1, that integrate ∫ f·2c dc, f linear in between."""
     steps = 16 * (len(roots) - 1)
     fine = (np.arange(steps) + 0.5) / steps
     return np.array([np.mean(4 * fine**3 * np.interp(fine, roots, one)) for one in np.eye(len(roots))])
 
 
 def _bounce(roughness: float, smith: str) -> Doubles:
-    """(4, len(ROOTS)): 1, and by_f0, by_f90 and lost of a single bounce."""
+    """Compute (4, len(ROOTS)): 1, and by_f0, by_f90 and lost of single scattering."""
     whole, grazing = albedos(np.maximum(ROOTS, NEAREST)**2, max(roughness**2, ALPHA_MIN), smith)
     return np.array([np.ones_like(whole), whole - grazing, grazing, 1 - whole])
 
 
 def film_albedo(roots: Doubles, roughness: float) -> Doubles:
-    """(n,) what a film of F0 0.04 reflects in a single bounce, at √cos (n,)."""
+    """Compute (n,) the single-scattering albedo of a film of F0 0.04 at √cos (n,)."""
     whole, grazing = albedos(np.maximum(roots, NEAREST)**2, max(roughness**2, ALPHA_MIN), "height_correlated")
     return np.asarray(0.04 * (whole - grazing) + grazing)
 
 
 def taken_from_gloss(roughness: float, smith: str) -> tuple[Doubles, Doubles]:
-    """(STEPS + 1, len(ROOTS)) twice: what is taken from f0 and f90 per albedo at ROOTS."""
+    """Compute (STEPS + 1, len(ROOTS)) twice: what is taken from f0 and f90 per albedo at ROOTS."""
     cosines = np.maximum(np.linspace(0, 1, STEPS + 1), NEAREST)**2
     alpha = max(roughness**2, ALPHA_MIN)
     met = microfacets(cosines, alpha, LATTICE)
@@ -114,14 +114,15 @@ def taken_from_gloss(roughness: float, smith: str) -> tuple[Doubles, Doubles]:
 
 
 def _below(cosines: Doubles, others: Doubles, weights: Doubles) -> Doubles:
-    """(n, len(ROOTS)): Σ weights·(E(others) − E(cosines)) over the others (n, m) below each of the cosines (n,)."""
+    """Compute the matrix (n, len(ROOTS)), applied to E at ROOTS, of Σ weights·(E(others) − E(cosines)) over the others
+    (n, m) below each of the cosines (n,)."""
     weights = np.where((others > 0) & (others < cosines[:, None]), weights, 0)
     matrix = -weights.sum(axis=1, keepdims=True) * _at(cosines[:, None], np.ones((len(cosines), 1)))
     return np.asarray(matrix + _at(np.clip(others, 0, 1), weights))
 
 
 def _at(cosines: Doubles, weights: Doubles) -> Doubles:
-    """(n, len(ROOTS)): what makes Σ weights·E(cosines), both (n, m), of E at ROOTS."""
+    """Compute the matrix (n, len(ROOTS)), applied to E at ROOTS, of Σ weights·E(cosines), both (n, m)."""
     place = np.sqrt(cosines) * (len(ROOTS) - 1)
     first = np.minimum(place.astype(np.int64), len(ROOTS) - 2)
     across, row = place - first, len(ROOTS) * np.arange(len(cosines))[:, None]
@@ -132,10 +133,10 @@ def _at(cosines: Doubles, weights: Doubles) -> Doubles:
 
 
 class Fibres:
-    """White ones of one roughness.
+    """White sheen fibres of one roughness.
 
-    reflected: (len(ROOTS),) what they reflect, bounded; part: (STEPS + 1,) that over the smaller of their unbounded
-    albedo and 1; taken: (STEPS + 1, len(ROOTS)), what a film takes from it per albedo of the film at ROOTS.
+    reflected: (len(ROOTS),) their albedo, bounded; part: (STEPS + 1,) that over the smaller of their unbounded albedo
+    and 1; taken: (STEPS + 1, len(ROOTS)), what a film takes from it per albedo of the film at ROOTS.
     """
 
     def __init__(self, roughness: float) -> None:
@@ -156,7 +157,7 @@ class Fibres:
 
 
 def _fibres(cos_o: Doubles, cos_i: Doubles, n: float) -> Doubles:
-    """(n, m) their f·cos wi, integrated over the azimuth, of cosines (n,) and (m,)."""
+    """Compute (n, m) the fibres' f·cos wi, integrated over the azimuth, for cosines (n,) and (m,)."""
     o, i = cos_o[:, None], cos_i
     phi = np.pi * (np.arange(64) + 0.5)[:, None, None] / 64
     along = np.sqrt((1 - o**2) * (1 - i**2)) * np.cos(phi)

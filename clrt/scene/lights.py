@@ -1,4 +1,4 @@
-"""Lights without a surface. (Meshes and spheres shine by their material's emission; the sky is the Environment.)"""
+"""Lights without a surface. Area lights are meshes and spheres with an emissive material; see also `Environment`."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ Length = Annotated[float, Gt(0)]
 
 @dataclass(frozen=True, kw_only=True)
 class PointLight:
-    """`intensity`: W/sr in every direction from `position`. `range`: from that far on it lights nothing, before that by
-    a part (distance/range)⁴ less (KHR_lights_punctual); None for light as it is."""
+    """Point light. `intensity`: W/sr in every direction from `position`. `range`: distance from which it is zero;
+    before, it is reduced by the fraction (distance/range)⁴ (KHR_lights_punctual); None for no limit."""
 
     kernel: ClassVar[str] = "point"
     position: tuple[float, float, float]
@@ -31,7 +31,7 @@ class DirectionalLight:
     """Light from infinitely far away that travels along `direction`; `irradiance`: W/m² on a surface facing it.
 
     angle_degrees: the angular diameter of its disc, which is visible to the camera and in reflections and softens
-    shadows; 0 (or less than 1e-4) for a delta light, which shadow rays alone find. The sun's is 0.53.
+    shadows; 0 (or less than 1e-4) for a delta light, found by shadow rays only. The sun's is 0.53.
     """
 
     kernel: ClassVar[str] = "directional"
@@ -44,7 +44,7 @@ class DirectionalLight:
 
     @property
     def radiance(self) -> Radiance:
-        """Radiance of its disc: the irradiance over the projected solid angle, pi sin²(angle/2); not for a point."""
+        """Return the disc's radiance, irradiance over projected solid angle, pi sin²(angle/2); not for angle 0."""
         solid_angle = pi * sin(radians(self.angle_degrees) / 2) ** 2
         red, green, blue = (value / solid_angle for value in self.irradiance)
         return red, green, blue
@@ -52,8 +52,8 @@ class DirectionalLight:
 
 @dataclass(frozen=True, kw_only=True)
 class SpotLight:
-    """A point that shines in a cone around `direction`: `intensity` W/sr up to `inner_degrees` from it, then less, and
-    nothing from `outer_degrees` on (KHR_lights_punctual of glTF, its falloff). `range`: as PointLight's."""
+    """Spot light: `intensity` W/sr in a cone of `inner_degrees` around `direction`, falling to zero at `outer_degrees`
+    as in glTF's KHR_lights_punctual. `range`: as PointLight's."""
 
     kernel: ClassVar[str] = "spot"
     position: tuple[float, float, float]

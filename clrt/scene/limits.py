@@ -1,29 +1,29 @@
-"""What a number may be, in the types of fields: `Annotated[float, Ge(0), Lt(90)]`.
+"""Bounds of numbers for the types of fields: `Annotated[float, Ge(0), Lt(90)]`.
 
-The package annotated-types has the same, but takes longer to load than all materials of this project.
+The package annotated-types has the same, but takes longer to import than all materials of this project.
 """
 
 from __future__ import annotations
 
 
 class Limit:
-    """bound: the number that it goes by."""
+    """Base class of the limits. bound: the number to compare with."""
 
     def __init__(self, bound: float) -> None:
         self.bound = bound
 
 
 class Ge(Limit):
-    """At least."""
+    """Inclusive lower bound."""
 
 
 class Gt(Limit):
-    """More than."""
+    """Exclusive lower bound."""
 
 
 class Le(Limit):
-    """At most."""
+    """Inclusive upper bound."""
 
 
 class Lt(Limit):
-    """Less than."""
+    """Exclusive upper bound."""

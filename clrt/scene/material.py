@@ -1,4 +1,4 @@
-"""What every material has, whatever it is (scene.materials)."""
+"""Fields and methods that all materials share (scene.materials)."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ Unit = Annotated[float, Ge(0), Le(1)]
 Albedo = tuple[Unit, Unit, Unit]
 Radiance = tuple[NonNegative, NonNegative, NonNegative]
 Parameter = float | tuple[float, ...] | Texture
-#: Which rays back faces are invisible to (`RenderSettings.back_face_culling`).
+#: Rays for which back faces are invisible (`RenderSettings.back_face_culling`).
 Culling = Literal["none", "camera", "all"]
 
-#: GGX below this alpha is beyond float32 (D ~ 1/(pi alpha²)), in the kernel too; use `Mirror` for a perfect one.
+#: Below this alpha GGX exceeds float32 (D ~ 1/(pi alpha²)), also in the kernel; use `Mirror` for perfect reflection.
 ALPHA_MIN = 1e-4
 
 
 def tuples_for_lists(record: Any) -> None:
-    """Makes tuples of a dataclass's lists and arrays of numbers, so that it can be written either way and hashed."""
+    """Convert a dataclass's lists and arrays of numbers to tuples, so that either may be given and it is hashable."""
     for field in fields(record):
         value = getattr(record, field.name)
         if hasattr(value, "tolist"):
@@ -31,17 +31,17 @@ def tuples_for_lists(record: Any) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """What every material has.
+    """Base class of materials.
 
-    emission: radiance in W·sr⁻¹·m⁻² that its front side sends out. double_sided: its back side does so, too, and
-    back-face culling leaves it alone (glTF's doubleSided). normal_map: bends the shading normal (glTF's convention:
-    linear, x to the right and y up in the picture); its factor scales how far. opacity: what part of light it stops;
-    the rest goes straight through. With an alpha_cutoff it stops all where the opacity reaches that, and nothing
-    elsewhere. one_sided: from behind it is not there.
+    emission: radiance in W·sr⁻¹·m⁻² that its front side emits. double_sided: its back side emits, too, and is not
+    subject to back-face culling (glTF's doubleSided). normal_map: perturbs the shading normal (glTF's convention:
+    linear, x to the right and y up in the image); its factor scales x and y. opacity: the fraction of light that
+    interacts with the surface; the rest passes straight through. With an alpha_cutoff (alpha mask) the surface is
+    opaque where the opacity reaches it, and absent elsewhere. one_sided: invisible from behind.
     """
 
     kernel: ClassVar[str]
-    #: Those of its features that have a kernel file of their own, bsdf/<name>.cl: `#include <NAME>_FILE`.
+    #: Features with a kernel file of their own, bsdf/<name>.cl: `#include <NAME>_FILE`.
     parts: ClassVar[tuple[str, ...]] = ()
     emission: Radiance | Texture = (0.0, 0.0, 0.0)
     normal_map: Texture | None = None
@@ -54,16 +54,16 @@ class Material:
         tuples_for_lists(self)
 
     def parameters(self) -> dict[str, Parameter]:
-        """The values its kernel reads: numbers, triples, rows of a multiple of four, or a texture for a field of these.
+        """Return the values its kernel reads: numbers, triples, rows of a multiple of four, or textures in their place.
 
-        What only some materials of a type have is what their field says for the others, or 0 where there is none.
+        A parameter that only others of its type return is the field of that name, or 0 if there is no such field.
         """
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in SHARED}
 
     def surface_parameters(self, culling: Culling) -> dict[str, Parameter]:
-        """Those of the fields above that the surface reads, as far as they say anything.
+        """Return the values of the fields above that surface kernels read, unless they are the defaults.
 
-        one_sided, of the kernels: 1 where no ray meets it from behind, 0.5 where no camera ray does.
+        The kernels' one_sided is 1 if no ray hits the back face, 0.5 if no camera ray does.
         """
         parameters: dict[str, Parameter] = {}
         if self.normal_map is not None:
@@ -73,27 +73,27 @@ class Material:
             one_sided = max(one_sided, 0.5)
         if self.opacity != 1 or one_sided:
             cutoff = -1.0 if self.alpha_cutoff is None else self.alpha_cutoff
-            # No field's name: materials without one have 0, and stop all light whatever the alpha of vertex colours is.
+            # Not a field's name: materials without it get 0, and are opaque whatever the alpha of vertex colors.
             parameters["cutoff"] = 0.0 if self.opacity == 1 else cutoff
             parameters |= {"opacity": self.opacity, "one_sided": one_sided}
         return parameters
 
     @property
     def is_culled(self) -> bool:
-        """Whether back-face culling is of its back faces: not of those that light inside it has to meet."""
+        """Whether back-face culling applies; not to transmissive materials, whose back faces light inside must hit."""
         return not (self.double_sided or "TRANSMISSION" in self.features())
 
     @property
     def radiance(self) -> Radiance:
-        """What it sends out, at most where that is a texture."""
+        """Return the emitted radiance, the maximum (factor) if it is textured."""
         return as_color(self.emission.factor) if isinstance(self.emission, Texture) else self.emission
 
     def conflicts(self) -> list[str]:
-        """What is wrong with its fields together: "FIELD: fault; remedy"."""
+        """Return what is wrong with its combination of fields: "FIELD: fault; remedy"."""
         return []
 
     def without_textures(self: Self) -> Self:
-        """Itself with the factors of its textures alone."""
+        """Return the material with each texture replaced by its factor."""
         colors = {field.name for field in fields(self) if isinstance(field.default, tuple)}
         maps = {field.name for field in fields(self) if field.default is None}
         plain: dict[str, Any] = {name: as_color(value.factor) if name in colors else value.factor
@@ -102,32 +102,32 @@ class Material:
 
     @property
     def bent_by(self) -> Texture | None:
-        """The normal map whose coordinates its tangents follow, if it has one."""
+        """The normal map whose texture coordinates its tangents follow, if it has one."""
         return self.normal_map
 
     def textures(self) -> list[Texture]:
-        """All that it reads."""
+        """Return all its textures."""
         values = (getattr(self, field.name) for field in fields(self))
         return [value for value in values if isinstance(value, Texture)]
 
     @property
     def is_specular(self) -> bool:
-        """Whether it has single directions alone, which no light sample finds."""
+        """Whether it scatters into discrete directions only, which light sampling cannot find."""
         return False
 
     def in_unit(self, unit: float) -> Material:
-        """The same where all lengths are multiplied by `unit`."""
+        """Return the material for a scene whose lengths are all multiplied by `unit`."""
         return self
 
     def features(self) -> frozenset[str]:
-        """Names to define while compiling, for parts of the kernel that only some materials of this type need."""
+        """Return the macros to define, for parts of the kernel that only some materials of this type need."""
         return frozenset()
 
 
-#: The fields that do not belong to a material's own kernel file.
+#: Fields that the material's own kernel file does not read.
 SHARED = frozenset(field.name for field in fields(Material))
 
 
 def as_color(factor: float | Radiance) -> Radiance:
-    """One number for all channels, or three."""
+    """Return a color from three numbers, or from one for all channels."""
     return factor if isinstance(factor, tuple) else (factor, factor, factor)

@@ -1,8 +1,8 @@
-"""Materials: plain data, one dataclass each. A material's behaviour is `kernels/bsdf/<kernel>.cl`.
+"""Materials: plain data, one dataclass each. A material's BSDF is `kernels/bsdf/<kernel>.cl`.
 
-To add one: write its kernel file, write its dataclass here and list it in MATERIALS. The scene file, the validation,
-the packing and the tests of every BSDF find it in that list. Field types carry their limits (limits.py), which
-`validate` checks for scenes from files and from Python alike. The largest has a file of its own.
+To add one: write its kernel file, write its dataclass here and list it in MATERIALS, where the scene file, the
+validation, the packing and the tests of every BSDF find it. Field types carry their limits (limits.py), which
+`validate` checks for scenes from files and from Python alike. MetallicRoughness has a file of its own.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from .textures import Texture
 Index = Annotated[float, Ge(0.01), Le(100)]
 Extinction = Annotated[float, Ge(0), Le(100)]
 
-#: What counts as black where a logarithm is taken.
+#: Lower limit of colors when taking their logarithm.
 BLACK = 1e-30
 
 
 @dataclass(frozen=True, kw_only=True)
 class Diffuse(Material):
-    """Lambert: f = color/π."""
+    """Lambertian reflection: f = color/π."""
 
     kernel: ClassVar[str] = "diffuse"
     color: Albedo | Texture = (0.8, 0.8, 0.8)
@@ -35,10 +35,9 @@ class Diffuse(Material):
 
 @dataclass(frozen=True, kw_only=True)
 class Conductor(Material):
-    """A metal by its measured complex index of refraction eta + i·k in each channel, with GGX's microfacets.
+    """Metal with a measured complex index of refraction eta + i·k per channel and a GGX microfacet distribution.
 
-    `preset` takes both from a table (scene.presets), unless they are given. alpha = roughness². One bounce between
-    microfacets counts.
+    `preset` takes both from a table (scene.presets), unless they are given. alpha = roughness². Single scattering only.
     """
 
     kernel: ClassVar[str] = "conductor"
@@ -60,7 +59,7 @@ class Conductor(Material):
 
 @dataclass(frozen=True, kw_only=True)
 class Mirror(Material):
-    """A perfect mirror that reflects `color` of the light at every angle."""
+    """Perfect mirror that reflects the fraction `color` at every angle."""
 
     kernel: ClassVar[str] = "mirror"
     color: Albedo | Texture = (1.0, 1.0, 1.0)
@@ -72,14 +71,14 @@ class Mirror(Material):
 
 @dataclass(frozen=True, kw_only=True)
 class Dielectric(Material):
-    """Glass or water: Fresnel's equations decide between reflection and refraction.
+    """Glass or water: the Fresnel equations give the fractions reflected and refracted.
 
-    ior: index of refraction inside over that outside; color: what part of the light that is refracted passes.
-    roughness: of the surface, alpha = roughness² of GGX's microfacets; 0 is smooth. thin: a sheet without an inside,
-    which bends nothing and passes `color` from face to face. Inside of others light becomes attenuation_color after the
-    attenuation_distance, in units of the scene, and so on (glTF's KHR_materials_volume; None: never).
-    multiple_scattering: gives back what one bounce between microfacets leaves out (scene.dielectric_energy), so that
-    rough glass loses no light.
+    ior: index of refraction inside over that outside; color: the fraction of the refracted light that is transmitted.
+    roughness: of the surface, with alpha = roughness² of the GGX distribution; 0 is smooth. thin: a sheet without an
+    interior, which does not bend light and transmits `color` from face to face. Inside others light is attenuated to
+    attenuation_color per attenuation_distance, in scene units (glTF's KHR_materials_volume; None: no attenuation).
+    multiple_scattering: compensates the energy that single scattering between microfacets loses
+    (scene.dielectric_energy), so that rough glass loses no light.
     """
 
     kernel: ClassVar[str] = "dielectric"
@@ -108,12 +107,12 @@ class Dielectric(Material):
 
     @property
     def rough(self) -> bool:
-        """Whether some of it is."""
+        """Whether the surface, or some of it, is rough."""
         return isinstance(self.roughness, Texture) or self.roughness > 0
 
     @property
     def scatters_again(self) -> bool:
-        """Whether light may leave after several bounces between microfacets."""
+        """Whether multiple scattering between microfacets is compensated."""
         return self.multiple_scattering and not self.is_specular
 
     @property
@@ -137,11 +136,11 @@ class Dielectric(Material):
 
 @dataclass(frozen=True, kw_only=True)
 class Phong(Material):
-    """Phong's model: Lambert and a gloss around the mirrored direction (Nadolny 3.1–3.3).
+    """Phong's model: a Lambertian lobe and a specular lobe around the mirror direction (Nadolny 3.1–3.3).
 
-    specular: of the gloss, the more narrow the larger `shininess` is. ambient: what part of `color` the local
-    integrator gives to the sky's light. In the path integrators the body has at most what the gloss leaves,
-    1 − specular, and the gloss reflects `specular` of light from straight above (Lafortune and Willems 1994).
+    specular: color of the specular lobe, which is narrower the larger `shininess` is. ambient: the fraction of `color`
+    that the local integrator multiplies with the sky's light. In the path integrators the Lambertian lobe is limited to
+    1 − specular, and the specular lobe reflects `specular` at normal incidence (Lafortune and Willems 1994).
     """
 
     kernel: ClassVar[str] = "phong"
@@ -153,7 +152,7 @@ class Phong(Material):
 
 @dataclass(frozen=True, kw_only=True)
 class BlinnPhong(Phong):
-    """Blinn's model: Phong's by the half vector, about as wide with four times its shininess."""
+    """Blinn's model: Phong's with the half vector; about as wide at four times the shininess."""
 
     kernel: ClassVar[str] = "blinn_phong"
 

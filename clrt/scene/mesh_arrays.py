@@ -1,4 +1,4 @@
-"""Meshes as two plain arrays and spheres as one, checked."""
+"""Validation of meshes given as two plain arrays, and of spheres given as one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Points = NDArray[np.float32] | NDArray[np.float64]
 
 
 def mesh_arrays(vertices: ArrayLike, faces: ArrayLike) -> tuple[Points, NDArray[np.int32]]:
-    """vertices (n, 3) float32 or float64 and a copy of faces (m, 3) int32; SceneError for what is no mesh."""
+    """Return vertices (n, 3) float32 or float64 and a copy of faces (m, 3) int32; SceneError if they are invalid."""
     points, indices = finite_points(vertices), whole_array("faces", faces, SceneError)
     if indices.ndim != 2 or indices.shape[1] != 3:
         raise SceneError(f"faces {indices.shape} must have the shape (m, 3)")
@@ -26,7 +26,8 @@ def mesh_arrays(vertices: ArrayLike, faces: ArrayLike) -> tuple[Points, NDArray[
 
 
 def finite_points(vertices: ArrayLike) -> Points:
-    """(n, 3), float64 if they are and else float32; SceneError for another shape, and for what float32 has not."""
+    """Return points (n, 3), float64 if given so, otherwise float32. Raises SceneError for another shape, and for values
+    that are not finite in float32."""
     given = real_array("vertices", vertices, SceneError)
     with np.errstate(over="ignore"):
         points = given.astype(np.float32)
@@ -39,7 +40,8 @@ def finite_points(vertices: ArrayLike) -> Points:
 
 
 def sphere_array(spheres: ArrayLike) -> Floats:
-    """(s, 4) float32, centre and radius; SceneError for another shape, NaN and infinity, and radii not above 0."""
+    """Return spheres (s, 4) float32, center and radius. Raises SceneError for another shape, values that are not
+    finite, and radii not above 0."""
     given = real_array("spheres", spheres, SceneError)
     with np.errstate(over="ignore"):
         table = given.astype(np.float32)

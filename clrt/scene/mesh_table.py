@@ -25,7 +25,7 @@ Vertex = Annotated[int, Ge(0), Lt(2**31)]
 
 @dataclass(frozen=True, kw_only=True)
 class MeshTable(Placing):
-    """The keys of [[mesh]]."""
+    """Keys of [[mesh]]."""
 
     name: str | None = None
     file: str | None = None
@@ -40,10 +40,10 @@ class MeshTable(Placing):
     visible: bool = True
 
     def read(self, folder: Path, where: str) -> Model:
-        """What is in its file, which is relative to `folder`, or in its vertices and faces, untransformed.
+        """Read its file, which is relative to `folder`, or its vertices and faces, untransformed.
 
-        Raises SceneError for a file that cannot be read, indices out of range, no geometry or two, and creases of
-        normals that are not computed.
+        Raises SceneError for a file that cannot be read, indices out of range, no geometry or both kinds, and
+        crease_degrees without computed normals.
         """
         if self.crease_degrees is None:
             return self._read(folder, where)

@@ -1,7 +1,7 @@
-"""Read model files as meshes. STL, OFF and uncommon PLY go through trimesh's parsers; other readers are our own.
+"""Model file reading. STL, OFF and uncommon PLY files use trimesh's parsers; other readers are our own.
 
-The parsers are called directly, since a trimesh.Trimesh no longer tells whether the file had normals. They hand on NaN
-and wrong indices and raise whatever Python raises, so all they return is checked here.
+The parsers are called directly, since a trimesh.Trimesh does not say whether the file had normals. They pass on NaN
+and invalid indices and raise arbitrary exceptions, so all they return is validated here.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 
 
 def read_mesh(path: Path, normals: Normals = "file") -> list[Mesh]:
-    """The meshes of a model file, as `read_model` reads them, with its instances as further ones."""
+    """Return the meshes of a model file, as `read_model` reads them, with its instances as further ones."""
     model = read_model(path, normals)
     return model.meshes + [baked(each) for each in model.instances]
 
 
 def read_model(path: Path, normals: Normals = "file") -> Model:
-    """What a model file holds: meshes, one per material, each with at least one triangle and valid arrays, and cameras.
+    """Read a model file: meshes, one per material, each with at least one triangle and valid arrays, and cameras.
 
-    Polygons are cut into fans. `normals`: see `choose_normals`. Raises SceneError naming the file, the mesh, and the
+    Polygons become triangle fans. `normals`: see `choose_normals`. Raises SceneError naming the file, the mesh, and the
     index or vertex that is wrong.
     """
     suffix = path.suffix.lower()
@@ -54,7 +54,7 @@ def read_model(path: Path, normals: Normals = "file") -> Model:
 
 
 def _parse(path: Path, suffix: str) -> dict[str, Any]:
-    """What trimesh reads from the file, as the keyword arguments of its own classes."""
+    """Parse the file into the keyword arguments of trimesh's own classes."""
     try:
         with np.errstate(all="ignore"), path.open("rb") as file:
             parts: dict[str, Any]
@@ -75,14 +75,14 @@ def _parse(path: Path, suffix: str) -> dict[str, Any]:
             return parts
     except SceneError:
         raise
-    except Exception as error:  # trimesh's parsers raise whatever the damage leads to
-        # Faced with bytes it cannot place, trimesh asks for a library that guesses encodings: no news for the user.
+    except Exception as error:  # a damaged file may make trimesh's parsers raise anything
+        # On undecodable bytes trimesh raises an ImportError about an encoding detector: no help to the user.
         detail = "" if isinstance(error, ImportError) else f" ({type(error).__name__}: {error})"
         raise SceneError(f"cannot be read as {suffix[1:].upper()}{detail}; export the model again") from error
 
 
 def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:
-    """The meshes in trimesh's keyword arguments, of one mesh or of several."""
+    """Build meshes from trimesh's keyword arguments for one mesh or for several."""
     several = parts.get("geometry", {stem: parts})
     pieces = {name: piece for name, piece in several.items() if _size(piece.get("faces"))}
     if not pieces:
@@ -99,7 +99,7 @@ def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:
 
 
 def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
-    """One mesh from trimesh's arrays, checked before anything follows their indices."""
+    """Build one mesh from trimesh's arrays, with its indices validated before use."""
     try:
         with np.errstate(over="ignore"):
             vertices = np.ascontiguousarray(piece["vertices"], np.float32)
@@ -125,13 +125,13 @@ def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
 
 
 def _downward(uv: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Texture coordinates (n, k) with v upwards, as these files have them, or with u alone, as (n, 2)."""
+    """Convert texture coordinates (n, k) with v upwards, as these formats have them, or with u alone, to (n, 2)."""
     v = uv[:, 1] if uv.shape[1] > 1 else np.zeros(len(uv), np.float32)
     return np.nan_to_num(np.stack([uv[:, 0], 1 - v], axis=1))
 
 
 def _linear_colors(colors: Any) -> NDArray[np.float32] | None:
-    """Vertex colours as these files have them: by sRGB's curve, whole numbers up to 255."""
+    """Convert these formats' vertex colors, sRGB-encoded and up to 255 if integers, to linear."""
     if colors is None:
         return None
     given = np.asarray(colors)
@@ -140,7 +140,7 @@ def _linear_colors(colors: Any) -> NDArray[np.float32] | None:
 
 
 def _triangles(polygons: NDArray[np.int64], name: str) -> NDArray[np.int64]:
-    """Polygons of k corners, (m, k), as fans of k − 2 triangles."""
+    """Split polygons of k corners, (m, k), into fans of k − 2 triangles."""
     if polygons.ndim != 2 or polygons.shape[1] < 3:
         raise SceneError(f'mesh "{name}": its faces have fewer than 3 corners; export triangles')
     if polygons.shape[1] == 3:

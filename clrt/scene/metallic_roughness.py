@@ -1,4 +1,4 @@
-"""glTF's base material."""
+"""glTF's metallic-roughness material."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Coupling = Literal["albedo", "fresnel", "half_vector"]
 
 
 class Lobes(NamedTuple):
-    """f0: specular reflectance at normal incidence; albedo: of the diffuse body, unattenuated; alpha: roughness²."""
+    """f0: specular reflectance at normal incidence; albedo: of the diffuse lobe, uncoupled; alpha: roughness²."""
 
     f0: tuple[float, ...]
     albedo: tuple[float, ...]
@@ -25,23 +25,23 @@ class Lobes(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class MetallicRoughness(Material):
-    """Cook–Torrance with GGX over a diffuse body (glTF's base material; Suchiński 6.5–6.15, Nadolny 3.5–3.13).
+    """Cook–Torrance with GGX over a diffuse lobe (glTF's base material; Suchiński 6.5–6.15, Nadolny 3.5–3.13).
 
-    alpha = roughness². `preset` takes F0 (and for metals the color) from the table. `smith` chooses the
+    alpha = roughness². `preset` takes F0 (and for metals the color) from the table. `smith` selects the
     masking–shadowing term: height-correlated (glTF), separable G1·G1, or Schlick-GGX with k = (r+1)²/8 ("schlick")
     or k = r²/2 ("schlick_ibl").
 
-    `coupling` chooses what the gloss leaves to the body: "albedo", (1 − E(wi))(1 − E(wo))/(1 − mean E) with the
-    directional albedo E of the gloss, which keeps all energy (Kelemen and Szirmay-Kalos 2001; Kulla and Conty 2017);
-    "fresnel", (1 − F(cos wi))(1 − F(cos wo)), which loses some; or "half_vector", 1 − F(wi·h) of the theses and glTF,
-    which makes some. `multiple_scattering` gives back what one bounce between microfacets loses: white metal then
-    reflects all light, and coloured metal grows deeper in color. Left out, both are what keeps energy with the
-    height-correlated term, and with the other forms what the theses have: "fresnel", without multiple scattering.
+    `coupling` selects how the specular lobe attenuates the diffuse one: "albedo", (1 − E(wi))(1 − E(wo))/(1 − mean E)
+    with the directional albedo E of the specular lobe, which conserves energy (Kelemen and Szirmay-Kalos 2001; Kulla
+    and Conty 2017); "fresnel", (1 − F(cos wi))(1 − F(cos wo)), which loses some; or "half_vector", 1 − F(wi·h) of the
+    theses and glTF, which gains some. `multiple_scattering` compensates what single scattering between microfacets
+    loses: white metal then reflects all light, and colored metal becomes more saturated. By default both conserve
+    energy with the height-correlated term; with the others they are as in the theses: "fresnel" and single scattering.
 
-    The rest are glTF's extensions by their names. `ior`, `specular` and `specular_color`: F0 of the dielectric part,
+    The rest are glTF's extensions, with their names. `ior`, `specular` and `specular_color`: F0 of the dielectric part,
     ((ior − 1)/(ior + 1))²·specular·specular_color, and F at grazing angles, `specular`. `clearcoat`: a clear film,
-    bent by `clearcoat_normal_map` alone. `sheen_color`: fibres. `transmission`: how much of the dielectric part
-    is a sheet which light passes.
+    affected by `clearcoat_normal_map` alone. `sheen_color`: fibres. `transmission`: the fraction of the dielectric part
+    that is a thin transmissive sheet.
     """
 
     kernel: ClassVar[str] = "metallic_roughness"
@@ -76,11 +76,11 @@ class MetallicRoughness(Material):
 
     @property
     def coupled_by(self) -> Coupling:
-        """`coupling`, or what it is where it is left out."""
+        """Return `coupling`, or its default if it is None."""
         return self.coupling or ("albedo" if self.smith == "height_correlated" else "fresnel")
 
     def _layers(self) -> dict[str, Parameter]:
-        """What its kernel reads of the extensions in use."""
+        """Return the parameters of the extensions in use."""
         has, values = self.features(), dict[str, Parameter]()
         if "SPECULAR" in has:
             values |= {"specular": self.specular, "specular_color": self.specular_color}
@@ -96,7 +96,7 @@ class MetallicRoughness(Material):
         return values | ({"transmission": self.transmission} if "THROUGH" in has else {})
 
     def _roughnesses(self, has: frozenset[str]) -> tuple[Unit | Texture, ...]:
-        """Of the base, the film and the fibres; of a layer that there is not, any number."""
+        """Return the roughnesses of base, film and fibres; for an absent layer, any number."""
         return (self.roughness, self.clearcoat_roughness if "CLEARCOAT" in has else 0.0,
                 self.sheen_roughness if "SHEEN" in has else 1.0)
 
@@ -106,7 +106,7 @@ class MetallicRoughness(Material):
 
     @property
     def lobes(self) -> Lobes:
-        """What its parameters come to; TypeError if one of them is a texture."""
+        """Return its constant parameters as lobes; TypeError if one of them is a texture."""
         single = self.parameters()
         color, f0, metallic, roughness = (single[name] for name in ("color", "f0", "metallic", "roughness"))
         if not (isinstance(color, tuple) and isinstance(f0, tuple) and isinstance(metallic, float | int)
@@ -120,12 +120,12 @@ class MetallicRoughness(Material):
         layers = {"CLEARCOAT": self.clearcoat != 0, "SHEEN": self.sheen_color != (0, 0, 0),
                   "THROUGH": self.transmission != 0}
         further = self.coupled_by == "albedo" if self.multiple_scattering is None else self.multiple_scattering
-        # A body under the albedo coupling has all that the gloss does not reflect, so a metal alone loses light.
+        # With the albedo coupling the diffuse lobe reflects what the specular one does not, so only metal loses energy.
         further &= metallic != 0 or self.coupled_by != "albedo" or layers["THROUGH"]
         above = layers["CLEARCOAT"] or layers["SHEEN"]
-        coupled = metallic != 1 or above    # what layers take from gloss leaves with what is coupled
+        coupled = metallic != 1 or above    # the coupled lobe also carries what layers take from the gloss
         fitted = further or (coupled and self.coupled_by == "albedo")
-        # A coat's own albedo is that of the height-correlated form.
+        # A clearcoat's own albedo is that of the height-correlated form.
         forms = {self.smith} if fitted else set()
         forms |= {"height_correlated"} if layers["CLEARCOAT"] else set()
         has = {f"SMITH_{self.smith.upper()}": True, f"COUPLING_{self.coupled_by.upper()}": coupled,

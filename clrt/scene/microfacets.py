@@ -1,8 +1,8 @@
-"""What GGX reflects of light by following it for one bounce between its microfacets only: its directional albedo.
+"""Directional albedo of single scattering at a GGX microfacet surface.
 
-With F = 1 microfacets reflect all light, but part of it only after they met it twice or more, and the usual
-single-bounce f leaves that out: of light from an angle of cosine c to the normal the part loss(c), which for
-alpha = 1 is up to 0.69. The kernels know these albedos by fits (kernels/bsdf/ggx_albedo.cl); here they are exact.
+With F = 1 microfacets reflect all light, but some of it only after two bounces or more, and the usual single-scattering
+BRDF omits that: the fraction loss(c) of light at a cosine c to the normal, which for alpha = 1 is up to 0.69. The
+kernels approximate these albedos by fits (kernels/bsdf/ggx_albedo.cl); here they are computed exactly.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ Doubles = NDArray[np.float64]
 
 
 def albedo(cosines: Doubles, alpha: float, smith: str) -> Doubles:
-    """(n,) of cosines (n,) in (0, 1]: what a bounce with F = 1 reflects of light from there; error below 1e-6."""
+    """Compute (n,) single-scattering albedos for F = 1 at cosines (n,) in (0, 1]; error below 1e-6."""
     return albedos(cosines, alpha, smith)[0]
 
 
 def albedos(cosines: Doubles, alpha: float, smith: str) -> tuple[Doubles, Doubles]:
-    """(n,) of cosines (n,) in (0, 1]: what a single bounce reflects with F = 1, and with F = (1 − wo·h)^5.
+    """Compute (n,) single-scattering albedos at cosines (n,) in (0, 1] for F = 1, and for F = (1 − wo·h)^5.
 
-    With Schlick's F of f0 and f90 a bounce reflects f0·(first − second) + f90·second.
+    For Schlick's F with f0 and f90 the albedo is f0·(first − second) + f90·second.
 
-    ∫ D·G·(wo·h)/cos wo dωh over the half vectors for which wi is above the horizon. Of h, tan θ = alpha·tan psi, which
-    makes D·cos θ dωh = 2·sin psi·cos psi dpsi dphi/(2·pi), and phi is its azimuth from wo. Gauss–Legendre points,
-    gathered by cubes where the integrand bends: in phi at 90°, in psi at the horizon.
+    ∫ D·G·(wo·h)/cos wo dωh over the half vectors for which wi is above the horizon. For h, tan θ = alpha·tan psi, which
+    makes D·cos θ dωh = 2·sin psi·cos psi dpsi dphi/(2·pi), and phi is its azimuth from wo. Gauss–Legendre nodes, cubed
+    to concentrate where the integrand varies most: in phi at 90°, in psi at the horizon.
     """
     y, weight = np.polynomial.legendre.leggauss(32)
     phi, phi_weight = np.pi / 2 * (1 - y**3), 1.5 * y**2 * weight
@@ -45,8 +45,8 @@ def albedos(cosines: Doubles, alpha: float, smith: str) -> tuple[Doubles, Double
 
 
 def shadowing(cos_o: Doubles, cos_i: Doubles, alpha: float, smith: str) -> Doubles:
-    """G2 by its name in `MetallicRoughness`: Smith's of GGX, height-correlated or separable (Heitz 2014, eq. 99, 98),
-    or Schlick's form of the latter (Karis 2013).
+    """Compute G2 by its name in `MetallicRoughness`: Smith's for GGX, height-correlated or separable (Heitz 2014, eq.
+    99, 98), or Schlick's approximation of the latter (Karis 2013).
     """
     if smith.startswith("schlick"):
         k = schlick_k(alpha, smith)
@@ -58,5 +58,5 @@ def shadowing(cos_o: Doubles, cos_i: Doubles, alpha: float, smith: str) -> Doubl
 
 
 def schlick_k(alpha: float, smith: str) -> float:
-    """k of Schlick's form: (roughness + 1)²/8, or alpha/2 for "schlick_ibl"."""
+    """Return k of Schlick's approximation: (roughness + 1)²/8, or alpha/2 for "schlick_ibl"."""
     return float(alpha / 2 if smith == "schlick_ibl" else (np.sqrt(alpha) + 1)**2 / 8)

@@ -1,10 +1,10 @@
-"""Indices of refraction by the names that Mitsuba has for substances."""
+"""Indices of refraction by Mitsuba's names of materials."""
 
 from __future__ import annotations
 
 Triple = tuple[float, float, float]
 
-#: At about 589 nm and room temperature (Hecht, Optics, 4th edition, 2002).
+#: Dielectrics, at about 589 nm and room temperature (Hecht, Optics, 4th edition, 2002).
 DIELECTRICS = {
     "vacuum": 1.0, "helium": 1.000036, "hydrogen": 1.000132, "air": 1.000277, "carbon dioxide": 1.00045,
     "water": 1.3330, "acetone": 1.36, "ethanol": 1.361, "carbon tetrachloride": 1.461, "glycerol": 1.4729,
@@ -12,8 +12,8 @@ DIELECTRICS = {
     "pyrex": 1.470, "acrylic glass": 1.49, "polypropylene": 1.49, "bk7": 1.5046, "sodium chloride": 1.544,
     "amber": 1.55, "pet": 1.5750, "diamond": 2.419}
 
-#: eta and k of metals in red, green and blue, as Mitsuba 3.9's `rgb` variants make them of measured spectra: integrals
-#: over the color matching functions, not values at a wavelength.
+#: eta and k of metals in red, green and blue, as Mitsuba 3.9's `rgb` variants derive them from measured spectra: by
+#: integration over the color matching functions, not at single wavelengths.
 METALS: dict[str, tuple[Triple, Triple]] = {
     "a-C": ((2.94405, 2.22714, 1.96816), (0.887465, 0.799299, 0.81529)),
     "Ag": ((0.155276, 0.116728, 0.138388), (4.82835, 3.12222, 2.1469)),

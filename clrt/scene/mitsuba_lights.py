@@ -1,4 +1,4 @@
-"""Mitsuba's emitters that are no shapes: point, directional, constant and envmap."""
+"""Mitsuba's emitters without a shape: point, directional, constant and envmap."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .mitsuba_xml import Plugin
 from .model import Environment
 from .pictures import read_picture
 
-#: Rows that an environment map is resampled to at least, by a whole factor.
+#: Minimum number of rows of an environment map, which is upsampled by an integer factor.
 ROWS = 1024
-#: How far the transform of an environment may be from a turn about +Y.
+#: Tolerance for an environment's transform to be a rotation about +Y.
 TURN = 1e-6
 
 
 def light(plugin: Plugin) -> Light:
-    """A point or directional light. UnsupportedError for others."""
+    """Read a point or directional light. Raises UnsupportedError for others."""
     if plugin.kind == "point":
         x, y, z = plugin.point("position") or plugin.transform("to_world")[:3, 3].tolist()
         plugin.used.add("to_world")
@@ -34,7 +34,7 @@ def light(plugin: Plugin) -> Light:
 
 
 def environment(plugin: Plugin) -> Environment:
-    """The sky of a constant or envmap emitter."""
+    """Read a constant or envmap emitter as the environment."""
     if plugin.kind == "constant":
         return Environment(color=rgb(plugin.color("radiance", 1.0), emitted=True))
     plugin.used.add("mis_compensation")
@@ -44,7 +44,7 @@ def environment(plugin: Plugin) -> Environment:
 
 
 def _turn(plugin: Plugin, to_world: Doubles) -> float:
-    """Degrees about +Y."""
+    """Return the rotation about +Y in degrees."""
     angle = atan2(to_world[0, 2], to_world[0, 0])
     c, s = np.cos(angle), np.sin(angle)
     if np.abs(to_world[:3, :3] - [[c, 0, s], [0, 1, 0], [-s, 0, c]]).max() > TURN:
@@ -54,9 +54,9 @@ def _turn(plugin: Plugin, to_world: Doubles) -> float:
 
 
 def rows_at_middles(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The same sky, (h, w, 3), of at least ROWS rows, interpolated linearly from those given.
+    """Resample an environment map, (h, w, 3), to at least ROWS rows by linear interpolation.
 
-    Mitsuba's H rows are at row/(H − 1) from pole to pole; those of clrt at (row + ½)/h.
+    Mitsuba's H rows lie at row/(H − 1) from pole to pole; clrt's h rows at (row + ½)/h.
     """
     cells = len(image) - 1
     if cells < 1:

@@ -1,4 +1,4 @@
-"""Mitsuba's BSDFs as materials of clrt, where they are the same model; the others are refused by name.
+"""Conversion of Mitsuba's BSDFs to clrt's materials if they are the same model; others are rejected by name.
 
 A surface without `twosided` is black from behind in Mitsuba; here it looks the same from both sides.
 """
@@ -20,21 +20,21 @@ from .mitsuba_values import rgb
 from .mitsuba_xml import Plugin
 from .textures import Texture
 
-#: An alpha up to which the separable Smith term takes less than 4e-4 of even light that the height-correlated leaves.
+#: Largest alpha at which the separable Smith term reduces albedo by less than 4e-4 below the height-correlated one.
 NEARLY_SMOOTH = 0.09
 
 
 class Look(NamedTuple):
-    """A material, and the attribute of the mesh that multiplies its color, if one does."""
+    """A material, and the mesh attribute that multiplies its color, if any."""
 
     material: Material
     attribute: Attribute | None = None
 
 
 class MaterialReader:
-    """Reads the BSDFs of one scene; shapes that refer to one BSDF share its material.
+    """Reader for the BSDFs of one scene; shapes that refer to one BSDF share its material.
 
-    differences: how far a model of clrt is from Mitsuba's, a sentence each.
+    differences: how clrt's models differ from Mitsuba's, one sentence each.
     """
 
     def __init__(self, textures: TextureReader) -> None:
@@ -43,7 +43,7 @@ class MaterialReader:
         self.differences: list[str] = []
 
     def look(self, plugin: Plugin) -> Look:
-        """Of a <bsdf>."""
+        """Return the material of a <bsdf>."""
         if plugin not in self._looks:
             if plugin.kind not in BSDFS:
                 plugin.refuse_kind(", ".join(sorted(BSDFS)))
@@ -82,7 +82,7 @@ class MaterialReader:
         return look._replace(material=replace(look.material, normal_map=normals))
 
     def _blend(self, plugin: Plugin) -> Look:
-        """Of two diffuse ones of even color by a number or an attribute: the colors are blended."""
+        """Blend the colors of two untextured diffuse BSDFs by a number or an attribute."""
         weight = self._textures.number(plugin, "weight", 0.5)
         colors = [look.material.color for look in map(self.look, plugin.all("bsdf"))
                   if type(look.material) is Diffuse and look == Look(Diffuse(color=look.material.color))]
@@ -100,7 +100,7 @@ class MaterialReader:
         _white(plugin, "specular_reflectance")
         color = self._textures.color(plugin, "specular_transmittance", 1.0)
         return Look(Dielectric(ior=ior, color=color, thin=thin, roughness=self._roughness(plugin) if rough else 0.0,
-                               multiple_scattering=not rough))    # Mitsuba's follows a single bounce
+                               multiple_scattering=not rough))    # Mitsuba's models single scattering only
 
     def _conductor(self, plugin: Plugin) -> Look:
         name = plugin.value("material", str, "" if {"eta", "k"} & {*plugin.values} else "none")
@@ -119,7 +119,7 @@ class MaterialReader:
         return Look(Conductor(eta=eta, k=k, roughness=0.0))
 
     def _roughness(self, plugin: Plugin) -> float:
-        """√alpha, of GGX with one alpha."""
+        """Return √alpha of an isotropic GGX distribution."""
         plugin.value("sample_visible", bool, True)
         distribution = plugin.value("distribution", str, "beckmann")
         if distribution != "ggx":
@@ -137,7 +137,7 @@ class MaterialReader:
 
 
 def _only(plugin: Plugin) -> Plugin:
-    """The one BSDF in a BSDF."""
+    """Return the one BSDF nested in a BSDF."""
     nested = plugin.all("bsdf")
     if len(nested) != 1:
         raise SceneError(f"{plugin.where}: has {len(nested)} BSDFs in it; write one")
@@ -145,7 +145,7 @@ def _only(plugin: Plugin) -> Plugin:
 
 
 def _index(plugin: Plugin, name: str, default: str) -> float:
-    """An index of refraction: a number, or that of a substance."""
+    """Return an index of refraction, given as a number or as the name of a material."""
     plugin.used.add(name)
     value = plugin.values.get(name, default)
     if isinstance(value, (int, float)):
@@ -162,7 +162,7 @@ def _white(plugin: Plugin, name: str) -> None:
 
 
 def absorbing(material: Material, medium: Plugin) -> Material:
-    """Glass with a medium inside that absorbs and does not scatter."""
+    """Return glass with a medium inside that absorbs and does not scatter."""
     if not isinstance(material, Dielectric) or material.thin or medium.kind != "homogeneous" or any(
             rgb(medium.color("albedo", 0.75))):
         medium.refuse(f"a {medium.kind} medium that scatters, or not in glass", "leave it out",

@@ -1,4 +1,4 @@
-"""Mitsuba's shapes without a file, as triangles with its texture coordinates, before any transform."""
+"""Mitsuba's analytic shapes as triangle meshes with its texture coordinates, before any transform."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from .model import Mesh
 
 Doubles = NDArray[np.float64]
 
-#: Of a turn, and from pole to pole or from a disk's middle to its rim: 1.5e-4 of the radius is the largest gap between
-#: a circle and its polygon's edges.
+#: Segments around a full turn, and from pole to pole or from a disk's center to its rim; the largest gap between a
+#: circle and its polygon's edges is 1.5e-4 of the radius.
 TURN, ACROSS = 256, 128
 
 
 def rectangle() -> Mesh:
-    """From −1 to 1 in x and y, facing +z."""
+    """Return the square from −1 to 1 in x and y, facing +z."""
     corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float64)
     return _mesh("rectangle", np.column_stack([2 * corners - 1, np.zeros(4)]), [(0, 1, 2), (0, 2, 3)], corners,
                  np.tile((0.0, 0.0, 1.0), (4, 1)))
 
 
 def cube() -> Mesh:
-    """From −1 to 1 in each axis; every side has all of a picture."""
+    """Return the cube from −1 to 1 in each axis; each side shows the whole texture."""
     normals = np.array([(0, -1, 0), (0, 1, 0), (1, 0, 0), (0, 0, 1), (-1, 0, 0), (0, 0, -1)], np.float64)
     corners = np.array([1, 5, 4, 0, 3, 2, 6, 7, 1, 3, 7, 5, 5, 7, 6, 4, 4, 6, 2, 0, 3, 1, 0, 2])
     points = 2.0 * np.column_stack([corners & 1, corners >> 1 & 1, corners >> 2]) - 1
@@ -32,7 +32,7 @@ def cube() -> Mesh:
 
 
 def sphere() -> Mesh:
-    """Of radius 1; u turns about z from +x, v goes from +z to −z."""
+    """Return the sphere of radius 1; u goes around z from +x, v from +z to −z."""
     u, v = _grid(TURN, ACROSS)
     phi, theta = 2 * np.pi * u, np.pi * v
     points = np.column_stack([np.cos(phi) * np.sin(theta), np.sin(phi) * np.sin(theta), np.cos(theta)])
@@ -40,7 +40,7 @@ def sphere() -> Mesh:
 
 
 def disk() -> Mesh:
-    """Of radius 1, facing +z; u is the distance from the middle, v turns from +x."""
+    """Return the disk of radius 1, facing +z; u is the distance from the center, v goes around from +x."""
     turn, out = _grid(TURN, ACROSS)
     phi = 2 * np.pi * turn
     points = np.column_stack([out * np.cos(phi), out * np.sin(phi), np.zeros(len(out))])
@@ -49,7 +49,7 @@ def disk() -> Mesh:
 
 
 def cylinder() -> Mesh:
-    """Of radius 1 about z, from 0 to 1, open at both ends; u turns from +x, v goes along."""
+    """Return the cylinder of radius 1 about z, from 0 to 1, open at both ends; u goes around from +x, v along z."""
     u, v = _grid(TURN, 1)
     around = np.column_stack([np.cos(2 * np.pi * u), np.sin(2 * np.pi * u)])
     return _mesh("cylinder", np.column_stack([around, v]), _quads(TURN, 1), np.column_stack([u, v]),
@@ -57,13 +57,13 @@ def cylinder() -> Mesh:
 
 
 def _grid(across: int, down: int) -> tuple[Doubles, Doubles]:
-    """Coordinates from 0 to 1 of the corners of a grid's cells, row by row."""
+    """Return the coordinates from 0 to 1 of a grid's vertices, row by row."""
     v, u = np.divide(np.mgrid[:down + 1, :across + 1], np.array([down, across])[:, None, None]).reshape(2, -1)
     return u, v
 
 
 def _quads(across: int, down: int) -> NDArray[np.int64]:
-    """Two triangles for each cell of a grid, wound from u to v."""
+    """Return two triangles per cell of a grid, wound from u to v."""
     corner = (np.arange(down)[:, None] * (across + 1) + np.arange(across)).reshape(-1, 1)
     below = corner + across + 1
     return np.concatenate([np.hstack([corner, corner + 1, below + 1]), np.hstack([corner, below + 1, below])])

@@ -1,4 +1,4 @@
-"""Read a scene in Mitsuba 3's XML: what clrt can draw of it, and by name what it cannot."""
+"""Reader for Mitsuba 3's XML scenes: the supported parts, and the unsupported ones by name."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ from .paths import name_of
 
 Part = TypeVar("Part")
 
-#: Integrators that are estimates of the same light, by ours; those that hold another are looked into.
+#: Integrators that estimate the same image, by clrt's; those in WRAPPERS are unwrapped.
 INTEGRATORS: dict[str, Integrator] = {
     "path": "path", "prb": "path", "ptracer": "path", "volpath": "path", "volpathmis": "path", "prbvolpath": "path",
     "direct": "direct"}
 WRAPPERS = ("moment", "aov")
 FILTERS: dict[str, Filter] = {"box": "box", "tent": "tent", "gaussian": "gaussian"}
-#: Mitsuba's camera's default, and the diagonal in mm of the film that focal_length is meant for.
+#: Default of Mitsuba's camera, and the diagonal in mm of the film that focal_length refers to.
 FOCAL_LENGTH, DIAGONAL = "50mm", hypot(36, 24)
-#: Where a path ends that Mitsuba would follow without end.
+#: Path depth limit for scenes without one in Mitsuba.
 ENDLESS = 1024
-#: How far a camera's axes may be from right angles and one length.
+#: Tolerance for a camera's axes to be orthogonal and equally long.
 ODD = 1e-5
-#: Parameters that change how Mitsuba finds its picture, not the picture.
+#: Ignored parameters, which affect how Mitsuba computes the image, not the image.
 IMMATERIAL = {"rr_depth", "near_clip", "far_clip", "pixel_format", "component_format", "file_format", "banner",
               "compensate", "samples_per_pass", "emitter_samples", "bsdf_samples", "shading_samples"}
 
 
 class MitsubaScene(NamedTuple):
-    """differences: where a model of clrt is near Mitsuba's and not the same, a sentence each. missing: what the
-    materials lack that others stand in for, by the name of the mesh or sphere."""
+    """differences: how clrt's models approximate Mitsuba's, one sentence each. missing: the unsupported features of
+    materials that `stand_in` replaces, by the name of the mesh or sphere."""
 
     scene: Scene
     differences: list[str]
@@ -50,10 +50,10 @@ class MitsubaScene(NamedTuple):
 
 
 def read_mitsuba(path: Path, stand_in: Material | None = None) -> MitsubaScene:
-    """The scene in an XML file of Mitsuba 3, as its `rgb` variants render it.
+    """Read the scene in an XML file of Mitsuba 3, as its `rgb` variants render it.
 
-    stand_in: instead of materials that are not supported. Raises SceneError for what is malformed, and UnsupportedError
-    with all that clrt has no counterpart for.
+    stand_in: replaces materials that are not supported. Raises SceneError if the file is malformed, and
+    UnsupportedError with all features that clrt does not support.
     """
     return _Reader(stand_in).scene(read_xml(path), name_of(path))
 
@@ -97,7 +97,7 @@ class _Reader:
         return list(self._shapes.parts(plugin))
 
     def _tried(self, read: Callable[[Plugin], Part], plugin: Plugin) -> Part | None:
-        """What is read of a plugin; None where it cannot be, which is noted."""
+        """Return what `read` returns for a plugin; None if it raises SceneError, which is noted."""
         try:
             return read(plugin)
         except SceneError as error:
@@ -110,7 +110,7 @@ class _Reader:
             self._features += [feature for feature in error.features if feature not in self._features]
 
     def _note_unread(self, root: Plugin) -> None:
-        """Parameters that nobody asked for, of plugins in use."""
+        """Note the parameters of plugins in use that were not read."""
         for plugin in _in_use(root):
             for name in plugin.unread():
                 self._note(UnsupportedError(f'{plugin.where}: "{name}" is not supported; leave it out',
@@ -118,7 +118,7 @@ class _Reader:
 
 
 def _in_use(root: Plugin) -> Iterator[Plugin]:
-    """Plugins that something was asked of, and those in them."""
+    """Yield the plugins that were read, and those nested in them."""
     for _, child in root.children:
         if child.used:
             yield child
@@ -130,7 +130,7 @@ def _of(parts: list[Mesh | Sphere | Instance], kind: type[Part]) -> list[Part]:
 
 
 def _film(sensor: Plugin) -> RenderSettings:
-    """Size, samples and filter."""
+    """Read size, samples per pixel and filter."""
     size, spp, kind = (768, 576), 4, "gaussian"
     for sampler in sensor.all("sampler"):
         spp = sampler.value("sample_count", int, spp)
@@ -148,7 +148,7 @@ def _film(sensor: Plugin) -> RenderSettings:
 
 
 def _integrator(plugin: Plugin, settings: RenderSettings) -> RenderSettings:
-    """The settings with integrator and depth."""
+    """Return the settings with the plugin's integrator and depth."""
     while plugin.kind in WRAPPERS and plugin.all("integrator"):
         plugin.used.add("aovs")
         plugin = plugin.all("integrator")[0]
@@ -162,7 +162,7 @@ def _integrator(plugin: Plugin, settings: RenderSettings) -> RenderSettings:
 
 
 def _camera(plugin: Plugin, size: tuple[int, int]) -> Camera:
-    """A sensor's view of a film of this size."""
+    """Read the camera of a sensor with a film of this size."""
     if plugin.kind not in ("perspective", "thinlens", "orthographic"):
         plugin.refuse_kind("perspective, thinlens or orthographic")
     plugin.used |= IMMATERIAL
@@ -180,7 +180,7 @@ def _camera(plugin: Plugin, size: tuple[int, int]) -> Camera:
 
 
 def _lengths(plugin: Plugin, to_world: Doubles) -> tuple[float, float, float]:
-    """Of a sensor's axes; refused where they are not at right angles, or mirror or stretch the picture."""
+    """Return the lengths of a sensor's axes; these must be orthogonal and not mirror or stretch the image."""
     axes = to_world[:3, :3]
     x, y, z = np.linalg.norm(axes, axis=0).tolist()
     if min(x, y, z) == 0 or np.abs((axes / (x, y, z)).T @ (axes / (x, y, z)) - np.eye(3)).max() > ODD or (
@@ -191,7 +191,7 @@ def _lengths(plugin: Plugin, to_world: Doubles) -> tuple[float, float, float]:
 
 
 def _vertical_fov(plugin: Plugin, aspect: float) -> float:
-    """In degrees, of `fov` along `fov_axis`, or of `focal_length` on film of 36 x 24 mm."""
+    """Return the vertical angle in degrees, from `fov` along `fov_axis`, or from `focal_length` on 36 x 24 mm film."""
     axis = plugin.value("fov_axis", str, "x").lower()
     if "fov" in plugin.values:
         spread = tan(radians(plugin.value("fov", float, 0.0)) / 2)

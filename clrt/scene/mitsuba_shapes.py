@@ -1,4 +1,4 @@
-"""Mitsuba's shapes as meshes, spheres and instances."""
+"""Conversion of Mitsuba's shapes to meshes, spheres and instances."""
 
 from __future__ import annotations
 
@@ -27,15 +27,17 @@ from .validate import index_problems
 PRIMITIVES: dict[str, Callable[[], Mesh]] = {
     "rectangle": rectangle, "cube": cube, "disk": disk, "cylinder": cylinder, "sphere": sphere}
 FILES = ("obj", "ply")
-#: How far a transform may be from turning, moving and scaling evenly.
+#: Tolerance for a transform to be a rotation, translation and uniform scale.
 UNEVEN = 1e-5
 Part = Mesh | Sphere
 Attributes = Mapping[str, FloatArray]
 
 
 class Piece(NamedTuple):
-    """A mesh, its attributes, and whether Mitsuba turns it inside out under a transform that mirrors: it takes the
-    side that emits from normals, those of the shape, or else those of its corners' order."""
+    """A mesh, its attributes, and whether Mitsuba turns it inside out under a mirroring transform.
+
+    Mitsuba takes the emitting side from the shape's normals, or else from the winding in world space.
+    """
 
     mesh: Mesh
     attributes: Attributes
@@ -43,10 +45,10 @@ class Piece(NamedTuple):
 
 
 class ShapeReader:
-    """Reads the shapes of one scene.
+    """Reader for the shapes of one scene.
 
-    stand_in: a material for shapes whose own is not supported; without one these are refused. missing: what these
-    lack, by the name of the mesh or sphere.
+    stand_in: a material for shapes whose own is not supported; without one these are rejected. missing: the unsupported
+    features of these, by the name of the mesh or sphere.
     """
 
     def __init__(self, textures: TextureReader, materials: MaterialReader, stand_in: Material | None) -> None:
@@ -57,7 +59,7 @@ class ShapeReader:
         self._groups: dict[Plugin, list[Part]] = {}
 
     def parts(self, plugin: Plugin) -> Iterator[Part | Instance]:
-        """What a <shape> draws; nothing for a group, which its instances draw."""
+        """Yield what a <shape> renders; nothing for a group, which its instances render."""
         if plugin.kind == "instance":
             yield from self._instances(plugin)
         elif plugin.kind != "shapegroup":
@@ -87,7 +89,7 @@ class ShapeReader:
             yield _dressed(_turned(moved) if mirrored and turns else moved, look, attributes, plugin)
 
     def _look(self, plugin: Plugin) -> Look:
-        """Of the shape's BSDF and what is inside; or what stands in for it."""
+        """Return the material of the shape's BSDF and interior medium; or `stand_in` if it is not supported."""
         try:
             return self._own_look(plugin)
         except UnsupportedError as error:
@@ -98,14 +100,14 @@ class ShapeReader:
 
     def _own_look(self, plugin: Plugin) -> Look:
         bsdfs = plugin.all("bsdf")
-        grey = 0.0 if plugin.all("emitter") else 0.5  # as Mitsuba takes them where a shape has no BSDF
+        grey = 0.0 if plugin.all("emitter") else 0.5  # Mitsuba's default for a shape without a BSDF
         look = self._materials.look(bsdfs[-1]) if bsdfs else Look(Diffuse(color=(grey, grey, grey)))
         for medium in plugin.all("medium"):
             look = look._replace(material=absorbing(look.material, medium))
         return look
 
     def _lit(self, plugin: Plugin, look: Look) -> Look:
-        """With the light of an area emitter."""
+        """Return the look with the emission of the shape's area emitter."""
         for emitter in plugin.all("emitter"):
             if emitter.kind != "area":
                 emitter.refuse_kind("area on a shape")
@@ -136,7 +138,7 @@ class ShapeReader:
 
 
 def _ball(plugin: Plugin) -> Doubles:
-    """Radius and center, of a sphere of radius 1."""
+    """Return the matrix that gives a sphere of radius 1 the plugin's radius and center."""
     matrix = np.eye(4)
     matrix[:3, :3] *= plugin.value("radius", float, 1.0)
     matrix[:3, 3] = plugin.point("center") or (0.0, 0.0, 0.0)
@@ -144,8 +146,8 @@ def _ball(plugin: Plugin) -> Doubles:
 
 
 def _between(plugin: Plugin) -> Doubles:
-    """From p0 to p1, of a cylinder along z, turned about it as Duff et al. 2017 ("Building an Orthonormal Basis,
-    Revisited") turn the other axes."""
+    """Return the matrix that takes a cylinder along z to the axis from p0 to p1; rotated about it by the basis of Duff
+    et al. 2017 ("Building an Orthonormal Basis, Revisited")."""
     start, end = np.array(plugin.point("p0") or (0, 0, 0)), np.array(plugin.point("p1") or (0, 0, 1))
     radius, along = plugin.value("radius", float, 1.0), end - start
     x, y, z = unit(along).tolist()
@@ -160,8 +162,10 @@ def _between(plugin: Plugin) -> Doubles:
 
 
 def _sphere(to_world: Doubles, look: Look, name: str) -> Sphere | None:
-    """A sphere of radius 1 in the world, where it stays one and nothing on it tells how it is turned, nor, where a
-    transform that mirrors has turned it inside out, which side is which."""
+    """Return the transformed sphere of radius 1; None if it becomes an ellipsoid, or if it is textured.
+
+    Also if a mirroring transform turns it inside out and its sides differ.
+    """
     linear = to_world[:3, :3]
     squares = linear.T @ linear
     radius = float(np.cbrt(abs(np.linalg.det(linear))))
@@ -175,13 +179,13 @@ def _sphere(to_world: Doubles, look: Look, name: str) -> Sphere | None:
 
 
 def _turned(mesh: Mesh) -> Mesh:
-    """The mesh inside out."""
+    """Return the mesh turned inside out."""
     return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]),
                    normals=None if mesh.normals is None else -mesh.normals)
 
 
 def _from_file(plugin: Plugin) -> Iterator[Piece]:
-    """The meshes of a file, with smooth normals where it has none, as Mitsuba makes them."""
+    """Yield the meshes of a file, with smooth normals if it has none, as in Mitsuba."""
     path = Path(plugin.value("filename", str, ""))
     flat = plugin.value("face_normals", bool, False)
     downward = plugin.value("flip_tex_coords", bool, plugin.kind == "obj")
@@ -199,7 +203,7 @@ def _from_file(plugin: Plugin) -> Iterator[Piece]:
 
 
 def _ply(path: Path) -> tuple[Mesh, Attributes] | None:
-    """A plain PLY file with all of its attributes; None for others."""
+    """Read a plain PLY file with all its attributes; None for others."""
     records = ply_records(path)
     if records is None:
         return None
@@ -212,7 +216,7 @@ def _ply(path: Path) -> tuple[Mesh, Attributes] | None:
         return np.column_stack([vertex[name] for name in names]).astype(np.float32)
 
     vertices = columns("x", "y", "z")
-    assert vertices is not None  # or it were not plain
+    assert vertices is not None  # guaranteed by ply_records
     faces = face["corners list"]["indices"]
     if problems := index_problems(faces, len(vertices), f'mesh "{path.stem}"'):
         raise SceneError([f"{path}: {problem}" for problem in problems])
@@ -225,7 +229,7 @@ def _ply(path: Path) -> tuple[Mesh, Attributes] | None:
 
 
 def _attributes(table: np.ndarray[tuple[int], np.dtype[np.void]]) -> dict[str, FloatArray]:
-    """Of columns color_0, color_1 … the arrays (n, k), by name."""
+    """Collect columns color_0, color_1 … into arrays (n, k), by name."""
     groups: dict[str, list[str]] = {}
     for column in table.dtype.names or ():
         name, _, place = column.rpartition("_")
@@ -236,7 +240,7 @@ def _attributes(table: np.ndarray[tuple[int], np.dtype[np.void]]) -> dict[str, F
 
 
 def _dressed(mesh: Mesh, look: Look, attributes: Attributes, plugin: Plugin) -> Mesh:
-    """In its material, and in the colors of an attribute: one of faces takes their corners apart."""
+    """Return the mesh with its material, and the colors of an attribute; a face attribute splits shared vertices."""
     mesh = replace(mesh, material=look.material, name=plugin.where)
     if mesh.uv is None and look.material.textures():
         raise SceneError(f"{plugin.where}: has a texture and no texture coordinates; add them to the file")

@@ -1,4 +1,4 @@
-"""Mitsuba's textures: bitmaps, checkerboards, and attributes of meshes, as what materials of clrt take."""
+"""Conversion of Mitsuba's textures: bitmaps, checkerboards, and mesh attributes."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .textures import Picture, Texture, Wrap
 
 WRAPS: dict[str, Wrap] = {"repeat": "repeat", "mirror": "mirror", "clamp": "clamp"}
 FILTERS: dict[str, Literal["linear", "nearest"]] = {"bilinear": "linear", "nearest": "nearest"}
-#: Of Rec. 709.
+#: Luminance weights of Rec. 709.
 LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
-#: How far the columns of a texture's transform may be from a right angle, by its cosine.
+#: Tolerance for the columns of a texture's transform to be orthogonal, as the cosine of their angle.
 SHEAR = 1e-6
 
 
 class Attribute(NamedTuple):
-    """Colors of a mesh by one of its attributes, such as "vertex_color": low + value·(high − low)."""
+    """Per-vertex or per-face colors of a mesh attribute, such as "vertex_color": low + value·(high − low)."""
 
     name: str
     low: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -30,13 +30,13 @@ class Attribute(NamedTuple):
 
 
 class TextureReader:
-    """Reads the textures of one scene; pictures of several textures are read once."""
+    """Reader for the textures of one scene; an image that several textures use is read once."""
 
     def __init__(self) -> None:
         self._pictures: dict[tuple[str, str], Picture] = {}
 
     def color(self, owner: Plugin, name: str, default: float, *, emitted: bool = False) -> Any:
-        """A color, a Texture or an Attribute."""
+        """Read a color: three numbers, a Texture or an Attribute."""
         child = owner.child(name)
         if child is None:
             return rgb(owner.color(name, default), emitted=emitted, bounded=not emitted)
@@ -47,7 +47,7 @@ class TextureReader:
         return self._bitmap(child, "color")
 
     def number(self, owner: Plugin, name: str, default: float) -> Any:
-        """A number, or a Texture."""
+        """Read a number, a Texture or an Attribute."""
         child = owner.child(name)
         if child is None:
             value = owner.color(name, default)
@@ -59,7 +59,7 @@ class TextureReader:
         return self._bitmap(child, "number")
 
     def normals(self, owner: Plugin, name: str) -> Texture:
-        """A normal map."""
+        """Read a normal map."""
         child = owner.child(name)
         if child is None:
             owner.refuse(f'has no texture "{name}"', "add one")
@@ -77,7 +77,7 @@ class TextureReader:
         if raw != (use == "normal") and use != "number":
             plugin.refuse(f"is {'raw' if raw else 'not raw'}", f"write raw = {str(not raw).lower()}, for a {use}",
                           f"bitmap, raw = {str(raw).lower()}, for a {use}")
-        plugin.used |= {"format", "accel"}  # how Mitsuba stores the same texels
+        plugin.used |= {"format", "accel"}  # these affect only how Mitsuba stores the texels
         path = plugin.value("filename", str, "")
         place = _placed(plugin, plugin.transform("to_uv"))
         wrap = WRAPS.get(plugin.value("wrap_mode", str, "repeat"))
@@ -88,7 +88,7 @@ class TextureReader:
         return Texture(picture=self._picture(path, linear), wrap=(wrap, wrap), filter=kind, **place)
 
     def _picture(self, file: str, curve: str) -> Picture:
-        """A file's texels: as they are, or as linear luminances of 8 bits in all channels."""
+        """Read a file's texels: unchanged, or as linear luminance of 8 bits in all channels."""
         if (file, curve) not in self._pictures:
             path = Path(file)
             texels = read_texels(path)
@@ -99,10 +99,10 @@ class TextureReader:
         return self._pictures[file, curve]
 
     def _checkerboard(self, plugin: Plugin, *, encoded: bool) -> Texture:
-        """Two by two texels, with factors that make the brighter color exact and the other near to what 8 bits hold."""
+        """Return 2x2 texels, with factors that make the brighter color exact and the other as close as 8 bits allow."""
         first, second = (rgb(plugin.color(name, value), bounded=True)
                          for name, value in (("color0", 0.4), ("color1", 0.2)))
-        if not encoded:  # of numbers Mitsuba 3 exchanges the two
+        if not encoded:  # Mitsuba 3 swaps the two for numbers
             first, second = second, first
         texels = np.full((2, 2, 4), 255, np.uint8)
         factors = [0.0, 0.0, 0.0]
@@ -115,7 +115,7 @@ class TextureReader:
 
 
 def _pair(first: float, second: float, encoded: bool) -> tuple[int, int, float]:
-    """Two texels and the factor, at most 1, with which they are nearest to two values."""
+    """Return the two texels, and the factor of at most 1, that approximate two values best."""
     levels = np.arange(256) / 255
     levels = linear_from_srgb(levels.astype(np.float32)).astype(np.float64) if encoded else levels
     most, least = max(first, second), min(first, second)
@@ -130,7 +130,7 @@ def _pair(first: float, second: float, encoded: bool) -> tuple[int, int, float]:
 
 
 def _placed(plugin: Plugin, to_uv: Doubles) -> dict[str, Any]:
-    """offset, scale and rotation_degrees of a texture that turns, stretches and moves coordinates so."""
+    """Return offset, scale and rotation_degrees of a texture with the transform `to_uv`."""
     matrix = to_uv[:2, :2]
     columns = hypot(*matrix[:, 0]), hypot(*matrix[:, 1])
     if abs(float(matrix[:, 0] @ matrix[:, 1])) > SHEAR * columns[0] * columns[1]:

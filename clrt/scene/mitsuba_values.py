@@ -1,4 +1,4 @@
-"""Values in Mitsuba's XML: numbers, colors, spectra and transforms from the attributes of an element."""
+"""Values in Mitsuba's XML: numbers, colors, spectra and transforms parsed from the attributes of an element."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class Color(NamedTuple):
 
 
 class Spectrum(NamedTuple):
-    """<spectrum>: values at increasing wavelengths in nm; one value and no wavelengths for a constant one."""
+    """<spectrum>: values at increasing wavelengths in nm; a single value without wavelengths if it is constant."""
 
     wavelengths: tuple[float, ...]
     values: tuple[float, ...]
 
 
 def rgb(value: float | Color | Spectrum, *, emitted: bool = False, bounded: bool = False) -> tuple[float, float, float]:
-    """The color that Mitsuba's `rgb` variants make of a value. emitted: of a radiance or the like, for which spectra
-    are relative to equal energy; bounded: of a reflectance, at most 1."""
+    """Return the color that Mitsuba's `rgb` variants derive from a value. emitted: it is a radiance or the like, whose
+    spectrum is relative to equal energy; bounded: it is a reflectance, clamped to 1."""
     if isinstance(value, Color):
         return value.values
     if isinstance(value, Spectrum) and value.wavelengths:
@@ -46,7 +46,7 @@ def rgb(value: float | Color | Spectrum, *, emitted: bool = False, bounded: bool
 
 
 def numbers(text: str) -> list[float]:
-    """The numbers of a list that is separated by commas or spaces. ValueError for what is no finite number."""
+    """Parse a list of numbers separated by commas or spaces. Raises ValueError unless all are finite numbers."""
     found = [float(word) for word in text.replace(",", " ").split()]
     if not np.isfinite(found).all():
         raise ValueError(text)
@@ -62,7 +62,7 @@ def boolean(text: str) -> bool:
 
 
 def color(text: str) -> Color:
-    """Three numbers, one for grey, or a hexadecimal sRGB color such as #ff8000."""
+    """Parse three numbers, one for grey, or a hexadecimal sRGB color such as #ff8000."""
     if text.strip().startswith("#"):
         from .pictures import linear_from_srgb
         encoded = np.array([int(text.strip()[i:i + 2], 16) for i in (1, 3, 5)], np.float32)
@@ -74,7 +74,7 @@ def color(text: str) -> Color:
 
 
 def spectrum(text: str) -> Spectrum:
-    """A constant, or pairs of a wavelength and a value."""
+    """Parse a constant, or pairs of a wavelength and a value."""
     if ":" not in text:
         (value,) = numbers(text)
         return Spectrum((), (value,))
@@ -86,7 +86,7 @@ def spectrum(text: str) -> Spectrum:
 
 
 def vector(attributes: Attributes, missing: float = 0.0) -> tuple[float, float, float]:
-    """Three numbers: as `value`, where one number stands for all, or as x, y and z."""
+    """Parse three numbers: in `value`, where one number may stand for all, or in x, y and z."""
     if "value" in attributes:
         values = numbers(attributes["value"])
         values = values * 3 if len(values) == 1 else values
@@ -97,7 +97,7 @@ def vector(attributes: Attributes, missing: float = 0.0) -> tuple[float, float, 
 
 
 def transform(steps: list[tuple[str, Attributes]]) -> Doubles:
-    """The 4x4 matrix of a <transform>: its steps in the order in which they are written, acting on column vectors."""
+    """Return the 4x4 matrix of a <transform>: its steps applied in document order to column vectors."""
     matrix = np.eye(4)
     for name, attributes in steps:
         matrix = STEPS[name](attributes) @ matrix
@@ -105,7 +105,7 @@ def transform(steps: list[tuple[str, Attributes]]) -> Doubles:
 
 
 def _rotate(attributes: Attributes) -> Doubles:
-    """Counter-clockwise by `angle` degrees for whom the axis points at (Rodrigues)."""
+    """Return the rotation by `angle` degrees, counter-clockwise looking against the axis (Rodrigues)."""
     x, y, z = unit(np.array(vector(attributes))).tolist()
     angle = np.radians(numbers(attributes["angle"])[0])
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -115,7 +115,7 @@ def _rotate(attributes: Attributes) -> Doubles:
 
 
 def _look_at(attributes: Attributes) -> Doubles:
-    """From local axes, +z forward, +y up and +x to the left, to the world."""
+    """Return the matrix from camera axes, +z forward, +y up and +x left, to the world."""
     texts = attributes["origin"], attributes["target"], attributes.get("up", "0 1 0")
     origin, target, up = (np.array(vector({"value": text})) for text in texts)
     forward = unit(target - origin)
@@ -128,7 +128,7 @@ def _look_at(attributes: Attributes) -> Doubles:
 
 
 def _matrix(attributes: Attributes) -> Doubles:
-    """Rows of 4x4 or 3x3 numbers."""
+    """Parse the rows of a 4x4 or 3x3 matrix."""
     values = numbers(attributes["value"])
     size = {16: 4, 9: 3}[len(values)]
     matrix = np.eye(4)
@@ -151,7 +151,7 @@ _READERS: dict[str, tuple[Callable[[str], Value], str]] = {
 
 
 def value_of(element: Element, where: str) -> Value:
-    """The value of an element that is no plugin. SceneError names what is wrong with it."""
+    """Parse the value of an element that is not a plugin. Raises SceneError naming what is wrong with it."""
     attributes = element.attrib
     try:
         if element.tag in ("point", "vector"):

@@ -1,4 +1,4 @@
-"""Mitsuba 3's XML as a tree of plugins: defaults, includes, references and transforms resolved, nothing interpreted.
+"""Mitsuba 3's XML as a tree of plugins, with defaults, includes, references and transforms resolved.
 
 The format: Mitsuba 3's manual, "Scene XML file format"; W. Jakob et al., 2022.
 """
@@ -23,12 +23,12 @@ Kind = TypeVar("Kind")
 VALUES = ("float", "integer", "boolean", "string", "rgb", "spectrum", "point", "vector", "transform")
 PLUGINS = ("scene", "integrator", "sensor", "film", "rfilter", "sampler", "emitter", "shape", "bsdf", "texture",
            "medium", "phase", "volume")
-#: Files that include one another, one in the other.
+#: Maximum nesting depth of includes.
 DEEPEST = 15
 
 
 class UnsupportedError(SceneError):
-    """Something in a scene that clrt cannot draw. `features`: what it is, in two or three words each."""
+    """A scene uses unsupported features. `features`: their names, two or three words each."""
 
     def __init__(self, problems: str | list[str], features: list[str]) -> None:
         super().__init__(problems)
@@ -37,9 +37,9 @@ class UnsupportedError(SceneError):
 
 @dataclass(eq=False)
 class Plugin:
-    """An element such as <bsdf type="diffuse">. tag: "bsdf"; kind: "diffuse"; where: what messages call it.
+    """An element such as <bsdf type="diffuse">. tag: "bsdf"; kind: "diffuse"; where: its name in messages.
 
-    What was asked for is `used`; so whoever reads a plugin can name what nobody read.
+    Parameters that were read are in `used`, so that a reader can report the others.
     """
 
     tag: str
@@ -50,7 +50,7 @@ class Plugin:
     used: set[str] = field(default_factory=set)
 
     def value(self, name: str, kind: type[Kind], default: Kind) -> Kind:
-        """A parameter of a plain kind; SceneError where it is of another."""
+        """Return a parameter of a plain type; raises SceneError if it has another type."""
         self.used.add(name)
         value = self.values.get(name, default)
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
@@ -60,7 +60,7 @@ class Plugin:
         return value
 
     def color(self, name: str, default: float) -> float | Color | Spectrum:
-        """A parameter that is a number, a color or a spectrum."""
+        """Return a parameter that is a number, a color or a spectrum."""
         self.used.add(name)
         value = self.values.get(name, default)
         if isinstance(value, bool) or not isinstance(value, (int, float, Color, Spectrum)):
@@ -68,7 +68,7 @@ class Plugin:
         return value
 
     def point(self, name: str) -> tuple[float, float, float] | None:
-        """A point or vector, if it is given."""
+        """Return a point or vector, None if it is missing."""
         self.used.add(name)
         value = self.values.get(name)
         if value is not None and not isinstance(value, tuple) or isinstance(value, (Color, Spectrum)):
@@ -76,7 +76,7 @@ class Plugin:
         return value
 
     def transform(self, name: str) -> Doubles:
-        """(4, 4); the identity where there is none."""
+        """Return a transform (4, 4), the identity if it is missing."""
         self.used.add(name)
         value = self.values.get(name)
         if value is not None and not isinstance(value, np.ndarray):
@@ -84,18 +84,18 @@ class Plugin:
         return np.eye(4) if value is None else value
 
     def all(self, tag: str) -> list[Plugin]:
-        """The children of one tag."""
+        """Return the children with this tag."""
         found = [(name, child) for name, child in self.children if child.tag == tag]
         self.used.update(name for name, _ in found)
         return [child for _, child in found]
 
     def child(self, name: str) -> Plugin | None:
-        """The child of this name, if there is one."""
+        """Return the child with this name, if there is one."""
         self.used.add(name)
         return next((child for own, child in self.children if own == name), None)
 
     def unread(self) -> list[str]:
-        """The names of parameters that nobody asked for."""
+        """Return the names of parameters that were not read."""
         return sorted(({*self.values} | {name for name, _ in self.children}) - self.used)
 
     def refuse(self, what: str, remedy: str, feature: str = "") -> NoReturn:
@@ -108,7 +108,7 @@ class Plugin:
 
 
 def read_xml(path: Path) -> Plugin:
-    """The scene in an XML file. Raises SceneError for what is malformed or refers to nothing."""
+    """Read the scene in an XML file. Raises SceneError if it is malformed or has a dangling reference."""
     return _Document(path).scene()
 
 
@@ -199,12 +199,12 @@ class _Document:
         return self._by_id[name]
 
     def file(self, name: str) -> Path:
-        """Where a file is that the scene names: beside it, or in a folder of its <path>s, the last one first."""
+        """Return the path of a file named in the scene: next to it, or in a <path> folder, the last one first."""
         found = (folder / name for folder in self._folders)
         return next((path for path in found if path.exists()), self._path.parent / name)
 
     def _substitute(self, element: Element, where: str) -> None:
-        """$NAME in attributes becomes what a <default> said."""
+        """Replace $NAME in attributes by the value of its <default>."""
         def said(match: re.Match[str]) -> str:
             if match[1] not in self._defaults:
                 raise SceneError(f'{where}: nothing says what ${match[1]} is; write <default name="{match[1]}" …/>')

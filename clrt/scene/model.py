@@ -1,4 +1,4 @@
-"""What is drawn: plain dataclasses, numpy only. Lengths in scene units, right-handed, +Y up, linear Rec. 709."""
+"""Scene description: plain dataclasses, numpy only. Lengths in scene units, right-handed, +Y up, linear Rec. 709."""
 
 from __future__ import annotations
 
@@ -34,12 +34,11 @@ Filter = Literal["box", "tent", "blackman_harris", "gaussian"]
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:
-    """What the picture shows; `look_at` is in its middle, and its right is cross(forward, up).
+    """Camera. `look_at` is at the image center; the image's right is cross(forward, up).
 
-    perspective: through a pinhole, or a thin lens of `aperture_radius` that is sharp at `focus_distance` along the view
-    (None: that of `look_at`); `fov_degrees`: vertical, full angle. orthographic: parallel rays, a picture `view_height`
-    high (None: as high as the perspective is at `look_at`). equirectangular: all directions, laid out as Environment's
-    for a view along +Z.
+    perspective: pinhole, or thin lens of `aperture_radius` focused at `focus_distance` along the view (None: at
+    `look_at`); `fov_degrees`: vertical, full angle. orthographic: parallel rays, an image `view_height` high (None: as
+    the perspective view at `look_at`). equirectangular: all directions, in Environment's mapping for a view along +Z.
     """
 
     position: Vector = (0.0, 0.0, 5.0)
@@ -57,15 +56,14 @@ class Camera:
 
 @dataclass(eq=False)
 class Mesh:
-    """Triangles of one material.
+    """Triangle mesh with one material.
 
-    vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front; both become that from lists
-    and arrays of other numbers. normals: (n, 3) float32,
-    interpolated over each face, or None for flat shading. uv, uv1: (n, 2) float32, the two sets of texture coordinates
-    (scene.textures). colors: (n, 3) or (n, 4) float32, linear, from 0 to 1, which multiply the material's color, and
-    the fourth its opacity, if that is not 1.
-    tangents: (n, 4) float32, for normal maps, w the sign of the bitangent as in glTF; computed where they are missing.
-    material_name: what a model file calls the material.
+    vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front; lists and arrays of other
+    dtypes are converted. normals: (n, 3) float32, interpolated over each face, or None for flat shading.
+    uv, uv1: (n, 2) float32, the two sets of texture coordinates (scene.textures). colors: (n, 3) or (n, 4) float32,
+    linear, from 0 to 1; they multiply the material's color, and the fourth component its opacity unless that is 1.
+    tangents: (n, 4) float32, for normal maps, w the sign of the bitangent as in glTF; computed if missing.
+    material_name: the material's name in the model file.
     """
 
     vertices: FloatArray
@@ -80,8 +78,7 @@ class Mesh:
     material_name: str = ""
 
     def __post_init__(self) -> None:
-        """Lists and arrays of other numbers become float32 and int32 where these hold them; what is wrong with an array
-        is for `validate` to say."""
+        """Convert lists and other dtypes to float32 and int32 if the values fit; `validate` reports invalid arrays."""
         with suppress(ClrtError), np.errstate(over="ignore", under="ignore"):
             self.vertices = real_array("vertices", self.vertices).astype(np.float32, copy=False)
         with suppress(ClrtError):
@@ -92,11 +89,10 @@ class Mesh:
 
 @dataclass(eq=False)
 class Instance:
-    """A mesh that stands in the world once more, in the memory of one. That mesh itself is drawn only where the scene's
-    `meshes` hold it, too.
+    """An instance, which shares its mesh's memory. The mesh itself is rendered only if the scene's `meshes` contain it.
 
     to_world: (3, 4), or (4, 4) with the last row 0, 0, 0, 1: an affine matrix that acts on column vectors and takes the
-    mesh's points to the world; it may mirror, but must not flatten. material: instead of the mesh's own.
+    mesh's points to the world; it may mirror, but must not be singular. material: replaces the mesh's own.
     """
 
     mesh: Mesh
@@ -105,7 +101,7 @@ class Instance:
     name: str = "instance"
 
     def __post_init__(self) -> None:
-        """Numbers become float64, four rows three; what is wrong with them is for `validate` to say."""
+        """Convert numbers to float64 and four rows to three; `validate` reports invalid ones."""
         with suppress(ValueError, TypeError, OverflowError):
             matrix = np.asarray(self.to_world, np.float64)
             affine = matrix.shape == (4, 4) and np.array_equal(matrix[3], (0.0, 0.0, 0.0, 1.0))
@@ -114,8 +110,7 @@ class Instance:
 
 @dataclass(eq=False, kw_only=True)
 class Model:
-    """What a model file holds: meshes or instances, at least one, its cameras by name, the first one first, and its
-    lights."""
+    """Content of a model file: meshes or instances, at least one, cameras by name in file order, and lights."""
 
     meshes: list[Mesh]
     instances: list[Instance] = field(default_factory=list)
@@ -125,7 +120,7 @@ class Model:
 
 @dataclass(frozen=True, kw_only=True)
 class Sphere:
-    """A sphere seen from outside (or from inside, which is its back side)."""
+    """Sphere seen from outside (or from inside, which is its back side)."""
 
     center: Vector = (0.0, 0.0, 0.0)
     radius: Positive = 1.0
@@ -138,9 +133,9 @@ class Sphere:
 
 @dataclass(eq=False, kw_only=True)
 class Environment:
-    """Light from infinitely far away: a constant `color`, or an `image` (h, w, 3) float32 in latitude–longitude form.
+    """Environment light: a constant `color`, or an environment map, `image` (h, w, 3) float32, equirectangular.
 
-    Direction to texel: u = atan2(x, −z)/2π mod 1, v = acos(y)/π, row 0 on top; `rotation_degrees` turns the
+    Direction to texel: u = atan2(x, −z)/2π mod 1, v = acos(y)/π, row 0 on top; `rotation_degrees` rotates the
     environment about +Y, counter-clockwise seen from above. Radiance = strength · (color or texel).
     """
 
@@ -152,12 +147,11 @@ class Environment:
 
 @dataclass(frozen=True, kw_only=True)
 class RenderSettings:
-    """How to render unless told otherwise. `size`: (width, height). `max_depth` counts path edges:
-    1 = only what glows, 2 = + direct light, 3 = + one bounce. shadows: whether they are cast, where the integrator is
-    local or raster. back_face_culling: which rays pass through the back faces of materials that are not double_sided:
-    "none", those of the "camera", or "all". clamp_direct, clamp_indirect: the largest value that any channel of one
-    contribution to a sample may have, for paths of at most two edges and for longer ones, where the integrator is path
-    or direct; 0 does not clamp."""
+    """Default render settings of a scene. `size`: (width, height). `max_depth`: maximum path depth, 1 = emission only,
+    2 = direct light, 3 = one bounce. shadows: whether the local and raster integrators cast them. back_face_culling:
+    which rays ignore the back faces of materials that are not double_sided: "none", those of the "camera", or "all".
+    clamp_direct, clamp_indirect: upper limits per channel of one contribution to a sample, for paths of at most two
+    edges and for longer ones, in the path and direct integrators; 0 does not clamp."""
 
     size: tuple[Pixels, Pixels] = (512, 512)
     spp: Annotated[int, Ge(1)] = 64
@@ -178,11 +172,11 @@ class RenderSettings:
 
 @dataclass(eq=False, kw_only=True)
 class Scene:
-    """Everything that one picture needs. `camera` takes it; `cameras`: others by name, those of the model files, too;
-    `animation`: how the camera moves (scene.animation).
+    """Everything needed to render an image. `camera` is rendered; `cameras`: others by name, including those of model
+    files; `animation`: how the camera moves (scene.animation).
 
-    materials: those that the scene file names; its meshes and spheres refer to these objects. source: where its parts
-    were read from, if they were.
+    materials: the scene file's named ones; meshes and spheres refer to these objects. source: the files that its parts
+    were read from, if any.
     """
 
     meshes: list[Mesh] = field(default_factory=list)

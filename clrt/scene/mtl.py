@@ -1,4 +1,4 @@
-"""Materials of Wavefront MTL libraries, with the keys for physically based ones that exporters agree on.
+"""Materials of Wavefront MTL libraries, including the common extension for physically based rendering (PBR).
 
 The format: "MTL material format", Wavefront, 1995; PBR keys: Exocortex and Blinn, "Extending OBJ/MTL", as in tinyobj.
 """
@@ -18,20 +18,20 @@ from .materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from .mtl_maps import Maps, strength
 from .textures import Texture
 
-#: Illumination models by what they ask for beyond a highlight.
+#: Illumination models with mirror reflection, and with refraction.
 MIRRORS, GLASS = {3, 5, 8}, {4, 6, 7, 9}
-#: Diffuse colours below this are black to the eye: what reflects beneath them is a mirror.
+#: Below this a diffuse color counts as black, and a material with a mirror illumination model becomes a Mirror.
 BLACK = 0.05
-#: Keys of layers and effects that no material here has.
+#: Keys of unsupported layers and effects.
 OTHERS = {"ps": "sheen (Ps)", "pc": "clearcoat (Pc)", "aniso": "anisotropy (aniso)"}
-#: Maps that are read.
+#: Supported maps.
 MAPS = {"map_kd", "map_ke", "map_d", "map_pr", "map_pm", "norm", "map_kn"}
 KEYS = {"kd", "ks", "ke", "ns", "ni", "tf", "tr", "d", "illum", "pr", "pm", *OTHERS}
 
 
 @dataclass
 class Entry:
-    """One newmtl of a library: its `numbers` by key, such as "kd", and of its `maps` what follows the key."""
+    """One newmtl of a library: its `numbers` by key, such as "kd", and the rest of the line for each of its `maps`."""
 
     name: str
     numbers: dict[str, list[float]] = field(default_factory=dict)
@@ -41,7 +41,7 @@ class Entry:
         return self.numbers[key][0] if key in self.numbers else missing
 
     def color(self, key: str, missing: float, most: float = 1.0) -> tuple[float, float, float]:
-        """Three numbers from 0 to `most`; one counts for all three."""
+        """Return three numbers clamped to 0 … `most`; a single one stands for all three."""
         values = self.numbers.get(key, [missing])
         red, green, blue = (min(max(value, 0.0), most) for value in (values * 3)[:3])
         return red, green, blue
@@ -52,14 +52,14 @@ class Entry:
 
 
 def read_library(text: str) -> dict[str, Entry]:
-    """The entries of a library by name. Raises SceneError for what should be a number and is none."""
+    """Return the entries of a library by name. Raises SceneError if a value is not a number."""
     entries: dict[str, Entry] = {}
     entry = Entry("")
     for line in text.splitlines():
         key, *words = line.split("#")[0].split() or [""]
         key, rest = key.lower(), " ".join(words)
         if key == "newmtl":
-            name = printable(" ".join(line.split()[1:]))  # in which # may stand
+            name = printable(" ".join(line.split()[1:]))  # names may contain #
             entry = entries.setdefault(name, Entry(name))
         elif key.startswith(("map_", "bump", "disp", "decal", "refl", "norm")):
             entry.maps[key] = rest
@@ -82,11 +82,11 @@ def _numbers(entry: Entry, key: str, rest: str) -> list[float]:
 
 
 def material(entry: Entry, maps: Maps) -> Material:
-    """What an entry says.
+    """Convert an entry to a material.
 
-    With Pr or Pm, metallic_roughness; else by `illum` glass, a mirror, gloss or diffuse. Gloss is as rough as its
-    exponent Ns says, where GGX is as wide as Blinn's lobe: alpha² = 2/(Ns + 2) (Walter et al. 2007). Maps multiply the
-    colours and numbers that they are of, or 1 where these are missing.
+    With Pr or Pm it is metallic_roughness; otherwise `illum` selects glass, a mirror, metallic_roughness or diffuse.
+    The roughness follows from the exponent Ns such that GGX is as wide as Blinn's lobe: alpha² = 2/(Ns + 2) (Walter et
+    al. 2007). Maps multiply the colors and numbers that they belong to, or 1 if these are missing.
     """
     found = {key: texture for key, words in entry.maps.items() if key in MAPS and (texture := maps.texture(words))}
     shared: dict[str, Any] = {"emission": _painted(found.get("map_ke"), entry, "ke", 0.0, math.inf)}
@@ -114,7 +114,7 @@ def material(entry: Entry, maps: Maps) -> Material:
 
 def _painted(texture: Texture | None, entry: Entry, key: str, missing: float,
              most: float = 1.0) -> tuple[float, float, float] | Texture:
-    """A colour, or its map times it."""
+    """Return a color, or its map with the color as factor."""
     return entry.color(key, missing, most) if texture is None else replace(texture, factor=entry.color(key, 1.0, most))
 
 
@@ -123,7 +123,7 @@ def _numbered(texture: Texture | None, number: float) -> float | Texture:
 
 
 def left_out(entries: Mapping[str, Entry]) -> list[str]:
-    """What the entries have that `material` leaves out, in words."""
+    """Return descriptions of what the entries have that `material` ignores."""
     maps = sorted({key for entry in entries.values() for key in entry.maps} - MAPS)
     numbers = {key for entry in entries.values() for key in entry.numbers}
     return [f"textures ({', '.join(maps)})"] * bool(maps) + [words for key, words in OTHERS.items() if key in numbers]

@@ -1,4 +1,4 @@
-"""The pictures of Wavefront MTL libraries: `map_Kd -s 2 2 1 wood.png` and the like as textures."""
+"""Textures of Wavefront MTL libraries: `map_Kd -s 2 2 1 wood.png` and the like."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from .textures import Channel, Picture, Texture, Wrap
 
 log = logging.getLogger(__name__)
 
-#: How many words follow an option, at most; of those with several the later ones may be left out.
+#: Maximum number of arguments of an option; trailing ones may be omitted.
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2, "-o": 3,
            "-s": 3, "-t": 3, "-texres": 1, "-type": 1}
 CHANNELS: dict[str, Channel] = {"r": "red", "g": "green", "b": "blue", "m": "alpha"}
 
 
 class Map(NamedTuple):
-    """A map's file name, and by option what follows it."""
+    """A map's file name, and the arguments of its options."""
 
     file: str
     options: dict[str, list[str]]
 
 
 def parse_map(words: str) -> Map:
-    """Options come first; the rest is the file's name, blanks and all."""
+    """Parse a map statement: options first; the rest is the file name, which may contain spaces."""
     rest, options = words.split(), {}
     while rest and (option := rest[0].lower()) in OPTIONS:
         count = 1
@@ -39,14 +39,14 @@ def parse_map(words: str) -> Map:
 
 
 class Maps:
-    """Reads the maps of one model's libraries, each picture once; their names are relative to the model's folder."""
+    """Reader for the maps of one model's libraries, each image once; file names are relative to the model's folder."""
 
     def __init__(self, model: Path) -> None:
         self._model = model
         self._pictures: dict[str, Picture | None] = {}
 
     def texture(self, words: str) -> Texture | None:
-        """The map; None, with a warning, if its picture cannot be read. In OBJ files v goes upwards."""
+        """Return the texture; None, with a warning, if its image cannot be read. In OBJ files v points up."""
         name, options = parse_map(words)
         picture = self._picture(name)
         if picture is None:
@@ -70,7 +70,7 @@ class Maps:
 
 
 def strength(words: str) -> float:
-    """How far a bump map bends: what follows -bm."""
+    """Return a bump map's strength, the argument of -bm."""
     given = parse_map(words).options.get("-bm", [])
     return abs(float(given[0])) if given and _is_number(given[0]) else 1.0
 

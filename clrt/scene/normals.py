@@ -1,4 +1,4 @@
-"""Vertex normals: from the file, or computed so that the surface looks smooth."""
+"""Vertex normals: from the file, or computed for smooth shading."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from .model import FloatArray, IntArray
 from .transform import unit
 
 Normals = Literal["file", "smooth", "flat"]
-#: Faces that a thread works on at a time, from memory that is there: larger arrays come anew from the system.
+#: Faces that a thread processes at a time; the arrays are small enough to reuse memory instead of allocating it anew.
 PART = 1 << 14
 
 
 def choose_normals(wanted: Normals, vertices: FloatArray, faces: IntArray, stored: FloatArray | None,
                    ) -> FloatArray | None:
-    """The normals that `wanted` asks for: (n, 3) float32 of unit length, or None for flat shading.
+    """Return the normals that `wanted` selects: (n, 3) float32 of unit length, or None for flat shading.
 
-    "file" takes the `stored` ones, and is flat where the file has none. Stored normals that are zero or not finite,
-    as exporters write for triangles of no area, are replaced by smooth ones.
+    "file" takes the `stored` ones, and is flat if the file has none. Stored normals that are zero or not finite, as
+    exporters write them for degenerate triangles, are replaced by smooth ones.
     """
     if wanted == "smooth":
         return smooth_normals(vertices, faces)
@@ -39,11 +39,11 @@ def choose_normals(wanted: Normals, vertices: FloatArray, faces: IntArray, store
 
 
 def smooth_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Unit normals, (n, 3) float32: the faces' normals weighted by their angle at each point.
+    """Compute unit normals, (n, 3) float32: the faces' normals weighted by their angle at each point.
 
-    The angle keeps the result free of how a surface was cut into triangles (Thürmer and Wüthrich 1998). Vertices at
-    the same place share one normal, since many files store every triangle's corners apart. Where the faces cancel
-    (a sheet with two sides), one face's normal serves; +Y where no face has an area.
+    Angle weights make the result independent of the triangulation (Thürmer and Wüthrich 1998). Vertices at the same
+    position share one normal, since many files store every triangle's corners separately. If the faces cancel (a sheet
+    with two sides), the normal is that of one face; +Y if no face has an area.
     """
     points, count = weld(vertices)
     corners = points[faces]
@@ -59,7 +59,7 @@ def smooth_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def corner_normals(vertices: FloatArray, faces: IntArray) -> NDArray[np.float64]:
-    """(3m, 3), by face and corner: the face's normal, as long as its angle there; 0 where the face has no area."""
+    """Compute (3m, 3), by face and corner: the face's normal times its angle there; 0 if the face has no area."""
     axes, weighted = vertices.T.astype(np.float64, order="C"), np.empty((3, len(faces), 3))
 
     def fill(first: int) -> None:
@@ -71,18 +71,18 @@ def corner_normals(vertices: FloatArray, faces: IntArray) -> NDArray[np.float64]
 
 
 def _weigh(positions: NDArray[np.float64], weighted: NDArray[np.float64]) -> None:
-    """Fills in what faces have at their corners, from the positions of these: all (x to z, corner, face)."""
+    """Compute the weighted normals at faces' corners from the corners' positions: all (x to z, corner, face)."""
     edges = np.roll(positions, -1, axis=1) - positions
     areas = np.cross(edges[:, 0], edges[:, 1], axis=0)
     doubled_area = np.sqrt(np.sum(areas**2, axis=0))
     normals = areas / np.where(doubled_area > 0, doubled_area, 1)
-    # atan2 is exact for needles too, unlike the arc cosine; |a x b| is the same at all three corners.
+    # Unlike the arc cosine, atan2 is also accurate for needles; |a x b| is the same at all three corners.
     angles = np.arctan2(doubled_area, -np.sum(edges * np.roll(edges, 1, axis=1), axis=0))
     np.multiply(normals[:, None], angles, out=weighted)
 
 
 def weld(vertices: FloatArray) -> tuple[NDArray[np.int64], int]:
-    """Number the distinct positions: each vertex's number (n,), and how many there are. −0 equals 0."""
+    """Number the distinct positions: each vertex's number (n,), and the count. −0 equals 0."""
     bits = (np.asarray(vertices, np.float32) + np.float32(0)).view(np.uint32).astype(np.uint64)
     pairs = np.unique(bits[:, 0] << 32 | bits[:, 1], return_inverse=True)[1].astype(np.uint64)
     points = np.unique(pairs << 32 | bits[:, 2], return_inverse=True)[1]
@@ -90,7 +90,7 @@ def weld(vertices: FloatArray) -> tuple[NDArray[np.int64], int]:
 
 
 def _some_normal(corners: NDArray[np.int64], face_normals: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """For each of `count` points the normal of one face with an area there; +Y where there is none."""
+    """Return for each of `count` points the normal of one non-degenerate face there; +Y if there is none."""
     normals = np.tile([0.0, 1.0, 0.0], (count, 1))
     real = face_normals.any(axis=1)
     for corner in range(3):

@@ -1,4 +1,4 @@
-"""What users give as arrays, as arrays of numbers."""
+"""Conversion of users' array arguments to numeric arrays."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ..errors import ClrtError, UsageError
 
 
 def real_array(name: str, values: ArrayLike, error: type[ClrtError] = UsageError) -> NDArray[Any]:
-    """`values` as an array of integers or floats of any width; `error`, with the name, for all else, such as rows of
-    different lengths, complex numbers, text and None."""
+    """Return `values` as an array of integers or floats of any width. Raises `error`, with the name, for anything else,
+    such as rows of different lengths, complex numbers, strings and None."""
     return _array(name, values, "fiu", "real numbers, such as float32", error)
 
 
 def whole_array(name: str, values: ArrayLike, error: type[ClrtError] = UsageError) -> NDArray[Any]:
-    """Likewise of integers; an empty array may have any dtype."""
+    """Return `values` as an array of integers; raises likewise. An empty array may have any dtype."""
     return _array(name, values, "iu", "whole numbers, such as int32", error)
 
 

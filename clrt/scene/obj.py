@@ -1,6 +1,6 @@
-"""Read Wavefront OBJ, in array operations where the file is regular: one mesh for each material.
+"""Reader for Wavefront OBJ, in array operations if the file is regular: one mesh per material.
 
-The format: "Object Files (.obj)", Wavefront, 1995. Points, lines and free-form surfaces are passed over.
+The format: "Object Files (.obj)", Wavefront, 1995. Points, lines and free-form surfaces are ignored.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ Ints = NDArray[np.int64]
 
 
 def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
-    """Meshes by material, in trimesh's words for arrays: vertices (n, 3), faces (m, 3), vertex_normals (n, 3) or None,
-    uv (n, 2) or None with v upward, vertex_colors (n, 3) or None; and `material`, `material_name`.
+    """Read meshes by material, with trimesh's names of arrays: vertices (n, 3), faces (m, 3), vertex_normals (n, 3) or
+    None, uv (n, 2) or None with v up, vertex_colors (n, 3) or None; and `material`, `material_name`.
 
-    Raises SceneError for lines that are not as the format says, and for indices that name nothing.
+    Raises SceneError for malformed lines and for indices out of range.
     """
     text = absolute_indices(_text(path).replace("\\\n", " "))
     points, normals, uv = _table(text, "v", 3), _table(text, "vn", 3), _table(text, "vt", 1)
@@ -57,7 +57,7 @@ def parse_obj(path: Path) -> dict[str, dict[str, Any]]:
 
 
 def absolute_indices(text: str) -> str:
-    """The file with its relative indices (−1 = the latest vertex so far) made absolute."""
+    """Return the text with relative indices (−1 = the latest vertex so far) made absolute."""
     if not re.search(r"^[ \t]*f.*[ \t/]-", text, re.MULTILINE):
         return text
     counts = {"v": 0, "vt": 0, "vn": 0}
@@ -74,17 +74,17 @@ def absolute_indices(text: str) -> str:
 
 
 def _absolute(index: str, count: int) -> str:
-    """An index as it counts from 1; one that is no number is for others to find."""
+    """Return an index that counts from 1; one that is not a number is returned as it is, and reported later."""
     return str(count + int(index) + 1) if re.fullmatch(r"-\d{1,15}", index) else index
 
 
 def _lines(text: str, key: str) -> list[str]:
-    """What follows `key` on its lines, without comments."""
+    """Return the rest of the lines that start with `key`, without comments."""
     return re.findall(rf"^[ \t]*{key}[ \t]+([^#\n]*)", text, re.MULTILINE) if key in text else []
 
 
 def _table(text: str, key: str, least: int) -> Floats:
-    """The numbers on the lines of `key`, (n, k): as many as the shortest line has, but at least `least`."""
+    """Return the numbers on the lines of `key`, (n, k): as many as the shortest line has, but at least `least`."""
     rows = [line.split() for line in _lines(text, key)]
     if not rows:
         return np.zeros((0, least))
@@ -99,7 +99,7 @@ def _table(text: str, key: str, least: int) -> Floats:
 
 
 def _odd(rows: list[list[str]], least: int) -> list[str]:
-    """The first row without enough numbers."""
+    """Return the first row without enough numbers."""
     def is_odd(row: list[str]) -> bool:
         try:
             return len(list(map(float, row))) < least
@@ -109,7 +109,7 @@ def _odd(rows: list[list[str]], least: int) -> list[str]:
 
 
 def _fans(polygons: list[list[str]]) -> tuple[list[str], Ints]:
-    """All corners, and of each triangle, (m, 3), the places of its three: polygons are cut into fans."""
+    """Return all corners, and the indices into them of each triangle, (m, 3); polygons become triangle fans."""
     sizes = np.array(list(map(len, polygons)))
     if sizes.min() < 3:
         odd = " ".join(polygons[int(sizes.argmin())])[:60]
@@ -123,7 +123,7 @@ def _fans(polygons: list[list[str]]) -> tuple[list[str], Ints]:
 
 
 def _indices(corners: list[str], counts: tuple[int, int, int]) -> Ints:
-    """Of each corner the vertex, texture coordinate and normal, (n, 3), from 1; 0 for none."""
+    """Parse each corner's vertex, texture coordinate and normal index, (n, 3), from 1; 0 for none."""
     slashes = {corner.count("/") for corner in corners}
     rows = np.zeros((len(corners), 3), np.int64)
     try:
@@ -145,7 +145,7 @@ def _indices(corners: list[str], counts: tuple[int, int, int]) -> Ints:
 
 
 def _distinct(rows: Ints) -> tuple[Ints, Ints]:
-    """The number of each row, (n,), among those that differ, and these, (k, 3)."""
+    """Return each row's index (n,) into the distinct rows, and these, (k, 3)."""
     keys = rows[:, 0]
     for column in rows.T[1:]:
         if column.any():
@@ -155,14 +155,14 @@ def _distinct(rows: Ints) -> tuple[Ints, Ints]:
 
 
 def _taken(table: Floats, places: Ints) -> Floats | None:
-    """Rows of a table, zeros at −1; None if there are no others."""
+    """Return rows of a table, zeros at −1; None if all are −1."""
     if (places < 0).all():
         return None
     return np.where(places[:, None] < 0, 0.0, table[places])
 
 
 def _libraries(path: Path, text: str) -> dict[str, Material]:
-    """The materials in the libraries beside an OBJ file; one that is missing is replaced by that of its own name."""
+    """Read the materials of an OBJ file's libraries; for a missing one, the library named like the OBJ file is read."""
     entries: dict[str, Entry] = {}
     own = path.with_suffix(".mtl")
     for line in re.findall(r"^[ \t]*mtllib[ \t]+(.*\S)", text, re.MULTILINE):
@@ -184,5 +184,5 @@ def _libraries(path: Path, text: str) -> dict[str, Material]:
 
 
 def _text(path: Path) -> str:
-    """The file, with bytes that are not UTF-8 as file names have them."""
+    """Read the file as UTF-8; other bytes become surrogates, as in file names."""
     return note_read(path).read_text(encoding="utf-8", errors="surrogateescape")

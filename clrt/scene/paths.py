@@ -1,4 +1,4 @@
-"""Files that scenes name: what is at a path, and which of them were read."""
+"""Input files of scenes: checks of paths, and a record of the files that were read."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _read: ContextVar[list[Path] | None] = ContextVar("_read", default=None)
 
 @contextmanager
 def files_read() -> Iterator[list[Path]]:
-    """Collects the files that this thread reads of scenes meanwhile."""
+    """Collect the scene files that this thread reads inside the context."""
     files: list[Path] = []
     token = _read.set(files)
     try:
@@ -25,19 +25,19 @@ def files_read() -> Iterator[list[Path]]:
 
 
 def note_read(path: Path) -> Path:
-    """The path, of a file that is read now."""
+    """Record the file as read, and return its path."""
     if (files := _read.get()) is not None:
         files.append(path)
     return path
 
 
 def name_of(path: Path) -> str:
-    """What a scene or mesh from a file at `path` is called: the file's stem, as text."""
+    """Return the name of a scene or mesh from a file at `path`: the file's stem, as printable text."""
     return printable(path.stem)
 
 
 def check_file(path: Path, what: str) -> None:
-    """Raise SceneError unless there is a regular file at `path`, to be read; what: "scene", "model" or "picture"."""
+    """Raise SceneError unless `path` is a regular file, and note it as read; what: "scene", "model" or "picture"."""
     if path.is_dir():
         raise SceneError(f"{path}: is a folder, not a {what}")
     if path.exists() and not path.is_file():

@@ -1,4 +1,4 @@
-"""Read a picture file: environment maps and pictures to compare as linear Rec. 709, textures as they are stored."""
+"""Image file reading: environment maps and images to compare as linear Rec. 709, textures as stored."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from .decoder import decode
 from .paths import check_file
 from .radiance import read_radiance
 
-#: How a glTF picture's bytes begin, and the ending of a file of that kind.
+#: Magic bytes of images embedded in glTF, and the file suffix of that format.
 EMBEDDED = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg", b"RIFF": ".webp"}
 
 
 def read_picture(path: Path) -> NDArray[np.float32]:
-    """The picture's pixels: (h, w, 3) float32, linear, row 0 on top, NaN and Inf kept.
+    """Return an image's pixels: (h, w, 3) float32, linear, row 0 on top, NaN and Inf kept.
 
-    Float files (.exr, .hdr) are taken as they are; integer ones (.png, .jpg and others) are decoded from sRGB.
-    One channel is grey; alpha is left out. Raises SceneError naming the file if it is missing, empty, damaged, cropped
-    (a data window that differs from the display window), or has no colour channels.
+    Float files (.exr, .hdr) are used unchanged; integer ones (.png, .jpg and others) are decoded from sRGB. One channel
+    is grey; alpha is dropped. Raises SceneError naming the file if it is missing, empty, damaged, cropped (a data
+    window that differs from the display window), or has no color channels.
     """
     _check_stored(path)
     if (radiance := read_radiance(path)) is not None:
@@ -35,10 +35,10 @@ def read_picture(path: Path) -> NDArray[np.float32]:
 
 
 def read_texels(source: Path | bytes, name: str = "") -> NDArray[np.uint8]:
-    """The texels of a picture file of at most 16 bits a channel, or of the bytes of one (PNG, JPEG, WebP).
+    """Return the texels of an image file of at most 16 bits per channel, or of the bytes of one (PNG, JPEG, WebP).
 
-    (h, w, 4) uint8 as stored, row 0 on top, alpha apart. `name`: what messages call the bytes. Raises SceneError as
-    `read_picture`, and for pictures of floats, which would lose most of what they hold.
+    (h, w, 4) uint8 as stored, row 0 on top, unassociated alpha. `name`: the bytes' name in messages. Raises SceneError
+    as `read_picture`, and for images of floats, which would lose most of their range.
     """
     if isinstance(source, Path):
         _check_stored(source)
@@ -63,7 +63,7 @@ def _check_stored(path: Path) -> None:
 
 
 def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], list[str]]:
-    """The pixels as they are stored, and the names of the channels."""
+    """Return the pixels as stored, and the names of the channels."""
     suffix = ""
     if isinstance(source, bytes):
         suffix = next((ending for start, ending in EMBEDDED.items() if source.startswith(start)), "")
@@ -83,13 +83,13 @@ def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], list[str]]:
 
 
 def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Undo the sRGB curve (IEC 61966-2-1) of values in [0, 1]; same shape and dtype."""
+    """Decode sRGB (IEC 61966-2-1) values in [0, 1] to linear; same shape and dtype."""
     power = ((encoded.astype(np.float64) + 0.055) / 1.055) ** 2.4
     return np.where(encoded <= 0.04045, encoded / 12.92, power).astype(np.float32)
 
 
 def _colour_channels(file: str, names: list[str]) -> list[int]:
-    """Where red, green and blue are among a file's channels."""
+    """Return the indices of red, green and blue among a file's channels."""
     upper = [name.upper() for name in names]
     if len(names) <= 2:  # grey, or grey and alpha
         return [0, 0, 0]

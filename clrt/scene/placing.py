@@ -1,4 +1,4 @@
-"""The keys of a scene file that place a mesh or an instance in the world."""
+"""Keys of a scene file that transform a mesh or an instance to the world."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ Row = tuple[float, float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Placing:
-    """A point is scaled, then turned about the fixed x, y and z axes in this order, then moved; or it goes by `matrix`,
-    four rows."""
+    """Transform keys. A point is scaled, then rotated about the fixed x, y and z axes in this order, then translated;
+    or it is multiplied by `matrix`, four rows."""
 
     translate: Vector = (0.0, 0.0, 0.0)
     scale: Vector = (1.0, 1.0, 1.0)
@@ -25,7 +25,7 @@ class Placing:
     matrix: tuple[Row, Row, Row, Row] | None = None
 
     def to_world(self, where: str) -> Matrix:
-        """The table's transform. Raises SceneError if it is given twice or is not affine."""
+        """Return the table's transform. Raises SceneError if it is given twice or is not affine."""
         if self.matrix is None:
             return translation(self.translate) @ rotation(self.rotate_degrees) @ scaling(self.scale)
         if any(getattr(self, key.name) != key.default for key in fields(Placing) if key.name != "matrix"):

@@ -1,6 +1,6 @@
-"""Read the common PLY files, those of triangles alone, in a few array operations.
+"""Reader for the common PLY files, those of triangles only, in a few array operations.
 
-trimesh reads the others; its import alone takes longer than such a file of a hundred thousand triangles.
+trimesh reads the others; its import alone takes longer than reading such a file of a hundred thousand triangles.
 The format: G. Turk, "The PLY Polygon File Format", 1994.
 """
 
@@ -16,7 +16,7 @@ _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
           "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
           "float32": "f4", "float64": "f8"}
-#: With texture coordinates trimesh takes vertices apart, and it knows what units colours have.
+#: Left to trimesh: with texture coordinates it splits vertices, and it scales colors by their type.
 _TEXTURE = {"u", "v", "s", "t", "texture_u", "texture_v"}
 _COLORS = {"red", "green", "blue"}
 
@@ -25,9 +25,9 @@ Records = np.ndarray[tuple[int], np.dtype[np.void]]
 
 
 def plain_ply(path: Path) -> dict[str, Any] | None:
-    """trimesh's keyword arguments for the file: vertices (n, 3), faces (m, 3), and vertex_normals (n, 3) if it has any.
+    """Return trimesh's keyword arguments: vertices (n, 3), faces (m, 3), and vertex_normals (n, 3) if there are any.
 
-    None for all but an undamaged file of vertices without texture coordinates or colours and then faces, each with
+    None unless it is an undamaged file of vertices without texture coordinates or colors, followed by faces, each with
     three indices and no other list.
     """
     records = ply_records(path)
@@ -45,9 +45,9 @@ def plain_ply(path: Path) -> dict[str, Any] | None:
 
 
 def ply_records(path: Path) -> tuple[Records, Records] | None:
-    """Vertices with at least x, y and z, and faces, whose indices are ["corners list"]["indices"], (m, 3).
+    """Return vertices with at least x, y and z, and faces, whose indices are ["corners list"]["indices"], (m, 3).
 
-    None for all but an undamaged file of both alone, in this order, whose faces have three indices and no other list.
+    None unless it is an undamaged file of only these two, in this order, with faces of three indices and no other list.
     """
     content = path.read_bytes()
     start = content.find(_END) + len(_END)
@@ -67,9 +67,9 @@ def ply_records(path: Path) -> tuple[Records, Records] | None:
 
 
 def _elements(header: list[str]) -> list[tuple[int, np.dtype[np.void]]]:
-    """Of vertices and faces how many there are, and the record of one; in text all its values are float64.
+    """Return the count and the record dtype of vertices and of faces; in text files all values are float64.
 
-    ValueError, KeyError or IndexError for a header that is not a plain one.
+    Raises ValueError, KeyError or IndexError for an unsupported header.
     """
     magic, encoding, *lines = (line.split() for line in header if not line.startswith(("comment", "obj_info")))
     order = _ORDERS[encoding[1]]

@@ -1,4 +1,4 @@
-"""Known substances: what surfaces of them reflect."""
+"""Reflectances and indices of refraction of known materials."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ Preset = Literal["water", "plastic_low", "plastic_high", "glass_low", "glass_hig
                  "iron", "copper", "gold", "aluminium", "silver"]
 
 Color = tuple[float, float, float]
-#: Complex indices of refraction (eta, k) in red, green and blue: at 611, 549 and 464 nm, which have the hues of Rec.
-#: 709's primaries, interpolated between measurements of films. Johnson and Christy 1972 (Phys. Rev. B 6, 4370: gold,
-#: copper, silver) and 1974 (Phys. Rev. B 9, 5056: iron, titanium, nickel, chromium), Rakić 1995 (Appl. Opt. 34, 4755:
-#: aluminium), as refractiveindex.info tabulates them (CC0).
+#: Complex indices of refraction (eta, k) in red, green and blue: at 611, 549 and 464 nm, the hues of Rec. 709's
+#: primaries, interpolated between measurements of films. Johnson and Christy 1972 (Phys. Rev. B 6, 4370: gold, copper,
+#: silver) and 1974 (Phys. Rev. B 9, 5056: iron, titanium, nickel, chromium), Rakić 1995 (Appl. Opt. 34, 4755:
+#: aluminium), as tabulated by refractiveindex.info (CC0).
 CONDUCTORS: dict[str, tuple[Color, Color]] = {
     "gold": ((0.223, 0.428, 1.335), (3.204, 2.46, 1.872)),
     "copper": ((0.367, 1.016, 1.246), (3.121, 2.579, 2.452)),

@@ -1,4 +1,4 @@
-"""Read Radiance pictures (.hdr) without a decoder that could crash: most skies come in them.
+"""Reader for Radiance images (.hdr), the most common format of environment maps, without the decoder process.
 
 The format: G. Ward, "Real Pixels", Graphics Gems II, 1991; Radiance's file format documentation.
 """
@@ -11,20 +11,20 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-#: Row 0 on top and columns from the left, the only order in use; of widths that run lengths can code.
+#: Row 0 on top and columns from the left, the only order in use; widths that run-length encoding supports.
 _HEADER = re.compile(rb"#\?(?:RADIANCE|RGBE)\n(?:[^\n]{0,4096}\n){0,1000}?\n-Y (\d{1,6}) \+X (\d{1,5})\n")
 _SCALED = re.compile(rb"^(?:EXPOSURE|COLORCORR|FORMAT=32-bit_rle_xyze)", re.MULTILINE)
 _BYTES = [bytes((value,)) for value in range(256)]
 
 
 def read_radiance(path: Path) -> NDArray[np.float32] | None:
-    """The pixels, (h, w, 3) float32, linear; None for all but an undamaged file of plain run-length coded RGB rows."""
+    """Read pixels, (h, w, 3) float32, linear; None unless it is an undamaged file of run-length encoded RGB rows."""
     content = path.read_bytes() if path.suffix.lower() == ".hdr" else b""
     header = _HEADER.match(content)
     if header is None or _SCALED.search(header[0]):
         return None
     height, width = int(header[1]), int(header[2])
-    # A run codes at most 127 bytes in two.
+    # A run encodes at most 127 bytes in two.
     if not 8 <= width < 2**15 or height * (4 + 8 * -(-width // 127)) > len(content) - header.end():
         return None
     rows = np.empty((height, 4, width), np.uint8)
@@ -45,7 +45,7 @@ def read_radiance(path: Path) -> NDArray[np.float32] | None:
 
 
 def _row(content: bytes, start: int, size: int) -> tuple[bytes | None, int]:
-    """A row's `size` bytes and where the next row begins; None for bytes that code more or fewer."""
+    """Decode a row of `size` bytes, and return the next row's start; None if the bytes decode to more or fewer."""
     parts, missing = [], size
     try:
         while missing > 0:

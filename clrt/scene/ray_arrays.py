@@ -1,4 +1,4 @@
-"""Rays as three plain arrays, checked."""
+"""Validation of rays given as three plain arrays."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Rays = tuple[NDArray[Any], NDArray[Any], NDArray[Any]]
 
 
 def ray_arrays(origins: ArrayLike, directions: ArrayLike, t_max: ArrayLike) -> Rays:
-    """origins (n, 3), directions (n, 3) and t_max (n,) of arrays that have these shapes, or (3,), (3,) and () for all.
+    """Broadcast to origins (n, 3), directions (n, 3) and t_max (n,); (3,), (3,) and () stand for all rays.
 
-    UsageError where they do not fit.
+    Raises UsageError if the shapes do not match.
     """
     given = {"origins": origins, "directions": directions, "t_max": t_max}
     arrays = {name: real_array(name, values) for name, values in given.items()}

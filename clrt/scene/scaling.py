@@ -1,9 +1,9 @@
-"""Scenes of any size and anywhere: the same scene in coordinates in which float32 neither overflows nor loses digits.
+"""Scaling and translation of scenes to coordinates in which float32 neither overflows nor loses precision.
 
-A triangle test multiplies three lengths, so edges of 1e-20 or 1e15 leave float32's range though the scene itself does
-not; multiplying all lengths by a power of two changes no digit and no picture. And a scene far from the origin has few
-digits left for its own size, where rays leave its surfaces; moving it back costs none, since numbers that are near each
-other are subtracted exactly (Sterbenz 1974).
+A triangle test multiplies three lengths, so edges of 1e-20 or 1e15 exceed float32's range although the scene itself
+does not; multiplying all lengths by a power of two is exact and does not change the image. And a scene far from the
+origin has little precision left relative to its own size, where rays leave its surfaces; translating it back is exact,
+since subtracting numbers close to each other is (Sterbenz 1974).
 """
 
 from __future__ import annotations
@@ -19,35 +19,35 @@ from .instancing import meshes_by_id
 from .lights import DirectionalLight, Light
 from .model import Camera, Instance, Mesh, Scene, Sphere, Vector
 
-#: Scenes whose largest coordinate (the camera's aside) lies between 2^-20 and 2^20 are left as large as they are.
+#: Scenes whose largest coordinate (the camera's excluded) lies between 2^-20 and 2^20 are not scaled.
 COMFORTABLE = 20
-#: The exponent of a unit, at most.
+#: Maximum absolute exponent of a unit.
 MOST = 126
-#: Along an axis a scene is left where it is unless its middle is this many times half its largest extent from 0.
+#: A scene is translated along an axis only if its center is this many times half its largest extent from 0.
 FAR = 4.0
 
 
 class Frame(NamedTuple):
-    """What the device sees of a point p: (p − center)·unit. unit: a power of two."""
+    """Coordinate frame on the device: a point p becomes (p − center)·unit. unit: a power of two."""
 
     center: Vector = (0.0, 0.0, 0.0)
     unit: float = 1.0
 
     def points(self, points: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(…, 3) points in this frame."""
+        """Return points (…, 3) in this frame."""
         if self == Frame():
             return points.astype(np.float32, copy=False)
         with np.errstate(over="ignore"):
             return np.asarray((points - np.array(self.center)) * self.unit, np.float32)
 
     def point(self, point: Vector) -> Vector:
-        """One point in this frame."""
+        """Return one point in this frame."""
         x, y, z = ((p - c) * self.unit for p, c in zip(point, self.center))
         return x, y, z
 
 
 def frame_around(low: NDArray[np.floating], high: NDArray[np.floating]) -> Frame:
-    """The frame for what lies in a box; low, high: (3,), or inf and −inf for nothing."""
+    """Return the frame for a bounding box; low, high: (3,), or inf and −inf for an empty one."""
     low, high = low.astype(np.float64), high.astype(np.float64)
     if not np.all(low <= high):
         return Frame()
@@ -58,14 +58,13 @@ def frame_around(low: NDArray[np.floating], high: NDArray[np.floating]) -> Frame
 
 
 def unit_for(largest: float) -> float:
-    """The power of two (a normal float32) that brings a largest coordinate near 1; 1 where it is comfortable already.
-    """
+    """Return the power of two (a normal float32) that scales the largest coordinate to about 1; 1 if not needed."""
     exponent = max(-MOST, min(MOST, frexp(largest)[1]))
     return 1.0 if largest == 0 or abs(exponent) <= COMFORTABLE else 2.0**-exponent
 
 
 def frame_of(scene: Scene) -> Frame:
-    """The frame for the scene's surfaces."""
+    """Return the frame for the scene's surfaces."""
     balls = [(np.array(sphere.center), sphere.radius) for sphere in scene.spheres]
     boxes = [_box(mesh) for mesh in scene.meshes if mesh.vertices.size] + _instance_boxes(scene.instances)
     low = [box[0] for box in boxes] + [center - radius for center, radius in balls]
@@ -74,12 +73,12 @@ def frame_of(scene: Scene) -> Frame:
 
 
 def _box(mesh: Mesh) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
-    # Column by column: numpy's min(axis=0) of three columns takes twenty times as long.
+    # Per column: numpy's min(axis=0) of three columns takes twenty times as long.
     return np.array([x.min() for x in mesh.vertices.T]), np.array([x.max() for x in mesh.vertices.T])
 
 
 def _instance_boxes(instances: list[Instance]) -> list[tuple[NDArray[np.floating], NDArray[np.floating]]]:
-    """Around the meshes' boxes where instances put them."""
+    """Return bounding boxes of the meshes' boxes under the instances' transforms."""
     own = {key: np.array(_box(mesh), np.float64) for key, mesh in meshes_by_id(instances).items()}
     boxes = []
     for each in instances:
@@ -90,8 +89,8 @@ def _instance_boxes(instances: list[Instance]) -> list[tuple[NDArray[np.floating
 
 
 def in_frame(scene: Scene, frame: Frame) -> Scene:
-    """The scene in a frame, with point and spot lights such that the picture stays the same; instances' meshes are each
-    in one of their own."""
+    """Return the scene in a frame, with point and spot lights scaled so that the image stays the same; each instanced
+    mesh gets a frame of its own."""
     scene = replace(scene, instances=_instances(scene.instances, frame))
     if frame == Frame():
         return scene
@@ -103,7 +102,7 @@ def in_frame(scene: Scene, frame: Frame) -> Scene:
 
 
 def _instances(instances: list[Instance], frame: Frame) -> list[Instance]:
-    """Their meshes each in the frame around it, from where they are taken to `frame`."""
+    """Return instances whose meshes are each in the frame around it, with transforms from there to `frame`."""
     meshes = meshes_by_id(instances)
     own = {key: frame_around(*_box(mesh)) for key, mesh in meshes.items()}
     framed = {key: replace(mesh, vertices=own[key].points(mesh.vertices), material=mesh.material.in_unit(frame.unit))
@@ -119,7 +118,7 @@ def _instances(instances: list[Instance], frame: Frame) -> list[Instance]:
 
 
 def camera_in(camera: Camera, frame: Frame) -> Camera:
-    """A camera in a frame."""
+    """Return a camera in a frame."""
     focus, height = (length and length * frame.unit for length in (camera.focus_distance, camera.view_height))
     return replace(camera, position=frame.point(camera.position), look_at=frame.point(camera.look_at),
                    aperture_radius=camera.aperture_radius * frame.unit, focus_distance=focus, view_height=height)

@@ -1,4 +1,4 @@
-"""The light for a model that comes without any: a clear sky over dark ground, and the sun."""
+"""Default lighting for a model without lights: a clear sky over dark ground, and the sun."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import numpy as np
 from .lights import DirectionalLight
 from .model import Environment
 
-#: The ground is dark because it is what the default camera sees behind the model: bright paper, whose radiance is
-#: near 1 in the sun and 0.3 in the shade, stands out from it; before a bright background it loses its outline.
+#: The ground is dark because the default camera sees it behind the model: white paper, whose radiance is near 1 in the
+#: sun and 0.3 in the shade, contrasts with it; against a bright background its outline would disappear.
 ZENITH, HORIZON, GROUND = (0.15, 0.22, 0.36), (0.52, 0.54, 0.55), (0.05, 0.046, 0.042)
-#: How fast the horizon's brightness fades downward: e times over an elevation whose sine is 1/12, about 5°.
+#: Falloff of the brightness below the horizon: by a factor of e per elevation whose sine is 1/12, about 5°.
 FADE = 12.0
 
-#: From the upper left of someone who looks along −Z. With the sky, white paper facing the sun has a radiance near 1.
+#: From the upper left for a viewer who looks along −Z. With the sky, white paper facing the sun has a radiance near 1.
 SUN = DirectionalLight(direction=(0.8, -1.0, -0.55), irradiance=(2.6, 2.4, 2.05), angle_degrees=0.53)
 
 
 def default_sky(height: int = 32) -> Environment:
-    """A latitude–longitude image, (height, 2·height, 3): blue zenith, bright horizon, dark grey-brown ground.
+    """Return a latitude–longitude image, (height, 2·height, 3): blue zenith, bright horizon, dark grey-brown ground.
 
     The sky darkens with the square root of the elevation's sine; the ground darkens away from the horizon.
     """

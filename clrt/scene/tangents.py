@@ -1,4 +1,4 @@
-"""Tangents: where a picture's right lies on a surface, for normal maps."""
+"""Tangents for normal maps: the direction on a surface in which u increases."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Doubles = NDArray[np.float64]
 
 
 def corner_tangents(mesh: Mesh, texture: Texture) -> tuple[Doubles, Doubles]:
-    """Unit tangents (m, 3, 3) at the corners of each face, and its handedness (m,): 1, −1, or 0 where there is none.
+    """Compute unit tangents (m, 3, 3) at each face's corners, and its handedness (m,): 1, −1, or 0 if it has none.
 
-    The bitangent, up in the texture's image, is handedness · cross(normal, tangent). The mesh's own tangents, or the
-    faces', along the image as the texture places it, weighted by their angle at each point and averaged over those
-    around it that are not mirrored (as Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited", ch. 3, has it,
-    without his splits at sharp seams).
+    The bitangent, up in the image, is handedness · cross(normal, tangent). Uses the mesh's own tangents, otherwise the
+    faces' along the image as the texture places it, weighted by their angle at each point and averaged over those
+    around it with the same handedness (as Mikkelsen 2008, "Simulation of Wrinkled Surfaces Revisited", ch. 3, without
+    splits at sharp seams).
     """
     if mesh.tangents is not None:
         corners = mesh.tangents[mesh.faces].astype(np.float64)
@@ -29,7 +29,7 @@ def corner_tangents(mesh: Mesh, texture: Texture) -> tuple[Doubles, Doubles]:
         return np.zeros((len(mesh.faces), 3, 3)), np.zeros(len(mesh.faces))
     p, t = mesh.vertices[mesh.faces].astype(np.float64), uv[mesh.faces] @ texture.to_picture[:, :2].T
     e1, e2, s1, s2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]
-    # Solves e = du·tangent − dv·bitangent for both edges; v points down in the picture, the bitangent up.
+    # Solves e = du·tangent − dv·bitangent for both edges; v points down in the image, the bitangent up.
     area = s1[:, 0] * s2[:, 1] - s2[:, 0] * s1[:, 1]
     handedness = -np.sign(area)
     tangent = unit(unit(e1 * s2[:, 1:] - e2 * s1[:, 1:]) * np.sign(area)[:, None])

@@ -1,4 +1,4 @@
-"""Textures as the scene file writes them: `color = { image = "wood.png", scale = [2, 2] }`."""
+"""Textures in the scene file: `color = { image = "wood.png", scale = [2, 2] }`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .textures import Channel, NonNegative, Pair, Picture, Texture, Wrap
 
 @dataclass(frozen=True, kw_only=True)
 class TextureTable:
-    """The keys of such a table, as in Texture; `wrap` may be one word for both directions, `scale` one number."""
+    """Keys of a texture table, as in Texture; `wrap` may be one word for both directions, `scale` one number."""
 
     image: str
     factor: NonNegative | tuple[NonNegative, NonNegative, NonNegative] = 1.0
@@ -29,16 +29,16 @@ class TextureTable:
 
 
 class TextureReader:
-    """Reads the textures of one scene file, each picture once."""
+    """Reader for the textures of one scene file, each image once."""
 
     def __init__(self, folder: Path) -> None:
-        """`folder`: what the tables' files are relative to."""
+        """Create a reader; the tables' files are relative to `folder`."""
         self._folder = folder
-        #: Those read so far, by their files.
+        #: Images read so far, by file name.
         self.pictures: dict[str, Picture] = {}
 
     def read(self, values: Mapping[str, Any], where: str) -> Texture:
-        """Raises SceneError with all that is wrong with the table or its picture."""
+        """Read a texture. Raises SceneError with all that is wrong with the table or its image."""
         values = dict(values)
         if isinstance(wrap := values.get("wrap"), str):
             values["wrap"] = (wrap, wrap)

@@ -1,6 +1,6 @@
-"""Textures: pictures that a material's parameter is read from, where a surface has texture coordinates.
+"""Textures: images that a material's parameter is looked up in, by a surface's texture coordinates.
 
-Coordinates are glTF's: (0, 0) is the upper left corner of the picture, (1, 1) the lower right one.
+Coordinates are glTF's: (0, 0) is the upper left corner of the image, (1, 1) the lower right one.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Value = TypeVar("Value")
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """texels: (h, w, 4) uint8, row 0 on top, alpha not multiplied in. Textures may share one."""
+    """Image of a texture. texels: (h, w, 4) uint8, row 0 on top, unassociated alpha. Textures may share one."""
 
     texels: NDArray[np.uint8]
     name: str = "picture"
@@ -33,11 +33,11 @@ WHITE = Picture(np.full((1, 1, 4), 255, np.uint8), "white")
 
 @dataclass(frozen=True, kw_only=True)
 class Texture:
-    """A picture, and how it lies on a surface.
+    """Texture: an image, and its mapping to a surface.
 
-    Colours are taken for sRGB, numbers for linear, read from one `channel`; `factor`, one number or three, multiplies
-    them. The coordinates of `uv_set` are scaled, turned by `rotation_degrees` (counter-clockwise for who sees the
-    picture upright), and moved by `offset`, as KHR_texture_transform says. filter: bilinear, or the nearest texel.
+    Colors are decoded from sRGB, numbers are linear and read from one `channel`; `factor`, one number or three,
+    multiplies them. The coordinates of `uv_set` are scaled, rotated by `rotation_degrees` (counter-clockwise on the
+    upright image), and translated by `offset`, as in KHR_texture_transform. filter: bilinear, or the nearest texel.
     """
 
     picture: Picture
@@ -52,7 +52,7 @@ class Texture:
 
     @property
     def to_picture(self) -> NDArray[np.float64]:
-        """(2, 3): what of (u, v, 1) makes the picture's coordinates, both from 0 to 1."""
+        """The matrix (2, 3) from (u, v, 1) to image coordinates, both from 0 to 1."""
         angle = np.radians(self.rotation_degrees)
         c, s = np.cos(angle), np.sin(angle)
         turned = np.array([[c, s], [-s, c]]) @ np.diag(self.scale)
@@ -67,7 +67,7 @@ class Texture:
 
 
 def untextured(value: Value | Texture) -> Value:
-    """A parameter of a material that is no texture; ValueError if it is one."""
+    """Return a material's parameter that must not be a texture; raises ValueError if it is one."""
     if isinstance(value, Texture):
         raise ValueError(f"the texture {value.picture.name}")
     return value

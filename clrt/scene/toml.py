@@ -1,4 +1,4 @@
-"""Turn a TOML document into a scene, collecting every mistake in it."""
+"""Conversion of a TOML document to a scene, collecting all problems in it."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ SECTIONS = ("camera", "cameras", "animation", "keyframe", "render", "environment
 
 
 class SceneReader:
-    """Reads one document. `problems` holds its mistakes; what they touch is left out of the scene or at its default."""
+    """Reader for one document. `problems` holds its problems; parts with problems are left out or at their defaults."""
 
     def __init__(self, path: Path, document: Table) -> None:
-        """`path`: where the document is from; the files that it names are relative to that folder."""
+        """Create a reader for a document read from `path`; the files that it names are relative to that folder."""
         self._path = path
         self._document: Table = _frozen(document)
         self._materials: dict[str, Material] = {}
@@ -75,7 +75,7 @@ class SceneReader:
         return self._source
 
     def _camera(self, values: Any, where: str) -> Camera:
-        """The camera; if some of it is wrong, what places it, so that this is checked all the same."""
+        """Return the camera; if it is invalid, one with its position, look_at and up, so that these are checked."""
         if not isinstance(values, dict):
             self.problems.append(f"{where}: {show(values)} is not a table; write its keys below [{where}]")
             return Camera()
@@ -84,14 +84,14 @@ class SceneReader:
         return camera or (Camera() if field_problems(Camera, place, where) else Camera(**usable(Camera, place)))
 
     def _named_camera(self, values: Table) -> Camera:
-        """The one of `cameras` that the table names."""
+        """Return the camera of `cameras` that the table names."""
         name = str(values["name"])
         self.problems += camera_problems(name, self._cameras, "camera.name")
         self.problems += [f"camera: has a name and {key}; keep one of them" for key in values if key != "name"]
         return self._cameras.get(name, Camera())
 
     def _animation(self) -> Animation | None:
-        """How the camera moves, if it does; None, too, if what is written of it is wrong."""
+        """Return the animation; None if there is none or if it is invalid."""
         if not {"animation", "keyframe"} & set(self._document):
             return None
         table = self._table("animation")
@@ -109,7 +109,7 @@ class SceneReader:
         return None
 
     def _table(self, name: str) -> Table:
-        """The section [name], empty if there is none."""
+        """Return the section [name], empty if there is none."""
         table = self._document.get(name, {})
         if isinstance(table, dict):
             return table
@@ -117,7 +117,7 @@ class SceneReader:
         return {}
 
     def _tables(self, name: str) -> Sequence[Any]:
-        """The sections [[name]]."""
+        """Return the sections [[name]]."""
         tables = self._document.get(name, ())
         if isinstance(tables, tuple):
             return tables
@@ -125,13 +125,13 @@ class SceneReader:
         return ()
 
     def _build(self, kind: type[Kind], values: Table, where: str) -> Kind | None:
-        """kind(**values), or None if they are wrong."""
+        """Return kind(**values), or None if they are invalid."""
         problems = field_problems(kind, values, where)
         self.problems += problems
         return None if problems else kind(**usable(kind, values))
 
     def _typed(self, kinds: Sequence[type[Kind]], values: Any, where: str) -> Kind | None:
-        """A material or light of the class whose `kernel` is the table's `type`."""
+        """Return a material or light of the class whose `kernel` is the table's `type`."""
         known = {kind.kernel: kind for kind in kinds}  # type: ignore[attr-defined]
         if not isinstance(values, dict):
             self.problems.append(f"{where}: {show(values)} is not a table; write its keys below [{where}]")
@@ -150,7 +150,7 @@ class SceneReader:
         return None
 
     def _texture(self, values: Table, where: str) -> Texture:
-        """The texture that a table describes, or a white one if it is wrong."""
+        """Return the texture that a table describes, or a white one if it is invalid."""
         return self._tried(self._textures.read, values, where) or Texture(picture=WHITE)
 
     def _environment(self, values: Table) -> Environment | None:
@@ -179,11 +179,11 @@ class SceneReader:
             return None
 
     def _material(self, values: Table, where: str) -> Material | None:
-        """The material that the table names, or None if it names none."""
+        """Return the material that the table names, or None if it names none."""
         return self._named_material(values["material"], f"{where}.material") if "material" in values else None
 
     def _named_material(self, name: Any, where: str) -> Material:
-        """The material of this name, or a grey one if there is none."""
+        """Return the material of this name, or a grey one if there is none."""
         if str(name) not in self._materials:
             self.problems.append(f"{where}: {show(name)} {unknown(name, self._materials)}")
         return self._materials.get(str(name), Diffuse())
@@ -196,7 +196,7 @@ class SceneReader:
         return self._build(Sphere, {**values, "material": material}, where)
 
     def _mesh(self, values: Any, where: str) -> Model:
-        """What one table draws, in world coordinates."""
+        """Return what one table shows, in world coordinates."""
         if not isinstance(values, dict):
             self.problems.append(f"{where}: {show(values)} is not a table; write [[mesh]]")
             return Model(meshes=[])
@@ -223,11 +223,11 @@ class SceneReader:
         return replace(shown, lights=model.lights if table and table.lights else [])
 
     def _located(self, values: Table) -> Table:
-        """The table of a mesh with an absolute path."""
+        """Return the table of a mesh with an absolute path."""
         return {**values, "file": (self._path.parent / values["file"]).resolve()} if "file" in values else values
 
     def _others(self, values: Table, own: set[str], where: str) -> dict[str, Material]:
-        """What the table writes in the place of the file's `own` materials, by their names."""
+        """Return the table's replacements for the file's `own` materials, by their names."""
         pairs = values.get("materials", {})
         if not isinstance(pairs, dict):
             self.problems.append(f"{where}.materials: {show(pairs)} is not a table; "
@@ -262,7 +262,7 @@ class SceneReader:
         return [each for each in built if each]
 
     def _tried(self, read: Callable[..., Kind], *arguments: Any) -> Kind | None:
-        """read(*arguments), or None if it finds mistakes."""
+        """Return read(*arguments), or None if it raises SceneError, whose problems are collected."""
         try:
             return read(*arguments)
         except SceneError as error:
@@ -271,7 +271,7 @@ class SceneReader:
 
 
 def camera_problems(name: str, cameras: Mapping[str, Camera], where: str) -> list[str]:
-    """Whether there is no camera of this name."""
+    """Return a problem if there is no camera of this name."""
     if name in cameras:
         return []
     remedy = unknown(name, cameras) if cameras else "is unknown, since neither [cameras] nor a model file has one"
@@ -279,12 +279,12 @@ def camera_problems(name: str, cameras: Mapping[str, Camera], where: str) -> lis
 
 
 def _one_scale(values: Table) -> Table:
-    """The table with one number for `scale` as three."""
+    """Return the table with a single number for `scale` expanded to three."""
     return {**values, "scale": (scale,) * 3} if isinstance(scale := values.get("scale"), (int, float)) else values
 
 
 def _frozen(value: Any) -> Any:
-    """TOML's arrays as tuples, all the way down."""
+    """Convert TOML's arrays to tuples, recursively."""
     if isinstance(value, list):
         return tuple(map(_frozen, value))
     return {key: _frozen(entry) for key, entry in value.items()} if isinstance(value, dict) else value

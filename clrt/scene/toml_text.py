@@ -1,4 +1,4 @@
-"""Values as TOML writes them."""
+"""Formatting of values as TOML."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 
 
 def is_plain(value: object) -> bool:
-    """Whether TOML has such values."""
+    """Return whether the value has a TOML representation."""
     return isinstance(value, bool | int | float | str | tuple)
 
 
 def toml_value(value: Any) -> str:
-    """A value; numbers to the last digit."""
+    """Format a value; numbers round-trip exactly."""
     if isinstance(value, tuple):
         return f"[{', '.join(map(toml_value, value))}]"
     if isinstance(value, dict):
@@ -24,5 +24,5 @@ def toml_value(value: Any) -> str:
 
 
 def toml_key(name: str) -> str:
-    """A key, in quotes where it needs them."""
+    """Format a key, quoted if necessary."""
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml_value(name)

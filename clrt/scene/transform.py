@@ -1,4 +1,4 @@
-"""4x4 float64 matrices that act on column vectors: p' = M p. `A @ B` does B first."""
+"""4x4 float64 matrices that act on column vectors: p' = M p. `A @ B` applies B first."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from .lights import DirectionalLight, Light, PointLight
 from .model import Camera, Mesh, Vector
 
 Matrix = NDArray[np.float64]
-#: A transform flattens if it makes a unit of volume smaller than this, measured in its own longest column.
+#: A transform is singular if it scales volumes by less than this, relative to the cube of its longest column.
 SINGULAR = 1e-12
 
 
 def translation(offset: Vector) -> Matrix:
-    """Move by `offset`."""
+    """Return the translation by `offset`."""
     matrix = np.eye(4)
     matrix[:3, 3] = offset
     return matrix
 
 
 def scaling(factors: Vector) -> Matrix:
-    """Scale each axis by its factor; negative factors mirror."""
+    """Return the scaling of each axis by its factor; negative factors mirror."""
     return np.diag([*factors, 1.0])
 
 
 def rotation(degrees: Vector) -> Matrix:
-    """Turn about the fixed x axis, then the fixed y axis, then the fixed z axis (extrinsic XYZ): Rz Ry Rx.
+    """Return the rotation about the fixed x axis, then the fixed y axis, then the fixed z axis: Rz Ry Rx.
 
-    Positive angles turn counter-clockwise for someone whom the axis points at.
+    Positive angles are counter-clockwise looking against the axis.
     """
     matrix = np.eye(4)
     for axis, angle in enumerate(np.radians(degrees)):
@@ -45,7 +45,7 @@ def rotation(degrees: Vector) -> Matrix:
 
 
 def quaternion(x: float, y: float, z: float, w: float) -> Matrix:
-    """The rotation of a quaternion (x, y, z, w) of any length but zero."""
+    """Return the rotation of a quaternion (x, y, z, w) of any length but zero."""
     x, y, z, w = np.array([x, y, z, w]) / np.linalg.norm([x, y, z, w])
     matrix = np.eye(4)
     matrix[:3, :3] = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -55,11 +55,11 @@ def quaternion(x: float, y: float, z: float, w: float) -> Matrix:
 
 
 def transform_mesh(mesh: Mesh, matrix: Matrix) -> Mesh:
-    """The mesh under an affine `matrix`; computed in float64, stored in float32.
+    """Return the mesh transformed by an affine `matrix`; computed in float64, stored in float32.
 
-    Normals go by the inverse transpose (its cofactors, which flat scalings have too). A mirroring matrix would turn
-    the surface inside out, so the faces are wound the other way. What leaves float32's range becomes Inf, which
-    `validate` refuses.
+    Normals are transformed by the inverse transpose (its cofactors, which singular matrices have, too). A mirroring
+    matrix would turn the surface inside out, so the faces' winding is reversed. Values beyond float32's range become
+    Inf, which `validate` rejects.
     """
     if np.array_equal(matrix, np.eye(4)):
         return mesh
@@ -80,7 +80,7 @@ def transform_mesh(mesh: Mesh, matrix: Matrix) -> Mesh:
 
 
 def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
-    """The camera under an affine `matrix`; its angle stays, and its lengths go with `up`."""
+    """Return the camera under an affine `matrix`; its angle is kept, and its lengths scale like `up`."""
     corners = np.array([[*camera.position, 1], [*camera.look_at, 1], [*camera.up, 0]]) @ matrix.T
     position, look_at, up = corners[:, :3].tolist()
     stretch = float(np.linalg.norm(up) / np.linalg.norm(camera.up))
@@ -90,7 +90,7 @@ def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
 
 
 def transform_light(light: Light, matrix: Matrix) -> Light:
-    """The light under an affine `matrix`, which moves and turns it; its strength and range stay, as in glTF."""
+    """Return the light under an affine `matrix`, moved and rotated; its strength and range are kept, as in glTF."""
     turned: tuple[float, float, float] = (0.0, 0.0, 0.0)
     if not isinstance(light, PointLight):
         x, y, z = unit(matrix[:3, :3] @ light.direction).tolist()
@@ -103,7 +103,7 @@ def transform_light(light: Light, matrix: Matrix) -> Light:
 
 
 def transform_faults(to_world: NDArray[np.float64]) -> dict[str, NDArray[np.bool_]]:
-    """Which of affine transforms (k, 3, 4) cannot be inverted, (k,), by what is to be said of them."""
+    """Return which affine transforms (k, 3, 4) cannot be inverted, (k,), by a description of the fault."""
     with np.errstate(all="ignore"):
         length = np.linalg.norm(to_world[..., :3], axis=1).max(axis=1, initial=0)
         volume = np.abs(np.linalg.det(to_world[..., :3] / np.maximum(length, 1e-300)[:, None, None]))
@@ -112,9 +112,9 @@ def transform_faults(to_world: NDArray[np.float64]) -> dict[str, NDArray[np.bool
 
 
 def unit(vectors: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Each row divided by its length, safe from overflow; rows that are zero or not finite become zero."""
+    """Normalize each row, safe from overflow; rows that are zero or not finite become zero."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        # numpy reduces many short rows slowly, and works on whole columns fast.
+        # numpy reduces many short rows slowly, but whole columns fast.
         largest = reduce(np.maximum, np.moveaxis(np.abs(vectors), -1, 0)).astype(np.float64)[..., None]
         scaled = vectors / largest
         rows = scaled / np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., None]

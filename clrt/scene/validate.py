@@ -1,4 +1,4 @@
-"""Find everything that is wrong with a scene, whether it was read from a file or built in Python."""
+"""Scene validation, for scenes read from files and built in Python alike."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .lights import LIGHTS, PointLight, SpotLight
 from .materials import MATERIALS, Diffuse, Material
 from .model import Camera, Environment, FloatArray, Instance, Mesh, RenderSettings, Scene, Sphere
 
-#: What a mesh may have for each vertex, and of how many numbers.
+#: Per-vertex arrays that a mesh may have, and their numbers of components.
 CORNERS = {"normals": (3,), "uv": (2,), "uv1": (2,), "colors": (3, 4), "tangents": (4,)}
 
 
 def check_is_scene(scene: object) -> None:
-    """UsageError unless it is one."""
+    """Raise UsageError unless it is a Scene."""
     if isinstance(scene, (str, PathLike)):
         raise UsageError(f"scene is the path {str(scene)!r}; read it with clrt.load")
     if not isinstance(scene, Scene):
@@ -30,10 +30,10 @@ def check_is_scene(scene: object) -> None:
 
 
 def validate(scene: Scene) -> None:
-    """Raise one SceneError with all problems of the scene; does nothing if there are none.
+    """Raise one SceneError with all problems of the scene; do nothing if there are none.
 
     Checks the limits in the field types, the meshes' arrays (`mesh_problems`), the instances' matrices, the camera's
-    frame, the environment's image and the lights' directions.
+    frame, the environment map and the lights' directions.
     """
     problems = scene_problems(scene)
     if problems:
@@ -41,7 +41,7 @@ def validate(scene: Scene) -> None:
 
 
 def scene_problems(scene: Scene) -> list[str]:
-    """One sentence a problem, empty if the scene can be rendered."""
+    """Return one sentence per problem; empty if the scene can be rendered."""
     if problems := _list_problems(scene):
         return problems
     problems = _camera_problems(scene.camera)
@@ -69,17 +69,17 @@ def scene_problems(scene: Scene) -> list[str]:
 
 
 def _list_problems(scene: Scene) -> list[str]:
-    """Parts of the scene that there may be many of, and are no list."""
+    """Return problems of parts of the scene that should be lists and are not."""
     parts = {name: getattr(scene, name) for name in ("meshes", "instances", "spheres", "lights")}
     return [f"{name}: {show(part)} is no list; write {name}=[...]" for name, part in parts.items()
             if not isinstance(part, (list, tuple))]
 
 
 def mesh_problems(mesh: object, where: str) -> list[str]:
-    """What is wrong with a mesh's arrays.
+    """Return what is wrong with a mesh's arrays.
 
-    Refused: other shapes or dtypes than `Mesh` names, no triangles, values that are not finite (used by a face or not),
-    indices outside the vertices, normals of length zero, which point nowhere, and colours outside 0 to 1.
+    Rejected: other shapes or dtypes than those of `Mesh`, no triangles, values that are not finite (used by a face or
+    not), indices out of range, normals of length zero, and colors outside 0 to 1.
     """
     if not isinstance(mesh, Mesh):
         return [f"{where}: {show(mesh)} is no Mesh; write a clrt.Mesh"]
@@ -109,7 +109,7 @@ def mesh_problems(mesh: object, where: str) -> list[str]:
 
 
 def texture_problems(mesh: Mesh, where: str) -> list[str]:
-    """Textures of a mesh that has no texture coordinates for them."""
+    """Return problems of textures for which the mesh has no texture coordinates."""
     material: object = mesh.material
     textures = material.textures() if isinstance(material, Material) else []
     return [f'{where} {show(mesh.name)}: its material reads the texture {show(texture.picture.name)} by uv'
@@ -118,7 +118,7 @@ def texture_problems(mesh: Mesh, where: str) -> list[str]:
 
 
 def index_problems(faces: NDArray[np.integer], n: int, where: str) -> list[str]:
-    """Indices of any integer dtype that are outside 0 … n − 1: the first one, and how many."""
+    """Return the first index, of any integer dtype, outside 0 … n − 1, and the number of others."""
     if len(faces) == 0 or (faces.min() >= 0 and faces.max() < n):
         return []
     bad = np.asarray(((faces < 0) | (faces >= n)).any(axis=1))
@@ -129,7 +129,7 @@ def index_problems(faces: NDArray[np.integer], n: int, where: str) -> list[str]:
 
 
 def _array_problem(array: object, dtype: type, rows: str, columns: tuple[int, ...], where: str) -> str | None:
-    """Whether `array` is no (rows, k) array of `dtype`, k one of `columns`."""
+    """Return a problem unless `array` is a (rows, k) array of `dtype`, with k one of `columns`."""
     name, shape = np.dtype(dtype).name, " or ".join(f"({rows}, {k})" for k in columns)
     if not isinstance(array, np.ndarray):
         return f"{where} is a {type(array).__name__}; write a numpy array of {name}, shape {shape}"
@@ -141,7 +141,7 @@ def _array_problem(array: object, dtype: type, rows: str, columns: tuple[int, ..
 
 
 def _row_problems(bad: NDArray[np.bool_], array: FloatArray, where: str, fault: str) -> list[str]:
-    """The first bad row, and how many there are."""
+    """Return a problem for the first bad row, with the number of others."""
     if not bad.any():
         return []
     row = int(bad.argmax())
@@ -165,7 +165,7 @@ def _others(rows: NDArray[np.bool_]) -> str:
 
 
 def _object_problems(value: object, kind: type, where: str) -> list[str]:
-    """Whether `value` is a `kind` whose fields keep their limits."""
+    """Return problems unless `value` is a `kind` whose fields are within their limits."""
     if not isinstance(value, kind):
         names = [each.__name__ for each in MATERIALS] if kind is Material else [kind.__name__]
         return [f"{where}: {show(value)} is no {kind.__name__}; write a clrt.{' or clrt.'.join(names)}"]
@@ -174,10 +174,10 @@ def _object_problems(value: object, kind: type, where: str) -> list[str]:
 
 
 def _instance_problems(instances: list[Instance], of_mesh: dict[int, list[str]]) -> list[str]:
-    """Of instances and the meshes that only they show; of_mesh: the problems of the others, by id."""
+    """Return problems of instances and of the meshes that only they show; of_mesh: problems of other meshes, by id."""
     problems: list[str] = []
     placed: list[tuple[int, Instance]] = []
-    seen = set()  # meshes in materials
+    seen = set()  # pairs of mesh and material
     for i, instance in enumerate(instances):
         where = f"instance[{i}]"
         wrong = _object_problems(instance, Instance, where)
@@ -197,7 +197,7 @@ def _instance_problems(instances: list[Instance], of_mesh: dict[int, list[str]])
 
 
 def _material_problems(users: list[tuple[str, Mesh | Sphere | Instance]]) -> list[str]:
-    """The problems of each material, where it is first used."""
+    """Return the problems of each material, at its first use."""
     first: dict[int, tuple[str, object]] = {}
     for where, user in users:
         material = getattr(user, "material", Diffuse())
@@ -212,7 +212,7 @@ def _material_problems(users: list[tuple[str, Mesh | Sphere | Instance]]) -> lis
 
 
 def _camera_problems(camera: Camera) -> list[str]:
-    """The camera's fields, and whether they span a frame."""
+    """Return problems of the camera's fields, and of a degenerate frame."""
     problems = _object_problems(camera, Camera, "camera")
     if problems:
         return problems
@@ -232,7 +232,7 @@ def _camera_problems(camera: Camera) -> list[str]:
 
 
 def _raster_problems(scene: Scene) -> list[str]:
-    """Whether the integrator is one for another camera."""
+    """Return a problem if the raster integrator does not support the camera."""
     camera = scene.camera
     if scene.render.integrator != "raster" or (camera.projection == "perspective" and not camera.aperture_radius):
         return []

@@ -1,4 +1,4 @@
-"""Finds emissive meshes that are wound backwards: nothing in the scene lies on the side that emits."""
+"""Detection of emissive meshes with reversed winding: nothing in the scene lies on the side that emits."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from .model import Mesh, Scene
 
 Doubles = NDArray[np.float64]
 
-#: The scene may reach this far in front of an emitter that faces nothing, relative to how far it reaches behind it and
-#: to the emitter's own size: a ceiling that a lamp touches, wound backwards, is not lit by it.
+#: The scene may extend this far in front of an emitter that faces nothing, relative to its extent behind it and to the
+#: emitter's own size: an emitter touching the ceiling does not light it if wound backwards.
 SHALLOW = 0.01
 
 

@@ -1,7 +1,7 @@
-"""Write a scene as a scene file: the same picture, and the same names, in a file that people may go on with.
+"""Writing of a scene as an editable scene file that renders the same image, with the same names.
 
-What was read from files is referred to where it is still the same (scene.source). What no scene file can say, such as a
-mesh or a sky made in Python, or a picture inside a model of which a material was changed, is written beside it.
+Parts read from files are referred to if they are unchanged (scene.source). What a scene file cannot hold, such as a
+mesh or an environment map made in Python, or an image inside a model with a changed material, is written next to it.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from .texture_table import TextureTable
 from .textures import Picture, Texture
 from .toml_text import is_plain, toml_key, toml_value
 
-#: Fields that are written even where they have their default, since they are what a user changes first.
+#: Fields that are written even at their default, since users change them first.
 TELLING = {"position", "look_at", "fov_degrees", "size", "spp", "max_depth", "color", "metallic", "roughness", "center",
            "radius"}
-#: What is not written of tables as it was read: materials and lights are those of now.
+#: Keys of tables that are not copied, since they are written from the scene's current state.
 ASSIGNED = ("material", "materials", "lights")
-#: What the scene file calls the one material of a file that has no names for its own.
+#: Name in the scene file of the one material of a file without material names.
 UNNAMED = "model"
 
 
 @dataclass
 class SceneFiles:
-    """A scene file's text, and what belongs beside it, by file names: models, texels (h, w, 4) uint8 for .png and
-    pixels (h, w, 3) float32 for .exr."""
+    """A scene file's text, and the files next to it, by name: models, texels (h, w, 4) uint8 for .png and pixels
+    (h, w, 3) float32 for .exr."""
 
     text: str = ""
     models: dict[str, bytes] = field(default_factory=dict)
@@ -50,14 +50,14 @@ class SceneFiles:
 
 
 def scene_files(scene: Scene, path: Path) -> SceneFiles:
-    """The scene as a scene file that is to be at `path`."""
+    """Return the scene as a scene file to be written to `path`."""
     return _Writer(scene, path).files
 
 
 def started(scene: Scene) -> Scene:
-    """A bare model's scene with those of the model's materials named that a scene file can say, for users to change.
+    """Return a bare model's scene with those of its materials named that a scene file can hold, for users to change.
 
-    Textures inside the model, and names that stand for several materials, stay the model's own.
+    Materials with textures inside the model, and names that several materials share, remain the model's own.
     """
     named: dict[str, list[Material]] = {}
     for origin in scene.source.meshes if scene.source else ():
@@ -71,13 +71,13 @@ def started(scene: Scene) -> Scene:
 
 
 class _Writer:
-    """Writes one scene. What is beside the text is noted in `files`."""
+    """Writer of one scene. Files next to the scene file are collected in `files`."""
 
     def __init__(self, scene: Scene, path: Path) -> None:
         self._scene, self._source = scene, scene.source or Source()
         self._folder, self._stem = Path(os.path.realpath(path)).parent, path.stem
         self.files = SceneFiles()
-        #: The names of files here that the scene was read from, and may still show.
+        #: Names of files in the same folder that the scene was read from, and may still refer to.
         self._read = {path.name for path in self._source.paths if path.parent == self._folder}
         self._names = {id(material): name for name, material in materials_of(scene).items()}
         self._materials = dict(scene.materials)
@@ -100,7 +100,7 @@ class _Writer:
         self.files.text = "\n".join([*head, *objects]) + "\n"
 
     def _cameras(self) -> Iterator[str]:
-        """Those by names; model files have theirs themselves."""
+        """Yield the named cameras, except those that a model file defines."""
         cameras = self._scene.cameras
         theirs = [name for name, camera in cameras.items() if self._source.cameras.get(name) == camera]
         yield from (f"# or, instead of the lines above: name = {toml_value(name)}" for name in theirs
@@ -131,7 +131,7 @@ class _Writer:
             yield f"image = {toml_value(name)}"
 
     def _read_meshes(self) -> Iterator[str]:
-        """The tables that were read, as far as they are still the same, and their instances."""
+        """Yield the tables that were read, if they are unchanged, and their instances."""
         shown = {shape_of(mesh): mesh for mesh in meshes_by_id(self._scene.instances).values()}
         for origin in self._source.meshes:
             if origin.table.get("visible") is False:
@@ -154,7 +154,7 @@ class _Writer:
                 self._give_back(parts)
 
     def _claimed(self, origin: Origin) -> list[Mesh | Instance]:
-        """The scene's objects that are the origin's parts, maybe in other materials; none where one is missing."""
+        """Return the scene's objects that are the origin's parts, maybe in other materials; empty if any is missing."""
         found = [left.pop(0) for part in origin.parts if (left := self._left.get(shape_of(part)))]
         if len(found) == len(origin.parts):
             return found
@@ -166,7 +166,7 @@ class _Writer:
             self._left.setdefault(shape_of(part), []).append(part)
 
     def _assigned(self, origin: Origin, parts: Sequence[Mesh | Instance]) -> list[str] | None:
-        """The keys of a table's materials; None where it cannot say which part has which."""
+        """Return the material keys of a table; None if they cannot tell its parts apart."""
         groups: dict[str, list[tuple[Material, Material | None]]] = {}
         for part, own in zip(parts, origin.own):
             mesh = part.mesh if isinstance(part, Instance) else part
@@ -184,7 +184,7 @@ class _Writer:
                   if (theirs := [name for name in kept if name]) else [])]
 
     def _own_objects(self) -> Iterator[str]:
-        """What no table says: each mesh in a file beside, hidden where only its instances are seen."""
+        """Yield the objects without a table: each mesh in its own file, hidden if only its instances are rendered."""
         left = [part for parts in self._left.values() for part in parts]
         meshes = [part for part in left if isinstance(part, Mesh)]
         instances = [part for part in left if isinstance(part, Instance)]
@@ -214,7 +214,7 @@ class _Writer:
         return id(material) in self._named
 
     def _name_of(self, material: Material) -> str:
-        """Its name, under which it will be written."""
+        """Return the name under which the material will be written."""
         name = self._names.get(id(material), "material")
         if self._materials.get(name) != material:
             name = self._by_value.get(material) or free_name(name or UNNAMED, self._materials, self._numbers)
@@ -223,13 +223,13 @@ class _Writer:
         return name
 
     def _keys(self, table: Mapping[str, Any]) -> Iterator[str]:
-        """A table as it was read, without its materials and lights."""
+        """Yield the keys of a table as they were read, without its materials and lights."""
         for name, value in table.items():
             if name not in ASSIGNED:
                 yield f"{toml_key(name)} = {toml_value(self._relative(value) if isinstance(value, Path) else value)}"
 
     def _section(self, title: str, record: Any, kind: str | None = None) -> Iterator[str]:
-        """A table of a dataclass's fields, without those of no interest."""
+        """Yield a table of a dataclass's fields, without most of those at their defaults."""
         yield from ("", title)
         if kind is not None:
             yield f"type = {toml_value(kind)}"
@@ -241,13 +241,13 @@ class _Writer:
                 yield f"{each.name} = {toml_value(value)}"
 
     def _texture(self, texture: Texture) -> str:
-        """An inline table."""
+        """Return an inline table."""
         values = {each.name: plain_value(getattr(texture, each.name)) for each in fields(TextureTable)
                   if each.name != "image" and getattr(texture, each.name) != each.default}
         return toml_value({"image": self._picture(texture.picture), **values})
 
     def _picture(self, picture: Picture) -> str:
-        """The file of a texture's picture, which is to be written beside if there is none."""
+        """Return the file of a texture's image, which is written next to the scene file if there is none."""
         if (file := self._source.file_of(picture)) is not None:
             return self._relative(file)
         if id(picture) not in self._pictures:
@@ -256,7 +256,7 @@ class _Writer:
         return self._pictures[id(picture)]
 
     def _beside(self, name: str, suffix: str) -> str:
-        """A file name for something of this name, next to the scene file."""
+        """Return an unused file name for something of this name, next to the scene file."""
         clean = re.sub(r"[^\w-]+", "_", name)[:64].strip("_") or "part"
         taken = {*self._read, *self.files.models, *self.files.texels, *self.files.pixels}
         number, file = 2, f"{self._stem}.{clean}{suffix}"
@@ -265,7 +265,7 @@ class _Writer:
         return file
 
     def _relative(self, file: Path) -> str:
-        """How the scene file names another file: relative to its own folder, where there is a way."""
+        """Return the path of another file relative to the scene file's folder, or absolute if there is no such path."""
         try:
             return Path(os.path.relpath(file, self._folder)).as_posix()
         except ValueError:  # on another drive
@@ -279,5 +279,5 @@ def _default_image() -> NDArray[np.float32]:
 
 
 def _is_plain(material: Material) -> bool:
-    """Whether a scene file can say all of a material without other files."""
+    """Return whether a scene file can describe the material without other files."""
     return not material.textures()

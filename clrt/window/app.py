@@ -1,4 +1,4 @@
-"""The window: where its panels stand, and what runs in every frame. Dear ImGui draws it (imgui-bundle)."""
+"""The application window: its panel layout and per-frame callbacks, drawn with Dear ImGui (imgui-bundle)."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from .tone_mapping import Look as Look
 from .viewport import Viewport
 
 SIZE = (1280, 800)
-#: Frames a second: at most, and while nothing happens.
+#: Frames per second: the maximum, and while idle.
 FASTEST, IDLE = 60.0, 20.0
 ADD_ONS = immapp.AddOnsParams(with_implot=True)
 
 
 class App:
-    """A window on a live session of its own. `params` are what Dear ImGui's runner takes."""
+    """A window on a live session of its own. `params`: the parameters of Dear ImGui's runner."""
 
     def __init__(self, scene: Scene, settings: Settings = Settings(), look: Look = Look()) -> None:
-        # Before any OpenGL is loaded: Mesa gives its LLVM to all that come later, and PoCL aborts with another's.
+        # Before OpenGL is loaded: libraries loaded later would get Mesa's LLVM, and PoCL aborts with a foreign one.
         devices = [info for info, _ in find_devices() if info.usable]
         self.live = Live(scene, settings=settings)
         self.editor, self.viewport = Editor(self.live, look, devices), Viewport()
@@ -52,13 +52,13 @@ class App:
         self.params.docking_params.dockable_windows = self._panels()
 
     def run(self, runner: Callable[..., None] = immapp.run) -> None:
-        """Shows the window until it is closed. runner: what drives it, with the arguments of immapp.run.
+        """Show the window until it is closed. runner: the function that runs the main loop, called like immapp.run.
 
-        OutputError where no window can be opened.
+        Raises OutputError if no window can be opened.
         """
         try:
             runner(runner_params=self.params, add_ons_params=ADD_ONS)
-        except RuntimeError as fault:  # of the library that opens it
+        except RuntimeError as fault:  # from the library that opens the window
             if not self.editor.frames:
                 raise no_display(str(fault)) from fault
             raise
@@ -67,7 +67,7 @@ class App:
             self.live.close()
 
     def close(self) -> None:
-        """Ends `run`, as closing the window does."""
+        """End `run`, as closing the window does."""
         self.params.app_shall_exit = True
 
     def _panels(self) -> list[hello_imgui.DockableWindow]:
@@ -92,6 +92,6 @@ class App:
 
 
 def _splits() -> list[hello_imgui.DockingSplit]:
-    """The picture on the left; panels on the right, and figures below them."""
+    """Return the layout: the viewport on the left; panels on the right, and statistics below them."""
     return [hello_imgui.DockingSplit("MainDockSpace", "Panels", imgui.Dir.right, 0.34),
             hello_imgui.DockingSplit("Panels", "Figures", imgui.Dir.down, 0.45)]

@@ -1,4 +1,4 @@
-"""What the user's hands do over the picture: keys walk, dragging looks around, the wheel comes nearer."""
+"""Camera navigation by keyboard and mouse: keys walk, dragging looks around or orbits, the wheel zooms."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from imgui_bundle import imgui
 from ..scene.model import Camera
 from .navigation import approached, distance, has_axes, orbited, shifted, turned, walked
 
-#: Keys, and which way they walk: right, up, forward.
+#: Keys, and the direction in which they walk: right, up, forward.
 KEYS = {imgui.Key.d: (1, 0, 0), imgui.Key.a: (-1, 0, 0), imgui.Key.e: (0, 1, 0), imgui.Key.q: (0, -1, 0),
         imgui.Key.w: (0, 0, 1), imgui.Key.s: (0, 0, -1)}
-#: How much faster with Shift.
+#: Speed factor with Shift.
 FASTER = 5.0
-#: Distance after a notch of the wheel over that before.
+#: Factor of the distance per notch of the wheel.
 NOTCH = 0.9
-#: Seconds of a frame that count at most, so that one that took long is no leap.
+#: Seconds per frame that count at most, so that a slow frame does not cause a jump.
 LONGEST = 0.1
 
 
 @dataclass
 class CameraControls:
-    """mode: what dragging does, "look" or "orbit"; pace: what a second of walking covers of the distance to what the
-    camera looks at."""
+    """mode: the effect of dragging, "look" or "orbit"; pace: walking speed per second, relative to
+    the distance to the look_at point."""
 
     mode: str = "look"
     pace: float = 0.5
 
     def move(self, camera: Camera, height: float) -> Camera:
-        """The camera after this frame's keys and mouse; the same object if it was not moved. ImGui's last item is the
-        picture, `height` pixels high."""
+        """Return the camera after this frame's keyboard and mouse input; the same object if it did not move. ImGui's
+        last item must be the image, `height` pixels high."""
         if not has_axes(camera):
             return camera
         if imgui.is_item_hovered() or imgui.is_item_active():

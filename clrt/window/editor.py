@@ -1,4 +1,4 @@
-"""What the panels share: the live session, how its picture is shown, and a place for complaints."""
+"""State shared by the panels: the live session, the display settings, and the last message."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ from .screenshot import screenshot
 from .tone_mapping import Look, ToneMapper
 
 _log = logging.getLogger(__name__)
-#: Panels, by their titles.
+#: Titles of panels.
 SPHERES, MATERIALS = "Spheres", "Materials"
-#: What a pixel of dragging a coordinate moves, over the camera's distance.
+#: Change of a coordinate per pixel of dragging, relative to the camera's distance.
 STEP = 1 / 500
-#: Seconds that a moving light takes for its circle.
+#: Period in seconds of a moving light's circle.
 ROUND = 8.0
 
 
 class Editor:
-    """The scene and the settings are the session's own. message: what could not be done last, or was done; frames: how
-    many were drawn; moving_light: the number of the one that circles round what the camera looks at; sphere, material:
-    the number and the name of those that the panels edit."""
+    """Scene editor. The scene and the settings are those of the session. message: the last error or success; frames:
+    the number of frames drawn; moving_light: index of the light that circles around the camera's look_at point; sphere,
+    material: index and name of those being edited."""
 
     def __init__(self, live: Live, look: Look, devices: Sequence[DeviceInfo]) -> None:
         self.live, self.look, self.devices = live, look, devices
@@ -60,49 +60,49 @@ class Editor:
 
     @property
     def scene(self) -> Scene:
-        """The newest scene, with all edits."""
+        """The current scene, with all edits."""
         return self.live.scene
 
     @property
     def settings(self) -> Settings:
-        """The newest settings."""
+        """The current settings."""
         return self.live.settings
 
     @property
     def snapshot(self) -> Snapshot:
-        """The newest picture."""
+        """The newest image of the session."""
         return self.live.snapshot()
 
     @property
     def step(self) -> float:
-        """What a pixel of dragging changes in a coordinate."""
+        """Change of a coordinate per pixel of dragging."""
         return STEP * distance(self.scene.camera)
 
     @property
     def materials(self) -> dict[str, Material]:
-        """The scene's by name (scene.editing)."""
+        """The scene's materials by name (scene.editing)."""
         if self._materials is None or self._materials[0] is not self.scene:
             self._materials = self.scene, materials_of(self.scene)
         return self._materials[1]
 
     def edit(self, **changes: Any) -> None:
-        """Replaces parts of the scene. What is dragged is one step of undoing."""
+        """Replace parts of the scene. A drag is a single undo step."""
         self._show(replace(self.scene, **changes))
 
     def repaint(self, old: Material, new: Material) -> None:
-        """Replaces a material wherever it is."""
+        """Replace a material everywhere."""
         self._show(with_material(self.scene, old, new))
 
     def walk(self, camera: Camera) -> None:
-        """Moves the camera, which is no step of undoing."""
+        """Move the camera, which is not an undo step."""
         self.attempt(lambda: self.live.edit(replace(self.scene, camera=camera), moving=True, step=False))
 
     def choose(self, settings: Settings) -> None:
-        """Replaces the settings."""
+        """Replace the settings."""
         self.attempt(lambda: self.live.choose(settings))
 
     def pick(self, x: float, y: float) -> None:
-        """Has the panels edit what is seen at a place of the picture (see `Live.pick`), once that is known."""
+        """Select what is visible at a position of the image (see `Live.pick`) for editing, once it is known."""
         self._picked = self.live.pick(x, y)
 
     def _choose_picked(self) -> None:
@@ -122,32 +122,32 @@ class Editor:
             _bring_forward(SPHERES if isinstance(thing, Sphere) else MATERIALS)
 
     def save_picture(self, path: Path) -> None:
-        """Writes the newest picture as it is shown (.png), or its light (.exr, .hdr)."""
+        """Write the newest image as displayed (.png), or its linear radiance (.exr, .hdr)."""
         look = self.look
         self._write(path, lambda: self.live.image().save(path, view=look.view, exposure=look.exposure))
 
     def save_scene(self, path: Path) -> None:
-        """Writes the scene as a scene file, with what belongs beside it."""
+        """Write the scene as a scene file, with the files that it refers to."""
         scene = self.scene
         self._write(path, lambda: save_scene(scene, path, force=False))
 
     def open(self, path: Path) -> None:
-        """Shows the scene in a file instead, which is a step of undoing."""
+        """Replace the scene by the one in a file, which is an undo step."""
         self._beside(path, "is shown", lambda: self.live.edit(load(path)))
 
     def save_screenshot(self, path: Path) -> None:
-        """Writes the window as it looks, once this frame is drawn."""
+        """Write a screenshot of the window at the end of this frame."""
         self._screenshot = path
 
     def take_screenshot(self) -> None:
-        """Does so, at the end of a frame."""
+        """Take the requested screenshot, if any; called at the end of a frame."""
         if self._screenshot is not None:
             path, pixels = self._screenshot, screenshot()
             self._screenshot = None
             self._write(path, lambda: write_image(path, pixels, view="raw"))
 
     def _write(self, path: Path, write: Callable[[], object]) -> None:
-        """Writes a file without waiting for it, unless that would replace one that is read-only or of the scene."""
+        """Write a file in the background; fails if that would replace a read-only file or one of the scene's."""
         source = self.scene.source or Source()
 
         def checked() -> None:
@@ -159,24 +159,24 @@ class Editor:
         self._beside(path, "is written", checked)
 
     def _beside(self, path: Path, done: str, do: Callable[[], object]) -> None:
-        """Does something with a file without waiting for it. done: what is said of the file then."""
+        """Run a file operation in the background. done: the message about the file on success."""
         def work() -> None:
             try:
                 self.attempt(do)
                 self.message = self.message or f"{path} {done}"
-            except Exception as error:  # a mistake of ours must not pass for success
+            except Exception as error:  # an internal error must not look like success
                 _log.exception("%s failed", path)
                 self.message = f"{path}: {type(error).__name__}: {error}"
 
         self._files.submit(work)
 
     def close(self) -> None:
-        """Ends its threads, once files are written."""
+        """Stop the threads, once files are written."""
         self._files.shutdown()
         self.tone_mapper.close()
 
     def attempt(self, do: Callable[[], object]) -> None:
-        """Does something that may be refused; says why if it is."""
+        """Run an action, and show the message if it raises ClrtError."""
         try:
             do()
             self.message = ""
@@ -184,7 +184,7 @@ class Editor:
             self.message = str(problem)
 
     def frame(self) -> None:
-        """What is to be done in every frame, before the panels are drawn."""
+        """Run the per-frame work, before the panels are drawn."""
         self.frames += 1
         self.tone_mapper.ask(self.snapshot, self.look)
         if self._dragging and not imgui.is_any_item_active():
@@ -216,7 +216,7 @@ class Editor:
 
 
 def _bring_forward(panel: str) -> None:
-    """Selects a panel's tab. The keyboard stays with the picture, which giving the panel the focus would not allow."""
+    """Select a panel's tab. The keyboard focus stays with the viewport, so the panel is not focused itself."""
     window = imgui.internal.find_window_by_name(panel)
     if window.dock_node is not None and window.dock_node.tab_bar is not None:
         window.dock_node.tab_bar.next_selected_tab_id = window.tab_id

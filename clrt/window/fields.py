@@ -1,8 +1,8 @@
-"""Widgets for the fields of dataclasses, chosen by the fields' types and limits: what the scene file knows, the window
-can change, under the same names.
+"""Widgets for the fields of dataclasses, chosen by the fields' types and limits, so that the window can edit whatever
+the scene file can hold, under the same names.
 
-Every function takes a value and returns it, the very same object where nothing was changed. Numbers that were typed or
-dragged are the shortest that are the same in float32.
+Every function takes a value and returns it, the same object if nothing was changed. Numbers that were typed or dragged
+become the shortest decimals with the same float32 value.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from ..scene.textures import Texture
 
 Value = TypeVar("Value")
 
-#: Of a limited range, what is too wide for a slider.
+#: Largest range for which a slider is used.
 WIDEST = 20000
-#: A wider one is logarithmic.
+#: Ranges wider than this get a logarithmic slider.
 WIDE = 1000
-#: What a pixel of dragging changes of a number, beside what it changes of a coordinate.
+#: Relative change of a number per pixel of dragging, if larger than that of a coordinate.
 DRAG = 0.005
-#: What sliders show of a range whose far end is seldom wanted; it can still be typed (Ctrl and a click).
+#: Slider maxima of fields whose upper limit is rarely needed; larger values can be typed (Ctrl and a click).
 USUAL = {"max_depth": 64}
 #: Lines of a list before it scrolls.
 LINES = 20
@@ -38,18 +38,18 @@ COLOR = imgui.ColorEditFlags_.float.value | imgui.ColorEditFlags_.hdr.value
 
 
 class Limits(NamedTuple):
-    """The least and the most that a number may be."""
+    """Minimum and maximum of a number."""
 
     least: float = -inf
     most: float = inf
 
     def clamp(self, value: float) -> float:
-        """The nearest number within."""
+        """Return the nearest number within the limits."""
         return min(max(value, self.least), self.most)
 
 
 def edit_fields(record: Value, step: float, without: Collection[str] = ()) -> Value:
-    """Widgets for a dataclass's fields, all but some. step: what a pixel of dragging changes in a coordinate."""
+    """Show widgets for all fields of a dataclass but some. step: change of a coordinate per pixel of dragging."""
     hints = get_type_hints(type(record), include_extras=True)
     changed = {}
     for field in fields(record):  # type: ignore[arg-type]
@@ -62,7 +62,7 @@ def edit_fields(record: Value, step: float, without: Collection[str] = ()) -> Va
 
 
 def edit(label: str, hint: Any, value: Any, step: float) -> Any:
-    """A widget for a value of this type: of those that scenes are made of (see scene.fields)."""
+    """Show a widget for a value of one of the types that scenes consist of (see scene.fields)."""
     origin, parts = get_origin(hint), get_args(hint)
     if origin in (Union, UnionType):
         kinds = [part for part in parts if part is not NoneType]
@@ -81,14 +81,14 @@ def edit(label: str, hint: Any, value: Any, step: float) -> Any:
 
 
 def choose(label: str, choices: Sequence[Value], value: Value, none: str = "none") -> Value:
-    """A list to choose one from; `none` is what it calls None."""
+    """Show a list to choose one value from; `none` is the text for None."""
     names = [none if choice is None else str(choice) for choice in choices]
     changed, index = imgui.combo(label, choices.index(value) if value in choices else -1, names, LINES)
     return choices[index] if changed else value
 
 
 def _edit_optional(label: str, kind: Any, value: Any, step: float) -> Any:
-    """Something that may be None: a choice more, or a mark whether it is given."""
+    """Show a widget for a value that may be None: one more choice, or a checkbox."""
     if get_origin(kind) is Literal:
         return choose(label, (None, *get_args(kind)), value)
     if kind is Texture and value is None:
@@ -112,7 +112,7 @@ def _edit_texture(label: str, texture: Texture, step: float) -> Texture:
 
 
 def _edit_tuple(label: str, kinds: tuple[Any, ...], value: tuple[Any, ...], step: float) -> tuple[Any, ...]:
-    """Colours where all numbers are from 0 on, vectors, or widgets one by one."""
+    """Show a color widget if all numbers are at least 0, a vector widget, or separate widgets."""
     limits = [limits_of(kind) for kind in kinds]
     if limits[0] is None:
         new = tuple(edit(f"{label}[{i}]", kind, part, step) for i, (kind, part) in enumerate(zip(kinds, value)))
@@ -131,7 +131,7 @@ def _edit_tuple(label: str, kinds: tuple[Any, ...], value: tuple[Any, ...], step
 
 
 def _number(hint: Any, step: float, label: str, value: float) -> tuple[bool, float]:
-    """A slider where the type has limits, something to drag where it has not."""
+    """Show a slider if the type has limits, otherwise a drag widget."""
     limits = limits_of(hint) or Limits()
     least, most = limits.least, USUAL.get(label, limits.most)
     slides, whole = isfinite(least) and most - least <= WIDEST, _base(hint) is int
@@ -149,7 +149,7 @@ def _number(hint: Any, step: float, label: str, value: float) -> tuple[bool, flo
 
 
 def limits_of(hint: Any) -> Limits | None:
-    """The limits of a number's type; None for what is no number."""
+    """Return the limits of a number's type; None for other types."""
     if _base(hint) not in (int, float):
         return None
     limits = Limits()
@@ -163,7 +163,7 @@ def limits_of(hint: Any) -> Limits | None:
 
 
 def _next(bound: float, towards: float, hint: Any) -> float:
-    """The number beside one that is excluded."""
+    """Return the number next to an excluded bound."""
     whole = bound + (1 if towards > bound else -1)
     return whole if _base(hint) is int else float(np.nextafter(np.float32(bound), np.float32(towards)))
 
@@ -172,20 +172,20 @@ _PLAIN: dict[Any, Any] = {bool: imgui.checkbox, str: imgui.input_text}
 
 
 def _initial(hint: Any) -> Any:
-    """What a field that was not given begins with: 1, or the nearest that is allowed."""
+    """Return the initial value of an optional field that becomes enabled: 1, or the nearest allowed."""
     if get_origin(hint) is tuple:
         return tuple(map(_initial, get_args(hint)))
     return _shortest((limits_of(hint) or Limits()).clamp(1), hint)
 
 
 def _is(kind: Any, value: Any) -> bool:
-    """Whether a value is of one of the types of a union."""
+    """Return whether a value is of a type."""
     base = get_origin(_base(kind)) or _base(kind)
     return isinstance(value, (float, int) if base is float else base)
 
 
 def _base(hint: Any) -> Any:
-    """A type without its limits."""
+    """Return a type without its limits."""
     return get_args(hint)[0] if get_origin(hint) is Annotated else hint
 
 
@@ -194,5 +194,5 @@ def _speed(size: float, step: float) -> float:
 
 
 def _shortest(number: float, hint: Any) -> float:
-    """The number with the fewest digits that float32 takes for the same."""
+    """Return the number with the fewest digits that has the same float32 value."""
     return int(number) if _base(hint) is int else float(str(np.float32(number)))

@@ -1,4 +1,4 @@
-"""A list to choose from, with buttons that add to it and take away."""
+"""A list box, with buttons that add and remove entries."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LINES = 6
 
 
 def pick(label: str, names: Sequence[str], chosen: int) -> int:
-    """The number of the chosen line. Only the lines in sight are drawn, so there may be very many."""
+    """Show a list box, and return the selected line's index. Only visible lines are drawn, so lists may be long."""
     height = (min(max(len(names), 1), LINES) + 0.5) * imgui.get_text_line_height_with_spacing()
     if imgui.begin_list_box(label, (-1, height)):
         clipper = imgui.ListClipper()
@@ -28,7 +28,7 @@ def pick(label: str, names: Sequence[str], chosen: int) -> int:
 
 
 def change(entries: Sequence[Entry], chosen: int, new: Mapping[str, Entry]) -> tuple[list[Entry], int]:
-    """Buttons that add an entry of `new` by its name, or remove the chosen one. Returns the entries, and the chosen."""
+    """Show buttons that add an entry of `new` by name, or remove the chosen one; return the entries and the chosen."""
     changed = list(entries)
     for name, entry in new.items():
         if imgui.button(f"add {name}"):

@@ -1,6 +1,6 @@
-"""How a camera moves: from one camera to the next, in the scene's units and radians.
+"""Camera motion: functions from one camera to the next, in the scene's units and radians.
 
-Turns are about the camera's `up` and its own right; they stop before it looks straight up or down.
+Rotations are about the camera's `up` and its own right; they stop short of looking straight up or down.
 """
 
 from __future__ import annotations
@@ -15,36 +15,36 @@ from ..scene.model import Camera, Vector
 
 Doubles = NDArray[np.float64]
 
-#: How near to `up`, or its opposite, a camera may look.
+#: Smallest angle between the view direction and `up` or its opposite.
 STEEPEST = radians(1)
 
 
 def walked(camera: Camera, right: float, up: float, forward: float) -> Camera:
-    """The camera moved along its own right, the scene's up, and where it looks."""
+    """Translate the camera along its own right, the scene's up, and its view direction."""
     ahead, side, top = _axes(camera)
     step = right * side + up * top + forward * ahead
     return replace(camera, position=_vector(camera.position + step), look_at=_vector(camera.look_at + step))
 
 
 def turned(camera: Camera, right: float, down: float) -> Camera:
-    """The camera looking elsewhere from where it stands."""
+    """Rotate the view direction about the camera's position."""
     return replace(camera, look_at=_vector(camera.position + _swung(camera, right, down)))
 
 
 def orbited(camera: Camera, right: float, down: float) -> Camera:
-    """The camera moved around what it looks at, as if that was turned by hand to the right and down."""
+    """Rotate the camera about its look_at point, as if the object were turned by hand to the right and down."""
     return replace(camera, position=_vector(camera.look_at - _swung(camera, right, down)))
 
 
 def shifted(camera: Camera, right: float, up: float) -> Camera:
-    """The camera moved in the plane of its picture, by parts of its distance from what it looks at."""
+    """Translate the camera in the image plane, by fractions of its distance from the look_at point."""
     ahead, side, _ = _axes(camera)
     step = distance(camera) * (right * side + up * np.cross(side, ahead))
     return replace(camera, position=_vector(camera.position + step), look_at=_vector(camera.look_at + step))
 
 
 def approached(camera: Camera, factor: float) -> Camera:
-    """The camera at `factor` times its distance; in an orthographic picture things grow instead."""
+    """Scale the camera's distance from look_at by `factor`; for an orthographic camera, scale view_height instead."""
     if camera.projection == "orthographic" and camera.view_height is not None:
         return replace(camera, view_height=camera.view_height * factor)
     back = np.subtract(camera.position, camera.look_at)
@@ -52,7 +52,7 @@ def approached(camera: Camera, factor: float) -> Camera:
 
 
 def around(point: Vector, camera: Camera, turn: float) -> Vector:
-    """The point turned about the axis that stands upright in what the camera looks at."""
+    """Rotate a point about the vertical axis through the camera's look_at point."""
     up = np.asarray(camera.up) / np.linalg.norm(camera.up)
     away = np.subtract(point, camera.look_at)
     along = (away @ up) * up
@@ -60,24 +60,24 @@ def around(point: Vector, camera: Camera, turn: float) -> Vector:
 
 
 def distance(camera: Camera) -> float:
-    """From the camera to what it looks at."""
+    """Return the distance from the camera to its look_at point."""
     return float(np.linalg.norm(np.subtract(camera.look_at, camera.position)))
 
 
 def has_axes(camera: Camera) -> bool:
-    """Whether it looks anywhere, and not along its `up`; else it cannot be moved."""
+    """Return whether the camera has a view direction that is not parallel to `up`; otherwise it cannot be moved."""
     return bool(np.cross(np.subtract(camera.look_at, camera.position), camera.up).any())
 
 
 def _axes(camera: Camera) -> tuple[Doubles, Doubles, Doubles]:
-    """Unit vectors: where it looks, its right, the scene's up."""
+    """Return unit vectors: the view direction, its right, the scene's up."""
     ahead = np.subtract(camera.look_at, camera.position, dtype=np.float64)
     side, up = np.cross(ahead, camera.up), np.asarray(camera.up, np.float64)
     return ahead / np.linalg.norm(ahead), side / np.linalg.norm(side), up / np.linalg.norm(up)
 
 
 def _swung(camera: Camera, right: float, down: float) -> Doubles:
-    """From the camera to what it looks at, after a turn."""
+    """Return the vector from the camera to its look_at point after a rotation."""
     ahead, side, up = _axes(camera)
     from_up = atan2(float(np.linalg.norm(np.cross(ahead, up))), float(ahead @ up))
     from_up = min(max(from_up + down, STEEPEST), np.pi - STEEPEST)

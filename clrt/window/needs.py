@@ -1,4 +1,4 @@
-"""Whether a window can be opened here."""
+"""Requirements for opening a window."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NO_DISPLAY = ("no window can be opened: {}. Run it on a desktop, through `ssh -X
 
 
 def check_window() -> None:
-    """Raise UsageError unless what `clrt[view]` installs is there, OutputError where there is no display."""
+    """Raise UsageError unless the packages of `clrt[view]` are installed, OutputError if there is no display."""
     try:
         import imgui_bundle  # noqa: F401
         import OpenGL  # noqa: F401
@@ -24,5 +24,5 @@ def check_window() -> None:
 
 
 def no_display(fault: str) -> OutputError:
-    """The error that says why no window can be opened, and what to do."""
+    """Return the error that no window can be opened, with its reason and remedy."""
     return OutputError(NO_DISPLAY.format(fault))

@@ -1,4 +1,4 @@
-"""The window as it looks."""
+"""Screenshots of the window."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 def screenshot() -> NDArray[np.float32]:
-    """(height, width, 3) float32 in [0, 1], row 0 on top: what this frame has drawn, before it is shown."""
+    """Return (height, width, 3) float32 in [0, 1], row 0 on top: what this frame has drawn, before it is displayed."""
     from OpenGL import GL
 
     io = imgui.get_io()

@@ -1,4 +1,4 @@
-"""Pictures made ready for the display in a thread of its own, so that no view transform holds up the window."""
+"""Tone mapping in a background thread, so that no view transform blocks the window."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..threads import Condition, beside
 
 @dataclass(frozen=True)
 class Look:
-    """How pictures are shown: a view transform (docs/colour.md) after a gain of 2^exposure."""
+    """Display settings: a view transform (docs/colour.md) after a gain of 2^exposure."""
 
     view: str = "srgb"
     exposure: float = 0.0
@@ -24,7 +24,7 @@ class Look:
 
 @dataclass(frozen=True, eq=False)
 class ToneMapped:
-    """rgba: (height, width, 4) uint8 of a snapshot as `look` shows it; error: why it is not, and black instead."""
+    """rgba: (height, width, 4) uint8 of a snapshot with `look` applied; error: why that failed, with black pixels."""
 
     snapshot: Snapshot
     look: Look
@@ -33,7 +33,7 @@ class ToneMapped:
 
 
 class ToneMapper:
-    """The thread. What is asked of it last is done next; what came in between is left out."""
+    """Background tone mapper. Only the latest request is processed next; older pending ones are dropped."""
 
     def __init__(self) -> None:
         self._asked: tuple[Snapshot, Look] | None = None
@@ -42,13 +42,13 @@ class ToneMapper:
         self._wait_for_end = beside(self._run, daemon=True)
 
     def ask(self, snapshot: Snapshot, look: Look) -> None:
-        """Has a picture tone mapped, if that has not been asked for before."""
+        """Request tone mapping of a snapshot, unless it is already the latest request."""
         if self._asked is None or self._asked[0] is not snapshot or self._asked[1] != look:
             self._asked = snapshot, look
             self._changed.notify()
 
     def close(self) -> None:
-        """Ends the thread."""
+        """Stop the thread."""
         self._closed = True
         self._changed.notify()
         self._wait_for_end()
@@ -64,7 +64,7 @@ class ToneMapper:
 
 
 def tone_mapped(snapshot: Snapshot, look: Look) -> ToneMapped:
-    """The picture as `clrt render --view --exposure` writes it to a .png."""
+    """Return the image as `clrt render --view --exposure` writes it to a .png."""
     data, error = shown_data(snapshot.scene.render.integrator, snapshot.pixels), None
     try:
         levels = to_display(snapshot.shown, look.view, look.exposure) if data is None else to_display(data, "raw")

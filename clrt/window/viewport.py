@@ -1,4 +1,4 @@
-"""The picture in the window, as large as fits, and what moves its camera."""
+"""Viewport: the image in the window, as large as fits, with camera navigation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ANY_BUTTON = (imgui.ButtonFlags_.mouse_button_left.value | imgui.ButtonFlags_.mo
 
 
 class Viewport:
-    """The panel. shown: what it shows; corner and size: where that is in the window, in its pixels."""
+    """Viewport panel. shown: the displayed image; corner and size: its position in the window, in window pixels."""
 
     def __init__(self) -> None:
         self.shown: ToneMapped | None = None
@@ -23,7 +23,7 @@ class Viewport:
         self._texture: hello_imgui.TextureGpu | None = None
 
     def show(self, editor: Editor) -> None:
-        """Draws it, and moves the camera as keys and mouse ask."""
+        """Draw the image, and move the camera by keyboard and mouse."""
         newest = editor.tone_mapper.newest
         if newest is not None and newest is not self.shown:
             self.shown, self._texture = newest, hello_imgui.create_texture_gpu_from_rgba_data(newest.rgba)
@@ -38,17 +38,17 @@ class Viewport:
             editor.walk(camera)
 
     def _clicked(self, editor: Editor) -> None:
-        """A click chooses what is there; the end of dragging does not."""
+        """Pick what is under a click; ignore the end of a drag."""
         if imgui.is_mouse_released(LEFT) and not any(imgui.get_mouse_drag_delta(LEFT)):
             at = imgui.get_mouse_pos()
             editor.pick((at.x - self.corner[0]) / self.size[0], (at.y - self.corner[1]) / self.size[1])
 
     def release(self) -> None:
-        """Gives back what lies on the display's device, which must be done while the window is there."""
+        """Release the GPU texture, which must be done while the window exists."""
         self._texture = None
 
     def _place(self, size: tuple[int, int]) -> None:
-        """Whole pixels of the window in the middle of its room, for a picture of this shape."""
+        """Compute whole window pixels, centered in the available space, for an image of this aspect ratio."""
         start, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
         factor = max(min(room.x / size[0], room.y / size[1]), 1 / min(size))
         self.size = max(1, floor(size[0] * factor)), max(1, floor(size[1] * factor))

@@ -1,1 +1,1 @@
-"""What the window shows beside the picture: a panel a file, drawn anew in every frame."""
+"""Panels next to the viewport, one per file, drawn anew in every frame."""

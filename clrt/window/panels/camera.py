@@ -1,4 +1,4 @@
-"""The camera: how it is moved, its lens, and bookmarks of places to come back to."""
+"""Camera panel: navigation, lens, and bookmarks."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ The wheel comes nearer."""
 
 
 class CameraPanel:
-    """The panel; `name` is the next bookmark's."""
+    """The panel; `name` is the name of the next bookmark."""
 
     def __init__(self) -> None:
         self.name = "bookmark"
 
     def show(self, editor: Editor) -> None:
-        """Draws it."""
+        """Draw the panel."""
         controls, camera = editor.controls, editor.scene.camera
         controls.mode = choose("dragging", ["look", "orbit"], controls.mode)
         imgui.set_item_tooltip(ABOUT)

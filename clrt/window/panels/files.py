@@ -1,4 +1,4 @@
-"""What is read, another scene, and written: the picture, the scene, the window itself."""
+"""File panel: opens another scene, and saves the image, the scene and a screenshot."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from ..editor import Editor
 
 
 class Files:
-    """The panel; `names` are the files that it writes, by what it writes to them, `other` the one to open."""
+    """The panel; `names`: output files, by what is written to them; `other`: the file to open."""
 
     def __init__(self) -> None:
         self.names: dict[str, str] = {}
         self.other, self._stem = "", ""
 
     def show(self, editor: Editor) -> None:
-        """Draws it."""
+        """Draw the panel."""
         if (stem := editor.scene.name) != self._stem:
             self._stem = stem
             self.names = {"picture": f"{stem}.png", "scene": f"{stem}.edited.toml", "screenshot": f"{stem}.window.png"}

@@ -1,4 +1,4 @@
-"""Lights: those without a surface, and the environment."""
+"""Lights panel: lights without a surface, and the environment."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from ..fields import edit_fields
 from ..lists import change, pick
 from ..navigation import distance
 
-#: Irradiance that a new light gives to what the camera looks at.
+#: Irradiance of a new light at the camera's look_at point.
 BRIGHT = 3.0
 
 
 class Lights:
-    """The panel; `chosen` is the light that it edits."""
+    """The panel; `chosen` is the index of the light being edited."""
 
     def __init__(self) -> None:
         self.chosen = 0
 
     def show(self, editor: Editor) -> None:
-        """Draws it."""
+        """Draw the panel."""
         scene = editor.scene
         self.chosen = pick("##lights", [light.kernel for light in scene.lights], self.chosen)
         lights, self.chosen = change(scene.lights, self.chosen, _new(scene.camera))
@@ -52,7 +52,7 @@ class Lights:
 
 
 def _new(camera: Camera) -> dict[str, Light]:
-    """Lights to add: above what the camera looks at, as far as the camera is from it."""
+    """Return lights to add: above the camera's look_at point, as far away as the camera."""
     far = distance(camera)
     up = np.asarray(camera.up) / np.linalg.norm(camera.up)
     position, down = np.add(camera.look_at, far * up).tolist(), (-up).tolist()
@@ -63,5 +63,5 @@ def _new(camera: Camera) -> dict[str, Light]:
 
 
 def _edited_sky(environment: Environment, step: float) -> Environment:
-    """Its color does nothing where it has an image."""
+    """Show widgets for the environment; its color is hidden if it has an image, as it has no effect."""
     return edit_fields(environment, step, without={"image"} | ({"color"} if environment.image is not None else set()))

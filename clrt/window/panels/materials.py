@@ -1,4 +1,4 @@
-"""Materials: of every type that there is, with every parameter and preset it has (scene.materials)."""
+"""Materials panel: every type, with all its parameters and presets (scene.materials)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TYPES = {kind.kernel: kind for kind in MATERIALS}
 
 
 def show(editor: Editor) -> None:
-    """Draws the panel."""
+    """Draw the panel."""
     names, chosen = list(editor.materials), editor.material
     editor.material = choose("##material", names, chosen if chosen in names else names[0]) if names else ""
     imgui.same_line()
@@ -36,7 +36,7 @@ def show(editor: Editor) -> None:
 
 
 def _edited(material: Material, step: float) -> Material:
-    """First what the type has of its own, then what all have."""
+    """Show widgets for the type's own fields, then for those that all materials share."""
     material = _of_type(material, choose("type", list(TYPES), material.kernel))
     imgui.set_item_tooltip(getdoc(type(material)) or "")
     substance = choose("substance", [*_substances()], None)
@@ -51,7 +51,7 @@ def _edited(material: Material, step: float) -> Material:
 
 
 def _of_type(material: Material, kernel: str) -> Material:
-    """A material of another type, with what both types know."""
+    """Return a material of another type, with the values of the fields that both types have."""
     kind = TYPES[kernel]
     if type(material) is kind:
         return material
@@ -61,7 +61,7 @@ def _of_type(material: Material, kernel: str) -> Material:
 
 
 def _substances() -> dict[str, tuple[str, str]]:
-    """Type and preset, by what a list calls them."""
+    """Return type and preset, by the names in the list."""
     found = {}
     for kind in MATERIALS:
         if "preset" in get_type_hints(kind):
@@ -71,12 +71,13 @@ def _substances() -> dict[str, tuple[str, str]]:
 
 
 def _words(hint: Any) -> list[str]:
-    """Those of a Literal, which may be a part of a union."""
+    """Return the strings of a Literal, which may be a part of a union."""
     return [word for part in get_args(hint) for word in ([part] if isinstance(part, str) else _words(part))]
 
 
 def _together(old: Material, new: Material) -> Material:
-    """Where fields only go together, as a metal's eta and k, all are given, as they were in effect before, or none."""
+    """Keep fields that must be given together consistent, such as a metal's eta and k: set all, with the values in
+    effect before, or none."""
     if new is old or not new.conflicts():
         return new
     optional = [field.name for field in fields(new) if field.default is None and field.name not in SHARED]

@@ -1,4 +1,4 @@
-"""How the picture is rendered, on what, and how it is shown."""
+"""Render panel: render settings, device, and display settings."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from ..editor import Editor
 from ..fields import choose, edit, edit_fields
 from ..tone_mapping import Look
 
-#: The settings that are one of these, by name; None is the one that suits device and scene.
+#: Settings with a fixed set of values, by name; None selects automatically by device and scene.
 CHOICES: dict[str, list[Any]] = {"tree": [None, True, False], "builder": [None, *BUILDER_NAMES],
                                  "layout": [None, *TREES], "triangle": [*TRIANGLE_TESTS]}
-#: The others, and what they may be (live.settings).
+#: The other settings, and their types (live.settings).
 NUMBERS: dict[str, Any] = {"samples": Annotated[int, Ge(1), Le(64)], "scale": Annotated[float, Ge(0.05), Le(4)],
                            "frame_rate": Annotated[float, Ge(0), Le(120)], "denoise": bool}
 
 
 def show(editor: Editor) -> None:
-    """Draws the panel."""
+    """Draw the panel."""
     imgui.push_id("render")
     render = edit_fields(editor.scene.render, editor.step)
     if render is not editor.scene.render:
@@ -55,7 +55,7 @@ def _edited(editor: Editor, settings: Settings) -> Settings:
 
 
 def _device(editor: Editor, selector: Any) -> Any:
-    """A list of devices, the one at work chosen. Several that render together are none of them."""
+    """Show a list of devices with the current one selected; none is if several render together."""
     names = [f"{info.name} ({info.platform})" for info in editor.devices]
     ids = [info.id for info in editor.devices]
     at_work = selector if selector in ids else editor.snapshot.device

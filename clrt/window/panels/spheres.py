@@ -1,4 +1,4 @@
-"""Spheres: where they are, how large and of what; more of them, and fewer."""
+"""Spheres panel: position, radius and material; adds and removes spheres."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ..fields import choose, edit_fields
 from ..lists import change, pick
 from ..navigation import distance
 
-#: A new sphere's radius over the camera's distance.
+#: A new sphere's radius relative to the camera's distance.
 NEW = 0.1
 
 
 def show(editor: Editor) -> None:
-    """Draws the panel."""
+    """Draw the panel."""
     scene = editor.scene
     editor.sphere = pick("##spheres", [sphere.name for sphere in scene.spheres], editor.sphere)
     material = scene.spheres[editor.sphere].material if scene.spheres else Diffuse()
@@ -37,7 +37,7 @@ def show(editor: Editor) -> None:
 
 
 def _edited(editor: Editor, sphere: Sphere) -> tuple[Sphere, dict[str, Material]]:
-    """The sphere, and the scene's named materials, to which its own may have come."""
+    """Return the edited sphere, and the scene's named materials, to which a new one may have been added."""
     sphere = edit_fields(sphere, editor.step, without={"material"})
     materials, named = editor.materials, editor.scene.materials
     name = next(name for name, material in materials.items() if material is sphere.material)

@@ -1,4 +1,4 @@
-"""What the picture costs, and how near it is to the truth."""
+"""Statistics panel: performance, memory, and estimated error."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ..editor import Editor
 
 #: The plot's height in lines of text.
 LINES = 9
-#: Its marks, on both axes.
+#: Tick marks of both axes.
 TICKS = [step * 10.0**power for power in range(-5, 5) for step in (1, 2, 5)]
 
 
 def show(editor: Editor) -> None:
-    """Draws the panel."""
+    """Draw the panel."""
     snapshot = editor.snapshot
     _table("progress", _progress(snapshot))
     _noise(snapshot)
@@ -36,7 +36,7 @@ def _table(name: str, rows: Iterable[tuple[str, str]]) -> None:
 
 
 def _progress(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
-    """How fast it comes, and how far it is."""
+    """Yield rows about speed and progress."""
     yield "window", f"{hello_imgui.frame_rate():.0f} frames/s"
     yield "pictures", f"{snapshot.frames_per_second:.1f} /s"
     yield "rays", f"{snapshot.rays_per_second / 1e6:.2f} million/s"
@@ -48,7 +48,7 @@ def _progress(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
 
 
 def _means(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
-    """By what it is rendered."""
+    """Yield rows about device, memory, BVH and programs."""
     yield "device", snapshot.device
     yield "memory there", f"{snapshot.device_bytes / 2**20:.1f} MiB"
     tree = snapshot.tree
@@ -61,10 +61,10 @@ def _means(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
 
 
 def _noise(snapshot: Snapshot) -> None:
-    """The estimated error over time, both logarithmic."""
+    """Plot the estimated error over time, both axes logarithmic."""
     points = np.array([(entry["seconds"], entry["noise"]) for entry in snapshot.history
                        if entry["noise"] and entry["seconds"] > 0], np.float64).reshape(-1, 2)
-    spans = len(points) > 1     # one point leaves the axes without a length
+    spans = len(points) > 1     # a single point leaves the axes without extent
     if implot.begin_plot("##noise", (-1, LINES * imgui.get_text_line_height_with_spacing()),
                          implot.Flags_.no_legend.value | implot.Flags_.no_mouse_text.value):
         fit = implot.AxisFlags_.auto_fit.value
