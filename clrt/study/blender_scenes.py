@@ -69,8 +69,7 @@ def build(library: Any, scene: str, material: str, folder: Path) -> Any:
 
 
 def exported(library: Any, made: Any, folder: Path) -> Scene:
-    """Return the scene that clrt reads from its glTF export, plus what glTF lacks: sun size, area lights,
-    environment."""
+    """Return the scene read from its glTF export, plus what glTF lacks: sun size, area lights, environment."""
     file = folder / "scene.glb"
     with quiet():
         library.ops.export_scene.gltf(filepath=str(file), export_apply=True, export_cameras=True, export_lights=True,
@@ -181,8 +180,7 @@ def _principled(nodes: Nodes, inputs: Inputs) -> None:
 
 
 def _make_solid(data: Any, nodes: Nodes) -> None:
-    """Make glass a solid by a thickness, which the exporter reads from a node group of this name; without, it is
-    thin."""
+    """Make glass solid by a thickness, which the exporter reads from a node group of this name; else it is thin."""
     group = data.node_groups.new("glTF Material Output", "ShaderNodeTree")
     group.interface.new_socket("Thickness", in_out="INPUT", socket_type="NodeSocketFloat")
     nodes("Group", {"Thickness": 1.0}, node_tree=group)
@@ -212,8 +210,7 @@ def _image(data: Any, name: str, texels: NDArray[np.float64], space: str) -> Any
 
 
 def checks() -> NDArray[np.float64]:
-    """Return a (256, 256, 3) checkerboard, redder to the right and bluer upwards to reveal rotated or mirrored
-    textures."""
+    """Return a (256, 256, 3) checkerboard, redder to the right and bluer upwards to reveal rotated or mirrored UVs."""
     v, u = np.mgrid[:256, :256] / 255
     dark = (np.floor(u * 16) + np.floor(v * 16)) % 2
     return np.asarray(np.dstack([0.4 + 0.5 * u, 0.6 * np.ones_like(u), 0.4 + 0.5 * v]) * (1 - 0.4 * dark)[..., None])

@@ -52,8 +52,7 @@ def plain_variants(kind: type[Material]) -> list[Material]:
 
 
 def worded_variants(kind: type[Material]) -> list[Material]:
-    """Return each literal string of each field, one at a time, with all flags, and numbers in the middle of the
-    range."""
+    """Return each string of each field, one at a time, with all flags, and numbers in the middle of the range."""
     numbers, flags, words = _values(kind)
     middle = {name: values[len(values) // 2] for name, values in numbers.items()}
     return [kind(**middle, **raised, **{name: word}) for name, found in words.items() for word in found
@@ -90,8 +89,10 @@ class Bsdfs:
 
     def sample(self, which: int, wo: Doubles, numbers: Doubles,
                front: bool = True) -> tuple[Doubles, Doubles, Doubles, Doubles]:
-        """Sample wi (n, 3), weight (n, 3), pdf (n,), specular (n,) from wo (3,) or (n, 3) and numbers (n, 3) in [0,
-        1)."""
+        """Sample wi (n, 3), weight (n, 3), pdf (n,), specular (n,).
+
+        wo: (3,) or (n, 3); numbers: (n, 3) in [0, 1).
+        """
         out = self._sample(which, wo, numbers, front)
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7]
 
@@ -147,7 +148,7 @@ def _numbers(kind: type[Material], name: str) -> tuple[Any, ...]:
     hint, default = get_type_hints(kind, include_extras=True)[name], getattr(kind(), name)
     if isinstance(default, tuple):
         return (COLOR,)
-    plain = next((part for part in get_args(hint) if get_origin(part) is Annotated), hint)   # of a number, alone or in a union
+    plain = next((part for part in get_args(hint) if get_origin(part) is Annotated), hint)   # of a number or a texture
     limits = [limit.bound for limit in get_args(plain)[1:] if isinstance(limit, Limit)]
     return (min(limits), sum(limits) / 2, max(limits)) if len(limits) == 2 else (default,)
 

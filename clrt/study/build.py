@@ -41,12 +41,12 @@ RAYS, QUICK_RAYS = (512, 512), (64, 64)
 
 def measure_build(vertices: Floats, faces: Faces, *, quick: bool = False,
                   device: str | int | None = None) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the results of `clrt bench build`, part by part, for the mesh in a closed room. vertices: (n, 3); faces:
-    (m, 3).
+    """Yield the results of `clrt bench build`, part by part, for the mesh (n, 3), (m, 3) in a closed room.
 
     size: see `measure_builders`, for each number of triangles; rays: see `measure_growth`; fresh: `measure_fresh` with
     the first builder that supports the largest size, for the smallest mesh with an empty program cache (`compiled`) and
-    once more (`cached`), and for the `largest` mesh. """
+    once more (`cached`), and for the `largest` mesh.
+    """
     opened = open_device(device)
     queries: dict[int, RayQuery] = {}
     kinds: dict[int, list[Workload]] = {}
@@ -74,7 +74,8 @@ def measure_builders(scene: Mesh, device: Device) -> dict[str, Any]:
 
     `builders` by name: seconds (median), first_seconds (of the first call, including all preparation), mtriangles (per
     second), bytes_per_triangle (persistent); except for Embree: peak_bytes_per_triangle (peak device memory of a
-    builder on the device), sah_cost, cost_ratio (to REFERENCE's), nodes, depth, stack. """
+    builder on the device), sah_cost, cost_ratio (to REFERENCE's), nodes, depth, stack.
+    """
     triangles = scene[0][scene[1]]
     triangles *= np.float32(unit_for(float(np.abs(triangles).max())))
     figures, builds = {}, {}
@@ -131,7 +132,8 @@ def measure_growth(queries: dict[int, RayQuery], kinds: dict[int, list[Workload]
     """Measure rays through BVHs of different sizes, in interleaved runs. queries, kinds: by number of triangles.
 
     kinds: for each kind of rays the result of `race` by size; fits: for each kind, `fit_logarithm` of the seconds per
-    ray. """
+    ray.
+    """
     races, fits = {}, {}
     for each in zip(*kinds.values()):
         runs = {size: Run(query, query.any_hit if kind.any_hit else query.closest_hit, kind.rays)

@@ -73,8 +73,7 @@ class Verdict:
     dropped: int
 
     def is_off(self, tests: int = 1) -> bool:
-        """Return whether the identity is violated. With `tests` valid identities, a false alarm has probability <=
-        FAMILY."""
+        """Return whether the identity is violated. With `tests` valid ones, a false alarm has probability FAMILY."""
         return self.rounds == len(ROUNDS) and corrected(self.p, tests) < FAMILY
 
 

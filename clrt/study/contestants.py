@@ -44,15 +44,13 @@ Contestant = Callable[[int, int], Picture]
 
 def choices_on(scene: Scene, devices: Sequence[int],
                choices: Mapping[str, Mapping[str, Any]] = CHOICES) -> dict[str, Contestant]:
-    """Return the renderer with each of `choices` on each device; names include the device's index if there are
-    several."""
+    """Return the renderer with each of `choices` on each device, whose index is in the names if there are several."""
     return {f"{name} (device {index})" if len(devices) > 1 else name: partial(_render, scene, index, options)
             for index in devices for name, options in choices.items()}
 
 
 def peers_of(scene: Scene) -> tuple[dict[str, Contestant], dict[str, str]]:
-    """Return the contestants of all PEERS, and for each peer without one the reason: not installed, or unsupported
-    scene."""
+    """Return the contestants of all PEERS, and why a peer has none: not installed, or an unsupported scene."""
     found: dict[str, Contestant] = {}
     missing = {}
     for package, module in PEERS.items():

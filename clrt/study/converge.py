@@ -62,7 +62,8 @@ def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort:
 
     scene, size, max_depth; reference: `spp` and its own `relmse`; missing: why a peer is not among the contestants; and
     contestants: the result of `figures`. say: called first with these reasons, then for each step of a reference that
-    is not cached. Raises what `Renderer` raises. """
+    is not cached. Raises what `Renderer` raises.
+    """
     others = [peers_of(scene) if peers else ({}, {}) for scene in scenes]
     for scene, (_, missing) in zip(scenes, others):
         for package, why in missing.items():
@@ -79,8 +80,7 @@ def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort:
 
 
 def take_turns(contestants: Mapping[str, Contestant], reference: Reference, effort: Effort) -> Points:
-    """Render images of effort's numbers of samples, per contestant while the next is expected within effort's
-    seconds."""
+    """Render images of effort's numbers of samples, for each contestant until the next would exceed its seconds."""
     points: Points = {name: {} for name in contestants}
     for seed in range(effort.seeds):
         running = list(contestants)
@@ -101,16 +101,16 @@ def _compare(picture: Picture, reference: Reference) -> Point:
 
 
 def figures(points: Points, reference: Reference) -> dict[str, dict[str, Any]]:
-    """Return results by contestant. Lists by samples: spp; seconds, cpu_seconds: medians over seeds; relmse: mean over
-    seeds.
+    """Return results by contestant. Lists by samples: spp; medians seconds, cpu_seconds; mean relmse over seeds.
 
     relmse_range: the minimum and maximum over seeds. The reference's own relMSE is subtracted from both. last: index
     into these lists of the most samples whose error still exceeds the reference's own. There: msamples (per second);
     relmse_seconds and relmse_cpu_seconds, relMSE times seconds, which is constant while errors fall with the square
-    root of time; ratio, cpu_ratio: these over the first contestant's. slope: of log relMSE over log samples, up to last
-    (−1 for independent samples). For the most samples of all: each channel's mean_ratio to the reference, whether it
-    agrees with 1 (see AGREES), and the results of `mean_tests`. noise_ratio: by samples and seeds, see `noise_ratio`.
-    NaN: undefined. """
+    root of time; ratio, cpu_ratio: these over the first contestant's.
+    slope: of log relMSE over log samples, up to last (−1 for independent samples). For the most samples of all: each
+    channel's mean_ratio to the reference, whether it agrees with 1 (see AGREES), and the results of `mean_tests`.
+    noise_ratio: by samples and seeds, see `noise_ratio`. NaN: undefined.
+    """
     rows = {name: _averages(levels, reference.relmse) for name, levels in points.items()}
     pixels = reference.total.shape[0] * reference.total.shape[1]
     for row in rows.values():

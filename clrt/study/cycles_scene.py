@@ -73,8 +73,7 @@ def blender_scene(data: Any, scene: Scene, folder: Path, bsdfs: Mapping[type[Mat
 
 
 def set_up(made: Any, settings: RenderSettings) -> None:
-    """Disable clamping and denoising and use a box filter one pixel wide; Cycles' bounces are the path depth minus
-    two."""
+    """Disable clamping and denoising, use a box filter one pixel wide; Cycles' bounces are the path depth minus 2."""
     render, cycles, (width, height) = made.render, made.cycles, settings.size
     depth = settings.max_depth if settings.integrator == "path" else 2
     render.engine, render.use_persistent_data = "CYCLES", True

@@ -103,8 +103,7 @@ def _closest(triangles: _Triangles, origins: Doubles, directions: Doubles) -> Bo
 
 def _met(triangles: _Triangles, origins: Doubles, directions: Doubles,
          reach: Doubles) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
-    """Return the rays (rows) and triangles (columns) of certain and possible hits, also behind the origin; which are
-    sure."""
+    """Return rays (rows) and triangles (columns) of certain and possible hits, also at t < 0; and which are certain."""
     pluecker = np.concatenate([directions, np.cross(origins, directions)], axis=1)
     one, two, three = (pluecker @ edge.T for edge in triangles.edges)
     least = np.minimum(np.minimum(one, two), three)

@@ -112,8 +112,7 @@ def _triangle_errors(subject: Subject, quick: bool) -> dict[str, Any]:
 
 
 def _box_errors(subject: Subject, quick: bool) -> dict[str, Any]:
-    """misses: as for triangles; wrong: per million axis-parallel rays, by float64; lost: per million rays at a
-    plane."""
+    """misses: as for triangles; wrong: per million axis-parallel rays, by float64; lost: per million at a plane."""
     rows = list(measure_axes(subject, quick=quick))
     return {**_parts(measure_watertight(subject, quick=quick, rays=RAYS)),
             "wrong": _a_million(row for row in rows if row.case == "G6"),

@@ -140,8 +140,7 @@ def compressed(rgba: Floats) -> Floats:
 
 
 def over_white(rgba: Floats, power: float | None = None) -> tuple[Floats, Floats]:
-    """Return the display's linear light over white, (h, w, 3), and the alpha, (h, w). power: decodes; None: the sRGB
-    curve."""
+    """Return the display's linear light over white, (h, w, 3), and alpha, (h, w). power: None for the sRGB curve."""
     colors, alpha = rgba[..., :3], rgba[..., 3:]
     decoded = linear_from_srgb(colors) if power is None else colors ** power
     return np.asarray(decoded * alpha + 1 - alpha, np.float32), alpha[..., 0]
@@ -153,8 +152,7 @@ def reduced(pixels: Floats, size: tuple[int, int]) -> Floats:
 
 
 def lanczos(pixels: Floats, size: tuple[int, int]) -> Floats:
-    """Resample (h, w, c) to (height, width, c) by the Lanczos kernel, which rings: values may exceed the pixels'
-    range."""
+    """Resample (h, w, c) to (height, width, c) by the Lanczos kernel, which rings: values may leave their range."""
     return _resampled(pixels, size, _lanczos_weights)
 
 

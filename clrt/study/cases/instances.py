@@ -1,5 +1,4 @@
-"""G11: instances with ill-conditioned transforms match triangles transformed in float64, and don't shadow
-themselves."""
+"""G11: instances with ill-conditioned transforms are hit like triangles transformed in float64, without shadow acne."""
 
 from __future__ import annotations
 
