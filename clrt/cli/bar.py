@@ -58,7 +58,7 @@ class _Other:
         self._stream, self._line = stream, line
 
     def write(self, text: str) -> int:
-        """See TextIO."""
+        """Erase the status line, then write the text."""
         self._line.erase()
         return self._stream.write(text)
 

@@ -136,7 +136,7 @@ class JsonLog(logging.Handler):
         self._progress = progress
 
     def emit(self, record: logging.LogRecord) -> None:
-        """See logging."""
+        """Forward a record to the display."""
         self._progress.warning(self.format(record))
 
 

@@ -25,7 +25,7 @@ class _Patient(io.RawIOBase):
         self._raw: Any = getattr(stream.buffer, "raw", stream.buffer)
 
     def write(self, data: ReadableBuffer, /) -> int | None:
-        """See io.RawIOBase; raises nothing."""
+        """Write data, or discard it after a failure; raises nothing."""
         if self.failure is None:
             try:
                 written: int | None = self._raw.write(data)
@@ -71,7 +71,8 @@ def patient_stdout() -> _Patient:
     """Make standard output raise no more errors; return the stream that stores the first.
 
     Characters that its encoding lacks are written as escapes. A Windows console stays a console, which accepts any
-    text. ASCII becomes UTF-8, in which click writes a "?" for each byte of a file name that is not UTF-8.
+    text. ASCII becomes UTF-8, which click writes in that case, with a "?" for each byte of a file name that is not
+    UTF-8.
     """
     sys.stdout.flush()
     encoding = codecs.lookup(sys.stdout.encoding).name

@@ -20,7 +20,7 @@ ROWS, COLUMNS = 52, 12
 LOWEST, HIGHEST = np.log(1e-7), np.log(1e4)
 #: Gauss–Legendre points per cell in log r; TURNS are those in azimuth.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
-#: For densities with discontinuities in a cell, at total internal reflection or where microfacets become invisible.
+#: More points, for pdfs with discontinuities in a cell: total internal reflection, or microfacets becoming invisible.
 MANY = np.polynomial.legendre.leggauss(24)
 TURNS, TURN_WEIGHTS = np.polynomial.legendre.leggauss(32)
 

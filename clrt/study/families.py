@@ -101,7 +101,10 @@ RACES: dict[str, Callable[[list[Subject], bool], Iterable[Contestant]]] = {
 
 
 def _triangle_errors(subject: Subject, quick: bool) -> dict[str, Any]:
-    """bytes: per triangle; misses: per million rays inside closed meshes; wrong: per million, by float64; ulp: of t."""
+    """Measure errors of a triangle test.
+
+    bytes: per triangle; misses: per million rays inside closed meshes; wrong: per million, by float64; ulp: of t.
+    """
     rows = list(measure_watertight(subject, quick=quick, rays=RAYS))
     wrong, count = _wrong_hits(subject, quick)
     steep, grazing = _distance_errors(subject, quick)
@@ -112,7 +115,10 @@ def _triangle_errors(subject: Subject, quick: bool) -> dict[str, Any]:
 
 
 def _box_errors(subject: Subject, quick: bool) -> dict[str, Any]:
-    """misses: as for triangles; wrong: per million axis-parallel rays, by float64; lost: per million at a plane."""
+    """Measure errors of a box test.
+
+    misses: as for triangles; wrong: per million axis-parallel rays, by float64; lost: per million rays at a plane.
+    """
     rows = list(measure_axes(subject, quick=quick))
     return {**_parts(measure_watertight(subject, quick=quick, rays=RAYS)),
             "wrong": _a_million(row for row in rows if row.case == "G6"),
@@ -120,14 +126,20 @@ def _box_errors(subject: Subject, quick: bool) -> dict[str, Any]:
 
 
 def _sphere_errors(subject: Subject, quick: bool) -> dict[str, Any]:
-    """wrong: per million rays that certainly hit or certainly miss; ulp: of t, for hits that are not grazing."""
+    """Measure errors of a sphere test.
+
+    wrong: per million rays that certainly hit or certainly miss; ulp: of t, for hits that are not grazing.
+    """
     rows = list(measure_spheres(subject, quick=quick))
     steep = [row.figure for row in rows if row.what.endswith("steep, largest") and row.figure is not None]
     return {"wrong": _a_million(row for row in rows if row.unit == ""), "ulp_max": max(steep)}
 
 
 def _offset_errors(subject: Subject, quick: bool) -> dict[str, Any]:
-    """dark, lit: wrong pixels per million, with the scene in place (near) and transformed (far); wrong: over all."""
+    """Measure errors of a ray origin offset.
+
+    dark, lit: wrong pixels per million, with the scene in place (near) and transformed (far); wrong: over all.
+    """
     rows = list(measure_departures(subject, quick=quick))
     near = [row for row in rows if "in its place" in row.what]
     far = [row for row in rows if row not in near]
@@ -140,7 +152,7 @@ ERRORS = {"triangle": _triangle_errors, "box": _box_errors, "sphere": _sphere_er
 
 
 def _parts(rows: Iterable[Row]) -> dict[str, float]:
-    """misses: per million rays; misses_moved: the same with the mesh transformed."""
+    """Return misses per million rays; misses_moved: the same with the mesh transformed."""
     rows = list(rows)
     home = [row for row in rows if row.what.endswith("in its place")]
     return {"misses": _a_million(home), "misses_moved": _a_million(row for row in rows if row not in home)}

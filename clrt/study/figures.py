@@ -34,7 +34,7 @@ def tube(points: ArrayLike, radii: ArrayLike, rings: int, sides: int, relief: Do
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     side = np.zeros_like(ahead)
     side[0] = _across(ahead[0])
-    for ring in range(1, rings):   # a frame that does not twist
+    for ring in range(1, rings):   # a frame without twist
         side[ring] = side[ring - 1] - ahead[ring] * (ahead[ring] @ side[ring - 1])
         side[ring] /= np.linalg.norm(side[ring])
     angles = 2 * np.pi * np.arange(sides) / sides

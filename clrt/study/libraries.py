@@ -31,7 +31,7 @@ class Library(NamedTuple):
 
 
 def clrt(query: RayQuery) -> Call:
-    """clrt, with an existing query."""
+    """Wrap an existing query of clrt."""
     def call(origins: Floats, directions: Floats) -> Answer:
         hits = query.closest_hit(origins, directions)
         return hits["primitive"], hits["t"]
@@ -40,7 +40,7 @@ def clrt(query: RayQuery) -> Call:
 
 
 def embreex(vertices: Floats, faces: Faces) -> Call:
-    """Embree's Python binding; single-threaded."""
+    """Prepare Embree's Python binding; single-threaded."""
     scene = import_module("embreex.rtcore_scene").EmbreeScene()
     import_module("embreex.mesh_construction").TriangleMesh(scene, vertices, faces)
 
@@ -52,18 +52,18 @@ def embreex(vertices: Floats, faces: Faces) -> Call:
 
 
 def trimesh_embreex(vertices: Floats, faces: Faces) -> Call:
-    """trimesh's engine on top of embreex."""
+    """Prepare trimesh's engine on top of embreex."""
     return _trimesh("trimesh.ray.ray_pyembree", vertices, faces)
 
 
 def trimesh_rtree(vertices: Floats, faces: Faces) -> Call:
-    """trimesh's own engine, numpy on top of rtree, which it would import at the first ray."""
+    """Prepare trimesh's own engine, numpy on top of rtree, which it would import at the first ray."""
     import_module("rtree")
     return _trimesh("trimesh.ray.ray_triangle", vertices, faces)
 
 
 def open3d(vertices: Floats, faces: Faces) -> Call:
-    """Open3D's RaycastingScene, on top of Embree; multithreaded."""
+    """Prepare Open3D's RaycastingScene, on top of Embree; multithreaded."""
     library = import_module("open3d")
     scene = library.t.geometry.RaycastingScene()
     scene.add_triangles(vertices, faces.astype(np.uint32))
@@ -76,7 +76,7 @@ def open3d(vertices: Floats, faces: Faces) -> Call:
 
 
 def warp(vertices: Floats, faces: Faces) -> Call:
-    """NVIDIA's Warp on the CPU: a kernel over its Mesh; single-threaded."""
+    """Prepare NVIDIA's Warp on the CPU: a kernel over its Mesh; single-threaded."""
     library = import_module("warp")
     library.config.log_level = library.LOG_ERROR
     vector, device = library.vec3, "cpu"

@@ -90,7 +90,10 @@ def _channels(texture: Texture, *names: str) -> Floats:
 
 
 def _opacity(material: Material) -> Any:
-    """Return the opacity. A cut-out is thresholded at a higher resolution, since Mitsuba would filter the result."""
+    """Return the opacity. A cut-out is thresholded at a higher resolution, since Mitsuba would filter the result.
+
+    (In Mitsuba, passing a cut-out counts towards the path depth.)
+    """
     texture, cutoff = material.opacity, material.alpha_cutoff
     if cutoff is None or not isinstance(texture, Texture):
         return number(texture if cutoff is None or isinstance(texture, Texture) else float(texture >= cutoff))

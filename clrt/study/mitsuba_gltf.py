@@ -119,7 +119,7 @@ def register(mi: Any) -> None:
             return crossing * albedo + bounced * lost[0] * lost[1] / dr.maximum(lost[2], TINY)
 
         def traverse(self, callback: Any) -> None:
-            """No parameter is exposed."""
+            """Expose no parameters."""
 
         def to_string(self) -> str:
             return "Gltf[]"

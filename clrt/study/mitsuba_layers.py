@@ -164,7 +164,7 @@ def register(mi: Any) -> None:
             return d * o / dr.maximum(4 * (i + o - i * o) * dr.maximum(albedo, 1), TINY)
 
         def traverse(self, callback: Any) -> None:
-            """No parameter is exposed."""
+            """Expose no parameters."""
 
         def to_string(self) -> str:
             return "GltfLayers[]"

@@ -43,7 +43,7 @@ def register(mi: Any) -> None:
             return dr.select(g_i + g_o > 0, 1 / (g_i + g_o - g_i * g_o), 0)
 
         def traverse(self, callback: Any) -> None:
-            """No parameter is exposed."""
+            """Expose no parameters."""
 
         def to_string(self) -> str:
             return "HeightCorrelated[]"

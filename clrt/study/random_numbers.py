@@ -14,8 +14,8 @@ from .significance import chi2_test, mean_test
 #: Returns (n, 2) random numbers for pixels, samples, dimensions and seeds.
 Draw = Callable[[ArrayLike, ArrayLike, ArrayLike, ArrayLike], Doubles]
 
-#: Middles of the ranges of indices: where float32 can no longer count, the end of an 8192² image, and where 31 and 32
-#: bits overflow; there the indices wrap around to 0.
+#: Middles of the ranges of indices: an ordinary one, where float32 can no longer count, the end of an 8192² image, and
+#: where 31 and 32 bits overflow; there the indices wrap around to 0.
 MIDDLES = (1 << 23, 1 << 24, 1 << 26, 1 << 31, 1 << 32)
 #: Offsets (pixel, sample, dimension, seed) of compared numbers: neighbors, diagonals, image rows, powers of two.
 STEPS = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (2, 0, 0, 0), (64, 0, 0, 0), (1920, 0, 0, 0),

@@ -1,4 +1,4 @@
-"""G11: instances with ill-conditioned transforms are hit like triangles transformed in float64, without shadow acne."""
+"""G11: instances with difficult transforms are hit like triangles transformed in float64, without shadow acne."""
 
 from __future__ import annotations
 
