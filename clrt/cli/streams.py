@@ -71,8 +71,7 @@ def patient_stdout() -> _Patient:
     """Make standard output raise no more errors; return the stream that stores the first.
 
     Characters that its encoding lacks are written as escapes. A Windows console stays a console, which accepts any
-    text. ASCII becomes UTF-8, which click writes in that case, with a "?" for each byte of a file name that is not
-    UTF-8.
+    text. ASCII becomes UTF-8, which click writes then, with a "?" for each byte of a file name that is not UTF-8.
     """
     sys.stdout.flush()
     encoding = codecs.lookup(sys.stdout.encoding).name

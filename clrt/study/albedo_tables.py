@@ -22,8 +22,7 @@ Doubles = NDArray[np.float64]
 LOSS, FRESNEL, MEAN_LOSS, MEAN_FRESNEL = (8, 8), (8, 6), 12, 9
 ROUGHNESSES = np.linspace(0.01, 1, 60)
 COSINES = np.concatenate([np.geomspace(1e-5, 0.01, 30), np.geomspace(0.011, 0.1, 30), np.linspace(0.11, 1, 60)])
-#: Added to the loss in the weights, so that errors of its root count where it is small: the hemispherical mean depends
-#: on them.
+#: Added to the loss in the weights, so that errors of its root count where it is small, as the means depend on them.
 SMALL = 0.01
 #: Iterations of reweighting towards the minimax fit, and the weight of small errors relative to the largest.
 ROUNDS, FLOOR = 60, 0.05

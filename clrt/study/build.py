@@ -131,8 +131,7 @@ def _in_turns(builds: dict[str, Build]) -> dict[str, float]:
 def measure_growth(queries: dict[int, RayQuery], kinds: dict[int, list[Workload]]) -> dict[str, Any]:
     """Measure rays through BVHs of different sizes, in interleaved runs. queries, kinds: by number of triangles.
 
-    kinds: for each kind of rays the result of `race` by size; fits: for each kind, `fit_logarithm` of the seconds per
-    ray.
+    kinds: for each kind of rays the result of `race` by size; fits: for each kind, `fit_logarithm` of seconds per ray.
     """
     races, fits = {}, {}
     for each in zip(*kinds.values()):

@@ -64,8 +64,7 @@ def peers_of(scene: Scene) -> tuple[dict[str, Contestant], dict[str, str]]:
 
 
 def _render(scene: Scene, device: int, options: Mapping[str, Any], spp: int, seed: int) -> Picture:
-    """Render an image, timing only the samples: the timer is paused for the states made at powers of two of the
-    samples.
+    """Render an image, timing only the samples, not the states made at powers of two of the samples.
 
     The states update the error estimate. Adaptive sampling depends on them, so there they are included in the time.
     """

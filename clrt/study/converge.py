@@ -101,7 +101,7 @@ def _compare(picture: Picture, reference: Reference) -> Point:
 
 
 def figures(points: Points, reference: Reference) -> dict[str, dict[str, Any]]:
-    """Return results by contestant. Lists by samples: spp; medians seconds, cpu_seconds; mean relmse over seeds.
+    """Return results by contestant, in lists by samples: spp; seconds, cpu_seconds (medians); relmse (mean over seeds).
 
     relmse_range: the minimum and maximum over seeds. The reference's own relMSE is subtracted from both. last: index
     into these lists of the most samples whose error still exceeds the reference's own. There: msamples (per second);

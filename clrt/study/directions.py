@@ -41,8 +41,7 @@ def count(wo: Doubles, wi: Doubles) -> NDArray[np.int64]:
 def integrate(density: Callable[[Doubles], Doubles], wo: Doubles, edged: bool = False) -> Doubles:
     """Integrate density(wi (n, 3)) -> (n,) over solid angle above the horizon, for each cell, (ROWS·COLUMNS,)."""
     nodes, weights = MANY if edged else (NODES, WEIGHTS)
-    # At grazing wo the horizon bends within about the grazing angle of azimuth 90°, a column's edge: cluster points
-    # there.
+    # At grazing wo the horizon bends within about that angle of azimuth 90°, a column's edge: cluster points there.
     inside, weight = (2 + TURNS * (3 - TURNS**2)) / 4, 0.75 * (1 - TURNS**2) * TURN_WEIGHTS
     phi = np.add.outer(np.arange(COLUMNS), inside).ravel() * 2 * np.pi / COLUMNS
     edges = np.minimum(np.linspace(LOWEST, HIGHEST, ROWS + 1)[:, None], _log_horizon(wo, phi))

@@ -52,8 +52,7 @@ def additivity(scene: Scene, draws: Draws) -> list[Side]:
 def strategies(scene: Scene, draws: Draws) -> list[Side]:
     """BSDF sampling and light sampling alone have the mean of both combined (MIS).
 
-    Each leaves to the other what it cannot sample: delta lights, specular directions, and environments below their
-    mean.
+    Each leaves to the other what it cannot sample: delta lights, specular directions, environments below their mean.
     """
     return [Side("both", [scene]), Side("BSDF sampling", [scene], {"MIS_WEIGHTS": ["study/bsdf_sampling.cl"]}),
             Side("light sampling", [scene], {"MIS_WEIGHTS": ["study/light_sampling.cl"]})]

@@ -41,7 +41,7 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
         if isinstance(owner, Mesh) and owner.colors is not None:
             plugin = _painted(plugin, material)
         if material.normal_map is not None:
-            # Mitsuba's bump shadowing (Estevez et al. 2019) also affects specular lobes, ours does not; nor do we flip
+            # Mitsuba's bump shadowing (Estevez et al. 2019) affects specular lobes, too, ours does not; nor do we flip
             # normals.
             if plugin["type"] == "gltf":
                 plugin |= {"bumps": True}

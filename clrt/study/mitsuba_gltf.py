@@ -36,8 +36,7 @@ def register(mi: Any) -> None:
 
     color, metallic, roughness: colors or textures; f0: of the dielectric part; smith, coupling: see
     `MetallicRoughness`; multiple: whether there is multiple scattering between microfacets; bumps: in a normal map,
-    whose bumps shadow the diffuse part. The unperturbed normal then stands for the geometric one; for flat meshes, it
-    is.
+    whose bumps shadow the diffuse part; the unperturbed normal then replaces the geometric one (equal for flat meshes).
     """
     dr = import_module("drjit")
 

@@ -66,8 +66,7 @@ def fibres(n: float) -> tuple[Doubles, Doubles, Doubles]:
 
 
 def gloss(alpha: float) -> tuple[Doubles, Doubles, Doubles]:
-    """Return cosines (SIDE, POINTS²) of directions that GGX reflects from ROOTS, the weight for F = 1, and (1 −
-    wo·h)^5.
+    """Return cosines (SIDE, POINTS²) of directions that GGX reflects from ROOTS, weights for F = 1, and (1 − wo·h)^5.
 
     Normals are sampled by their visible area: a disc, part of which is compressed according to the slant of wo (Heitz
     2018, "Sampling the GGX Distribution of Visible Normals").

@@ -1,7 +1,6 @@
 """Difficult lighting with known results: L3, L5 and L9, images against closed forms and quadrature in float64.
 
-A camera that sees practically a single point makes all pixels one experiment; the mean must be within some standard
-errors.
+A camera that practically sees one point makes all pixels one experiment; its mean must be within some standard errors.
 """
 
 from __future__ import annotations

@@ -28,8 +28,7 @@ FIRST_SEED = 2**32 - 1
 
 @dataclass(frozen=True)
 class Reference:
-    """Reference image. total, squares: (h, w, 3) float64, sums of the steps' images and of their squares; means:
-    (steps, 3).
+    """Reference image. total, squares: (h, w, 3) float64, sums of images and of their squares; means: (steps, 3).
 
     step_spp: samples per pixel of a step.
     """

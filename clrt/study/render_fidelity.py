@@ -65,8 +65,7 @@ class Effort(NamedTuple):
 
 def judge(found: Sequence[Scenario], width: int | None, spp: int, denoise: bool = False,
           device: str | int | None = None) -> Iterator[Judged]:
-    """Yield each scenario, rendered with `width` pixels per row (None: its own) and compared at no more than the
-    website's.
+    """Yield each scenario, rendered `width` pixels wide (None: its own) and compared at the website's size or less.
 
     The row's result: inside or outside of the others' spread; no spread if fewer than two have an image; missing if
     files are; not read if clrt cannot, with `problems`. Raises UsageError without flip-evaluator.
@@ -190,8 +189,7 @@ def _without_background(scene: Scene, pixels: Floats, effort: Effort) -> tuple[F
 
 def verdict(images: Mapping[str, Floats], means: Mapping[str, Means]) -> dict[str, Any]:
     """Return result; flip: clrt's distance to each; mean_flip: their mean, spread: the largest such mean of the others;
-    means: by region ("" is the whole image), with `beyond`, clrt's factor outside of their range (1 inside, < 1 too
-    dark).
+    means: by region ("" is the whole image), with `beyond`, clrt's factor outside their range (1 inside, < 1 too dark).
     """
     others = [name for name in images if name != "clrt"]
     distances = {(a, b): _flip(images[a], images[b]) for i, a in enumerate(images) for b in [*images][i + 1:]}

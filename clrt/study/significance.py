@@ -60,8 +60,7 @@ def chi2_test(observed: ArrayLike, expected: ArrayLike, min_expected: float = 5.
 
 
 def mean_test(mean: Numbers, variance: Numbers, count: Numbers, expected: Numbers) -> NDArray[np.float64]:
-    """Two-sided z-test: return the p-value of each sample mean, given the samples' variance and number, and the true
-    mean.
+    """Two-sided z-test: return the p-value of sample means, given the samples' variance and number, and true mean.
 
     Arguments broadcast. `count` must be large enough for the mean to be normal. For zero variance the p-value is 1 if
     the mean is exact and 0 otherwise.
@@ -74,11 +73,9 @@ def mean_test(mean: Numbers, variance: Numbers, count: Numbers, expected: Number
 
 
 def t_test(t: float, freedom: float) -> float:
-    """Two-sided t-test: return the p-value of t, a mean over its standard error, with `freedom` (>= 1) degrees of
-    freedom.
+    """Two-sided t-test: return the p-value of t (mean over standard error) for `freedom` >= 1 degrees of freedom.
 
-    With t = √freedom·tan θ its density is proportional to cos^(freedom − 1) θ; the integral from θ is divided by the
-    total.
+    With t = √freedom·tan θ its density is proportional to cos^(freedom − 1) θ, integrated from θ over the total.
     """
     nodes, weights = _gauss()
 
