@@ -1,4 +1,4 @@
-"""The command line: one file a command; here only the choice of command and the way errors are told."""
+"""Command line interface: one file per command; this one dispatches to the commands and reports errors."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from .options import Group
 from .streams import open_missing, patient_stdout, show_names, stdout_problem, tell
 
 STARTED = time.perf_counter()
-#: What commands find as their context's object where they have the process to themselves.
+#: Context object of commands that run in a process of their own.
 PROGRAM = "clrt"
-#: After so many new objects garbage is looked for.
+#: Number of new objects that triggers garbage collection.
 OBJECTS = 100_000
 COMMANDS = ("render", "view", "info", "debug", "convert", "compare", "devices", "bench", "cache", "doctor")
 
 
 class _Commands(Group):
-    """Commands by name, each imported when it is used."""
+    """Commands by name, each imported on first use."""
 
     def list_commands(self, context: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -44,10 +44,10 @@ def commands() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Runs a command and exits: 0 done, 2 usage, 3 scene, 4 device, 5 kernel, 6 output, 130 interrupted."""
-    # numpy's OpenBLAS starts a thread a core as it is loaded, and these spin for a while. No command has work for them.
+    """Run a command and exit: 0 done, 2 usage, 3 scene, 4 device, 5 kernel, 6 output, 130 interrupted."""
+    # When loaded, numpy's OpenBLAS starts a thread per core, which spin for a while. No command needs them.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # Python looks for garbage after every 700 new objects, a tenth of the time until all modules are there.
+    # By default Python collects garbage every 700 new objects, a tenth of the time it takes to import all modules.
     gc.set_threshold(OBJECTS)
     open_missing()
     show_names()
@@ -60,7 +60,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _run(arguments: list[str] | None) -> str | int | None:
-    """Runs a command and tells what goes wrong; the exit code."""
+    """Run a command, report its errors and return the exit code."""
     try:
         commands.main(arguments, prog_name="clrt", standalone_mode=False, obj=PROGRAM)
     except click.exceptions.Exit as stop:
@@ -85,14 +85,14 @@ def _run(arguments: list[str] | None) -> str | int | None:
 
 
 def _keep(error: str) -> None:
-    """For `clrt doctor`."""
+    """Store the error for `clrt doctor`."""
     from ..device.cache import keep_log
 
     keep_log("error", error)
 
 
 def _leave(code: str | int | None) -> NoReturn:
-    """Exits; at once where a device has hung, as its driver might wait for it for ever."""
+    """Exit; immediately if a device has hung, as its driver might block the regular exit forever."""
     pulse = sys.modules.get("clrt.device.pulse")
     if pulse is not None and pulse.has_hung() and isinstance(code, int):
         sys.stdout.flush()

@@ -1,5 +1,5 @@
-"""Progress as one line of a terminal that is redrawn in place, in plain characters: no escape sequences, no cursor that
-stays hidden where the process is killed, nothing that wraps."""
+"""Progress as one line of a terminal, redrawn in place with plain characters: no escape sequences, no cursor that stays
+hidden if the process is killed, no wrapping."""
 
 from __future__ import annotations
 
@@ -16,49 +16,49 @@ from .progress import PHASES, Progress, describe_workers, figures, where
 if TYPE_CHECKING:
     from ..rendering.renderer import State
 
-#: Characters of the bar, and columns of a terminal that does not tell how many it has.
+#: Width of the bar in characters, and default number of terminal columns if it is unknown.
 BAR, COLUMNS = 20, 80
 
 
 class StatusLine:
-    """The line of a terminal in which its cursor is."""
+    """The terminal line that contains the cursor."""
 
     def __init__(self, terminal: TextIO) -> None:
         self._terminal, self._shown = terminal, 0
 
     def show(self, parts: Iterable[str]) -> None:
-        """Replaces what is shown by as many of the parts as there is room for, the first ones first."""
-        room = columns(self._terminal) - 1      # in the last column some terminals go on to the next line
+        """Replace the line's text by as many of the parts as fit, the first ones first."""
+        room = columns(self._terminal) - 1      # at the last column some terminals wrap
         text = fitted(parts, room)
         self._put("\r" + text.ljust(min(self._shown, room)))
         self._shown = len(text)
 
     def erase(self) -> None:
-        """Leaves the line empty."""
+        """Clear the line."""
         if self._shown:
             self._put("\r" + " " * min(self._shown, columns(self._terminal) - 1) + "\r")
         self._shown = 0
 
     def keep(self) -> None:
-        """Goes on to the next line."""
+        """Keep the text and continue on the next line."""
         if self._shown:
             self._put("\n")
         self._shown = 0
 
     def _put(self, text: str) -> None:
-        with suppress(OSError):     # of a terminal that has gone
+        with suppress(OSError):     # the terminal may be closed
             self._terminal.write(text)
             self._terminal.flush()
 
 
 class _Other:
-    """A stream to the same terminal: what is written to it takes the status line's place."""
+    """A stream to the same terminal: its output replaces the status line."""
 
     def __init__(self, stream: TextIO, line: StatusLine) -> None:
         self._stream, self._line = stream, line
 
     def write(self, text: str) -> int:
-        """See TextIO."""
+        """Erase the status line, then write the text."""
         self._line.erase()
         return self._stream.write(text)
 
@@ -67,7 +67,7 @@ class _Other:
 
 
 class BarProgress(Progress):
-    """A bar with time left, samples, error and rate. What a picture ended with stays above its files' names."""
+    """A bar with time left, samples, error and rate. The final state stays above the names of the files written."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -113,13 +113,13 @@ class BarProgress(Progress):
 
 
 def bar(done: float) -> str:
-    """The part that is done, 0 to 1."""
+    """Draw a progress bar. done: from 0 to 1."""
     full = int(BAR * done)
     return f"[{'#' * full}{'-' * (BAR - full)}]"
 
 
 def fitted(parts: Iterable[str], room: int) -> str:
-    """The parts that fit into so many columns, in their order, those that are empty left out; the first one is cut."""
+    """Join the nonempty parts that fit into `room` columns, in order; the first one is truncated."""
     line = ""
     for part in filter(None, parts):
         longer = f"{line}  {part}" if line else part[:room]
@@ -128,7 +128,7 @@ def fitted(parts: Iterable[str], room: int) -> str:
 
 
 def columns(terminal: TextIO) -> int:
-    """How many a terminal has, or fewer if COLUMNS says so."""
+    """Return the terminal's number of columns, or COLUMNS of the environment if that is smaller."""
     with suppress(OSError, ValueError):
         found = os.get_terminal_size(terminal.fileno()).columns or COLUMNS
         asked = os.environ.get("COLUMNS", "")

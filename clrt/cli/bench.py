@@ -1,4 +1,4 @@
-"""`clrt bench`: experiments, each with its figures as a table and as JSON."""
+"""`clrt bench`: experiments, each with its results as a table and as JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`clrt bench agree`: whether another renderer draws the same pictures."""
+"""`clrt bench agree`: whether another renderer produces the same images."""
 
 from __future__ import annotations
 

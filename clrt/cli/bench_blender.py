@@ -1,4 +1,4 @@
-"""`clrt bench blender`: scenes made in Blender, rendered by clrt and by Cycles."""
+"""`clrt bench blender`: scenes built in Blender, rendered by clrt and by Cycles."""
 
 from __future__ import annotations
 

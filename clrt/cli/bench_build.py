@@ -1,4 +1,4 @@
-"""`clrt bench build`: trees by the number of triangles."""
+"""`clrt bench build`: BVH builds by number of triangles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`clrt bench combinations`: test identities that hold for all pictures over random scenes."""
+"""`clrt bench combinations`: test identities that hold for all images over random scenes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`clrt bench converge`: error against time, by the renderer's choices and beside other renderers."""
+"""`clrt bench converge`: error against time, for the renderer's configurations and other renderers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..scene.model import Integrator
     from ..study.converge import Effort
 
-#: Those of contestants.py, there after "clrt, ".
+#: The configurations of contestants.py, where the names start with "clrt, ".
 NAMES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "lanes 8", "lanes 16", "paths in lanes",
          "unplanned"]
 INTEGRATORS = ["path", "direct", "local", "raster"]

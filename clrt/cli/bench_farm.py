@@ -1,4 +1,4 @@
-"""`clrt bench farm`: whether a farm's picture is one machine's, and what the farm costs."""
+"""`clrt bench farm`: whether a cluster renders the same image as a single process, and its overhead."""
 
 from __future__ import annotations
 

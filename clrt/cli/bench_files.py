@@ -1,4 +1,4 @@
-"""The files that an experiment writes: its figures as JSON, plots and pictures."""
+"""Files that an experiment writes: its results as JSON, plots and images."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ import click
 from ..errors import OutputError, UsageError
 from .fallback import kept_elsewhere
 
-#: Parameters that name files that are written, and what they are called; those that name folders for pictures.
+#: Parameters that name output files, with their options; parameters that name folders for images.
 FILES = {"json_file": "--json", "plot": "--plot"}
 FOLDERS = ("pictures", "keep")
 
 
 def figures_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add --json and --force to an experiment, whose files are checked before it begins as `clrt render` checks its
-    own; folders are made."""
+    """Add --json and --force to an experiment. Its output files are checked before it starts, as in `clrt render`, and
+    its folders are created."""
     @wraps(command)
     def checked(force: bool, **given: Any) -> None:
         _check(given, force)
@@ -34,8 +34,10 @@ def figures_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def write_figures(path: Path | None, figures: Mapping[str, Any]) -> None:
-    """Writes them where a file for them was named, and prints its name; OutputError, which names where they are if they
-    could be written elsewhere."""
+    """Write the results if a file was named, and print its name.
+
+    Raises OutputError if that fails, with the fallback location if the results were written elsewhere.
+    """
     if path is None:
         return
     from ..output.report import write_report
@@ -66,5 +68,5 @@ def _check(given: Mapping[str, Any], force: bool) -> None:
 
 
 def _paths(value: Any) -> Iterator[Path]:
-    """Those that an option's value consists of."""
+    """Yield the paths in an option's value."""
     yield from (each for each in (value if isinstance(value, tuple) else (value,)) if isinstance(each, Path))

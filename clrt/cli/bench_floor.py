@@ -1,4 +1,4 @@
-"""`clrt bench floor`: a plastic floor beside physical models and other renderers."""
+"""`clrt bench floor`: a plastic floor compared with physical models and other renderers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`clrt bench hits`: how many answers differ between trees, builders and devices, and from float64."""
+"""`clrt bench hits`: how many hits differ between BVHs, builders and devices, and from float64."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def hits_command(device: str | None, quick: bool, json_file: Path | None) -> Non
 
 
 def _lines(result: Mapping[str, Any]) -> list[str]:
-    """A line for each way: of how many rays each kind differs from the first line."""
+    """Return a line per configuration: for how many rays of each kind the result differs from the first line's."""
     title = f"  {'device layout builder      traversal':40}{'rays':>9}"
     lines = [f"{result['mesh']}: {result['triangles']} triangles, {result['rays']} rays",
              title + "".join(f"{kind:>10}" for kind in result["kinds"])]

@@ -1,4 +1,4 @@
-"""`clrt bench mitsuba-data`: Mitsuba's own test scenes beside their references."""
+"""`clrt bench mitsuba-data`: Mitsuba's own test scenes against their references."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`clrt bench numerics`: what each way to intersect gets wrong beside its speed, and all hard cases by the defaults."""
+"""`clrt bench numerics`: errors and speed of each intersection test, and all hard cases with the defaults."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _family(name: str, tests: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
 
 def _echo(row: Any) -> dict[str, Any]:
-    """Prints a row as it comes."""
+    """Print a row immediately, and return it."""
     figure = "" if row.figure is None else f"{row.figure:12.4g} {row.unit}"
     click.echo(f"  {row.case:4} {row.what:72}{row.wrong:>8} of {row.count:<10}{figure}")
     return asdict(row)

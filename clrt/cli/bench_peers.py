@@ -1,4 +1,4 @@
-"""`clrt bench peers`: clrt beside other ray libraries."""
+"""`clrt bench peers`: clrt compared with other ray casting libraries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`clrt bench rays`: rays a second through one mesh."""
+"""`clrt bench rays`: rays per second through one mesh."""
 
 from __future__ import annotations
 

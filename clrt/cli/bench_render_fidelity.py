@@ -1,4 +1,4 @@
-"""`clrt bench render-fidelity`: Khronos' scenarios of glTF models beside other path tracers' images of them."""
+"""`clrt bench render-fidelity`: Khronos' glTF scenarios against the images of other path tracers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`clrt bench theses`: the experiments of two theses, beside their own figures."""
+"""`clrt bench theses`: the experiments of two theses, with their own results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`clrt cache`: where compiled programs, what is known of devices and drivers, and reference pictures are kept."""
+"""`clrt cache`: the cache of compiled programs, device and driver data, and reference images."""
 
 from __future__ import annotations
 

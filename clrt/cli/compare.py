@@ -1,4 +1,4 @@
-"""`clrt compare`: how far a picture is from another."""
+"""`clrt compare`: error metrics of an image against another."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `clrt bench converge` prints."""
+"""Tables of `clrt bench converge`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ LEGEND = ["  relMSE: mean over seeds, less the reference's own; ratio: of relMSE
 
 
 def scene_lines(result: Mapping[str, Any], on_cpu: bool) -> list[str]:
-    """Of what `measure_convergence` yields; on_cpu: with the processor's time."""
+    """Return the lines for a result of `measure_convergence`; on_cpu: include processor time."""
     from ..study.converge import AGREES
 
     (width, height), reference, rows = result["size"], result["reference"], result["contestants"]
@@ -39,7 +39,7 @@ def _line(name: str, row: Mapping[str, Any], on_cpu: bool) -> str:
 
 
 def _noise_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """The median over seeds of each number of samples that has one."""
+    """Return the median over seeds for each number of samples that has an estimate."""
     lines = []
     for name, row in rows.items():
         known = [(spp, [ratio for ratio in ratios if isfinite(ratio)])
@@ -50,7 +50,7 @@ def _noise_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
 
 def calibration_lines(told: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Of what `calibrations` returns."""
+    """Return the lines for the result of `calibrations`."""
     from ..study.calibration import RIGHT
 
     lines = [f"  {name:28}{row['pictures']:9}{row['within']:9.1%}{row['median']:9.2f}{row['worst']:9.2f}"

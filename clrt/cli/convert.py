@@ -1,4 +1,4 @@
-"""`clrt convert`: a model to a scene file to start from."""
+"""`clrt convert`: a model to a scene file as a starting point."""
 
 from __future__ import annotations
 

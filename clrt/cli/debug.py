@@ -15,7 +15,7 @@ from .options import Pixel, picture_options, tracing_options
 if TYPE_CHECKING:
     from ..rendering.choices import Choices
 
-#: Options that are settings of the scene by the same name.
+#: Options with the name of the scene setting that they replace.
 SETTINGS = ("size", "spp", "seed", "integrator", "sampler", "back_face_culling", "clamp_direct", "clamp_indirect")
 
 

@@ -1,4 +1,4 @@
-"""`clrt devices`: the OpenCL devices of this machine, best first, whether they compute right, and how fast."""
+"""`clrt devices`: the OpenCL devices of this machine, best first, with correctness checks and speed measurements."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
 
 
 def _measured(info: DeviceInfo, limit: float) -> str:
-    """Measures a device and keeps its speed; returns what went wrong."""
+    """Measure a device's speed and store it; return an error message, or ""."""
     from ..device.speeds import keep_speed
     from ..study.device_speed import measure_device
 
@@ -76,8 +76,7 @@ def _measured(info: DeviceInfo, limit: float) -> str:
 
 
 def _checked(info: DeviceInfo, limit: float, verdicts: dict[str, Verdict]) -> str:
-    """Checks a device, telling what is going on, and keeps the verdict, also among `verdicts`; returns why there is
-    none."""
+    """Check a device, report progress, and store the verdict, also in `verdicts`; return an error message, or ""."""
     from ..check.run import check_device
     from ..device.verdicts import keep_verdict
 

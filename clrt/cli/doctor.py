@@ -1,4 +1,4 @@
-"""`clrt doctor`: all that someone who is to help with a device or driver needs to know, in one piece."""
+"""`clrt doctor`: a report of everything needed to diagnose a device or driver problem."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def command(as_json: bool, output: Path | None, force: bool) -> None:
 
 
 def as_text(found: dict[str, Any]) -> str:
-    """For people: a heading for each part, and below it what there is, by name."""
+    """Format the report as text: a heading for each part, followed by its entries."""
     return "".join(f"== {name}\n" + "".join(f"{line}\n" for line in _lines(value)) + "\n"
                    for name, value in found.items())
 

@@ -1,4 +1,4 @@
-"""Results that cannot be written where they were asked for are kept elsewhere, as they took hours."""
+"""Fallback locations for results that cannot be written where requested, as they may have taken hours."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from pathlib import Path
 
 from ..errors import ClrtError, KeptBesideError, OutputError
 
-#: Where they are kept: in the first of these that they can be written to.
+#: Fallback folders; the first writable one is used.
 FOLDERS: tuple[Callable[[], Path], ...] = (Path.cwd, Path.home, lambda: Path(tempfile.gettempdir()))
 
 
 def kept_elsewhere(error: OutputError, path: Path, write: Callable[[Path], object]) -> OutputError:
-    """Write what could not be written to `path` by `write` elsewhere, and return the error with where it is."""
+    """Write to a fallback location what `write` could not write to `path`, and return the error with that location."""
     if isinstance(error, KeptBesideError):
         return error
     kept = _write_elsewhere(path, write)
@@ -23,10 +23,10 @@ def kept_elsewhere(error: OutputError, path: Path, write: Callable[[Path], objec
 
 
 def _write_elsewhere(path: Path, write: Callable[[Path], object]) -> Path | None:
-    """Where it is, under a name that is new there; None where it could be written nowhere."""
+    """Return the path of the fallback file, whose name is unique; None if no folder is writable."""
     name = f"{path.stem}-{os.urandom(4).hex()}{path.suffix}"
     for folder in FOLDERS:
-        with suppress(OSError, RuntimeError, ClrtError):     # there may be no such folder
+        with suppress(OSError, RuntimeError, ClrtError):     # the folder may not exist
             kept = folder() / name
             write(kept)
             return kept

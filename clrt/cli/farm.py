@@ -27,7 +27,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def farm_options(command: F) -> F:
-    """Who renders, beside this machine's devices."""
+    """Add the options that select a cluster instead of this machine's devices."""
     for option in [
         click.option("--local-cluster", type=click.IntRange(min=1), metavar="N",
                      help="Render with N processes on this machine; needs clrt[farm]."),
@@ -40,7 +40,7 @@ def farm_options(command: F) -> F:
 
 @contextmanager
 def cluster_for(scheduler: str | None, local: int | None, progress: Progress) -> Iterator[Cluster | None]:
-    """The cluster that was asked for, while it is needed; None where this machine's devices render."""
+    """Provide the requested cluster; None if this machine's devices render."""
     if scheduler is None and local is None:
         yield None
         return
@@ -54,7 +54,7 @@ def cluster_for(scheduler: str | None, local: int | None, progress: Progress) ->
 
 
 def make_renderer(cluster: Cluster | None, scene: Scene, **options: Any) -> Renderer:
-    """A renderer on the cluster, or on this machine's devices."""
+    """Return a renderer on the cluster, or on this machine's devices."""
     if cluster is None:
         from ..rendering.renderer import Renderer
 
@@ -65,7 +65,7 @@ def make_renderer(cluster: Cluster | None, scene: Scene, **options: Any) -> Rend
 
 
 def is_huge(size: tuple[int, int]) -> bool:
-    """Whether a picture is rendered in bands, as the client would not have it in memory."""
+    """Return whether an image is rendered in bands, as it would not fit into the client's memory."""
     from ..farm.bands import HUGE
 
     return size[0] * size[1] > HUGE
@@ -73,7 +73,7 @@ def is_huge(size: tuple[int, int]) -> bool:
 
 def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: Goal, results: Outputs,
                 progress: Progress) -> bool:
-    """Renders in bands, to the goal each, and writes the results; False where it was interrupted."""
+    """Render in bands, each to the goal, and write the results; return False if interrupted."""
     from ..farm.bands import Banded
     from ..farm.orders import PictureOrder
 
@@ -104,8 +104,7 @@ def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: G
 
 def render_frames(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: Goal, sequence: Sequence,
                   progress: Progress) -> bool:
-    """Renders the frames that are still to be made, each by a worker, and joins all to videos; False where it was
-    interrupted."""
+    """Render the remaining frames, each on a worker, and encode the videos; return False if interrupted."""
     from ..farm.orders import PictureOrder
     from ..farm.whole_pictures import WholePictures
     from ..output.image import Image
@@ -135,6 +134,6 @@ def render_frames(cluster: Cluster, scene: Scene, options: dict[str, Any], goal:
 
 
 def _warn(scene: Scene, texts: Iterable[str]) -> None:
-    """Log what workers found: their own logs stay with them."""
+    """Log the workers' warnings, as their own logs are not transferred."""
     for text in texts:
         logging.getLogger(__name__).warning("%s: %s", scene.name, text)

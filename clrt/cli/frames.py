@@ -1,4 +1,4 @@
-"""`clrt render --frames`: the frames of a scene whose camera moves, in numbered files and videos."""
+"""`clrt render --frames`: the frames of a scene with a moving camera, as numbered files and videos."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from ..scene.model import Camera, Scene
 
 F = TypeVar("F", bound=Callable[..., Any])
-#: Fields of Outputs that say nothing of what is in a picture.
+#: Fields of Outputs that do not affect an image's content.
 FILES = {"inputs", "pictures", "report", "plot", "force", "header", "spool", "pipes", "_errors"}
 
 
 class Numbers(click.ParamType[str]):
-    """Frames: all, or numbers and ranges such as 3,7,0-99:5. Stays a text, which `chosen` reads."""
+    """Frames: all, or numbers and ranges such as 3,7,0-99:5. The value stays a string, which `_numbers` parses."""
 
     name = "FRAMES"
 
@@ -38,7 +38,7 @@ class Numbers(click.ParamType[str]):
 
 
 def frame_options(command: F) -> F:
-    """Which frames; with neither of the first two a still picture."""
+    """Add the options that select frames; without --frames and --turntable a still image is rendered."""
     for option in [
         click.option("--fps", type=click.FloatRange(min=0, min_open=True),
                      help="Frames a second; default: the scene's."),
@@ -54,8 +54,8 @@ def frame_options(command: F) -> F:
 
 @dataclass
 class Sequence:
-    """outputs: with one name for all frames; videos: of these; chosen: numbers of frames, None for all; resume: whether
-    frames that are there are left out."""
+    """Frames to render. outputs: with one file name pattern for all frames; videos: of these frames; chosen: frame
+    numbers, None for all; resume: whether existing frames are skipped."""
 
     outputs: Outputs
     videos: tuple[Path, ...]
@@ -63,8 +63,8 @@ class Sequence:
     resume: bool
 
     def scene(self, scene: Scene, size: tuple[int, int] | None, turntable: int | None, fps: float | None) -> Scene:
-        """The scene as its first frame shows it. Finds out before the render whether there are such frames, and whether
-        what is asked of them can be written."""
+        """Return the scene as in its first frame. Checks before rendering that frames exist and outputs are
+        writable."""
         from ..output.files import check_unprotected
         from ..output.video import check_video
         from ..scene.animation import Animation, frames, turntable as turned
@@ -82,14 +82,14 @@ class Sequence:
         return replace(scene, camera=next(iter(self._stills.values())), animation=None)
 
     def _of(self, number: int) -> Outputs:
-        """What is written of a frame."""
+        """Return the outputs of a frame."""
         asked = self.outputs
         return replace(asked, pictures=tuple(numbered(path, number) for path in asked.pictures),
                        report=asked.report and numbered(asked.report, number),
                        spool=asked.spool and numbered(asked.spool, number))
 
     def check_apart(self, inputs: Iterable[Path]) -> None:
-        """See `Outputs.check_apart`, of every frame and video."""
+        """Apply `Outputs.check_apart` to every frame and video."""
         files = {os.path.realpath(path) for path in inputs}
         for number in self._stills:
             self._of(number).check_apart(inputs)
@@ -99,7 +99,7 @@ class Sequence:
                                  "another file")
 
     def left(self, scene: Scene, choices: Choices, goal: object) -> Iterator[tuple[Outputs, Camera]]:
-        """Outputs and camera of each frame that is still to be made. Of a picture is known what it was made of."""
+        """Yield outputs and camera of each remaining frame. Finished images contain a hash of all they depend on."""
         from ..output.files import make_folder
         from ..output.images import metadata_of
         from ..rendering.identity import facts_of
@@ -120,7 +120,7 @@ class Sequence:
                 yield outputs, camera
 
     def join(self) -> None:
-        """Writes the videos, and removes what was kept for them alone."""
+        """Write the videos, and remove frames that were only written for them."""
         from ..output.video import write_video
 
         pattern = next((path for path in self.outputs.pictures if path.suffix.lower() == ".png"), Path())
@@ -133,12 +133,12 @@ class Sequence:
         if spool := self.outputs.spool:
             for number in self._stills:
                 numbered(spool, number).unlink(missing_ok=True)
-            with suppress(OSError):   # files of others are in it
+            with suppress(OSError):   # it may contain other files
                 spool.parent.rmdir()
 
 
 def make_sequence(outputs: Outputs, frames: str | None, resume: bool, single: Mapping[str, object]) -> Sequence:
-    """Of outputs as they were asked for, of which some may be videos; single: options for one picture alone."""
+    """Return the sequence of the requested outputs, of which some may be videos; single: still-image options."""
     from ..output.video import is_video
 
     if outputs.pipes:
@@ -155,7 +155,7 @@ def make_sequence(outputs: Outputs, frames: str | None, resume: bool, single: Ma
 
 
 def _numbers(text: str) -> list[int] | None:
-    """The frames that a text names, ascending; None for all, and empty where it names none."""
+    """Parse frame numbers, ascending; None for all, and empty if the text names none."""
     if text == "all":
         return None
     numbers: set[int] = set()
@@ -168,7 +168,7 @@ def _numbers(text: str) -> list[int] | None:
 
 
 def numbered(path: Path, number: int) -> Path:
-    """The name of a frame: its number in the place of the last ####, or after _ before the suffix."""
+    """Return a frame's file name: its number replaces the last ####, or is appended to the stem after _."""
     runs = list(re.finditer("#+", path.name))
     if not runs:
         return path.with_name(f"{path.stem}_{number:04}{path.suffix}")

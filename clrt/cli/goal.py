@@ -1,4 +1,4 @@
-"""Where a render will stop, and when: for its progress."""
+"""Stopping criteria of a render and its estimated end, for the progress display."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Pace:
-    """How fast a render is of late: speeds change with other programs, and with where samples go."""
+    """Current speed of a render, which varies with other programs' load, and with where samples are taken."""
 
     WINDOW = 10.0
 
@@ -20,14 +20,14 @@ class Pace:
         self._seen: deque[tuple[float, int]] = deque()
 
     def add(self, seconds: float, samples: int) -> None:
-        """So many samples, of all pixels, were there after so many seconds."""
+        """Record the number of samples of all pixels after `seconds`."""
         self._seen.append((seconds, samples))
         while len(self._seen) > 2 and seconds - self._seen[1][0] >= self.WINDOW:
             self._seen.popleft()
 
     @property
     def rate(self) -> float:
-        """Samples a second in the last WINDOW seconds, or since the last time before; at first since the start."""
+        """Samples per second over the last WINDOW seconds, or since the previous record; initially since the start."""
         (start, before), (end, samples) = self._seen[0], self._seen[-1]
         if end <= start or samples <= before:
             start, before = 0.0, 0
@@ -36,7 +36,7 @@ class Pace:
 
 @dataclass(frozen=True)
 class Goal:
-    """Where a render will stop, as far as that is known. percentile: of the tiles that are to have the error."""
+    """Stopping criteria, as far as known. percentile: of the tiles that must reach the error."""
 
     spp: int | None
     seconds: float | None
@@ -44,21 +44,21 @@ class Goal:
     percentile: float | None = None
 
     def done(self, state: State) -> float:
-        """The part that is done, 0 to 1."""
+        """Return the fraction done, 0 to 1."""
         parts = [state.spp / self.spp] if self.spp else []
         parts += [state.seconds / self.seconds] if self.seconds else []
         parts += [(self.error / state.stops_by) ** 2] if self.error and state.stops_by else []
         return min(1.0, max(parts, default=0.0))
 
     def percent(self, state: State) -> str:
-        """What is done for certain, rounded down: 100 % is the end, and nothing else."""
+        """Format the fraction done, rounded down: 100 % is reached at the end only."""
         return f"{floor(100 * self.done(state)):3} %  "
 
 
 def time_left(state: State, goal: Goal, rate: float) -> float | None:
-    """Seconds until the render, at so many samples a second, stops by what comes first; None where that is not known.
+    """Return the seconds until the first criterion is met at `rate` samples per second; None if unknown.
 
-    Noise² falls as 1/samples.
+    The squared noise is proportional to 1/samples.
     """
     ends = [] if goal.seconds is None else [goal.seconds - state.seconds]
     if goal.spp is not None and rate > 0:

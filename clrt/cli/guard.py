@@ -1,8 +1,8 @@
-"""A process that watches the one that renders, ends it where its driver hangs, and tells where a driver crashed.
+"""Watchdog process for the rendering process: kills it if its driver hangs, and reports if a driver crashed.
 
-A driver that hangs in a call may hold Python's lock, so that no thread of the same process would ever get to tell. The
-process that renders is a fork of this one, made before anything large is loaded, and so costs some milliseconds. It is
-a group of its own: all signals come here, and are handed on once.
+A driver that hangs in a call may hold Python's GIL, so that no thread of the same process could report it. The
+rendering process is a fork of this one, made before anything large is loaded, which costs a few milliseconds. It has
+a process group of its own: all signals arrive here, and are forwarded once.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from math import isinf
 
 from ..device.pulse import VARIABLE, call_in_progress, patience
 
-#: By their names, as Windows has few of them, and imports this, too.
+#: By name, as Windows has few of them and imports this module, too.
 CRASHES = {"SIGSEGV", "SIGABRT", "SIGBUS", "SIGFPE", "SIGILL"}
 HANDED_ON = {"SIGINT", "SIGTERM", "SIGHUP", "SIGTSTP"}
-#: Of a patience, how often it is looked.
+#: Number of polls within the time limit of a call.
 LOOKS = 20
 DEVICE = 4
 PR_SET_PDEATHSIG = 1
 
 
 def guarded(advice: Callable[[], str]) -> None:
-    """Returns in a new process, which is to do the work; this one exits as that one does, or with 4 where it hangs or
-    crashes, and then with the advice. Where there is no such thing as a fork, or nothing to watch, it just returns."""
+    """Return in a child process that does the work; this process exits with the child's code, or prints the advice and
+    exits with 4 if the child hangs or crashes. Just returns if the platform has no fork or there is no time limit."""
     limit = patience()
     if isinf(limit) or not hasattr(signal, "sigtimedwait"):
         return
-    # What was started with nohup stays deaf to SIGHUP.
+    # SIGHUP stays ignored if started with nohup.
     handed_on = map(signal.Signals.__getitem__, HANDED_ON)
     watched = {each for each in handed_on if signal.getsignal(each) is not signal.SIG_IGN} | {signal.SIGCHLD}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, watched)
@@ -45,7 +45,7 @@ def guarded(advice: Callable[[], str]) -> None:
 
 
 def _die_with(parent: int) -> None:
-    """Has this process killed when its parent is; Linux alone can do that."""
+    """Have this process killed when its parent dies; supported on Linux only."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, int(signal.SIGKILL))
     if os.getppid() != parent:
@@ -53,12 +53,12 @@ def _die_with(parent: int) -> None:
 
 
 def _watch(child: int, watched: set[signal.Signals], limit: float, advice: Callable[[], str]) -> int:
-    """The exit code, once the child has ended or was ended. Ticks are counted, not time: it may be stopped itself, and
-    while the child is stopped there are none."""
+    """Wait until the child ends or is killed, and return the exit code. Polls are counted instead of time: this process
+    may be stopped itself, and polls do not count while the child is stopped."""
     waited, last_call, stopped = 0, 0, False
     while True:
         came = signal.sigtimedwait(watched, limit / LOOKS)
-        if came is not None and came.si_signo not in watched:   # what Python returns after a stop longer than the wait
+        if came is not None and came.si_signo not in watched:   # after a stop longer than the timeout
             came = None
         changed, status = os.waitpid(child, os.WNOHANG | os.WUNTRACED | os.WCONTINUED)
         if changed and (os.WIFEXITED(status) or os.WIFSIGNALED(status)):
@@ -97,5 +97,5 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
 
 
 def _say(problem: str, advice: Callable[[], str]) -> None:
-    start = "\n" if sys.stderr.isatty() else ""     # there may be a line of progress
+    start = "\n" if sys.stderr.isatty() else ""     # end a progress line
     print(f"{start}error: {problem}{advice()}", file=sys.stderr, flush=True)

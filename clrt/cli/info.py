@@ -1,4 +1,4 @@
-"""`clrt info`: what is in a scene, its tree, and what will be compiled and uploaded for it."""
+"""`clrt info`: the contents of a scene, its BVH, and what is compiled and uploaded for it."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
 
 
 def _device(selector: str | None) -> Device | None:
-    """The device that would render; None where there is none and none is asked for."""
+    """Return the device that would render; None if there is none and none was requested."""
     from ..device.discover import find_devices
     from ..device.open import open_device
 

@@ -1,5 +1,5 @@
-"""Ctrl-C, the signal by which batch systems end jobs, and SIGHUP, by which a terminal tells that it has gone: the first
-asks for an orderly end, the second ends now, unless it is SIGHUP, of which shell and kernel may each send one."""
+"""Handling of Ctrl-C, termination signals of batch systems, and SIGHUP, which is sent when a terminal closes: the first
+requests an orderly end, the second ends immediately, unless it is SIGHUP, as shell and kernel may both send one."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ HANG_UP = getattr(signal, "SIGHUP", None)
 
 
 def signals() -> list[signal.Signals]:
-    """Those of them that there are here, without SIGHUP where nohup has this process ignore it."""
+    """Return those of NAMES that the platform has, without SIGHUP if nohup made this process ignore it."""
     known = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
     return [each for each in known if each != HANG_UP or signal.getsignal(each) is not signal.SIG_IGN]
 
 
 def end_by_signals() -> None:
-    """Has each of them be what Ctrl-C is."""
+    """Make each of these signals raise KeyboardInterrupt, like Ctrl-C."""
     for number in signals():
         signal.signal(number, signal.default_int_handler)
 
 
 class Interruptible:
-    """While it lasts, the first signal calls `ask` and nothing else; the next raises KeyboardInterrupt."""
+    """Context in which the first signal only calls `ask`; the next one raises KeyboardInterrupt."""
 
     def __init__(self, ask: Callable[[], None]) -> None:
         self.asked, self._ask = False, ask
@@ -39,7 +39,7 @@ class Interruptible:
         end_by_signals()
 
     def _heed(self, number: int, frame: FrameType | None) -> None:
-        """Python may call it for a second signal while it is in it for the first."""
+        """Handle a signal. Python may call this for a second signal while the first call is in progress."""
         if self.asked and number != HANG_UP:
             raise KeyboardInterrupt
         self.asked = True

@@ -1,4 +1,4 @@
-"""What `-q` and `-v` show of the log: the library writes to loggers named `clrt…`, and the command line to stderr."""
+"""Logging options `-q` and `-v`: the library writes to loggers named `clrt…`, the command line shows them on stderr."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def verbose_option(command: F) -> F:
-    """`-v`: what is chosen and done, too; `-vv`: all that is logged."""
+    """Add `-v`, which also shows informational messages, and `-vv`, which shows all messages."""
     return click.option("-v", "--verbose", count=True, expose_value=False, callback=_show_more,
                         help="Tell more; -vv tells everything.")(command)
 
 
 def silence() -> None:
-    """No warnings, the libraries' either, as long as the command runs."""
+    """Disable warnings, including those of libraries, until the command ends."""
     logging.disable(logging.WARNING)
     click.get_current_context().call_on_close(lambda: logging.disable(logging.NOTSET))
 
 
 def _show_more(context: click.Context, parameter: click.Parameter, count: int) -> None:
-    last = logging.lastResort    # writes to standard error, whatever that is at the time, so beside a bar
+    last = logging.lastResort    # looks up sys.stderr for each message, so it works with a bar
     if count and last is not None:
         level = logging.INFO if count == 1 else logging.DEBUG
         last.setLevel(level)

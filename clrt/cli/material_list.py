@@ -1,4 +1,4 @@
-"""`clrt info --materials`: every type of material with its fields and limits, and every preset."""
+"""`clrt info --materials`: every material type with its fields and limits, and every preset."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from ..scene.presets import F0_PRESETS
 from ..scene.presets import CONDUCTORS
 from ..scene.textures import Texture
 
-#: What a limit of a number is called.
+#: Descriptions of limits.
 LIMITS = {Ge: "at least", Gt: "above", Le: "at most", Lt: "below"}
 
 
 def material_list() -> dict[str, Any]:
-    """The types, with what all of them have first, and the presets of those that have some."""
+    """Return the fields that all types share, the types, and the presets."""
     shared = _described(Material, SHARED)
     types = [{"type": kind.kernel, "about": (kind.__doc__ or "").split("\n")[0],
               "fields": _described(kind, {field.name for field in fields(kind)} - SHARED)} for kind in MATERIALS]
@@ -33,7 +33,7 @@ def material_list() -> dict[str, Any]:
 
 
 def material_lines(as_json: bool) -> Iterator[str]:
-    """`material_list` as lines of text, or as one of JSON."""
+    """Yield `material_list` as lines of text, or as one line of JSON."""
     found = material_list()
     if as_json:
         yield json.dumps(found)
@@ -58,7 +58,7 @@ def _described(kind: type[Material], names: set[str] | frozenset[str]) -> list[d
 
 
 def _values(hint: Any) -> Iterator[str]:
-    """What a field of this type may be, in words."""
+    """Yield descriptions of the values that a type hint allows."""
     origin, parts = get_origin(hint), get_args(hint)
     if origin in (Union, UnionType):
         for part in parts:

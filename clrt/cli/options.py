@@ -1,4 +1,4 @@
-"""Option types and groups that several commands share."""
+"""Option types and groups shared by several commands."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class Group(click.Group):
-    """Commands by name; one that is misspelt is answered with the nearest."""
+    """Group of commands that suggests the closest name for a misspelled one."""
 
     def resolve_command(self, context: click.Context, arguments: list[str]
                         ) -> tuple[str | None, click.Command | None, list[str]]:
         if arguments and not arguments[0].startswith("-") and self.get_command(context, arguments[0]) is None:
-            from ..scene.fields import unknown  # with numpy, which no command that is known needs as yet
+            from ..scene.fields import unknown  # imports numpy, which valid commands do not need yet
 
             context.fail(f'command "{arguments[0]}" {unknown(arguments[0], self.list_commands(context))}')
         return super().resolve_command(context, arguments)
@@ -49,7 +49,7 @@ class Pixel(click.ParamType[tuple[int, int]]):
 
 
 class Finite(click.FloatRange):
-    """A range without NaN and infinity, which are within all of click's."""
+    """Range that excludes NaN and infinity, which all of click's ranges include."""
 
     def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> float:
         number: float = super().convert(value, param, context)
@@ -66,7 +66,7 @@ box_option = click.option("--box", type=click.Choice(["robust", "plain"]), defau
 
 
 def picture_options(command: F) -> F:
-    """Which picture: with the scene's own settings these determine every sample."""
+    """Add the options that, together with the scene's own settings, determine every sample of an image."""
     for option in reversed([
         click.option("--camera", metavar="NAME", help="A camera in the model file; see `clrt info`."),
         click.option("--size", type=Size(), help="Picture size in pixels."),
@@ -89,7 +89,7 @@ def picture_options(command: F) -> F:
 
 
 def tracing_options(command: F) -> F:
-    """How rays are traced: defaults suit the device; the other choices are there to compare."""
+    """Add the options for tracing methods: the defaults suit the device; others are for comparison."""
     for option in [
         click.option("--lanes", type=click.Choice(["1", "8", "16"]), help="Paths a work-item.",
                      callback=lambda context, parameter, value: int(value) if value else None),

@@ -1,4 +1,4 @@
-"""What `clrt render` writes: pictures, a report and a plot, checked before the render."""
+"""Outputs of `clrt render`: images, a report and a plot, checked before the render."""
 
 from __future__ import annotations
 
@@ -24,11 +24,12 @@ if TYPE_CHECKING:
 
 @dataclass
 class Outputs:
-    """inputs: the scene, and the reference if any; pictures: of the end result, with its aovs; denoise: whether
-    the raw ones are kept beside them; view, exposure: of .png pictures; force: whether read-only files are replaced;
-    header: what is written there beside the report; spool: one of the pictures that is there for a video only: it is
-    not told of, and nothing is kept beside it; pipes: where else the picture goes, alone. One that cannot be written
-    keeps no other from being written, and is written elsewhere, where that is possible."""
+    """Requested outputs. inputs: the scene, and the reference if any; pictures: files of the final image, with its
+    AOVs; denoise: whether the raw images are stored as well; view, exposure: of .png images; force: whether read-only
+    files are replaced; header: metadata in addition to the report; spool: one of `pictures` that is only needed for a
+    video: it is not reported, and has no accompanying files; pipes: further destinations of the image, without
+    accompanying files. If an output cannot be written, the others still are, and it is written to a fallback location
+    if possible."""
 
     inputs: tuple[Path, ...]
     pictures: tuple[Path, ...]
@@ -46,25 +47,25 @@ class Outputs:
 
     @property
     def raws(self) -> tuple[Path, ...]:
-        """Where the raw pictures go, if there are any."""
+        """Paths of the raw images, if any."""
         from ..output.denoise import raw_path
 
         return tuple(map(raw_path, self._kept)) if self.denoise else ()
 
     @property
     def _kept(self) -> tuple[Path, ...]:
-        """The pictures that stay."""
+        """Image files that are kept."""
         return tuple(path for path in self.pictures if path != self.spool)
 
     @property
     def beside(self) -> tuple[Path, ...]:
-        """Where the AOVs go that are files of their own."""
+        """Paths of the AOVs that have files of their own."""
         from ..output.layers import files_beside
 
         return tuple(path for picture in self._kept for path in files_beside(picture, self.aovs).values())
 
     def check(self, checkpoint: Path | None = None) -> None:
-        """Finds out before the render whether its results can be written, and over none of its inputs."""
+        """Check before the render that the results can be written and do not replace any of its inputs."""
         from ..output.files import check_target
         from ..output.images import check_writable
         from ..output.plots import check_plot
@@ -87,7 +88,7 @@ class Outputs:
             check_plot(self.plot)
 
     def check_unprotected(self, checkpoint: Path | None = None) -> None:
-        """Finds out whether results would replace read-only files."""
+        """Check whether results would replace read-only files."""
         from ..output.files import check_unprotected
 
         older = checkpoint and Path(f"{checkpoint}~")
@@ -96,7 +97,7 @@ class Outputs:
                 check_unprotected(path, self.force)
 
     def check_apart(self, inputs: Iterable[Path], checkpoint: Path | None = None) -> None:
-        """Finds out whether results are written over files of the scene, or over each other."""
+        """Check that results do not overwrite files of the scene, or each other."""
         named = {"a picture (-o)": self.pictures,
                  "where the raw picture is kept": self.raws, "where an AOV is written": self.beside,
                  "the --report": (self.report,), "the --plot": (self.plot,),
@@ -110,7 +111,7 @@ class Outputs:
                 taken[real] = what
 
     def save(self, image: Image, raw: bool = False) -> None:
-        """Writes the pictures, or the raw ones."""
+        """Write the images, or the raw ones."""
         from ..output.layers import files_beside
 
         def save(path: Path, image: Image = image) -> None:
@@ -127,7 +128,7 @@ class Outputs:
             self._write_pipe(pipe, lambda path: save(path, alone if path.suffix == ".png" else image))
 
     def save_rows(self, banded: Banded) -> None:
-        """Writes pictures and report of a picture that is kept in bands; OutputError at the end."""
+        """Write image files and report of an image that is stored in bands; raises OutputError at the end."""
         from ..output.report import header_of, write_report
 
         told = {**banded.summary(), "total_seconds": time.perf_counter() - STARTED}
@@ -144,7 +145,7 @@ class Outputs:
         self._raise_errors()
 
     def save_frame(self, image: Image) -> None:
-        """Writes the pictures of a frame, also the raw ones, and its report; OutputError at the end."""
+        """Write the image files of a frame, including raw ones, and its report; raises OutputError at the end."""
         from ..output.report import write_report
 
         if image.raw is not None:
@@ -155,7 +156,7 @@ class Outputs:
         self._raise_errors()
 
     def save_measures(self, renderer: Renderer, image: Image) -> None:
-        """Writes report and plot, and then raises OutputError where anything could not be written."""
+        """Write report and plot, and then raise OutputError if anything could not be written."""
         from ..output.plots import plot_history
         from ..output.report import write_report
 
@@ -167,7 +168,7 @@ class Outputs:
         self._raise_errors()
 
     def _write(self, path: Path, write: Callable[[Path], object], tell: bool = True) -> bool:
-        """Whether it was written; prints where."""
+        """Return whether the file was written; prints its path."""
         try:
             write(path)
         except OutputError as error:
@@ -184,7 +185,7 @@ class Outputs:
             self._errors.append(kept_elsewhere(error, Path(f"image{pipe.suffix}"), write))
 
     def _tell(self, path: Path) -> None:
-        """Prints where a result is, unless standard output has the picture."""
+        """Print the path of a result, unless standard output receives the image."""
         if all(pipe.path != STDOUT for pipe in self.pipes):
             click.echo(str(path))
 

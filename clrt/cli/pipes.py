@@ -1,5 +1,5 @@
-"""`clrt render -o -`: images to standard output, a pipe or a character device, encoded in a temporary file first, as
-encoders seek."""
+"""`clrt render -o -`: images to standard output, a pipe or a character device. They are encoded in a temporary file
+first, as encoders seek."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from typing import IO
 from ..errors import OutputError, UsageError
 
 STDOUT = Path("-")
-#: What else standard output is called, also where it is redirected to a file.
+#: Names of standard output, even if it is redirected to a file.
 ITS_NAMES = (STDOUT, Path("/dev/stdout"), Path("/dev/fd/1"), Path("/proc/self/fd/1"))
-#: Formats that may be named before the path, as in "exr:-".
+#: Formats that may precede the path, as in "exr:-".
 FORMATS = ("png", "exr", "hdr")
 
 
 @dataclass(frozen=True)
 class Pipe:
-    """path: what is written to, STDOUT for standard output by any name; suffix: of the format, such as ".png"."""
+    """A pipe or device. path: the destination, STDOUT for standard output by any name; suffix: such as ".png"."""
 
     path: Path
     suffix: str
 
     def check(self) -> None:
-        """Raise UsageError where it is a terminal or closed, OutputError where the format is unknown."""
+        """Raise UsageError if it is a terminal or closed, OutputError if the format is unknown."""
         if self.suffix[1:] not in FORMATS:
             raise OutputError(f"{self.path}: unknown image format {self.suffix}; write FORMAT:{self.path}, with "
                               f"{', '.join(FORMATS[:-1])} or {FORMATS[-1]}")
@@ -39,7 +39,7 @@ class Pipe:
             raise UsageError(f"-o {self.path}: is a terminal; redirect it to a file or a program, or name a file")
 
     def write(self, save: Callable[[Path], object]) -> None:
-        """Writes the image that `save` writes to a path; raises OutputError."""
+        """Write the image that `save` writes to a path; raises OutputError."""
         try:
             with tempfile.TemporaryDirectory(prefix="clrt-") as folder:
                 file = Path(folder) / f"image{self.suffix}"
@@ -68,7 +68,7 @@ class Pipe:
 
 
 def split_pipes(outputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Pipe, ...]]:
-    """The paths of files among those after -o, and the pipes, each of which may be named once: else UsageError."""
+    """Split the paths of -o into files and pipes. Raises UsageError if a pipe is named twice."""
     files, pipes = list[Path](), list[Pipe]()
     for path in outputs:
         if (pipe := pipe_at(path)) is None:
@@ -81,8 +81,8 @@ def split_pipes(outputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Pipe, 
 
 
 def pipe_at(path: Path) -> Pipe | None:
-    """The pipe at a path, "FORMAT:PATH" or "PATH"; None where it is none. The format is by default that of the
-    extension, and PNG without one."""
+    """Return the pipe at a path, "FORMAT:PATH" or "PATH"; None if it is not a pipe. The format defaults to the
+    extension's, and to PNG without one."""
     kind, colon, name = str(path).partition(":")
     if colon and kind.isalnum() and _is_pipe(Path(name)):
         return Pipe(_known(Path(name)), f".{kind.lower()}")

@@ -1,4 +1,4 @@
-"""Progress on standard error: a bar for people, plain lines for logs, JSON lines for programs, or nothing."""
+"""Progress on standard error: a bar for terminals, plain lines for logs, JSON lines for programs, or nothing."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PHASES = {"connect": "starting the workers", "load": "loading the scene", "build
 
 
 class Progress:
-    """Shows nothing; the others override what they show."""
+    """Progress that shows nothing; base class of the others."""
 
     def __init__(self) -> None:
         self._pace = Pace()
@@ -27,7 +27,7 @@ class Progress:
         self._bands = -1
 
     def workers(self, shares: list[dict[str, Any]]) -> None:
-        """What each of several workers did so far (`Picture.shares`)."""
+        """Set what each of several workers has done so far (`Picture.shares`)."""
         self._workers = [share for share in shares if "worker" in share]
 
     def _left(self, state: State, goal: Goal) -> float | None:
@@ -39,28 +39,28 @@ class Progress:
         return goal.percent(state) + "  ".join(filter(None, told))
 
     def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
-        """A phase of PHASES begins; "render" on a device, with so much of its memory."""
+        """Begin a phase of PHASES; for "render" with the device and the memory it uses there."""
 
     def frame(self, number: int, done: int, count: int) -> None:
-        """The frame of this number begins; of the `count` that are to be made so many are done."""
+        """Begin the frame with this number; `done` of the `count` frames to render are finished."""
         self._pace = Pace()
 
     def state(self, state: State, goal: Goal) -> None:
-        """A state was reached on the way to the goal."""
+        """Show a state of the render."""
 
     def bands(self, done: int, count: int) -> None:
-        """So many of a large picture's bands are there."""
+        """Show how many bands of a large image are finished."""
 
     def __enter__(self) -> Progress:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        """Ends the display."""
+        """End the display."""
 
 
 class PlainProgress(Progress):
-    """A line for each phase and state."""
+    """Progress as a line for each phase and state."""
 
     def phase(self, name: str, device: str = "", device_bytes: int = 0) -> None:
         tell(PHASES[name] + where(device, device_bytes))
@@ -80,7 +80,7 @@ class PlainProgress(Progress):
 
 
 class JsonProgress(Progress):
-    """One JSON object a line, with `phase`; in the phase "render" also the state. Warnings are such lines, too."""
+    """Progress as JSON objects, one per line, with `phase`; in the phase "render" with the state. Includes warnings."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -88,7 +88,7 @@ class JsonProgress(Progress):
         self._log = JsonLog(self)
 
     def warning(self, message: str) -> None:
-        """Something was logged."""
+        """Show a logged message."""
         _tell_json({"phase": self._phase, "warning": message})
 
     def __enter__(self) -> Progress:
@@ -123,27 +123,27 @@ class JsonProgress(Progress):
 
 
 def _tell_json(values: dict[str, Any]) -> None:
-    from ..output.json_text import json_text     # with numpy, which is loaded beside other things
+    from ..output.json_text import json_text     # imports numpy, which is being loaded in another thread
 
     tell(json_text(values))
 
 
 class JsonLog(logging.Handler):
-    """Has a display show what is logged."""
+    """Log handler that forwards messages to a display."""
 
     def __init__(self, progress: JsonProgress) -> None:
         super().__init__()
         self._progress = progress
 
     def emit(self, record: logging.LogRecord) -> None:
-        """See logging."""
+        """Forward a record to the display."""
         self._progress.warning(self.format(record))
 
 
 def make_progress(kind: str | None, quiet: bool) -> Progress:
-    """The display of that kind; without one a bar for people at a terminal, else plain lines.
+    """Return the display of that kind; by default a bar on an interactive terminal, otherwise plain lines.
 
-    A bar needs a terminal in any case: elsewhere it is plain lines, too.
+    A bar needs a terminal: without one, plain lines are used instead.
     """
     if quiet:
         return Progress()
@@ -157,18 +157,18 @@ def make_progress(kind: str | None, quiet: bool) -> Progress:
 
 
 def _is_watched() -> bool:
-    """Whether the terminal redraws lines, and is no log of continuous integration, by the variables TERM and CI."""
+    """Return whether the terminal can redraw lines and is not a CI log, by the variables TERM and CI."""
     terminal = os.environ.get("TERM", "xterm" if sys.platform == "win32" else "dumb")
     return terminal not in ("", "dumb", "unknown") and os.environ.get("CI", "false") in ("", "0", "false")
 
 
 def where(device: str, device_bytes: int) -> str:
-    """On which device, and how much memory that takes there."""
+    """Describe the device and its memory use."""
     return f" on {device}, {device_bytes / 2**20:.1f} MiB there" if device else ""
 
 
 def figures(state: State, rate: float) -> list[str]:
-    """Samples, time, samples a second, and errors where they are known."""
+    """Return samples, time, samples per second, and errors if known."""
     told = [f"{state.spp} spp", f"{state.seconds:.1f} s", f"{rate / 1e6:.2f} Msamples/s"]
     tiles = "" if state.tile_noise is None else f" (of tiles {state.tile_noise:.4f})"
     if state.noise is not None:
@@ -179,6 +179,6 @@ def figures(state: State, rate: float) -> list[str]:
 
 
 def describe_workers(workers: list[dict[str, Any]]) -> str:
-    """How many are at work, and how fast the slowest and the fastest of them are."""
+    """Describe how many workers are active, and the rates of the slowest and the fastest."""
     rates = [worker["samples_per_second"] / 1e6 for worker in workers if not worker["lost"]]
     return f"{len(rates)} workers, {min(rates):.2f} to {max(rates):.2f} Msamples/s each" if rates else ""

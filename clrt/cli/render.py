@@ -1,4 +1,4 @@
-"""`clrt render`: a scene to pictures and a report."""
+"""`clrt render`: a scene to images and a report."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from ..output.denoise import Denoiser
     from ..rendering.renderer import Renderer, State
 
-#: Where there is a reference, a noise that is farther from the true error than by this factor is warned of.
+#: With a reference, a warning is logged if the estimated error is off by more than this factor.
 RIGHT = 1.2
 
 
@@ -161,8 +161,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         if print_kernel:
             click.echo(renderer.compiled.source)
             return
-        # Else Python, as it ends, searches all modules' objects for garbage, in 0.05 s. Not where it ends before the
-        # render: OpenImageIO then tells what of its own is left.
+        # Otherwise Python searches all modules' objects for garbage at exit, which takes 0.05 s. Not if it exits before
+        # the render: OpenImageIO then reports its remaining objects.
         atexit.register(gc.freeze)
         with Interruptible(renderer.interrupt) as interruptible:
             try:
@@ -182,7 +182,7 @@ def _chosen_aovs(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _open(selectors: tuple[str, ...] | None) -> list[Device]:
-    """The devices, and all that renders on them loaded: half of it is waiting for files, and needs no scene."""
+    """Open the devices and import what renders: half of this is file access, and it needs no scene."""
     from ..device.open import open_devices
 
     devices = open_devices(selectors)
@@ -197,7 +197,7 @@ def _denoiser() -> Denoiser:
 
 def _render_frames(renderer: Renderer, sequence: Sequence, goal: Goal, denoiser: Denoiser | None,
                    progress: Progress) -> None:
-    """Renders the frames that are still to be made, each to the goal, and joins all to videos."""
+    """Render the remaining frames, each to the goal, and encode the videos."""
     shots = list(sequence.left(renderer.scene, renderer.choices, goal))
     for done, (results, camera) in enumerate(shots):
         progress.frame(results.header["frame"], done, len(shots))
@@ -210,7 +210,7 @@ def _render_frames(renderer: Renderer, sequence: Sequence, goal: Goal, denoiser:
 
 def _render(renderer: Renderer, results: Outputs, goal: Goal, expected: Any, denoiser: Denoiser | None,
             progress: Progress) -> None:
-    """Renders to the goal, or until it is interrupted, and writes the results; of an interrupted frame none."""
+    """Render to the goal, or until interrupted, and write the results; an interrupted frame is not written."""
     guides = renderer.session.guides() if denoiser else {}
     progress.phase("render", device=renderer.name, device_bytes=renderer.session.device_bytes)
     for state in renderer.passes(spp=goal.spp, time=goal.seconds, error=goal.error, reference=expected):

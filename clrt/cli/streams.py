@@ -1,4 +1,4 @@
-"""Standard streams that are closed, or cannot be written, end no work: what is to be written to files is written."""
+"""Tolerance of standard streams that are closed or cannot be written: files are still written."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 
 class _Patient(io.RawIOBase):
-    """What is beneath a stream; its first failure is kept, and it takes and forgets all that follows."""
+    """Raw stream that stores its first failure, and discards everything that is written afterwards."""
 
     def __init__(self, stream: TextIO) -> None:
         self.failure: OSError | None = None
-        self._stream = stream   # else garbage collection would close the file
+        self._stream = stream   # otherwise garbage collection would close the file
         self._raw: Any = getattr(stream.buffer, "raw", stream.buffer)
 
     def write(self, data: ReadableBuffer, /) -> int | None:
-        """See io.RawIOBase; raises nothing."""
+        """Write data, or discard it after a failure; raises nothing."""
         if self.failure is None:
             try:
                 written: int | None = self._raw.write(data)
@@ -35,43 +35,43 @@ class _Patient(io.RawIOBase):
         return memoryview(data).nbytes
 
     def writable(self) -> bool:
-        """Yes."""
+        """Return True."""
         return True
 
     def fileno(self) -> int:
-        """Of the file beneath."""
+        """Return the descriptor of the underlying file."""
         return int(self._raw.fileno())
 
     def isatty(self) -> bool:
-        """Of the file beneath."""
+        """Return whether the underlying file is a terminal."""
         return bool(self._raw.isatty())
 
 
 def open_missing() -> None:
-    """Opens the null device for each of standard output and error that is closed, in whose place the next file that is
-    opened would be, and get what is printed."""
+    """Open the null device for standard output and error if closed: otherwise the next file opened would get their
+    descriptor, and receive what is printed."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8", closefd=False))
 
 
 def show_names() -> None:
-    """Has standard error show file names that are not UTF-8 as `printable` has them."""
+    """Make standard error show file names that are not UTF-8 like `printable`."""
     if isinstance(sys.stderr, io.TextIOWrapper):
         sys.stderr.reconfigure(errors=SHOWN)
 
 
 def tell(line: str) -> None:
-    """Prints it on standard error, unless nobody is there any more, such as a terminal that was closed."""
+    """Print a line on standard error; a closed terminal is ignored."""
     with suppress(OSError):
         print(line, file=sys.stderr, flush=True)
 
 
 def patient_stdout() -> _Patient:
-    """Has standard output raise no errors any more; returns what keeps the first.
+    """Make standard output raise no more errors; return the stream that stores the first.
 
-    What its encoding lacks is written as an escape. A console of Windows stays one, which takes any text. ASCII becomes
-    UTF-8: click writes that there, with a "?" for each byte of a file name that is not UTF-8.
+    Characters that its encoding lacks are written as escapes. A Windows console stays a console, which accepts any
+    text. ASCII becomes UTF-8, which click writes then, with a "?" for each byte of a file name that is not UTF-8.
     """
     sys.stdout.flush()
     encoding = codecs.lookup(sys.stdout.encoding).name
@@ -82,7 +82,7 @@ def patient_stdout() -> _Patient:
 
 
 def stdout_problem(patient: _Patient) -> str:
-    """What is to be told of it: empty where all was written, or whoever read it has gone."""
+    """Return the error to report: empty if all was written, or if the reader has closed the pipe."""
     sys.stdout.flush()
     failure = patient.failure
     if failure is None or failure.errno == errno.EPIPE:

@@ -1,4 +1,4 @@
-"""Tables of races, as `clrt bench` prints them."""
+"""Tables of races for `clrt bench`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 
 
 def race_table(title: str, kinds: Mapping[str, Any], on_cpu: bool, *, agrees: bool = True) -> list[str]:
-    """A line for each contestant.
+    """Return a line per contestant.
 
-    A column for each kind of rays has rays/s, the time of a ray over the first contestant's, and (on a CPU) that of
-    processor time; the last one has the part of the rays for which answers agree.
+    The columns for each kind of rays are rays/s, the time per ray relative to the first contestant's, and (on a CPU)
+    the same of processor time; the last column is the fraction of rays for which results agree.
     """
     columns = f"{'rays/s':>9}{'time':>6}" + (f" ({'CPU':>5})" if on_cpu else " " * 8)
     lines = [f"  {title:24}" + "".join(f"{kind:>23}" for kind in kinds),
@@ -26,7 +26,7 @@ def race_table(title: str, kinds: Mapping[str, Any], on_cpu: bool, *, agrees: bo
 
 
 def race_legend(on_cpu: bool) -> str:
-    """What the columns of `race_table` are, in the user's words."""
+    """Explain the columns of `race_table`."""
     return f"  time{' (CPU: processor time)' if on_cpu else ''}: of a ray, over the first line's; above 1 is slower"
 
 

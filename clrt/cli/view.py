@@ -1,4 +1,4 @@
-"""`clrt view`: a scene in a window, to walk through and to change."""
+"""`clrt view`: interactive window to walk through a scene and edit it."""
 
 from __future__ import annotations
 

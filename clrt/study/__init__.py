@@ -1,1 +1,1 @@
-"""Experiments that anyone can run again: what is claimed of speed and error is measured here."""
+"""Reproducible experiments that measure the speed and accuracy claimed for clrt."""

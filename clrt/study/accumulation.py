@@ -1,4 +1,4 @@
-"""The film's sums: whether means stay right over any number of samples, and what is no number stays out."""
+"""Film accumulation: whether means stay accurate for any number of samples, and non-finite samples are dropped."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ..rendering.film import Film
 from ..rendering.records import PIXEL
 from .probe import Doubles, Probe
 
-#: Samples of a launch; llvmpipe ends loops after 65535 rounds.
+#: Samples per launch; llvmpipe terminates loops after 65535 iterations.
 LAUNCH = 1 << 15
 LARGEST_SUM = 1e38
-#: Rows of the kernel's state, in its order.
+#: Rows of the kernel's state, in order.
 STATE = ("sum", "sum_error", "square", "square_error")
-#: Radiances that pixels get: the second one takes the place of every `period`-th first.
+#: Streams of radiances by name: (common value, rare value, period). Every `period`-th sample is the rare value.
 STREAMS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], int]] = {
     "constant": ((1.0, 0.1, 1 + 2.0**-23), (1.0, 0.1, 1 + 2.0**-23), 2),
     "far apart": ((1e6, 1e-6, 1e30), (1e6, 1e-6, 1e30), 2),
@@ -26,14 +26,14 @@ STREAMS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float],
 
 
 class Sums(NamedTuple):
-    """A row of pixels; exact: (n, 3) means of the float32 radiances that were added."""
+    """Film of a row of pixels. exact: (n, 3) means of the float32 radiances that were added."""
 
     film: Film
     exact: Doubles
 
 
 def accumulate(probe: Probe, often: Doubles, seldom: Doubles, period: int, samples: int, before: int = 0) -> Sums:
-    """Adds `samples` samples to pixels that hold `before` samples of `often` (n, 3); every period-th is `seldom`."""
+    """Add `samples` samples to pixels that hold `before` samples of `often` (n, 3); every period-th one is `seldom`."""
     pair = [a.astype(np.float32).astype(np.float64) for a in (often, seldom)]
     state, counts, added = np.zeros((len(often), 12)), np.zeros((len(often), 2)), 0
     if before:
@@ -52,7 +52,7 @@ def accumulate(probe: Probe, often: Doubles, seldom: Doubles, period: int, sampl
 
 
 def stream_errors(probe: Probe, samples: int, before: int = 0) -> Iterator[tuple[str, float, int]]:
-    """Of each stream the largest relative error of a mean, and how many samples the film has counted wrong."""
+    """Yield each stream's name, the largest relative error of a mean, and the error of the film's sample count."""
     for name, (often, seldom, period) in STREAMS.items():
         sums = accumulate(probe, np.array([often]), np.array([seldom]), period, samples, before)
         error = float(np.max(np.abs(sums.film.mean[0] / sums.exact - 1)))
@@ -60,6 +60,6 @@ def stream_errors(probe: Probe, samples: int, before: int = 0) -> Iterator[tuple
 
 
 def _split(sums: Doubles) -> Doubles:
-    """(n, 6): float64 numbers as the float32 above and what it lacks."""
+    """Split float64 numbers into float32 and remainder, (n, 6)."""
     head = sums.astype(np.float32).astype(np.float64)
     return np.hstack([head, sums - head])

@@ -1,8 +1,8 @@
-"""Whether two renderers draw the same picture: their means over many seeds, block by block.
+"""Whether two renderers produce the same image: their means over many seeds are compared block by block.
 
-Each renders as many pictures with seeds of their own. A block of 16 x 16 pixels has a mean in each; its spread
-over the seeds says what its own error is, however the pixels' errors go together. So each block and channel of the two
-is compared by Welch's t, and the least p-value of all is corrected for their number (Šidák).
+Both render one image per seed. A block of 16 x 16 pixels has a mean in each image, and the spread of these means over
+the seeds gives their error, whatever the correlation between pixels. Every block and channel is compared by Welch's
+t-test, and the smallest p-value is corrected for the number of tests (Šidák).
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ from .significance import FAMILY, corrected, t_test
 
 Doubles = NDArray[np.float64]
 
-#: Pixels along a block's side.
+#: Side of a block in pixels.
 BLOCK = 16
-#: Within which the means of whole pictures are held to agree.
+#: Relative tolerance of the means of whole images.
 MEAN = 0.005
 
 
 class Means(NamedTuple):
-    """Of a renderer: blocks (seeds, rows, columns, 3), and whole pictures (seeds, 3)."""
+    """Means of a renderer's images: blocks (seeds, rows, columns, 3) and whole images (seeds, 3)."""
 
     blocks: Doubles
     whole: Doubles
 
 
 def means_of(renderer: Contestant, spp: int, seeds: Sequence[int], block: int = BLOCK) -> Means:
-    """Of pictures with these seeds."""
+    """Render an image with each of these seeds and return their means."""
     blocks, whole = [], []
     for seed in seeds:
         pixels = renderer(spp, seed).pixels.astype(np.float64)
@@ -48,19 +48,19 @@ def means_of(renderer: Contestant, spp: int, seeds: Sequence[int], block: int = 
 
 
 def block_means(pixels: Doubles, block: int) -> Doubles:
-    """(h, w, 3) to (rows, columns, 3); what is left over at the lower and right edge joins no block."""
+    """Reduce (h, w, 3) to (rows, columns, 3); pixels left over at the lower and right edges are ignored."""
     rows, columns = (size // block for size in pixels.shape[:2])
     whole = pixels[:rows * block, :columns * block]
     return np.asarray(whole.reshape(rows, block, columns, block, 3).mean((1, 3)))
 
 
 def compared(ours: Means, theirs: Means) -> dict[str, Any]:
-    """How far ours are from theirs.
+    """Compare our means with theirs.
 
-    mean_ratio, mean_error: by channel, and its standard error. blocks: how many were compared, in each channel; noise:
-    the standard error of a block's relative difference, the median and the largest; difference: the largest
-    relative one; p: the least, corrected; rejected: how many blocks and channels are below FAMILY after correction.
-    agree: the means within MEAN, and no block rejected. Blocks that are black in both agree.
+    mean_ratio, mean_error: the ratio per channel, and its standard error. blocks: how many were compared, per channel;
+    noise: the standard error of a block's relative difference, the median and the largest; difference: the largest
+    relative difference; p: the smallest, corrected; rejected: the number of blocks and channels below FAMILY after
+    correction. agree: the means are within MEAN and no block is rejected. Blocks that are black in both agree.
     """
     ratio, error = mean_ratio(ours.whole, theirs.whole)
     t, freedom, difference, noise = _welch(ours.blocks, theirs.blocks)
@@ -73,7 +73,7 @@ def compared(ours: Means, theirs: Means) -> dict[str, Any]:
 
 
 def mean_ratio(ours: Doubles, theirs: Doubles) -> tuple[Doubles, Doubles]:
-    """Of the means of (seeds, channels), and its standard error; 1 where both are black."""
+    """Return the ratio of means over (seeds, channels), and its standard error; the ratio is 1 if both are black."""
     black = (ours.mean(0) == 0) & (theirs.mean(0) == 0)
     mean = np.where(black, 1, theirs.mean(0))
     ratio = np.where(black, 1, ours.mean(0) / mean)
@@ -81,7 +81,7 @@ def mean_ratio(ours: Doubles, theirs: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def _welch(ours: Doubles, theirs: Doubles) -> tuple[Doubles, Doubles, Doubles, Doubles]:
-    """t, its degrees of freedom (Welch 1947), the relative difference and its standard error, of (seeds, …)."""
+    """Return t, its degrees of freedom (Welch 1947), the relative difference and its standard error, of (seeds, …)."""
     level = (ours.mean(0) + theirs.mean(0)) / 2
     rounding = (ROUNDING * level) ** 2
     own, other = _squared_error(ours) + rounding, _squared_error(theirs) + rounding
@@ -93,16 +93,16 @@ def _welch(ours: Doubles, theirs: Doubles) -> tuple[Doubles, Doubles, Doubles, D
 
 
 def _squared_error(rows: Doubles) -> Doubles:
-    """Of the mean over seeds."""
+    """Return the squared standard error of the mean over seeds."""
     return np.asarray(rows.var(0) / (len(rows) - 1))
 
 
 def agreement(scene: Scene, spp: int, seeds: int, device: str | int | None = None) -> dict[str, Any]:
-    """`compared` of clrt's pictures of `scene` with Mitsuba's, with the scene's name and size.
+    """Return `compared` for clrt's and Mitsuba's images of `scene`, with the scene's name and size.
 
-    Rough glass follows a single bounce between microfacets in both.
+    In both, rough glass is restricted to a single microfacet bounce.
 
-    UsageError where Mitsuba is not installed, or cannot draw it, or a picture is smaller than a block.
+    Raises UsageError if Mitsuba is not installed or cannot render the scene, or if an image is smaller than a block.
     """
     if min(scene.render.size) < BLOCK:
         width, height = scene.render.size

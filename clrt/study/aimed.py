@@ -1,4 +1,4 @@
-"""Rays at what is hard to decide: vertices, edges, planes of boxes. In float32, so that all answer the same rays."""
+"""Rays aimed at hard cases: vertices, edges, planes of boxes. In float32, so that all intersect the same rays."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import numpy as np
 from .rays import Floats, Rays, scattered_rays
 from .workloads import Doubles, Faces
 
-#: From the middle of a mesh, in its half extents: where rays at vertices and edges start.
+#: Extent of the origins of rays at vertices and edges around a mesh's center, relative to its smallest half extent.
 INSIDE = 0.3
 
 
 def rays_of_kinds(vertices: Floats, faces: Faces, count: int, seed: int = 0) -> dict[str, Rays]:
-    """`count` rays of each kind. random: see `scattered_rays`; vertices, edges: from the middle of the mesh to those.
+    """Return `count` rays per kind. random: see `scattered_rays`; vertices, edges: from the mesh's center to those.
 
-    axes: along an axis, in both directions and with zeros of both signs, half of them through a vertex, exactly.
+    axes: parallel to an axis, in both directions and with zeros of both signs, half of them exactly through a vertex.
     """
     rng = np.random.default_rng(seed)
     corners = vertices[faces[rng.integers(0, len(faces), count)]].astype(np.float64)
@@ -26,7 +26,7 @@ def rays_of_kinds(vertices: Floats, faces: Faces, count: int, seed: int = 0) -> 
 
 
 def inside_rays(vertices: Floats, faces: Faces, count: int, rng: np.random.Generator) -> Rays:
-    """`count` rays from the middle of a mesh: a third each to vertices, to points of edges and of faces."""
+    """Return `count` rays from the center of a mesh: a third each to vertices, to points on edges and on faces."""
     corners = vertices[faces[rng.integers(0, len(faces), count)]].astype(np.float64)
     weights = rng.dirichlet([1, 1, 1], count)
     weights[: count // 3] = [1, 0, 0]
@@ -56,6 +56,6 @@ def _along_axes(rng: np.random.Generator, vertices: Floats, targets: Doubles) ->
 
 
 def all_rays(kinds: dict[str, Rays]) -> Rays:
-    """Those of all kinds, one after another."""
+    """Concatenate the rays of all kinds."""
     origins, directions, t_max = (np.concatenate(arrays) for arrays in zip(*kinds.values()))
     return origins, directions, t_max

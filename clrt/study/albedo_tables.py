@@ -18,19 +18,19 @@ from ..scene.metallic_roughness import Smith
 from ..scene.microfacets import albedos, schlick_k
 
 Doubles = NDArray[np.float64]
-#: Terms of the polynomials in x and y: of the loss and of the Fresnel part; those of the means in y.
+#: Polynomial terms in x and y, for the loss and for the Fresnel part; terms in y, for their hemispherical means.
 LOSS, FRESNEL, MEAN_LOSS, MEAN_FRESNEL = (8, 8), (8, 6), 12, 9
 ROUGHNESSES = np.linspace(0.01, 1, 60)
 COSINES = np.concatenate([np.geomspace(1e-5, 0.01, 30), np.geomspace(0.011, 0.1, 30), np.linspace(0.11, 1, 60)])
-#: What the root of the loss may miss where the loss is small: the mean over the hemisphere depends on it.
+#: Added to the loss in the weights, so that errors of its root count where it is small, as the means depend on them.
 SMALL = 0.01
-#: Rounds of reweighting towards the smallest largest error, and how much each weighs small errors beside the largest.
+#: Iterations of reweighting towards the minimax fit, and the weight of small errors relative to the largest.
 ROUNDS, FLOOR = 60, 0.05
 INDENT = "    "
 
 
 class Table(NamedTuple):
-    """Coefficients by power: loss and fresnel of [x][y], the means of [y]."""
+    """Coefficients by power: `loss` and `fresnel` as [x][y], the means as [y]."""
 
     loss: Doubles
     fresnel: Doubles
@@ -39,7 +39,7 @@ class Table(NamedTuple):
 
 
 def fit_table(smith: Smith) -> Table:
-    """The fits of one form of masking–shadowing, over all roughnesses and angles."""
+    """Fit one form of masking–shadowing over all roughnesses and angles."""
     alpha, root_y = ROUGHNESSES[:, None]**2, 2 * np.sqrt(ROUGHNESSES) - 1
     exact = np.array([albedos(COSINES, a, smith) for a in alpha[:, 0]])
     loss, grazing = np.maximum(1 - exact[:, 0], 0), exact[:, 1]
@@ -60,25 +60,25 @@ def fit_table(smith: Smith) -> Table:
 
 
 def is_squared(smith: Smith) -> bool:
-    """Whether the loss is fitted by the square of a polynomial: behind its peak Smith's falls with 1/cos²."""
+    """Return whether the loss is fitted as the square of a polynomial: behind its peak, Smith's falls with 1/cos²."""
     return not smith.startswith("schlick")
 
 
 def stretched(cosines: Doubles, width: Doubles) -> tuple[Doubles, Doubles]:
-    """x and q of the angles: what happens at cosines of about `width` comes to the same x for every width."""
+    """Return x and q for the cosines: features at cosines around `width` map to the same x for every width."""
     q = cosines / (cosines + width)
     return 2 * np.sqrt(q * (1 + width)) - 1, q
 
 
 def loss_width(alpha: Doubles, smith: Smith) -> Doubles:
-    """2·alpha, or of Schlick's forms 16·k and 32·k."""
+    """Return the width of the loss in cos θ: 2·alpha, or 16·k and 32·k for Schlick's forms."""
     if is_squared(smith):
         return 2 * alpha
     return np.asarray(np.vectorize(schlick_k)(alpha, smith) * (16 if smith == "schlick" else 32))
 
 
 def mean_scale(alpha: Doubles, smith: Smith) -> Doubles:
-    """What the mean loss goes like where alpha is small."""
+    """Return the asymptotic behavior of the mean loss for small alpha."""
     if is_squared(smith):
         return np.asarray(alpha**2 * np.log1p(alpha**-2.0))
     k = np.vectorize(schlick_k)(alpha, smith)
@@ -86,7 +86,7 @@ def mean_scale(alpha: Doubles, smith: Smith) -> Doubles:
 
 
 def evaluate(table: Table, cosines: Doubles, alpha: float, smith: Smith) -> tuple[Doubles, Doubles]:
-    """(n,) the loss and the Fresnel part at cosines (n,), as the kernel computes them."""
+    """Return the loss and the Fresnel part at cosines (n,), as the kernel computes them."""
     roughness = np.sqrt(alpha)
     x, q = stretched(cosines, loss_width(np.asarray(alpha), smith))
     root = np.maximum((1 - q) * polynomial.polyval(x, polynomial.polyval(2 * roughness - 1, table.loss.T)), 0)
@@ -97,7 +97,7 @@ def evaluate(table: Table, cosines: Doubles, alpha: float, smith: Smith) -> tupl
 
 
 def _means(table: Table, alpha: float, smith: Smith) -> tuple[float, float]:
-    """Of the fits, weighed by 2·cos: by the midpoint rule in log cos."""
+    """Return the means of the fits, weighted by 2·cos, by the midpoint rule in log cos."""
     steps = 4000
     cosines = np.exp(-16 * (np.arange(steps) + 0.5) / steps)
     loss, fresnel = (16 * np.mean(2 * cosines**2 * part) for part in evaluate(table, cosines, alpha, smith))
@@ -105,7 +105,7 @@ def _means(table: Table, alpha: float, smith: Smith) -> tuple[float, float]:
 
 
 def _fit(x: Doubles, y: Doubles, values: Doubles, weights: Doubles, terms: tuple[int, int]) -> Doubles:
-    """[x][y] coefficients of the polynomial whose largest weighted error is about the least."""
+    """Return [x][y] coefficients of the polynomial whose largest weighted error is approximately minimal."""
     basis = chebyshev.chebvander2d(x.ravel(), np.repeat(y, x.shape[1]), [terms[0] - 1, terms[1] - 1])
     target, weight = values.ravel(), np.broadcast_to(weights, values.shape).ravel()
     stress, least = np.ones_like(target), np.inf
@@ -125,12 +125,12 @@ def _fit(x: Doubles, y: Doubles, values: Doubles, weights: Doubles, terms: tuple
 
 
 def _fit_mean(y: Doubles, values: Doubles, terms: int) -> Doubles:
-    """Coefficients in y, relative errors alike."""
+    """Return coefficients in y, fitted with equal relative weights."""
     return np.asarray(chebyshev.cheb2poly(chebyshev.chebfit(y, values, terms - 1, w=1 / values)))
 
 
 def write_table(smith: Smith, table: Table) -> Iterator[str]:
-    """The lines of its file."""
+    """Yield the lines of the table file."""
     name = smith.upper()
     scale = {"schlick": "0.125f * square(sqrt(alpha) + 1.0f)",
              "schlick_ibl": "0.5f * alpha"}.get(smith, "square(alpha)")

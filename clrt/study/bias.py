@@ -1,7 +1,7 @@
-"""Whether renderers are unbiased: each channel's mean over many pictures, against that of a reference with errors.
+"""Bias test: each channel's mean over many images, against that of a reference with known errors.
 
-A picture's mean is known from the spread over seeds alone: pixels' errors are not independent, those of good samplers
-least of all. The same goes for the reference's, by its steps.
+The error of an image's mean is estimated from the spread over seeds only: pixel errors are correlated, especially with
+good samplers. The reference's error is estimated likewise, from the spread of its steps.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from numpy.typing import NDArray
 
 from .significance import FAMILY, corrected, t_test
 
-#: Of a mean; so much of it float32 may shift along a path, however many samples there are.
+#: Relative error of a mean that float32 rounding along a path may cause, independent of the number of samples.
 ROUNDING = 1e-6
 
 Doubles = NDArray[np.float64]
 
 
 def mean_tests(ratios: Mapping[str, Doubles], steps: Doubles) -> dict[str, dict[str, Any]]:
-    """Of each contestant `z` and `p`, by channel, and whether it is `biased`.
+    """Return `z` and `p` per channel for each contestant, and whether it is `biased`.
 
-    ratios: (seeds, channels) of a contestant, the means of its pictures over the reference's; steps: (n, channels), the
-    means of the pictures that the reference is the mean of. z: by how many standard errors the mean ratio is above 1;
+    ratios: (seeds, channels) of a contestant, the means of its images over the reference's; steps: (n, channels), the
+    means of the images that the reference is the mean of. z: by how many standard errors the mean ratio exceeds 1;
     p: two-sided by Student's t with Welch's degrees of freedom, corrected for all contestants and channels (Šidák 1967:
-    also for normal errors that are not independent); biased where one is below FAMILY. NaN: a black channel, one seed.
+    also valid for correlated normal errors); biased if any p is below FAMILY. NaN: a black channel or a single seed.
     """
     tests = {name: _welch(rows, steps) for name, rows in ratios.items()}
     count = sum(isfinite(z) for pairs in tests.values() for z, _ in pairs)
@@ -39,7 +39,7 @@ def mean_tests(ratios: Mapping[str, Doubles], steps: Doubles) -> dict[str, dict[
 
 
 def _welch(ratios: Doubles, steps: Doubles) -> list[tuple[float, float]]:
-    """z and its degrees of freedom (Welch 1947), by channel."""
+    """Return z and its degrees of freedom (Welch 1947) per channel."""
     with np.errstate(invalid="ignore", divide="ignore"):
         own = _squared_error(ratios) + ROUNDING**2
         other = _squared_error(steps) / steps.mean(0) ** 2
@@ -49,5 +49,5 @@ def _welch(ratios: Doubles, steps: Doubles) -> list[tuple[float, float]]:
 
 
 def _squared_error(rows: Doubles) -> Doubles:
-    """Of the mean of rows (n, channels); NaN of one."""
+    """Return the squared standard error of the mean of rows (n, channels); NaN for one row."""
     return np.asarray(rows.var(0) / (len(rows) - 1) if len(rows) > 1 else np.full(rows.shape[1], np.nan))

@@ -1,4 +1,4 @@
-"""clrt and Cycles on scenes made in Blender (`blender_scenes`): mean radiances compared object by object."""
+"""Comparison of clrt and Cycles on scenes built in Blender (`blender_scenes`): mean radiance per object."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from .cycles_renderer import Cycles
 
 
 class Judged(NamedTuple):
-    """ratios: mean radiance in clrt over that in Cycles, by object; errors: their standard errors; images: by renderer,
-    (h, w, 3) float32, linear Rec. 709, means over the seeds."""
+    """Comparison of one scene. ratios: mean radiance in clrt over that in Cycles, by object; errors: their standard
+    errors; images: by renderer, (h, w, 3) float32, linear Rec. 709, means over the seeds."""
 
     scene: str
     material: str
@@ -33,9 +33,9 @@ class Judged(NamedTuple):
 
 def judge(scenes: Collection[str], materials: Collection[str], spp: int, seeds: int,
           device: str | int | None = None) -> Iterator[Judged]:
-    """Each of `scenes` with each of `materials` (none: all), rendered by both with seeds from 1 to `seeds` (>= 2).
+    """Compare each of `scenes` with each of `materials` (empty: all), rendered by both with seeds 1 to `seeds` (>= 2).
 
-    UsageError for names that are not in SCENES or MATERIALS, and where Blender is not installed.
+    Raises UsageError for names that are not in SCENES or MATERIALS, and if Blender is not installed.
     """
     for chosen, known in ((scenes, SCENES), (materials, MATERIALS)):
         if unknown := [name for name in chosen if name not in known]:
@@ -62,7 +62,7 @@ def _judged(library: Any, scene: str, material: str, spp: int, seeds: range, dev
 
 
 def _rendered(scene: Scene, spp: int, seed: int, device: int) -> tuple[NDArray[np.float32], NDArray[np.generic]]:
-    """The pixels, and the numbers of the objects seen first."""
+    """Return the pixels, and the object ids of the first hits."""
     renderer = Renderer(scene, spp=spp, seed=seed, device=device, aovs="object")
     *_, state = renderer.passes(spp=spp)
     return state.pixels, renderer.aovs(state)["object"]
@@ -70,8 +70,10 @@ def _rendered(scene: Scene, spp: int, seed: int, device: int) -> tuple[NDArray[n
 
 def compared(ours: FloatArray, theirs: FloatArray,
              regions: Mapping[str, NDArray[np.bool_]]) -> tuple[dict[str, float], dict[str, float]]:
-    """The ratios of means over the pixels (h, w) of each region and all channels, and their standard errors, from
-    images (seeds, h, w, 3)."""
+    """Return the ratios of means over the pixels (h, w) of each region and all channels, and their standard errors.
+
+    ours, theirs: images (seeds, h, w, 3).
+    """
     means = [np.column_stack([images[:, where].mean((1, 2), dtype=np.float64) for where in regions.values()])
              for images in (ours, theirs)]
     ratios, errors = mean_ratio(*means)

@@ -1,7 +1,7 @@
-"""Scenes made in Blender 5 (`pip install bpy`), and what clrt reads of them after Blender's own glTF exporter.
+"""Scenes built in Blender 5 (`pip install bpy`), and what clrt reads of them through Blender's own glTF exporter.
 
-Suzanne, a ball and a cube stand on a textured floor, lit by one or all of LIGHTS. Lengths in metres; +z is up, as in
-Blender.
+Suzanne, a sphere and a cube stand on a textured floor, lit by one or all of LIGHTS. Lengths are in meters; +z is up,
+as in Blender.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from .floor import low_sun
 
 SETTINGS = RenderSettings(size=(240, 160), max_depth=8)
 CAMERA, LOOK_AT, FOV_DEGREES = (0.5, -6.0, 3.0), (0.0, 0.0, 0.45), 27.0
-#: The sun of the environment map is at −z of clrt, which cycles_scene makes Blender's −x, and the exporter clrt's −x.
+#: The environment map's sun is at clrt's −z, which cycles_scene maps to Blender's −x, and the exporter to clrt's −x.
 ROTATION = 90.0
 #: Edge length of the area light and of the emissive square.
 SIDE = 1.0
 
-#: How bmesh makes the shapes, and where they stand: location, scale, turn about z in degrees.
+#: The bmesh operator and arguments of each shape, and its location, scale and rotation about z in degrees.
 SHAPES: dict[str, tuple[str, dict[str, Any], Vector, float, float]] = {
     "floor": ("create_grid", {"size": 5.0}, (0.0, 0.0, 0.0), 1.0, 0.0),
     "Suzanne": ("create_monkey", {}, (-1.4, 0.0, 0.6), 0.6, -20.0),
@@ -54,7 +54,7 @@ MATERIALS: dict[str, dict[str, Inputs]] = {
 
 
 def build(library: Any, scene: str, material: str, folder: Path) -> Any:
-    """The scene of `library` (bpy), which it replaces, by names of SCENES and MATERIALS; images go to `folder`."""
+    """Build a scene by names of SCENES and MATERIALS, replacing that of `library` (bpy); images go to `folder`."""
     library.ops.wm.read_factory_settings(use_empty=True)
     data, made = library.data, library.context.scene
     set_up(made, SETTINGS)
@@ -69,7 +69,7 @@ def build(library: Any, scene: str, material: str, folder: Path) -> Any:
 
 
 def exported(library: Any, made: Any, folder: Path) -> Scene:
-    """What clrt reads of the scene's glTF file, with what such a file lacks: the sun's size, area lights, the sky."""
+    """Return the scene read from its glTF export, plus what glTF lacks: sun size, area lights, environment."""
     file = folder / "scene.glb"
     with quiet():
         library.ops.export_scene.gltf(filepath=str(file), export_apply=True, export_cameras=True, export_lights=True,
@@ -86,7 +86,7 @@ def exported(library: Any, made: Any, folder: Path) -> Scene:
 
 
 def emissive_square(light: Any) -> Mesh:
-    """A square for an area light, of its radiance P/(πA), which it sends along its −z."""
+    """Return an emissive square for an area light, with its radiance P/(πA), emitting along the light's −z."""
     corners = np.array([[-1, -1, 0, 0], [-1, 1, 0, 0], [1, 1, 0, 0], [1, -1, 0, 0]]) * light.data.size / 2
     x, y, z = (np.array(light.matrix_world) @ (corners + (0, 0, 0, 1)).T)[:3]
     radiance = light.data.energy / (pi * light.data.size**2)
@@ -95,7 +95,7 @@ def emissive_square(light: Any) -> Mesh:
 
 
 def _spot(data: Any, made: Any, folder: Path) -> None:
-    """Without blend: within the cone glTF's falloff is not Blender's."""
+    """Add a spot light without blend: within the cone, glTF's falloff differs from Blender's."""
     light = _add_light(data, made, "SPOT", 1000.0, (2.0, -3.0, 4.0))
     light.shadow_soft_size, light.spot_size, light.spot_blend = 0.0, radians(45.0), 0.0
 
@@ -136,7 +136,7 @@ SCENES: dict[str, tuple[str, ...]] = {name: (name,) for name in LIGHTS} | {
 
 
 def _add_light(data: Any, made: Any, kind: str, energy: float, position: Vector) -> Any:
-    """A white light aimed at LOOK_AT; energy: W, W/m² of suns."""
+    """Add a white light aimed at LOOK_AT. energy: in W, or W/m² for suns."""
     light = data.lights.new(kind.lower(), kind)
     light.energy = energy
     _aimed(place(data, made, light), position)
@@ -144,7 +144,7 @@ def _add_light(data: Any, made: Any, kind: str, energy: float, position: Vector)
 
 
 def _aimed(placed: Any, position: Vector) -> Any:
-    """The object at a position, its −z turned to LOOK_AT."""
+    """Place the object at a position and aim its −z at LOOK_AT."""
     placed.location = position
     placed.rotation_euler = (placed.location.__class__(LOOK_AT) - placed.location).to_track_quat("-Z", "Y").to_euler()
     return placed
@@ -170,7 +170,7 @@ def _add_object(data: Any, made: Any, name: str, inputs: Inputs) -> None:
 
 
 def _nodes(data: Any, name: str) -> tuple[Nodes, Any]:
-    """Makes a material; its nodes, and itself."""
+    """Add a material and return its nodes and the material."""
     material = data.materials.new(name)
     return Nodes(material), material
 
@@ -180,14 +180,14 @@ def _principled(nodes: Nodes, inputs: Inputs) -> None:
 
 
 def _make_solid(data: Any, nodes: Nodes) -> None:
-    """By a thickness, which the exporter takes from a group of this name: without it, glass is a sheet in glTF."""
+    """Make glass solid by a thickness, which the exporter reads from a node group of this name; else it is thin."""
     group = data.node_groups.new("glTF Material Output", "ShaderNodeTree")
     group.interface.new_socket("Thickness", in_out="INPUT", socket_type="NodeSocketFloat")
     nodes("Group", {"Thickness": 1.0}, node_tree=group)
 
 
 def _mesh(data: Any, name: str, material: Any, kind: str, **shape: Any) -> Any:
-    """The cube and squares are flat, the rest smooth."""
+    """Add a mesh by a bmesh operator: the cube and squares are flat-shaded, the others smooth."""
     bmesh = import_module("bmesh")
     made, build = data.meshes.new(name), bmesh.new()
     build.loops.layers.uv.new("UVMap")
@@ -200,7 +200,7 @@ def _mesh(data: Any, name: str, material: Any, kind: str, **shape: Any) -> Any:
 
 
 def _image(data: Any, name: str, texels: NDArray[np.float64], space: str) -> Any:
-    """An 8-bit image of (h, w, 3) texels from 0 to 1, as they are stored, row 0 at the bottom."""
+    """Add an 8-bit image of encoded (h, w, 3) texels in [0, 1], row 0 at the bottom."""
     height, width, _ = texels.shape
     image = data.images.new(name, width, height)
     image.colorspace_settings.name = space
@@ -210,14 +210,14 @@ def _image(data: Any, name: str, texels: NDArray[np.float64], space: str) -> Any
 
 
 def checks() -> NDArray[np.float64]:
-    """(256, 256, 3) squares, redder to the right and bluer upwards, so that a turned or mirrored texture shows."""
+    """Return a (256, 256, 3) checkerboard, redder to the right and bluer upwards to reveal rotated or mirrored UVs."""
     v, u = np.mgrid[:256, :256] / 255
     dark = (np.floor(u * 16) + np.floor(v * 16)) % 2
     return np.asarray(np.dstack([0.4 + 0.5 * u, 0.6 * np.ones_like(u), 0.4 + 0.5 * v]) * (1 - 0.4 * dark)[..., None])
 
 
 def bumps() -> NDArray[np.float64]:
-    """(256, 256, 3) a normal map of waves with slopes up to 0.5, 8 along each side."""
+    """Return a (256, 256, 3) normal map of waves with slopes up to 0.5, 8 along each side."""
     v, u = (np.mgrid[:256, :256] + 0.5) / 256 * 8 * 2 * np.pi
     slope = 0.5 * np.dstack([np.sin(u) * np.cos(v), np.cos(u) * np.sin(v), np.zeros_like(u)])
     normal = np.array([0.0, 0.0, 1.0]) - slope

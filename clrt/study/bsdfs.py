@@ -1,4 +1,4 @@
-"""Every material with every kind of parameters, taken from the registry, and its kernel called on arrays."""
+"""Variants of every registered material, covering each kind of parameter, and its BSDF kernel called on arrays."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ..scene.materials import MATERIALS, Material
 from ..scene.model import Scene, Sphere
 from .probe import Doubles, Probe
 
-#: What is tried of fields that want other numbers than the ends and the middle of their range.
+#: Test values of fields for which the ends and the middle of the range are not suitable.
 NUMBERS: dict[str, tuple[Any, ...]] = {
     "roughness": (0.0, 0.05, 0.1, 0.3, 0.6, 1.0), "ior": (0.25, 1.5), "shininess": (0.0, 3.0, 30.0, 1000.0),
     "ambient": (1.0,)}
 COLOR = (1.0, 0.5, 0.2)
-#: Of a type: sets of fields that are tried with each other alone, and left at their defaults everywhere else.
+#: Sets of fields by kernel, each tested on its own with every second number; other variants leave them at defaults.
 LAYERS: dict[str, tuple[dict[str, Any], ...]] = {"metallic_roughness": (
     {"ior": 2.0}, {"specular": 0.0}, {"specular": 0.5, "specular_color": COLOR},
     {"clearcoat": 1.0}, {"clearcoat": 0.5, "clearcoat_roughness": 0.6}, {"clearcoat": 1.0, "clearcoat_roughness": 1.0},
@@ -31,28 +31,28 @@ LAYERS: dict[str, tuple[dict[str, Any], ...]] = {"metallic_roughness": (
     {"transmission": 0.5, "specular": 0.5, "clearcoat": 0.7, "clearcoat_roughness": 0.2, "sheen_color": (0.5, 0.5, 0.5),
      "sheen_roughness": 0.3}),
     "dielectric": ({"multiple_scattering": False},)}
-#: cos θ of wo, down to grazing; these sines are float32 numbers or round to 1.
+#: cos θ of wo, down to grazing; the sines are float32 numbers or round to 1.
 COSINES = (1.0, 0.6, 0.1, 2.0**-7, 2.0**-10, 2.0**-13)
-#: Of wo that does not graze.
+#: Azimuth of wo in radians for cosines above STEEP; grazing wo have azimuth 0.
 AZIMUTH, STEEP = 1.0, 0.05
-#: A lobe of GGX is 2·alpha·cos θ wide across the plane of incidence. One of less than 16 roundings of a unit vector's
-#: components is no function of float32 directions any more.
+#: Narrowest lobe under test. A GGX lobe is 2·alpha·cos θ wide across the plane of incidence; below 16 roundings of a
+#: unit vector's components it cannot be resolved by float32 directions.
 NARROWEST = 16 * 2.0**-24
 
 
 def variants(kind: type[Material]) -> list[Material]:
-    """All combinations of the numbers and flags above, each word that a field may be, one at a time, and LAYERS."""
+    """Return the plain, worded and layered variants of a material class."""
     return plain_variants(kind) + worded_variants(kind) + layered_variants(kind)
 
 
 def plain_variants(kind: type[Material]) -> list[Material]:
-    """All combinations of numbers and flags."""
+    """Return all combinations of numbers and flags."""
     numbers, flags, _ = _values(kind)
     return [kind(**values) for values in _product(numbers | flags)]
 
 
 def worded_variants(kind: type[Material]) -> list[Material]:
-    """Each word that a field may be, one at a time, with all flags, and numbers from the middle of their ranges."""
+    """Return each string of each field, one at a time, with all flags, and numbers in the middle of the range."""
     numbers, flags, words = _values(kind)
     middle = {name: values[len(values) // 2] for name, values in numbers.items()}
     return [kind(**middle, **raised, **{name: word}) for name, found in words.items() for word in found
@@ -60,28 +60,28 @@ def worded_variants(kind: type[Material]) -> list[Material]:
 
 
 def views(material: Material) -> list[float]:
-    """Of COSINES those from which the material's lobes are wide enough for float32."""
+    """Return those COSINES from which the material's lobes are wide enough for float32."""
     alpha = 1.0 if material.is_specular else max(getattr(material, "roughness", 1.0)**2, ALPHA_MIN)
     return [cosine for cosine in COSINES if 2 * alpha * cosine >= NARROWEST]
 
 
 def view(cosine: float) -> Doubles:
-    """A unit wo at an angle to the normal, with components that float32 holds.
+    """Return a unit wo at an angle to the normal, with components that are exact in float32.
 
-    A grazing one is along x: there the lobe is narrow in y, which float32 resolves best around 0.
+    A grazing wo is along x: there the lobe is narrow in y, which float32 resolves best around 0.
     """
     sine, azimuth = np.sqrt(1 - cosine**2), AZIMUTH if cosine > STEEP else 0.0
     return np.array([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], np.float32).astype(np.float64)
 
 
 def uniform(count: int, seed: int) -> Doubles:
-    """(count, 3) numbers in [0, 1) that float32 holds exactly."""
+    """Return (count, 3) numbers in [0, 1) that are exact in float32."""
     return np.random.default_rng(seed).integers(1 << 24, size=(count, 3)) / (1 << 24)
 
 
 @dataclass
 class Bsdfs:
-    """Materials on a device; `code[i]` names the i-th to the kernels."""
+    """Materials on a device; `code[i]` identifies the i-th to the kernels."""
 
     materials: list[Material]
     probe: Probe
@@ -89,12 +89,15 @@ class Bsdfs:
 
     def sample(self, which: int, wo: Doubles, numbers: Doubles,
                front: bool = True) -> tuple[Doubles, Doubles, Doubles, Doubles]:
-        """wi (n, 3), weight (n, 3), pdf (n,), specular (n,) for one wo (3,) or (n, 3) and numbers (n, 3) in [0, 1)."""
+        """Sample wi (n, 3), weight (n, 3), pdf (n,), specular (n,).
+
+        wo: (3,) or (n, 3); numbers: (n, 3) in [0, 1).
+        """
         out = self._sample(which, wo, numbers, front)
         return out[:, :3], out[:, 3:6], out[:, 6], out[:, 7]
 
     def spread(self, which: int, front: bool = True) -> float:
-        """Radiance on one side of the surface over that beyond it: 1 unless light is refracted."""
+        """Return the ratio of radiance on one side of the surface to that beyond it: 1 unless light is refracted."""
         out = self._sample(which, np.array([0.0, 0.0, 1.0]), uniform(1 << 10, which), front)
         through = out[:, 8][(out[:, 6] > 0) & (out[:, 2] < 0)]
         return float(through[0]) if len(through) else 1.0
@@ -106,21 +109,21 @@ class Bsdfs:
 
     def value(self, which: NDArray[np.intp] | int, wo: Doubles, wi: Doubles,
               front: bool = True) -> tuple[Doubles, Doubles]:
-        """f·|cos| (n, 3) and pdf (n,) for wi (n, 3); which (n,) or one, wo (n, 3) or (3,)."""
+        """Evaluate f·|cos| (n, 3) and pdf (n,) for wi (n, 3); which: (n,) or one; wo: (n, 3) or (3,)."""
         codes = np.broadcast_to(self.code[which], len(wi))
         out = self.probe("bsdf_value", 4, codes, np.broadcast_to(wo, wi.shape), wi, front=front)
         return out[:, :3], out[:, 3]
 
 
 def bsdfs(device: Device, materials: list[Material] | None = None, changes: Mapping[str, str] | None = None) -> Bsdfs:
-    """These materials, or all variants of all; changes: see Probe."""
+    """Set up these materials, or all variants of all materials, on a device; changes: see Probe."""
     wanted = materials or [material for kind in MATERIALS for material in variants(kind)]
     probe = Probe(device, Scene(spheres=[Sphere(material=material) for material in wanted]), changes=changes)
     return Bsdfs(wanted, probe, probe.compiled.buffers["spheres"][1]["material"])
 
 
 def _values(kind: type[Material]) -> tuple[dict[str, tuple[Any, ...]], ...]:
-    """What is tried of the fields that are numbers, of those that are flags, and of those that are words."""
+    """Return the test values of the fields that are numbers, of those that are flags, and of those that are strings."""
     hints = get_type_hints(kind)
     apart = {name for layer in LAYERS.get(kind.kernel, ()) for name in layer}
     names = [field.name for field in fields(kind) if field.name not in SHARED | apart]
@@ -131,7 +134,7 @@ def _values(kind: type[Material]) -> tuple[dict[str, tuple[Any, ...]], ...]:
 
 
 def layered_variants(kind: type[Material]) -> list[Material]:
-    """Each of its LAYERS with combinations of numbers, every second one of them."""
+    """Return each of the material's LAYERS with combinations of numbers, using every second one."""
     some = {name: values[::2] for name, values in _values(kind)[0].items()}
     return [kind(**values, **layer) for layer in LAYERS.get(kind.kernel, ()) for values in _product(some)]
 
@@ -141,7 +144,7 @@ def _product(values: Mapping[str, tuple[Any, ...]]) -> list[dict[str, Any]]:
 
 
 def _numbers(kind: type[Material], name: str) -> tuple[Any, ...]:
-    """A color, or the ends and the middle of the range in the field's type; its default where it has no two ends."""
+    """Return a color, or both ends and the middle of the field's range; the default if the range lacks an end."""
     hint, default = get_type_hints(kind, include_extras=True)[name], getattr(kind(), name)
     if isinstance(default, tuple):
         return (COLOR,)
@@ -151,7 +154,7 @@ def _numbers(kind: type[Material], name: str) -> tuple[Any, ...]:
 
 
 def _words(hint: Any) -> list[str]:
-    """The strings that a Literal, alone or in a union, allows."""
+    """Return the strings that a Literal, alone or in a union, allows."""
     if get_origin(hint) is Literal:
         return list(get_args(hint))
     return [word for part in get_args(hint) for word in _words(part)]

@@ -1,4 +1,4 @@
-"""Building trees: seconds, quality and memory by the number of triangles, and what the trees are worth to rays."""
+"""BVH builders: build time, quality and memory by number of triangles, and the traversal speed of the results."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from .rays import Floats, Run
 from .resize import resized
 from .workloads import Faces, Mesh, Workload, closed_room, workloads
 
-#: Numbers of triangles, two to a decade.
+#: Numbers of triangles, two per decade.
 SIZES, QUICK_SIZES = [round(10 ** (k / 2)) for k in range(8, 15)], [1_000, 4_000, 16_000]
-#: Most triangles for builders in numpy, which take up to half a minute for a million.
+#: Most triangles for the numpy builders, which take up to half a minute for a million.
 MOST_IN_NUMPY = 1_100_000
 REFERENCE, EMBREE = "sah", "embree"
-#: After a first call each builds so often or, where that would last longer, for so many seconds.
+#: Builds per builder after a first call, and the total seconds after which a builder is not run again.
 ROUNDS, SECONDS = 5, 15.0
 KINDS = ("primary", "bounce", "shadow")
 RAYS, QUICK_RAYS = (512, 512), (64, 64)
@@ -41,11 +41,11 @@ RAYS, QUICK_RAYS = (512, 512), (64, 64)
 
 def measure_build(vertices: Floats, faces: Faces, *, quick: bool = False,
                   device: str | int | None = None) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The figures of `clrt bench build`, part by part, for the mesh in a closed room. vertices: (n, 3); faces: (m, 3).
+    """Yield the results of `clrt bench build`, part by part, for the mesh (n, 3), (m, 3) in a closed room.
 
-    size: see `measure_builders`, for each number of triangles; rays: see `measure_growth`; fresh: `measure_fresh`, by
-    the first builder that makes the largest size, of the smallest one, with an empty cache of programs (`compiled`) and
-    once more (`cached`), and of the `largest`.
+    size: see `measure_builders`, for each number of triangles; rays: see `measure_growth`; fresh: `measure_fresh` with
+    the first builder that supports the largest size, for the smallest mesh with an empty program cache (`compiled`) and
+    once more (`cached`), and for the `largest` mesh.
     """
     opened = open_device(device)
     queries: dict[int, RayQuery] = {}
@@ -70,11 +70,11 @@ def measure_build(vertices: Floats, faces: Faces, *, quick: bool = False,
 
 
 def measure_builders(scene: Mesh, device: Device) -> dict[str, Any]:
-    """Of one mesh `builders`: those that make the device's layout, and Embree where it is installed.
+    """Measure the builders that support the device's layout, and Embree if it is installed, on one mesh.
 
-    seconds (median), first_seconds (of the first call, with all that it prepares), mtriangles (a second),
-    bytes_per_triangle (that stay); not of Embree: peak_bytes_per_triangle (that a builder on the device has there at a
-    time), sah_cost, cost_ratio (to REFERENCE's), nodes, depth, stack.
+    `builders` by name: seconds (median), first_seconds (of the first call, including all preparation), mtriangles (per
+    second), bytes_per_triangle (persistent); except for Embree: peak_bytes_per_triangle (peak device memory of a
+    builder on the device), sah_cost, cost_ratio (to REFERENCE's), nodes, depth, stack.
     """
     triangles = scene[0][scene[1]]
     triangles *= np.float32(unit_for(float(np.abs(triangles).max())))
@@ -84,7 +84,7 @@ def measure_builders(scene: Mesh, device: Device) -> dict[str, Any]:
         try:
             seconds, facts = build()
         except UsageError:
-            continue    # not every builder makes every layout, and Embree may be missing
+            continue    # not every builder supports every layout, and Embree may be missing
         builds[name] = build
         figures[name] = {"seconds": seconds, "first_seconds": time.perf_counter() - start, **facts}
     for name, seconds in _in_turns(builds).items():
@@ -99,7 +99,7 @@ Build = Callable[[], tuple[float, dict[str, Any]]]
 
 
 def _builds(scene: Mesh, triangles: Floats, device: Device) -> dict[str, Build]:
-    """Each builds a tree once: its seconds, and what else there is to say of it."""
+    """Return functions that build a BVH once and return the seconds and further properties."""
     def ours(name: str) -> tuple[float, dict[str, Any]]:
         tree = build_tree(device, device.layout, name, triangles)
         return tree.build_seconds, _facts(tree, len(triangles))
@@ -119,7 +119,7 @@ def _facts(tree: Layout, count: int) -> dict[str, Any]:
 
 
 def _in_turns(builds: dict[str, Build]) -> dict[str, float]:
-    """Median seconds of each."""
+    """Return the median seconds of each builder, from interleaved runs."""
     taken: dict[str, list[float]] = {name: [] for name in builds}
     for _ in range(ROUNDS):
         for name, build in builds.items():
@@ -129,10 +129,9 @@ def _in_turns(builds: dict[str, Build]) -> dict[str, float]:
 
 
 def measure_growth(queries: dict[int, RayQuery], kinds: dict[int, list[Workload]]) -> dict[str, Any]:
-    """Rays through trees of different sizes, in turns. queries, kinds: by the number of triangles.
+    """Measure rays through BVHs of different sizes, in interleaved runs. queries, kinds: by number of triangles.
 
-    kinds: for each kind of rays what `race` returns for each number; fits: for each kind `fit_logarithm` of the seconds
-    that a ray takes.
+    kinds: for each kind of rays the result of `race` by size; fits: for each kind, `fit_logarithm` of seconds per ray.
     """
     races, fits = {}, {}
     for each in zip(*kinds.values()):

@@ -1,10 +1,10 @@
-"""Test identities of pictures (identities.py) over random scenes, with corrected significance.
+"""Test identities of images (identities.py) over random scenes, with corrected significance.
 
-Each side of an identity is rendered with several seeds. The means over blocks of pixels and over the whole picture, by
-channel, are compared by Student's t over the differences per seed; the least p-value is corrected for their number.
-A suspicious scene is rendered again with fresh seeds and more samples, up to four times. The p-value of the last round
-alone, which does not depend on the earlier ones, decides: suspicion costs no significance, and differences with heavy
-tails, for which t-tests of few samples reject too often, are judged from the most samples.
+Each side of an identity is rendered with several seeds. The means over blocks of pixels and over the whole image, by
+channel, are compared by Student's t over the differences per seed; the smallest p-value is corrected for the number of
+tests. A suspicious scene is rendered again with fresh seeds and more samples, up to four times. The p-value of the last
+round alone, which does not depend on the earlier ones, decides: suspicion costs no significance, and heavy-tailed
+differences, for which t-tests of few samples reject too often, are judged from the most samples.
 """
 
 from __future__ import annotations
@@ -31,19 +31,18 @@ from .significance import FAMILY, corrected, t_test
 
 Doubles = NDArray[np.float64]
 
-#: Pixels along a block's side.
+#: Side of a block in pixels.
 BLOCK = 8
-#: Differences up to this, relative to a block or to the whole picture, are rounding errors of float32 where positions
-#: are rounded differently.
+#: Differences up to this, relative to a block or to the whole image, are attributed to float32 rounding of positions.
 ROUNDING = 2e-5
-#: Where a strategy finds a light a few times or never, deviations over the seeds tell nothing. The standard error of a
-#: single strategy includes this many samples of the brightest light: as many as are unlikely to be missed, 17 (with
-#: p 5e-8), are then 6 standard errors.
+#: If a strategy samples a light rarely or never, the variance over seeds underestimates the error. The standard error
+#: of a single strategy includes this many samples of the brightest light: as many as are unlikely to be missed, 17
+#: (with p 5e-8), are then 6 standard errors.
 UNSEEN = 3
 
 
 class Round(NamedTuple):
-    """Pictures with `seeds` seeds and `spp` samples per pixel; a p-value below `suspect` leads to another round."""
+    """Images with `seeds` seeds and `spp` samples per pixel; a p-value below `suspect` leads to another round."""
 
     seeds: int
     spp: int
@@ -58,8 +57,8 @@ class Verdict:
     """The result of one property for one scene.
 
     side: name of the side that differs most from the first; rounds: how many were rendered. p: of the last round,
-    corrected for blocks, channels and sides; difference: relative, in the least likely block; mean: ratio of the
-    pictures' means; noise: its standard error. dropped: number of samples that were not finite.
+    corrected for blocks, channels and sides; difference: relative, in the block with the smallest p; mean: ratio of the
+    images' means; noise: its standard error. dropped: number of non-finite samples.
     """
 
     property: str
@@ -74,7 +73,7 @@ class Verdict:
     dropped: int
 
     def is_off(self, tests: int = 1) -> bool:
-        """Return whether the identity is violated: among `tests` right ones with probability FAMILY at most."""
+        """Return whether the identity is violated. With `tests` valid ones, a false alarm has probability FAMILY."""
         return self.rounds == len(ROUNDS) and corrected(self.p, tests) < FAMILY
 
 
@@ -123,9 +122,9 @@ def _compared(device: Device, sides: Sequence[Side], spp: int, seeds: Sequence[i
 
 
 def _difference(name: str, first: Doubles, other: Doubles, dropped: int, unseen: float) -> _Comparison:
-    """Compare (seeds, n) means, the last three of which are those of the whole pictures by channel.
+    """Compare means (seeds, n), the last three of which are those of the whole images by channel.
 
-    The whole pictures, where a small difference is seen best, are a family of their own. unseen: the radiance, summed
+    The whole images, which reveal small differences best, are a test family of their own. unseen: the radiance, summed
     over pixels, that a side may have missed.
     """
     difference, level = other - first, (other + first).mean(0) / 2
@@ -144,13 +143,13 @@ def _difference(name: str, first: Doubles, other: Doubles, dropped: int, unseen:
 
 
 def _means(device: Device, side: Side, spp: int, seeds: Sequence[int]) -> tuple[Doubles, int]:
-    """Return (seeds, n) means of blocks and, last, of the whole picture, and the number of dropped samples."""
+    """Return means (seeds, n) of blocks and, last, of the whole image, and the number of dropped samples."""
     rendered = [_rendered(device, side, i, spp, seeds) for i in range(len(side.scenes))]
     return np.asarray(side.scale * np.sum([rows for rows, _ in rendered], 0)), sum(dropped for _, dropped in rendered)
 
 
 def _rendered(device: Device, side: Side, number: int, spp: int, seeds: Sequence[int]) -> tuple[Doubles, int]:
-    """Return the same of one of the side's scenes."""
+    """Return the same for one of the side's scenes."""
     scene = side.scenes[number]
     compiled = compile_scene(scene, choices(device), device=device)
     files = {name: side.files.get(name, own) if own else own for name, own in compiled.chosen_files.items()}

@@ -1,4 +1,4 @@
-"""What `clrt bench converge` compares: the renderer by its choices, and other renderers."""
+"""Contestants of `clrt bench converge`: configurations of the renderer, and other renderers."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from ..errors import UsageError
 from ..rendering.renderer import Renderer
 from ..scene.model import Scene
 
-#: Choices of the renderer by name, for its keywords; the first is what the others are compared with.
+#: Configurations by name, as keywords of Renderer; the first is the baseline of the others.
 CHOICES: dict[str, dict[str, Any]] = {
     "clrt": {}, "clrt, stratified": {"sampler": "stratified"}, "clrt, independent": {"sampler": "independent"},
     "clrt, lanes 1": {"lanes": 1}, "clrt, bvh2": {"layout": "bvh2"}}
-#: Those that are compared only if asked for; unplanned: as with --time or --error, when no `spp` is known.
+#: Configurations compared only on request. unplanned: without known `spp`, as with --time or --error.
 MORE_CHOICES: dict[str, dict[str, Any]] = {
     "clrt, adaptive": {"adaptive": True}, "clrt, lanes 8": {"lanes": 8}, "clrt, lanes 16": {"lanes": 16},
     "clrt, paths in lanes": {"paths": "lanes"}, "clrt, unplanned": {"spp": None}}
-#: Other renderers: what pip calls them, and the module beside this one whose `contestants(scene)` they are.
+#: Other renderers: pip package, and the module of this package with their `contestants(scene)`.
 PEERS = {"mitsuba": "mitsuba_renderer", "bpy": "cycles_renderer"}
 
 
 class Picture(NamedTuple):
-    """pixels: (h, w, 3) float32 of so many samples; seconds, cpu_seconds (of all cores): what they took once all was
-    loaded and compiled. noise: √relMSE as the renderer tells it, where it does."""
+    """A rendered image. pixels: (h, w, 3) float32; seconds, cpu_seconds (of all cores): rendering time, excluding
+    loading and compilation. noise: √relMSE as estimated by the renderer, or None."""
 
     spp: int
     seconds: float
@@ -38,19 +38,19 @@ class Picture(NamedTuple):
     noise: float | None = None
 
 
-#: Renders a picture with so many samples a pixel, or few more, and a seed.
+#: Renders an image with a number of samples per pixel (or slightly more) and a seed.
 Contestant = Callable[[int, int], Picture]
 
 
 def choices_on(scene: Scene, devices: Sequence[int],
                choices: Mapping[str, Mapping[str, Any]] = CHOICES) -> dict[str, Contestant]:
-    """The renderer with each of `choices` on each device, named with the device's number where there are several."""
+    """Return the renderer with each of `choices` on each device, whose index is in the names if there are several."""
     return {f"{name} (device {index})" if len(devices) > 1 else name: partial(_render, scene, index, options)
             for index in devices for name, options in choices.items()}
 
 
 def peers_of(scene: Scene) -> tuple[dict[str, Contestant], dict[str, str]]:
-    """The contestants of all PEERS, and why a peer has none: it is not installed, or cannot draw the scene."""
+    """Return the contestants of all PEERS, and why a peer has none: not installed, or an unsupported scene."""
     found: dict[str, Contestant] = {}
     missing = {}
     for package, module in PEERS.items():
@@ -64,9 +64,9 @@ def peers_of(scene: Scene) -> tuple[dict[str, Contestant], dict[str, str]]:
 
 
 def _render(scene: Scene, device: int, options: Mapping[str, Any], spp: int, seed: int) -> Picture:
-    """The clock stands still while states are made: at powers of two of the samples, for the noise that they tell.
+    """Render an image, timing only the samples, not the states made at powers of two of the samples.
 
-    Adaptive sampling needs the states, so there it runs.
+    The states update the error estimate. Adaptive sampling depends on them, so there they are included in the time.
     """
     renderer = Renderer(scene, device=device, **{"spp": spp, "seed": seed, **options})
     seconds, cpu_seconds = 0.0, 0.0

@@ -1,4 +1,4 @@
-"""How fast pictures come near the truth: relMSE by samples and by time, contestants in turns, with several seeds."""
+"""Convergence: relMSE by samples and by time, for interleaved contestants with several seeds."""
 
 from __future__ import annotations
 
@@ -16,14 +16,13 @@ from .calibration import noise_ratio
 from .contestants import CHOICES, Contestant, Picture, choices_on, peers_of
 from .reference import STEP_SPP, Reference, render_reference
 
-#: Samples a pixel, until there is no more time.
+#: Samples per pixel, until the time is used up.
 POWERS = [2**power for power in range(32)]
 
 
 class Effort(NamedTuple):
-    """seconds: that a picture may take; seeds: pictures of each number of samples; steps, step_spp: see reference.py.
-
-    spp: the numbers of samples a pixel, ascending.
+    """Extent of a measurement. seconds: time limit per image; seeds: images per number of samples; spp: the numbers of
+    samples per pixel, ascending; steps, step_spp: see reference.py.
     """
 
     seconds: float = 10.0
@@ -34,14 +33,14 @@ class Effort(NamedTuple):
 
 
 QUICK = Effort(seconds=1.0, seeds=3, steps=2)
-#: Pictures of one scene agree unless all of a channel's means are off by more than this part, to one side.
+#: Images of a scene agree unless all of a channel's means deviate by more than this fraction, in the same direction.
 AGREES = 0.005
 
 
 class Point(NamedTuple):
-    """What one picture took, and how far it is from the reference; mean_ratio: of each channel.
+    """Time and error of one image; mean_ratio: per channel, against the reference.
 
-    noise: the √relMSE that the renderer told; NaN where it tells none.
+    noise: the √relMSE that the renderer estimated; NaN if it estimates none.
     """
 
     spp: int
@@ -52,18 +51,18 @@ class Point(NamedTuple):
     noise: float = nan
 
 
-#: Of each contestant, by samples a pixel, a point a seed.
+#: Points by contestant and samples per pixel, one per seed.
 Points = dict[str, dict[int, list[Point]]]
 
 
 def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort: Effort, *, peers: bool = False,
                         choices: Mapping[str, Mapping[str, Any]] = CHOICES,
                         say: Callable[[str], None] = lambda message: None) -> Iterator[dict[str, Any]]:
-    """The figures of `clrt bench converge`, scene by scene.
+    """Yield the results of `clrt bench converge`, scene by scene.
 
     scene, size, max_depth; reference: `spp` and its own `relmse`; missing: why a peer is not among the contestants; and
-    contestants: what `figures` returns. say hears of these reasons first, and of each step of a reference that is not
-    kept. Raises what `Renderer` does.
+    contestants: the result of `figures`. say: called first with these reasons, then for each step of a reference that
+    is not cached. Raises what `Renderer` raises.
     """
     others = [peers_of(scene) if peers else ({}, {}) for scene in scenes]
     for scene, (_, missing) in zip(scenes, others):
@@ -81,7 +80,7 @@ def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort:
 
 
 def take_turns(contestants: Mapping[str, Contestant], reference: Reference, effort: Effort) -> Points:
-    """Pictures of effort's numbers of samples, of each while the next will take no more than effort's seconds."""
+    """Render images of effort's numbers of samples, for each contestant until the next would exceed its seconds."""
     points: Points = {name: {} for name in contestants}
     for seed in range(effort.seeds):
         running = list(contestants)
@@ -102,15 +101,15 @@ def _compare(picture: Picture, reference: Reference) -> Point:
 
 
 def figures(points: Points, reference: Reference) -> dict[str, dict[str, Any]]:
-    """Of each contestant, by samples: spp, seconds, cpu_seconds, relmse: means over seeds, of the times medians.
+    """Return results by contestant, in lists by samples: spp; seconds, cpu_seconds (medians); relmse (mean over seeds).
 
-    relmse_range: the least and the greatest of the seeds. From both the reference's own is subtracted. last: where in
-    these lists the most samples are whose error is still above the reference's own. There: msamples (a second);
-    relmse_seconds and relmse_cpu_seconds, relMSE times seconds, which stays while errors fall with the square root of
-    time; these over the first contestant's: ratio, cpu_ratio.
-    slope: of log relMSE over log samples, up to last (−1 where samples are independent). Of the most samples of all:
-    each channel's mean_ratio to the reference, whether it agrees with 1 (see AGREES), and what `mean_tests` says of it.
-    noise_ratio: by samples and seeds, see `noise_ratio`. NaN: has no meaning.
+    relmse_range: the minimum and maximum over seeds. The reference's own relMSE is subtracted from both. last: index
+    into these lists of the most samples whose error still exceeds the reference's own. There: msamples (per second);
+    relmse_seconds and relmse_cpu_seconds, relMSE times seconds, which is constant while errors fall with the square
+    root of time; ratio, cpu_ratio: these over the first contestant's.
+    slope: of log relMSE over log samples, up to last (−1 for independent samples). For the most samples of all: each
+    channel's mean_ratio to the reference, whether it agrees with 1 (see AGREES), and the results of `mean_tests`.
+    noise_ratio: by samples and seeds, see `noise_ratio`. NaN: undefined.
     """
     rows = {name: _averages(levels, reference.relmse) for name, levels in points.items()}
     pixels = reference.total.shape[0] * reference.total.shape[1]
@@ -131,7 +130,7 @@ def figures(points: Points, reference: Reference) -> dict[str, dict[str, Any]]:
 
 
 def _averages(levels: Mapping[int, Sequence[Point]], own: float) -> dict[str, Any]:
-    """own: the reference's relMSE."""
+    """Return a contestant's results by samples. own: the reference's relMSE."""
     channels = list(zip(*(point.mean_ratio for point in levels[max(levels)])))
     return {"spp": [level[0].spp for level in levels.values()],
             "seconds": [median(point.seconds for point in level) for level in levels.values()],
@@ -146,7 +145,7 @@ def _averages(levels: Mapping[int, Sequence[Point]], own: float) -> dict[str, An
 
 
 def _slope(samples: Sequence[int], errors: Sequence[float]) -> float:
-    """Of the least-squares line through the logarithms."""
+    """Return the slope of the least-squares line through the logarithms."""
     return linear_regression([log(n) for n in samples], [log(e) for e in errors]).slope if len(samples) > 1 else nan
 
 

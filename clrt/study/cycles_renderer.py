@@ -20,16 +20,16 @@ from .cycles_scene import blender_scene, check_scene
 
 
 def contestants(scene: Scene) -> dict[str, Contestant]:
-    """Cycles. ImportError where it is not installed, UsageError for what it cannot draw."""
+    """Return Cycles. Raises ImportError if it is not installed, UsageError if it does not support the scene."""
     library = import_module("bpy")
     check_scene(scene)
     return {"cycles": Cycles(library, partial(blender_scene, library.data, scene))}
 
 
 class Cycles:
-    """A contestant; make: Blender's scene, whose images may be written to a folder (see `blender_scene`).
+    """Contestant. make: returns Blender's scene, whose images may be written to a folder (see `blender_scene`).
 
-    Each picture is prepared by Blender, and read from a file: both are in its time.
+    The time of an image includes Blender's preparation and reading the image from a file.
     """
 
     def __init__(self, library: Any, make: Callable[[Path], Any]) -> None:
@@ -56,7 +56,7 @@ class Cycles:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Blender and its Python add-ons tell standard output of every file that they save."""
+    """Discard standard output, where Blender and its add-ons report every saved file."""
     sys.stdout.flush()
     kept = os.dup(1)
     with open(os.devnull, "w") as nothing:

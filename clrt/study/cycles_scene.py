@@ -1,7 +1,7 @@
-"""A scene as Blender holds it, for Cycles: `bpy.data` and its objects, of Blender 5.
+"""Conversion of a scene to Blender 5 for Cycles: `bpy.data` and its objects.
 
-Blender's up is +z: its x, y, z are our z, x, y, which also makes its environment pictures ours. To add a material,
-write its node in BSDFS.
+Blender's up is +z: its x, y, z are our z, x, y, so that environment maps need no conversion. To add a material, write
+its node in BSDFS.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from ..scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphe
 from ..scene.textures import untextured
 from .shapes import icosphere
 
-#: How near and far the camera sees, of the distance to where it looks.
+#: Near and far clip distances, relative to the distance of the look-at point.
 NEAR, FAR = 1e-4, 1e6
-#: Cycles has no spheres: they are 20·4^this triangles with a sphere's normals.
+#: Cycles has no spheres: they are tessellated into 20·4^SUBDIVISIONS triangles with the sphere's normals.
 SUBDIVISIONS = 6
-#: Watt of a point light that sends 1 W/sr everywhere.
+#: Power in W of a point light of 1 W/sr in all directions.
 POINT_WATT = 4 * np.pi
 
 
 def check_scene(scene: Scene) -> None:
-    """UsageError names what has no counterpart in Cycles."""
+    """Raise UsageError for a feature that has no counterpart in Cycles."""
     owners: list[Mesh | Sphere] = [*unfolded(scene).meshes, *scene.spheres]
     for owner in owners:
         if type(owner.material) not in BSDFS:
@@ -57,7 +57,7 @@ def check_scene(scene: Scene) -> None:
 
 
 def blender_scene(data: Any, scene: Scene, folder: Path, bsdfs: Mapping[type[Material], Bsdf] | None = None) -> Any:
-    """A scene of `data` (bpy.data); pictures that Blender reads are written to `folder`. bsdfs: in place of BSDFS."""
+    """Add the scene to `data` (bpy.data); images are written to `folder`. bsdfs: used instead of BSDFS."""
     made = data.scenes.new(scene.name)
     set_up(made, scene.render)
     bsdfs = bsdfs or BSDFS
@@ -73,7 +73,7 @@ def blender_scene(data: Any, scene: Scene, folder: Path, bsdfs: Mapping[type[Mat
 
 
 def set_up(made: Any, settings: RenderSettings) -> None:
-    """No clamping, no denoising, no filter but a pixel's own square; bounces are path edges but the first two."""
+    """Disable clamping and denoising, use a box filter one pixel wide; Cycles' bounces are the path depth minus 2."""
     render, cycles, (width, height) = made.render, made.cycles, settings.size
     depth = settings.max_depth if settings.integrator == "path" else 2
     render.engine, render.use_persistent_data = "CYCLES", True
@@ -89,7 +89,7 @@ def set_up(made: Any, settings: RenderSettings) -> None:
 
 
 class Nodes:
-    """Makes nodes of a material or world, by their type without "ShaderNode"; inputs are values, or outputs to link."""
+    """Adds nodes to a material or world, by type without "ShaderNode"; inputs are values, or outputs to link."""
 
     def __init__(self, owner: Any) -> None:
         self._tree = owner.node_tree
@@ -116,13 +116,13 @@ def _mirror(nodes: Nodes, material: Mirror) -> Any:
 
 
 def _metal(nodes: Nodes, material: MetallicRoughness) -> Any:
-    """The F82 model is Schlick's where its tint is white; roughness is squared there, too."""
+    """Return a metal. The F82 model equals Schlick's if its tint is white; Blender squares roughness, too."""
     return nodes("BsdfMetallic", {"Base Color": (*material.lobes.f0, 1), "Edge Tint": (1, 1, 1, 1),
                                   "Roughness": material.roughness}, fresnel_type="F82", distribution="GGX")
 
 
 def _dielectric(nodes: Nodes, material: Dielectric) -> Any:
-    """Of Blender's glass the colour would also be the reflection's."""
+    """Mix reflection and refraction: the color of Blender's glass would also tint the reflection."""
     reflection = nodes("BsdfAnisotropic", {"Color": (1, 1, 1, 1), "Roughness": 0.0})
     color = (*untextured(material.color), 1)
     refraction = nodes("BsdfRefraction", {"Color": color, "Roughness": 0.0, "IOR": material.ior})
@@ -141,7 +141,7 @@ def _is_metal(material: MetallicRoughness) -> bool:
 
 
 def _material(data: Any, material: Material, bsdfs: Mapping[type[Material], Bsdf]) -> Any:
-    """Its BSDF, and its emission, from the front or from both sides."""
+    """Return a material with its BSDF, and its emission from the front or from both sides."""
     made = data.materials.new(material.kernel)
     nodes = Nodes(made)
     shader = bsdfs[type(material)](nodes, material).outputs[0]
@@ -170,7 +170,7 @@ def _mesh(data: Any, vertices: NDArray[Any], faces: NDArray[Any], normals: NDArr
 
 
 def sphere_triangles(sphere: Sphere) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Vertices, faces that are seen from outside, and normals."""
+    """Return vertices, faces oriented outwards, and normals of a tessellated sphere."""
     normals, faces = icosphere(SUBDIVISIONS)
     a, b, c = normals[faces].transpose(1, 0, 2)
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0
@@ -179,7 +179,7 @@ def sphere_triangles(sphere: Sphere) -> tuple[NDArray[Any], NDArray[Any], NDArra
 
 
 def _light(data: Any, light: Light) -> tuple[Any, NDArray[np.float64]]:
-    """The light and where it stands: it shines along its −z."""
+    """Return the light, which emits along its −z, and its matrix to the world."""
     if isinstance(light, PointLight):
         made = data.lights.new("light", "POINT")
         made.shadow_soft_size, made.energy, made.color = 0.0, POINT_WATT, light.intensity
@@ -194,7 +194,7 @@ def _light(data: Any, light: Light) -> tuple[Any, NDArray[np.float64]]:
 
 
 def _camera(data: Any, camera: Camera) -> tuple[Any, NDArray[np.float64]]:
-    """The camera and where it stands: it looks along its −z, up is +y."""
+    """Return the camera, which looks along its −z with +y up, and its matrix to the world."""
     made = data.cameras.new("camera")
     back = np.subtract(camera.position, camera.look_at, dtype=np.float64)
     distance = np.linalg.norm(back)
@@ -206,7 +206,7 @@ def _camera(data: Any, camera: Camera) -> tuple[Any, NDArray[np.float64]]:
 
 
 def world(data: Any, environment: Environment, folder: Path) -> Any:
-    """A world of Blender; the image of the environment, if it has one, is written to `folder`."""
+    """Return a Blender world; the environment's image, if any, is written to `folder`."""
     made = data.worlds.new("world")
     nodes = Nodes(made)
     color: Any = (*environment.color, 1)
@@ -223,7 +223,7 @@ def world(data: Any, environment: Environment, folder: Path) -> Any:
 
 
 def place(data: Any, made: Any, content: Any, frame: NDArray[np.float64] | None = None) -> Any:
-    """Into the scene; frame: (4, 4), to the world."""
+    """Place an object in the scene. frame: (4, 4), to the world."""
     placed = data.objects.new(content.name, content)
     made.collection.objects.link(placed)
     if frame is not None:
@@ -232,12 +232,12 @@ def place(data: Any, made: Any, content: Any, frame: NDArray[np.float64] | None 
 
 
 def frame_of_axes(axes: NDArray[np.float64], origin: ArrayLike) -> NDArray[np.float64]:
-    """(4, 4) to Blender's world, of our (3, 3) axes, one a row."""
+    """Return the (4, 4) matrix to Blender's world of our (3, 3) axes, one per row, and origin."""
     frame = np.eye(4)
     frame[:3] = np.column_stack([*turned(axes), turned(origin)])
     return frame
 
 
 def turned(points: ArrayLike) -> NDArray[np.float64]:
-    """(..., 3) our x, y, z as Blender's."""
+    """Convert our x, y, z (..., 3) to Blender's axes."""
     return np.roll(np.asarray(points, np.float64), 1, axis=-1)

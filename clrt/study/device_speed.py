@@ -1,7 +1,7 @@
-"""How many rays a second a device follows: some seconds of primary, bounce and shadow rays, in a process of their own.
+"""Ray throughput of a device: primary, bounce and shadow rays are traced for some seconds, in a separate process.
 
-`python -m clrt.study.device_speed ID` is that process. The scene is a bumpy ball of 49 152 triangles in a room; there
-are as many rays as keep the device busy for a while, however fast it is.
+`python -m clrt.study.device_speed ID` is that process. The scene is a bumpy ball of 49 152 triangles in a room; the
+number of rays is chosen to keep the device busy, however fast it is.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from .workloads import Workload, bumpy_ball, closed_room, workloads
 
 KINDS = ("primary", "bounce", "shadow")
 SUBDIVISIONS = 6
-#: The picture whose rays are followed, in pixels a side: doubled until its primary rays take BUSY seconds.
+#: Side in pixels of the image whose rays are traced: doubled until its primary rays take BUSY seconds.
 SMALLEST, LARGEST, BUSY = 64, 2048, 0.02
-#: Each kind of rays is followed for so many seconds, and the fastest time counts, as others may use the machine, too.
+#: Seconds for which each kind of rays is traced; the fastest time counts, as the machine may be shared.
 MEASURED = 0.3
 
 
 def measure_device(info: DeviceInfo, limit: float) -> Speed:
-    """Its speed; DeviceError where it crashes or takes more than `limit` seconds."""
+    """Measure a device in a child process. Raises DeviceError if it crashes or takes more than `limit` seconds."""
     with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as errors:
         child = start_child(__name__, info.id, output, errors)
         try:
@@ -47,7 +47,7 @@ def measure_device(info: DeviceInfo, limit: float) -> Speed:
 
 
 def measure(device: str) -> Speed:
-    """The speed of a device, measured in this process."""
+    """Measure a device in this process."""
     ball = bumpy_ball(SUBDIVISIONS)
     room = closed_room(*ball)
     query = RayQuery(*room, device=device)
@@ -59,7 +59,7 @@ def measure(device: str) -> Speed:
 
 
 def _seconds(query: RayQuery, kind: Workload, budget: float = 0.0) -> float:
-    """The shortest time that the kernel took for these rays in `budget` seconds, after a run to warm up."""
+    """Return the shortest kernel time for these rays within `budget` seconds, after a warm-up run."""
     run = Run(query, query.any_hit if kind.any_hit else query.closest_hit, kind.rays)
     end = time.perf_counter() + budget
     shortest = run()[0]
@@ -69,7 +69,7 @@ def _seconds(query: RayQuery, kind: Workload, budget: float = 0.0) -> float:
 
 
 def main() -> None:
-    """Measures the device that the first argument names. What its driver prints goes to standard error."""
+    """Measure the device that the first argument names. What its driver prints goes to standard error."""
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as result:
         os.dup2(2, 1)
         json.dump(asdict(measure(sys.argv[1])), result)

@@ -1,6 +1,6 @@
-"""Embree 4 through its C interface: the library inside pip's embreex, and a loop in C over all rays and threads.
+"""Embree 4 through its C interface: the library in the package embreex, and a C loop over all rays and threads.
 
-The loop, embree_loop.c, is compiled on demand. Numbers of enumerations are those of Embree 4's headers.
+The loop, embree_loop.c, is compiled on demand. Enumeration values are those of Embree 4's headers.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ class _Work(Structure):
 
 
 class _Arguments(Structure):
-    """RTCIntersectArguments and RTCOccludedArguments, with room for the members that builds of Embree add."""
+    """RTCIntersectArguments and RTCOccludedArguments, with room for members that builds of Embree add."""
 
     _fields_ = [("flags", c_uint), ("feature_mask", c_uint), ("others", c_void_p * 8)]
 
 
 class EmbreeScene:
-    """Triangles in Embree's tree: vertices (n, 3) float32, faces (m, 3) int32; robust: its watertight mode.
+    """Triangles in an Embree BVH: vertices (n, 3) float32, faces (m, 3) int32; robust: its watertight mode.
 
-    build_seconds: of the tree, of Embree's default quality; bytes: all that Embree holds for the scene. Raises
-    UsageError where embreex or a C compiler is missing, or Embree fails.
+    build_seconds: of the BVH, with Embree's default quality; bytes: Embree's memory for the scene. Raises UsageError if
+    embreex or a C compiler is missing, or if Embree fails.
     """
 
     def __init__(self, vertices: Floats, faces: Faces, *, robust: bool = False) -> None:
@@ -76,12 +76,12 @@ class EmbreeScene:
         self.bytes = held.value
 
     def close(self) -> None:
-        """Gives the memory back."""
+        """Release the memory."""
         self._embree.rtcReleaseScene(self.handle)
         self._embree.rtcReleaseDevice(self._device)
 
     def function(self, name: str) -> c_void_p:
-        """A function of Embree's, as a pointer."""
+        """Return a pointer to an Embree function."""
         return ctypes.cast(getattr(self._embree, name), c_void_p)
 
     def _fill(self, geometry: c_void_p, kind: int, form: int, array: NDArray[Any]) -> None:
@@ -89,7 +89,7 @@ class EmbreeScene:
         ctypes.memmove(target, array.ctypes.data, array.nbytes)
 
     def _new(self, name: str, *arguments: Any) -> c_void_p:
-        """The pointer that a function of Embree's returns."""
+        """Call an Embree function and return its pointer."""
         function = getattr(self._embree, name)
         function.restype = c_void_p
         if not (pointer := function(*arguments)):
@@ -102,10 +102,10 @@ class EmbreeScene:
 
 
 class EmbreeRays:
-    """Rays (as `RayQuery` takes them, float32) to be traced through a scene, singly or in packets of 8 (`width`).
+    """Rays (as for `RayQuery`, float32) to trace through a scene, singly or in packets of 8 (`width`).
 
-    What Embree leaves behind: t (n,) float32 and primitive (n,) int32, for closest hits t_max and −1 where nothing
-    was hit, for any hit (`any_hit`) t = −inf where something was.
+    Results are stored in t (n,) float32 and primitive (n,) int32. Closest hits: a miss has t_max and −1; any hit
+    (`any_hit`): t = −inf for a hit.
     """
 
     def __init__(self, scene: EmbreeScene, rays: Rays, *, any_hit: bool, width: int = 1,
@@ -120,9 +120,9 @@ class EmbreeRays:
                            ctypes.addressof(self._arguments), *arrays, len(self.t))
 
     def trace(self) -> tuple[float, float]:
-        """Traces them all on all threads: seconds and processor seconds, both without what the loop itself takes.
+        """Trace all rays on all threads. Return seconds and processor seconds, both without the overhead of the loop.
 
-        That is, the part of the seconds that threads spend inside Embree's functions.
+        The seconds are scaled by the fraction that threads spend inside Embree's functions.
         """
         start = time.perf_counter()
         if error := _loop().trace_all(byref(self._work), self._scene.threads):
@@ -133,7 +133,7 @@ class EmbreeRays:
 
 @cache
 def _library() -> ctypes.CDLL:
-    """Embree itself, which embreex brings along."""
+    """Load Embree from embreex."""
     try:
         folder = Path(import_module("embreex").__path__[0])
     except ImportError:
@@ -146,7 +146,7 @@ def _library() -> ctypes.CDLL:
 
 @cache
 def _loop() -> ctypes.CDLL:
-    """embree_loop.c, compiled for this processor; the file may go as soon as it is loaded."""
+    """Compile embree_loop.c for this processor and load it; the file may be deleted once loaded."""
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "embree_loop.so"
         try:

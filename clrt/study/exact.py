@@ -1,9 +1,9 @@
-"""Closest hits in float64, every ray against every triangle: what answers in float32 rounding leaves open.
+"""Closest hits in float64 by brute force: the range of results that float32 rounding permits.
 
-A line passes an edge on the side that their Plücker product says (Shoemake 1998, "Plücker coordinate tutorial"); of a
-unit direction and a unit edge it is a length, their distance times the sine between them. A ray meets a triangle for
-sure if it passes all three edges on the same side by more than `reach`, and maybe if it does by more than −reach.
-A triangle without an area is never met.
+The sign of a Plücker product tells on which side of an edge a line passes (Shoemake 1998, "Plücker coordinate
+tutorial"); for a unit direction and a unit edge its value is a length, their distance times the sine between them. A
+ray certainly hits a triangle if it passes all three edges on the same side by more than `reach`, and possibly if by
+more than −reach. A triangle of zero area is never hit.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 from .rays import Floats, Rays
 from .workloads import Doubles, Faces
 
-#: What float32 makes of a corner relative to the ray, in parts of how far from its origin the mesh reaches: some 20
-#: roundings of 2^-24 (subtraction, shear, product, in two coordinates, at both ends of an edge, seen at √3), or 32.
+#: Error of a vertex relative to the ray in float32, in units of the mesh's farthest extent from the ray's origin: about
+#: 20 roundings of 2^-24 (subtraction, shear, product, in two coordinates, at both ends of an edge, times √3), or 32.
 ROUNDING = 2.0**-19
-#: Rays at a time times triangles: 8 MB an array.
+#: Rays per chunk times triangles: 8 MB per array.
 TESTS = 1 << 20
 UNDECIDED = -2
 
 
 class Bounds(NamedTuple):
-    """What may be found: low <= t·|direction| <= high, (n,) float64, inf for no hit; primitive (n,) int64.
+    """Permitted hits: low <= t·|direction| <= high, (n,) float64, inf for a miss; primitive (n,) int64.
 
-    primitive: the only one possible, −1 if no hit is, UNDECIDED where several are. Of copies it is the lowest.
+    primitive: the only possible one, −1 if there is none, UNDECIDED if there are several; the lowest of duplicates.
     """
 
     low: Doubles
@@ -35,16 +35,16 @@ class Bounds(NamedTuple):
     primitive: NDArray[np.int64]
 
     def wrong(self, rays: Rays, hits: NDArray[Any]) -> NDArray[np.bool_]:
-        """(n,) which records of `RayQuery.closest_hit` for the rays cannot be."""
+        """Return (n,) which records of `RayQuery.closest_hit` for the rays are outside the bounds."""
         t = hits["t"] * np.linalg.norm(rays[1].astype(np.float64), axis=1)
         named = (self.primitive != UNDECIDED) & (self.primitive != hits["primitive"])
         return np.asarray(named | (t < self.low) | (t > self.high))
 
 
 class _Triangles(NamedTuple):
-    """Those with an area, each once. edges: three (m, 6), of unit edges; normals: unit; points: one of each, (m, 3).
+    """Distinct triangles with nonzero area. edges: three (m, 6), of unit edges; normals: unit; points: a vertex (m, 3).
 
-    aspect: length of the longest edge over the least height; primitive: as the mesh counts; extent: of all corners.
+    aspect: longest edge over smallest height; primitive: index in the mesh; extent: largest distance of all vertices.
     """
 
     edges: tuple[Doubles, Doubles, Doubles]
@@ -56,7 +56,7 @@ class _Triangles(NamedTuple):
 
 
 def closest_bounds(vertices: Floats, faces: Faces, rays: Rays) -> Bounds:
-    """The bounds of the closest hits of rays without an end."""
+    """Return the bounds of the closest hits of rays with infinite t_max."""
     triangles = _prepare(vertices[faces].astype(np.float64))
     parts = max(1, len(rays[2]) * len(faces) // TESTS)
     chunks = zip(*(np.array_split(array.astype(np.float64), parts) for array in rays[:2]))
@@ -78,7 +78,7 @@ def _prepare(corners: Doubles) -> _Triangles:
 
 
 def areas(corners: Doubles) -> Doubles:
-    """(m,) of triangles (m, 3, 3)."""
+    """Return the areas (m,) of triangles (m, 3, 3)."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return np.asarray(np.linalg.norm(normals, axis=1) / 2)
 
@@ -103,7 +103,7 @@ def _closest(triangles: _Triangles, origins: Doubles, directions: Doubles) -> Bo
 
 def _met(triangles: _Triangles, origins: Doubles, directions: Doubles,
          reach: Doubles) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
-    """Rays and triangles that meet, sure or maybe, behind the origin as well: rows, columns, which are sure."""
+    """Return rays (rows) and triangles (columns) of certain and possible hits, also at t < 0; and which are certain."""
     pluecker = np.concatenate([directions, np.cross(origins, directions)], axis=1)
     one, two, three = (pluecker @ edge.T for edge in triangles.edges)
     least = np.minimum(np.minimum(one, two), three)
@@ -114,7 +114,7 @@ def _met(triangles: _Triangles, origins: Doubles, directions: Doubles,
 
 def _distances(triangles: _Triangles, origins: Doubles, directions: Doubles, reach: Doubles, row: NDArray[np.intp],
                column: NDArray[np.intp]) -> tuple[Doubles, Doubles]:
-    """Of pairs, the least and most t at which the plane may be met: slanted and narrow triangles leave much open."""
+    """Return the smallest and largest t of pairs with the plane: uncertain for grazing rays and narrow triangles."""
     normals = triangles.normals[column]
     cosine = np.einsum("ij,ij->i", normals, directions[row])
     distance = np.einsum("ij,ij->i", normals, triangles.points[column] - origins[row])

@@ -1,6 +1,6 @@
-"""Intersection tests of one kind side by side: what each takes, and what it gets wrong.
+"""Alternative intersection tests compared: their speed and their errors.
 
-Speeds are taken in turns, errors by the hard cases of `cases`. In each family the first is the default.
+Speeds are measured in interleaved runs, errors by the hard cases of `cases`. In each family the first is the default.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from .row import Row
 from .shapes import soup
 from .workloads import bumpy_ball, closed_room, workloads
 
-#: The tests of each kind.
+#: Tests of each family.
 FAMILIES = {"triangle": ("watertight", "moller_trumbore", "precomputed", "baldwin_weber"),
             "box": ("robust", "plain"), "sphere": ("robust", "textbook"), "offset": ("bound", "ulp", "fixed")}
-#: Of each family the errors: their keys and what they are; the first is the one it is judged by.
+#: Errors of each family: keys and descriptions; the first is the primary criterion.
 FIGURES = {
     "triangle": {"misses": "misses/M", "misses_moved": "misses/M moved", "wrong": "wrong hits/M",
                  "ulp_max": "t ulp max", "ulp_999": "t ulp 99.9 %", "ulp_999_grazing": "grazing 99.9 %",
@@ -42,12 +42,12 @@ FIGURES = {
                "lit_near": "leaks, in place", "lit_far": "leaks, elsewhere"}}
 LEAST_GRAZING_DEGREES = 85.0
 BALLS = 2000
-#: Of each test from inside closed meshes.
+#: Rays from inside closed meshes per test.
 RAYS = 4e6
 
 
 def measure_families(device: int, *, quick: bool) -> Iterator[tuple[str, dict[str, dict[str, Any]]]]:
-    """Each family's name, and of each of its tests what `race` returns beside its errors (FIGURES)."""
+    """Yield each family's name, and for each of its tests the results of `race` and its errors (FIGURES)."""
     for family, names in FAMILIES.items():
         chosen: list[dict[str, Any]] = [{family: name} for name in names]
         subjects = {name: replace(Subject(device), **choice) for name, choice in zip(names, chosen)}
@@ -56,7 +56,7 @@ def measure_families(device: int, *, quick: bool) -> Iterator[tuple[str, dict[st
 
 
 def _race_rays(subjects: list[Subject], quick: bool) -> Iterator[Contestant]:
-    """Bounce rays in a closed room."""
+    """Trace bounce rays in a closed room."""
     mesh = bumpy_ball(4 if quick else 7)
     room = closed_room(*mesh)
     size = (200, 200) if quick else (640, 640)
@@ -68,7 +68,7 @@ def _race_rays(subjects: list[Subject], quick: bool) -> Iterator[Contestant]:
 
 
 def _race_balls(subjects: list[Subject], quick: bool) -> Iterator[Contestant]:
-    """Rays in all directions from among many spheres."""
+    """Trace rays in all directions from among many spheres."""
     rng, count = np.random.default_rng(0), 1 << (12 if quick else 19)
     balls = np.hstack([rng.uniform(-1, 1, (BALLS, 3)), rng.uniform(0.005, 0.03, (BALLS, 1))]).astype(np.float32)
     rays = endless(rng.uniform(-1, 1, (count, 3)), unit_vectors(rng, count))
@@ -78,7 +78,7 @@ def _race_balls(subjects: list[Subject], quick: bool) -> Iterator[Contestant]:
 
 
 def _race_pictures(subjects: list[Subject], quick: bool) -> Iterator[Contestant]:
-    """Samples of a ball in a room under a lamp; `rays` are samples."""
+    """Render a corner of two walls under a directional light; `rays` counts samples."""
     size, samples = ((128, 128), 4) if quick else ((256, 256), 8)
     scene = lit_scenes(np.zeros(3), 1.0, level_only=False)["corner of two walls"]
     settings = RenderSettings(size=size, integrator="path", max_depth=6)
@@ -101,7 +101,10 @@ RACES: dict[str, Callable[[list[Subject], bool], Iterable[Contestant]]] = {
 
 
 def _triangle_errors(subject: Subject, quick: bool) -> dict[str, Any]:
-    """bytes: a triangle; misses: of a million rays inside closed meshes; wrong: of a million, by float64; ulp: of t."""
+    """Measure errors of a triangle test.
+
+    bytes: per triangle; misses: per million rays inside closed meshes; wrong: per million, by float64; ulp: of t.
+    """
     rows = list(measure_watertight(subject, quick=quick, rays=RAYS))
     wrong, count = _wrong_hits(subject, quick)
     steep, grazing = _distance_errors(subject, quick)
@@ -112,7 +115,10 @@ def _triangle_errors(subject: Subject, quick: bool) -> dict[str, Any]:
 
 
 def _box_errors(subject: Subject, quick: bool) -> dict[str, Any]:
-    """misses: as of triangles; wrong: a million rays along axes, by float64; lost: a million rays onto a plane."""
+    """Measure errors of a box test.
+
+    misses: as for triangles; wrong: per million axis-parallel rays, by float64; lost: per million rays at a plane.
+    """
     rows = list(measure_axes(subject, quick=quick))
     return {**_parts(measure_watertight(subject, quick=quick, rays=RAYS)),
             "wrong": _a_million(row for row in rows if row.case == "G6"),
@@ -120,14 +126,20 @@ def _box_errors(subject: Subject, quick: bool) -> dict[str, Any]:
 
 
 def _sphere_errors(subject: Subject, quick: bool) -> dict[str, Any]:
-    """wrong: a million rays that hit or miss without a doubt; ulp: of t of hits that do not graze."""
+    """Measure errors of a sphere test.
+
+    wrong: per million rays that certainly hit or certainly miss; ulp: of t, for hits that are not grazing.
+    """
     rows = list(measure_spheres(subject, quick=quick))
     steep = [row.figure for row in rows if row.what.endswith("steep, largest") and row.figure is not None]
     return {"wrong": _a_million(row for row in rows if row.unit == ""), "ulp_max": max(steep)}
 
 
 def _offset_errors(subject: Subject, quick: bool) -> dict[str, Any]:
-    """dark, lit: a million pixels that should be the other, with the scene as it is and with others; wrong: in all."""
+    """Measure errors of a ray origin offset.
+
+    dark, lit: wrong pixels per million, with the scene in place (near) and transformed (far); wrong: over all.
+    """
     rows = list(measure_departures(subject, quick=quick))
     near = [row for row in rows if "in its place" in row.what]
     far = [row for row in rows if row not in near]
@@ -140,7 +152,7 @@ ERRORS = {"triangle": _triangle_errors, "box": _box_errors, "sphere": _sphere_er
 
 
 def _parts(rows: Iterable[Row]) -> dict[str, float]:
-    """misses: of a million rays, with the mesh in its place, and anywhere else."""
+    """Return misses per million rays; misses_moved: the same with the mesh transformed."""
     rows = list(rows)
     home = [row for row in rows if row.what.endswith("in its place")]
     return {"misses": _a_million(home), "misses_moved": _a_million(row for row in rows if row not in home)}
@@ -152,7 +164,7 @@ def _a_million(rows: Iterable[Row]) -> float:
 
 
 def _wrong_hits(subject: Subject, quick: bool) -> tuple[int, int]:
-    """Answers of rays in all directions that float64 rules out, and for how many it knows the only one possible."""
+    """Count hits of random rays that float64 rules out, and rays for which float64 finds a single possible result."""
     wrong = count = 0
     for mesh in (bumpy_ball(3), soup(400)):
         rays: Rays = scattered_rays(mesh[0], 1 << (10 if quick else 18))
@@ -163,7 +175,7 @@ def _wrong_hits(subject: Subject, quick: bool) -> tuple[int, int]:
 
 
 def _distance_errors(subject: Subject, quick: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Errors of t in ulps, over all distances: of steep rays, and of grazing ones."""
+    """Return errors of t in ulps over all distances, for steep and for grazing rays."""
     errors: tuple[list[np.ndarray], list[np.ndarray]] = [], []
     for distance in DISTANCES:
         for angle in ANGLES_DEGREES:

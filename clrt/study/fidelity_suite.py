@@ -1,6 +1,6 @@
-"""The scenarios of github.com/KhronosGroup/glTF-Render-Fidelity, and the images that other path tracers made of them.
+"""Scenarios of github.com/KhronosGroup/glTF-Render-Fidelity, and the images of other path tracers.
 
-A scenario is a model, an environment map, and a camera on an orbit (`test/config.json` of the repository's submodule,
+A scenario is a model, an environment map, and an orbit camera (`test/config.json` of the repository's submodule,
 glTF-Render-Fidelity-Generator). The images ("goldens") are those of the submodule, or else the smaller ones of the
 website. All were tone mapped by three.js' fit of ACES, then encoded.
 """
@@ -23,25 +23,25 @@ from ..scene.pictures import linear_from_srgb, read_texels
 Floats = NDArray[np.float32]
 
 GENERATOR = "glTF-Render-Fidelity-Generator"
-#: The path tracers among the renderers, by the names of their files.
+#: The path tracers among the renderers, by file name.
 PATH_TRACERS = ("blender-cycles", "vray", "stellar", "dspbr-pt", "three-gpu-pathtracer")
-#: Their scripts encode by a power of 1/2.2 where the others use the sRGB curve.
+#: Exponents of renderers whose scripts encode by the power 1/2.2; the others use the sRGB curve.
 POWER = {"blender-cycles": 2.2, "vray": 2.2}
-#: What a scenario does not say (src/config-reader.ts).
+#: Defaults of a scenario (src/config-reader.ts).
 LIGHTING, SIZE, FOV = "environments/lightroom_14b.hdr", {"width": 768, "height": 768}, 45.0
 TARGET, ORBIT = {"x": 0.0, "y": 0.0, "z": 0.0}, {"theta": 0.0, "phi": 90.0, "radius": 1.0}
-#: Columns of the website's images, to which larger ones were shrunk by the Lanczos kernel with this many lobes (sharp's
-#: `resize`), and the quality of their lossy compression, which halves the resolution of hues.
+#: Width in pixels of the website's images, to which larger ones were reduced by the Lanczos kernel with this many lobes
+#: (sharp's `resize`), and the quality of their lossy compression, which halves the resolution of chroma.
 WEBSITE_WIDTH, LOBES, QUALITY = 512, 3, 90
-#: Linear Rec. 709 to the space of the fit, what the fit multiplies values by first, and back (Hill, BakingLab; MIT).
+#: The fit's exposure factor, and the matrices from linear Rec. 709 to its space and back (Hill, BakingLab; MIT).
 EXPOSURE = 1 / 0.6
 ACES_IN = np.array([[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]])
 ACES_OUT = np.array([[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]])
 
 
 class Scenario(NamedTuple):
-    """lighting: an environment map, which is the background as well if `skybox`, which is transparent otherwise. size:
-    (width, height) that were meant; goldens: image files by path tracer."""
+    """A scenario. lighting: environment map, also the background if `skybox`; otherwise the background is transparent.
+    size: nominal (width, height); goldens: image files by path tracer."""
 
     name: str
     model: Path
@@ -53,7 +53,7 @@ class Scenario(NamedTuple):
 
 
 def scenarios(folder: Path) -> list[Scenario]:
-    """Those of a checkout that a path tracer has an image of. UsageError where there are none."""
+    """Return a checkout's scenarios for which a path tracer's image exists. Raises UsageError if there are none."""
     config = folder / GENERATOR / "test" / "config.json"
     try:
         entries = json.loads(config.read_text(encoding="utf-8"))["scenarios"]
@@ -70,7 +70,7 @@ def scenarios(folder: Path) -> list[Scenario]:
 
 
 def _scenario(folder: Path, entry: dict[str, Any]) -> Scenario:
-    """The scenario of an entry of the config; its paths are relative to a folder of the generator's website."""
+    """Parse an entry of the config; its paths are relative to a folder of the generator's website."""
     generator, name = folder / GENERATOR, entry["name"]
     size = SIZE | entry.get("dimensions", {})
     golden = {"": generator / "test" / "goldens" / name, ".thumb": folder / "public" / "thumbnails" / "goldens" / name}
@@ -83,12 +83,12 @@ def _scenario(folder: Path, entry: dict[str, Any]) -> Scenario:
 
 
 def files_of(model: Path) -> list[Path]:
-    """The model's file, and where that is glTF's JSON, those that it names beside it."""
+    """Return the model's file and, if it is glTF JSON, the files it references."""
     try:
         document = json.loads(model.read_text(encoding="utf-8")) if model.suffix == ".gltf" else {}
         named = [one.get("uri", "data:") for part in ("buffers", "images") for one in document.get(part, [])]
     except (OSError, ValueError, AttributeError):
-        named = []    # whoever reads the model says what is wrong
+        named = []    # reported when the model is read
     return [model, *(model.parent / unquote(uri) for uri in named if not uri.startswith("data:"))]
 
 
@@ -97,7 +97,7 @@ def _inside(path: str) -> str:
 
 
 def orbit_camera(target: dict[str, float], orbit: dict[str, float], fov_degrees: float) -> Camera:
-    """A camera `radius` away from the target: phi degrees from +Y, theta from +Z towards +X."""
+    """Return a camera `radius` away from the target: phi degrees from +Y, theta from +Z towards +X."""
     theta, phi = np.radians([orbit["theta"], orbit["phi"]])
     away = np.array([np.sin(phi) * np.sin(theta), np.cos(phi), np.sin(phi) * np.cos(theta)])
     center = np.array([target["x"], target["y"], target["z"]])
@@ -107,14 +107,14 @@ def orbit_camera(target: dict[str, float], orbit: dict[str, float], fov_degrees:
 
 
 def tone_mapped(linear: NDArray[Any]) -> Floats:
-    """Linear Rec. 709 to the display's linear light, in [0, 1]."""
+    """Tone map linear Rec. 709 to the display's linear light, in [0, 1]."""
     v = np.maximum(linear, 0).astype(np.float64) @ (EXPOSURE * ACES_IN.T)
     fitted = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081)
     return np.asarray(np.clip(fitted @ ACES_OUT.T, 0, 1), np.float32)
 
 
 def golden(renderer: str, path: Path, size: tuple[int, int]) -> tuple[Floats, Floats] | None:
-    """The image, as `over_white`; None where its shape is another, as of one that was framed differently."""
+    """Return the image as `over_white`; None if its aspect ratio differs, as with a different framing."""
     rgba = np.asarray(read_texels(path) / 255, np.float32)
     width, height = size
     if abs(rgba.shape[0] * width / (rgba.shape[1] * height) - 1) > 0.02:
@@ -123,8 +123,8 @@ def golden(renderer: str, path: Path, size: tuple[int, int]) -> tuple[Floats, Fl
 
 
 def shrunk(rgba: Floats, size: tuple[int, int]) -> Floats:
-    """Encoded colours and alpha, (h, w, 4) in [0, 1], shrunk as for the website: colours count by their alpha. So text,
-    highlights and edges smaller than a pixel weigh as in the images that were shrunk there."""
+    """Reduce encoded colors and alpha, (h, w, 4) in [0, 1], as the website does: colors are weighted by alpha. So text,
+    highlights and edges smaller than a pixel have the same weight as in the images reduced there."""
     premultiplied = rgba * np.concatenate([np.broadcast_to(rgba[..., 3:], (*rgba.shape[:2], 3)), np.ones_like(
         rgba[..., 3:])], axis=2)
     pixels = np.clip(lanczos(premultiplied, size), 0, 1)
@@ -133,26 +133,26 @@ def shrunk(rgba: Floats, size: tuple[int, int]) -> Floats:
 
 
 def compressed(rgba: Floats) -> Floats:
-    """What the website's compression leaves of it."""
+    """Return the image after the website's compression."""
     import imageio.v3 as imageio
     stored = imageio.imwrite("<bytes>", np.rint(rgba * 255).astype(np.uint8), extension=".webp", quality=QUALITY)
     return np.asarray(imageio.imread(stored, extension=".webp", mode="RGBA") / 255, np.float32)
 
 
 def over_white(rgba: Floats, power: float | None = None) -> tuple[Floats, Floats]:
-    """The display's linear light over white, (h, w, 3), and the alpha, (h, w). power: decodes; None: the sRGB curve."""
+    """Return the display's linear light over white, (h, w, 3), and alpha, (h, w). power: None for the sRGB curve."""
     colors, alpha = rgba[..., :3], rgba[..., 3:]
     decoded = linear_from_srgb(colors) if power is None else colors ** power
     return np.asarray(decoded * alpha + 1 - alpha, np.float32), alpha[..., 0]
 
 
 def reduced(pixels: Floats, size: tuple[int, int]) -> Floats:
-    """(h, w, c) to (height, width, c): means over the area of each pixel."""
+    """Reduce (h, w, c) to (height, width, c) by means over the area of each pixel."""
     return _resampled(pixels, size, _averages)
 
 
 def lanczos(pixels: Floats, size: tuple[int, int]) -> Floats:
-    """(h, w, c) to (height, width, c) by the Lanczos kernel, which rings: values may lie beyond those of the pixels."""
+    """Resample (h, w, c) to (height, width, c) by the Lanczos kernel, which rings: values may leave their range."""
     return _resampled(pixels, size, _lanczos_weights)
 
 
@@ -163,7 +163,7 @@ def _resampled(pixels: Floats, size: tuple[int, int], weights: Callable[[int, in
 
 
 def _averages(n: int, m: int) -> Floats:
-    """(m, n): row i has the parts of the i-th of m equal intervals that each of n equal ones covers."""
+    """Return (m, n): row i has the fraction of the i-th of m equal intervals that each of n equal ones covers."""
     edges = np.linspace(0, n, m + 1)
     cells = np.arange(n)
     covered = np.minimum(edges[1:, None], cells + 1) - np.maximum(edges[:-1, None], cells)
@@ -171,7 +171,7 @@ def _averages(n: int, m: int) -> Floats:
 
 
 def _lanczos_weights(n: int, m: int) -> Floats:
-    """(m, n): row i has the kernel at the n pixels, as wide as the larger pixels, around the i-th of m."""
+    """Return (m, n): row i has the kernel, scaled to the larger pixels, at the n pixels around the i-th of m."""
     x = ((np.arange(m)[:, None] + 0.5) * n / m - np.arange(n) - 0.5) * min(m / n, 1.0)
     kernel = np.where(np.abs(x) < LOBES, np.sinc(x) * np.sinc(x / LOBES), 0.0)
     return np.asarray(kernel / kernel.sum(axis=1, keepdims=True), np.float32)

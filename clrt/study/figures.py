@@ -1,8 +1,8 @@
-"""Figures made of tubes along curves: a dragon, a tree and a statue, of as many triangles as those of the theses.
+"""Procedural models made of tubes along curves: a dragon, a tree and a statue, as large as those of the theses.
 
-The scans that the theses used may not be shipped. Of what matters for speed these have the same: the number of
-triangles, limbs that hide each other, and bumps of some triangles' size. +Y is up; they stand on y = 0 and look to +X.
-`python -m clrt.study.figures FOLDER` writes those that lie in scenes/models.
+The scans that the theses used cannot be redistributed. These have what matters for speed: the same number of
+triangles, limbs that occlude each other, and relief at the scale of some triangles. +Y is up; they stand on y = 0 and
+face +X. `python -m clrt.study.figures FOLDER` writes those in scenes/models.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ Doubles = NDArray[np.float64]
 
 def tube(points: ArrayLike, radii: ArrayLike, rings: int, sides: int, relief: Doubles | float = 0.0,
          flat: float = 1.0) -> Mesh:
-    """A closed tube of 2·rings·sides triangles along a smooth curve through points (k, 3), with radii (k,) there.
+    """Return a closed tube of 2·rings·sides triangles along a smooth curve through points (k, 3), with radii (k,).
 
-    relief: by what part radii are larger, (rings, sides). flat: its width across the plane of the curve's beginning,
-    over that in it.
+    relief: relative increase of the radii, (rings, sides). flat: ratio of its width perpendicular to the plane of the
+    curve's start to that in it.
     """
     knots = np.linspace(0, 1, len(np.asarray(points)))
     at = np.linspace(0, 1, rings)
@@ -34,7 +34,7 @@ def tube(points: ArrayLike, radii: ArrayLike, rings: int, sides: int, relief: Do
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     side = np.zeros_like(ahead)
     side[0] = _across(ahead[0])
-    for ring in range(1, rings):   # a frame that does not twist
+    for ring in range(1, rings):   # a frame without twist
         side[ring] = side[ring - 1] - ahead[ring] * (ahead[ring] @ side[ring - 1])
         side[ring] /= np.linalg.norm(side[ring])
     angles = 2 * np.pi * np.arange(sides) / sides
@@ -47,7 +47,7 @@ def tube(points: ArrayLike, radii: ArrayLike, rings: int, sides: int, relief: Do
 
 
 def _skin(rings: int, sides: int) -> NDArray[np.int32]:
-    """Faces between rings of vertices and two more at the ends, seen from outside."""
+    """Return outward-facing faces between rings of vertices and two end vertices."""
     ring, side = np.mgrid[:rings - 1, :sides]
     a, b = ring * sides + side, ring * sides + (side + 1) % sides
     walls = np.stack([np.stack([a, b, b + sides], -1), np.stack([a, b + sides, a + sides], -1)]).reshape(-1, 3)
@@ -59,13 +59,13 @@ def _skin(rings: int, sides: int) -> NDArray[np.int32]:
 
 
 def _across(direction: Doubles) -> Doubles:
-    """A unit vector across: level, where there is one."""
+    """Return a unit vector perpendicular to a direction: horizontal, if it is unique."""
     level = np.cross([0.0, 1.0, 0.0], direction)
     level = level if level.any() else np.array([1.0, 0.0, 0.0])
     return np.asarray(level / np.linalg.norm(level))
 
 
-#: The dragon's back, from the tip of the tail to the snout, and how thick it is there.
+#: Points along the dragon's back, from the tip of the tail to the snout, and its radius there.
 SPINE = np.array([(-1.15, 0.95, 0.42), (-1.48, 0.62, 0.28), (-1.38, 0.24, -0.05), (-0.98, 0.2, -0.2),
                   (-0.62, 0.5, -0.08), (-0.2, 0.72, 0.08), (0.25, 0.6, 0.06), (0.6, 0.62, -0.04), (0.8, 0.95, -0.06),
                   (0.78, 1.3, 0.0), (1.0, 1.52, 0.05), (1.28, 1.44, 0.06), (1.5, 1.36, 0.06)])
@@ -73,7 +73,7 @@ THICK = np.array([0.012, 0.04, 0.07, 0.11, 0.18, 0.23, 0.24, 0.21, 0.15, 0.115, 
 
 
 def dragon() -> Mesh:
-    """A scaly dragon of 19 332 triangles, 3 long."""
+    """Return a scaly dragon of 19 332 triangles, 3 units long."""
     rings, sides = 220, 36
     along, around = np.arange(rings)[:, None], np.arange(sides)[None]
     scales = 0.06 * np.abs(np.sin(np.pi * along / 5)) * np.abs(np.cos(np.pi * (around / 6 + (along // 5) / 2)))
@@ -92,7 +92,7 @@ def dragon() -> Mesh:
 
 
 def _crest() -> list[Mesh]:
-    """Spikes along the back."""
+    """Return spikes along the back."""
     at = np.linspace(0.08, 0.85, 26)
     knots = np.linspace(0, 1, len(SPINE))
     path, ahead = smooth(knots, SPINE, at), smooth(knots, SPINE, at + 1e-3) - smooth(knots, SPINE, at - 1e-3)
@@ -106,7 +106,7 @@ def _crest() -> list[Mesh]:
 
 
 def tree() -> tuple[Mesh, Mesh]:
-    """A tree of 264 triangles, 3 high: its wood (84) and its leaves (180)."""
+    """Return a tree of 264 triangles, 3 units high: its wood (84) and its leaves (180)."""
     wood = [tube([(0, 0, 0), (0.04, 0.6, 0.02), (-0.03, 1.5, 0)], [0.17, 0.11, 0.06], 3, 6)]
     crown = [(0.0, 2.35, 0.0, 0.62)]
     for turn in range(3):
@@ -126,7 +126,7 @@ def tree() -> tuple[Mesh, Mesh]:
 
 
 def statue(detail: int = 4) -> Mesh:
-    """A winged figure in a long robe, 2.2 high: 448 880 triangles at detail 4, about a 16th of them at 1."""
+    """Return a winged figure in a robe, 2.2 units high: 448 880 triangles at detail 4, about a 16th of that at 1."""
     def part(points: ArrayLike, radii: ArrayLike, rings: int, sides: int, folds: float = 0.0, count: int = 1,
              flat: float = 1.0) -> Mesh:
         rings, sides = rings * detail // 4, sides * detail // 4
@@ -152,7 +152,7 @@ def _wing(z: int, rings: int, sides: int) -> Mesh:
 
 
 def column(detail: int = 4) -> Mesh:
-    """A fluted column, 3 high: 62 784 triangles at detail 4."""
+    """Return a fluted column, 3 units high: 62 784 triangles at detail 4."""
     rings, sides = 436 * detail // 4, 72 * detail // 4
     flutes = 0.08 * np.abs(np.cos(6 * 2 * np.pi * np.arange(sides)[None] / sides))
     return tube([(0, 0, 0), (0, 0.15, 0), (0, 0.3, 0), (0, 1.6, 0), (0, 2.7, 0), (0, 2.85, 0), (0, 3, 0)],
@@ -160,7 +160,7 @@ def column(detail: int = 4) -> Mesh:
 
 
 def write_models(folder: Path) -> None:
-    """dragon.ply and tree.obj, as they lie in scenes/models."""
+    """Write dragon.ply and tree.obj, the files in scenes/models."""
     vertices, faces = dragon()
     header = ("ply\nformat binary_little_endian 1.0\ncomment clrt/study/figures.py\n"
               f"element vertex {len(vertices)}\nproperty float x\nproperty float y\nproperty float z\n"

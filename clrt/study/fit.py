@@ -1,4 +1,4 @@
-"""How a quantity grows with the number of triangles: the work of a ray in a good tree grows with its logarithm."""
+"""Growth of a quantity with the number of triangles: the cost of a ray in a good BVH grows logarithmically."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 
 
 def fit_logarithm(sizes: ArrayLike, values: ArrayLike) -> dict[str, float]:
-    """The least-squares line a + b·log2(size) through values (k,) at sizes (k,) > 0, k >= 2, and its R², `r2`.
+    """Fit a + b·log2(size) by least squares to values (k,) at sizes (k,) > 0, k >= 2, with the coefficient R², `r2`.
 
-    R² is the part of the values' variance that the line explains; 1 where they are all alike.
+    R² is the fraction of the values' variance that the line explains; 1 if they are all equal.
     """
     x, y = np.log2(np.asarray(sizes, np.float64)), np.asarray(values, np.float64)
     from_mean, deviations = x - x.mean(), y - y.mean()

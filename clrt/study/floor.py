@@ -1,7 +1,7 @@
-"""A plastic floor under lights that are hard to reflect rightly, beside physical models and other renderers.
+"""A plastic floor under lights that are hard to shade accurately, compared with physical models and other renderers.
 
-Means of pictures of 2 degrees, from straight above and from 75 degrees off the normal, over those of a white Lambertian
-floor (float64): 1 is what a white matte floor reflects.
+Results are means of images with a 2 degree field of view, from straight above and at 75 degrees off the normal,
+divided by those of a white Lambertian floor (float64): 1 is what a white matte floor reflects.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ WHITE = (1.0, 1.0, 1.0)
 MATERIALS: dict[str, Material] = {"Lambert": Diffuse(color=WHITE)} | {
     f"roughness {roughness:g}": MetallicRoughness(color=WHITE, ior=Plastic.IOR, roughness=roughness)
     for roughness in (0.1, 0.5, 1.0)}
-#: Angles from the normal at which the floor is seen, from the side that the light comes towards.
+#: Viewing angles from the normal, on the side that the light travels towards.
 VIEWS = {"above": 0.0, "75°": 75.0}
 DISTANCE, FOV_DEGREES, SIZE = 10.0, 2.0, (16, 16)
-#: The sky: texels, its radiance, and its sun's; the sun's elevation and the deviation of its bell, in degrees.
+#: The sky: size in texels, its radiance, and its sun's; the sun's elevation and Gaussian deviation in degrees.
 SKY_SIZE, SKY_RADIANCE, SUN_RADIANCE, SUN_ELEVATION, SUN_WIDTH = (64, 128), 0.2, 100.0, 10.0, 3.0
 
 
 def lights() -> dict[str, dict[str, Any]]:
-    """What a scene has besides the floor, by name; the light comes from -z."""
+    """Return the contents of a scene besides the floor, by name; the light comes from -z."""
     lamp = Mesh(vertices=np.array([[-0.5, 0.3, -4], [0.5, 0.3, -4], [0.5, 1.3, -4], [-0.5, 1.3, -4]], np.float32),
                 faces=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
                 material=Diffuse(color=(0.0, 0.0, 0.0), emission=(10.0, 10.0, 10.0)), name="lamp")
@@ -51,7 +51,7 @@ def lights() -> dict[str, dict[str, Any]]:
 
 
 def low_sun() -> FloatArray:
-    """(h, w, 3) an even sky with a sun near the horizon, towards -z."""
+    """Return an environment map (h, w, 3), constant except for a sun near the horizon towards -z."""
     height, width = SKY_SIZE
     theta, phi = np.meshgrid((np.arange(height) + 0.5) / height * np.pi, (np.arange(width) + 0.5) / width * 2 * np.pi,
                              indexing="ij")
@@ -62,7 +62,7 @@ def low_sun() -> FloatArray:
 
 
 def floor_scene(light: str, view: str, material: str) -> Scene:
-    """By names of `lights`, VIEWS and MATERIALS; of direct light alone."""
+    """Return a scene by names of `lights`, VIEWS and MATERIALS, with direct lighting only."""
     floor = Mesh(vertices=np.array([[-50, 0, -50], [-50, 0, 50], [50, 0, 50], [50, 0, -50]], np.float32),
                  faces=np.array([[0, 1, 2], [0, 2, 3]], np.int32), material=MATERIALS[material], name="floor")
     off = np.radians(VIEWS[view])
@@ -74,9 +74,9 @@ def floor_scene(light: str, view: str, material: str) -> Scene:
 
 def measure_floor(found: Mapping[str, Judge], spp: int, seeds: int,
                   chosen: Collection[str] = ()) -> Iterator[dict[str, Any]]:
-    """A row for each light, view and material: {column: (value, standard error)} under "values", MODELS first.
+    """Yield a row per light, view and material: {column: (value, standard error)} under "values", MODELS first.
 
-    chosen: of these lights, or of all.
+    chosen: these lights; all if empty.
     """
     for light in chosen or lights():
         for view in VIEWS:
@@ -90,13 +90,13 @@ def measure_floor(found: Mapping[str, Judge], spp: int, seeds: int,
 
 
 def _mean(renderer: Contestant, spp: int, seeds: int) -> Estimate:
-    """Of all pixels, in red, by the spread over seeds."""
+    """Return the mean over all pixels, in red, with its error from the spread over seeds."""
     means = [float(renderer(spp, seed).pixels[..., 0].mean(dtype=np.float64)) for seed in range(1, seeds + 1)]
     return Estimate(float(np.mean(means)), float(np.std(means, ddof=1) / seeds**0.5))
 
 
 def judges(device: str | int | None = None) -> tuple[dict[str, Judge], dict[str, str]]:
-    """clrt and what else is installed, by column, and why others are missing."""
+    """Return clrt and the other installed renderers by column, and the reasons why others are missing."""
     number = choose(device)[0].index
     found: dict[str, Judge] = {"clrt": lambda scene: choices_on(scene, [number], {"clrt": {}})["clrt"]}
     missing = {}
@@ -109,7 +109,7 @@ def judges(device: str | int | None = None) -> tuple[dict[str, Judge], dict[str,
 
 
 def _mitsuba(module: Any) -> dict[str, Judge]:
-    """Mitsuba's own plastics, of the same F0 and alpha."""
+    """Return Mitsuba's own plastics, with the same F0 and alpha."""
     library, _ = module.load()
 
     def judge(plastic: Mapping[str, Any], scene: Scene) -> Contestant:
@@ -132,7 +132,7 @@ def _mitsuba(module: Any) -> dict[str, Judge]:
 
 
 def _cycles(module: Any) -> dict[str, Judge]:
-    """Blender's Principled BSDF with its defaults, but white, of that roughness."""
+    """Return Blender's Principled BSDF with its defaults, except that it is white and has the material's roughness."""
     from .cycles_scene import BSDFS, Nodes, blender_scene
 
     def principled(nodes: Nodes, material: MetallicRoughness) -> Any:
@@ -142,6 +142,6 @@ def _cycles(module: Any) -> dict[str, Judge]:
     return {"Cycles": lambda scene: module.Cycles(library, partial(blender_scene, library.data, scene, bsdfs=bsdfs))}
 
 
-#: By what pip calls them: their modules and the columns that these make.
+#: By pip package: module, and the function that makes its columns.
 PEERS: dict[str, tuple[str, Callable[[Any], dict[str, Judge]]]] = {
     "mitsuba": ("mitsuba_renderer", _mitsuba), "bpy": ("cycles_renderer", _cycles)}

@@ -1,10 +1,11 @@
-"""The radiance of a floor in float64, by Monte Carlo integration of white plastic as its papers have it.
+"""Reference radiance of a plastic floor in float64, by Monte Carlo integration of the published model.
 
     f = F·D·G/(4·cos wi·cos wo) + (1 − E(wi))·(1 − E(wo))/(π·(1 − mean E))
 
-for a white body: GGX's D (Walter et al. 2007, eq. 33), the height-correlated G (Heitz 2014, eq. 99), Schlick's F
-(1994), and the coupling of Kelemen and Szirmay-Kalos (2001) with the directional albedo E of the gloss. These are
-clrt's; MODELS has two more, to find where another renderer's differ. Nothing here is shared with the kernels. y is up.
+for a white base: GGX's D (Walter et al. 2007, eq. 33), the height-correlated G (Heitz 2014, eq. 99), Schlick's F
+(1994), and the coupling of Kelemen and Szirmay-Kalos (2001) with the directional albedo E of the specular lobe. These
+are clrt's; MODELS has two more, to locate the differences of other renderers. No code is shared with the kernels.
+y is up.
 """
 
 from __future__ import annotations
@@ -23,32 +24,32 @@ from ..scene.textures import untextured
 Doubles = NDArray[np.float64]
 Bsdf = Callable[[Doubles, Doubles], Doubles]
 
-#: Directions at a time, and how many times.
+#: Directions per batch, and the number of batches.
 BATCH, BATCHES = 1 << 18, 8
-#: Nodes of √cos for which E is integrated, and of each number of a direction.
+#: Nodes in √cos at which E is integrated, and nodes in each dimension of its integral over directions.
 NODES, DIRECTIONS = 96, 64
 
 
 class Estimate(NamedTuple):
-    """A mean, and its standard error."""
+    """Mean and its standard error."""
 
     mean: float
     error: float
 
 
 class Model(NamedTuple):
-    """exact: F by Fresnel's equations; by_view: the body is weighed by 1 − E(wo) alone, which is not reciprocal."""
+    """Model options. exact: F by Fresnel's equations; by_view: scale the base by 1 − E(wo) only (not reciprocal)."""
 
     exact: bool = False
     by_view: bool = False
 
 
-#: clrt's; the same with Fresnel's equations; and with the layering of Cycles' Principled BSDF.
+#: clrt's model; the same with Fresnel's equations; and with the layering of Cycles' Principled BSDF.
 MODELS = {"model": Model(), "Fresnel": Model(exact=True), "by view": Model(exact=True, by_view=True)}
 
 
 class Plastic:
-    """White with an index of refraction `IOR`."""
+    """White plastic with an index of refraction `IOR`."""
 
     IOR = 1.5
 
@@ -60,7 +61,7 @@ class Plastic:
         self._kept = 1 - float(np.sum(2 * weights * self._roots**3 * self._albedos))   # mean E = ∫ 2c·E dc, c = root²
 
     def __call__(self, wo: Doubles, wi: Doubles) -> Doubles:
-        """(n,) of f."""
+        """Evaluate f, (n,)."""
         h = _unit(wo + wi)
         fresnel = self._fresnel(np.sum(wo * h, axis=1))
         gloss = fresnel * self._distribution(h[:, 1]) * self._shadowing(wo[:, 1], wi[:, 1]) / (4 * wo[:, 1] * wi[:, 1])
@@ -68,11 +69,11 @@ class Plastic:
         return np.asarray(gloss + (1 - self.albedo(wo[:, 1])) * below / np.pi)
 
     def albedo(self, cosine: Doubles) -> Doubles:
-        """E: the part of light from there that the gloss reflects."""
+        """Return E, the directional albedo of the specular lobe."""
         return np.asarray(np.interp(np.sqrt(cosine), self._roots, self._albedos))
 
     def draw(self, wo: Doubles, u: Doubles) -> Doubles:
-        """(n, 3) directions mirrored at visible normals, by numbers (n, 2) (Heitz 2018, listing 1)."""
+        """Sample (n, 3) directions reflected at visible normals, from numbers (n, 2) (Heitz 2018, listing 1)."""
         stretch = np.array([self.alpha, 1.0, self.alpha])
         v = _unit(wo * stretch)
         across = np.hypot(v[:, 0], v[:, 2])
@@ -86,12 +87,12 @@ class Plastic:
         return np.asarray(2 * np.sum(wo * h, axis=1)[:, None] * h - wo)
 
     def density(self, wo: Doubles, wi: Doubles) -> Doubles:
-        """Of what `draw` draws (Heitz 2018, eq. 3)."""
+        """Return the pdf of `draw` (Heitz 2018, eq. 3)."""
         h = _unit(wo + wi)
         return np.asarray(self._distribution(h[:, 1]) / (1 + self._lambda(wo[:, 1])) / (4 * wo[:, 1]))
 
     def _albedo(self, cosine: float) -> float:
-        """Over visible normals, whose first number is sin² of an angle, in which the integrand is smooth."""
+        """Integrate over visible normals; their first number is sin² of an angle in which the integrand is smooth."""
         x, weights = np.polynomial.legendre.leggauss(DIRECTIONS)
         angle, turn = np.meshgrid((x + 1) * np.pi / 4, (np.arange(DIRECTIONS) + 0.5) / DIRECTIONS, indexing="ij")
         share = (np.sin(2 * angle) * weights[:, None] * np.pi / 4 / DIRECTIONS).ravel()
@@ -121,7 +122,7 @@ class Plastic:
 
 
 class Lamp:
-    """An emitting parallelogram: where it is sampled, what it sends, and how densely its directions are drawn."""
+    """Emissive parallelogram: sampling, radiance and pdf."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._corner, b, _, d = mesh.vertices.astype(np.float64)
@@ -134,7 +135,7 @@ class Lamp:
         return _unit(self._corner + u @ self._sides - p)
 
     def light(self, p: Doubles, wi: Doubles) -> tuple[Doubles, Doubles]:
-        """(n,) radiance from there, and the density of `draw`."""
+        """Return the radiance from wi, (n,), and the pdf of `draw`."""
         facing = -wi @ self._normal
         t = (self._corner - p) @ self._normal / np.where(facing > 0, -facing, -1)
         places = np.linalg.lstsq(self._sides.T, (p + t[:, None] * wi - self._corner).T, rcond=None)[0]
@@ -143,7 +144,7 @@ class Lamp:
 
 
 class Sky:
-    """An environment image, drawn by the brightest texel around."""
+    """Environment map, importance sampled by the maximum of each texel and its neighbors."""
 
     def __init__(self, environment: Environment) -> None:
         assert environment.image is not None
@@ -156,7 +157,7 @@ class Sky:
         self._sums = np.cumsum(self._chances)
 
     def draw(self, p: Doubles, u: Doubles) -> Doubles:
-        """The first number chooses a texel, and what is left of it the place across."""
+        """Sample a direction. The first number selects a texel, and its remainder the horizontal position within it."""
         height, width = self._texels.shape
         texel = np.minimum(np.searchsorted(self._sums, u[:, 0], "right"), self._texels.size - 1)
         chance = self._chances.ravel()[texel]
@@ -165,7 +166,7 @@ class Sky:
         return np.column_stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)])
 
     def light(self, p: Doubles, wi: Doubles) -> tuple[Doubles, Doubles]:
-        """Likewise, bilinear between texels."""
+        """Return the radiance, bilinearly interpolated between texels, and the pdf of `draw`."""
         height, width = self._texels.shape
         u = np.arctan2(wi[:, 0], -wi[:, 2]) / (2 * np.pi) % 1 * width
         v = np.arccos(np.clip(wi[:, 1], -1, 1)) / np.pi * height
@@ -180,11 +181,12 @@ class Sky:
 
 
 def floor_radiance(scene: Scene, model: Model = MODELS["model"], seed: int = 0) -> Estimate:
-    """The mean radiance of a scene's picture (red), which shows but its first mesh, the floor y = 0.
+    """Estimate the mean radiance (red) of a scene's image, which must show only its first mesh, the floor y = 0.
 
     Its material is white, `diffuse` or `metallic_roughness`; it is lit directly by delta lights, or by one further
-    mesh, or by an environment image: Monte Carlo integration over pixels and directions, which are drawn in turns from
-    the light, the gloss and the cosine, with the mixture's density (the balance heuristic of Veach and Guibas 1995).
+    mesh, or by an environment map. This is Monte Carlo integration over pixels and directions, which are sampled in
+    turn from the light, the specular lobe and the cosine, with the pdf of the mixture (the balance heuristic of Veach
+    and Guibas 1995).
     """
     material = scene.meshes[0].material
     plastic = Plastic(untextured(material.roughness), model) if isinstance(material, MetallicRoughness) else None
@@ -203,7 +205,7 @@ def floor_radiance(scene: Scene, model: Model = MODELS["model"], seed: int = 0) 
 
 
 def _seen(camera: Camera, u: Doubles) -> tuple[Doubles, Doubles]:
-    """Points of the floor that a square picture shows at places (n, 2), and the directions to the camera."""
+    """Return the points on the floor at positions (n, 2) of a square image, and the directions to the camera."""
     position = np.array(camera.position)
     forward = _unit((np.array(camera.look_at) - position)[None])[0]
     right = _unit(np.cross(forward, camera.up)[None])[0]

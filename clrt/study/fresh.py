@@ -1,6 +1,6 @@
-"""What a new process pays, from arrays to first answers: seconds, kernels' building included, and its peak of memory.
+"""Cold-start cost of a new process, from arrays to first results: seconds including compilation, and peak memory.
 
-`python -m clrt.study.fresh FOLDER` is that process: it answers what `measure_fresh` has put into the folder.
+`python -m clrt.study.fresh FOLDER` is that process: it answers the query that `measure_fresh` stored in the folder.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from .rays import Rays
 from .workloads import Mesh
 
 ARRAYS, OPTIONS, FIGURES = "arrays.npz", "options.json", "figures.json"
-#: Where programs are kept: clrt's own cache and PoCL's.
+#: Environment variables of the program caches: clrt's own and PoCL's.
 CACHES = ("CLRT_CACHE_DIR", "POCL_CACHE_DIR")
 
 
 def measure_fresh(scene: Mesh, rays: Rays, cache: Path | None = None, **options: Any) -> dict[str, Any]:
-    """The figures of a new process that builds the tree and asks for the closest hits. options: see RayQuery.
+    """Measure a new process that builds the BVH and finds the closest hits. options: see RayQuery.
 
-    build_seconds: from arrays to the tree on the device; tree_seconds: of the tree; answer_seconds: of the first call;
-    hits; peak_bytes: the most memory that the process had. cache: a folder to keep programs in, which an empty one
-    must be compiled for; left out, the user's.
+    build_seconds: from arrays to the BVH on the device; tree_seconds: of the BVH build alone; answer_seconds: of the
+    first call; hits; peak_bytes: the process's peak memory. cache: the folder of the program caches; if empty, programs
+    are compiled; if left out, the user's caches are used.
     """
     with TemporaryDirectory() as folder:
         np.savez(Path(folder) / ARRAYS, *scene, *rays)
@@ -46,7 +46,7 @@ def measure_fresh(scene: Mesh, rays: Rays, cache: Path | None = None, **options:
 
 
 def answer(folder: Path) -> None:
-    """What the new process does."""
+    """Run the query in the new process."""
     with np.load(folder / ARRAYS) as stored:
         vertices, faces, *rays = (stored[name] for name in stored.files)
     start = time.perf_counter()
@@ -60,9 +60,9 @@ def answer(folder: Path) -> None:
 
 
 def peak_bytes() -> int | None:
-    """The most memory that this process had at a time; None where the system does not say.
+    """Return this process's peak memory; None if the system does not report it.
 
-    Linux says more of it in /proc than by getrusage, which counts what the parent had as well.
+    On Linux, /proc is more accurate than getrusage, which includes the parent's peak.
     """
     try:
         lines = Path("/proc/self/status").read_text().splitlines()

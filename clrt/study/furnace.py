@@ -1,4 +1,4 @@
-"""White furnaces: what a surface sends back where the same light comes from everywhere, from every angle."""
+"""White furnace tests: what a surface reflects under uniform illumination, for all viewing angles."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ COSINES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.1, 0.03, 1e-2, 1e-3, 1e-4)
 SMITHS: tuple[Smith, ...] = get_args(Smith)
 IORS = (1.0, 1.2, 1.5, 2.5, 4.0)
 COLOR = (0.8, 0.5, 0.2)
-#: Rough glass from nearly smooth to the roughest, of every index, and thin sheets.
+#: Rough glass from nearly smooth to the roughest, for every index of refraction, and thin sheets.
 GLASSES = [Dielectric(ior=ior, roughness=roughness, thin=thin)
            for ior, thin in [*((ior, False) for ior in (0.25, 0.7, 0.99, 1.01, 1.1, 1.33, 1.5, 2.4, 4.0)), (1.5, True)]
            for roughness in ROUGHNESSES[1:]]
 
 
-#: What may lie on white, or pass light through it, and what is below.
+#: White layers on top of white materials (LAYERS) and the materials below them (BELOW).
 WHITE = (1.0, 1.0, 1.0)
 FILM_ROUGHNESSES, FIBRE_ROUGHNESSES = (0.0, 0.1, 0.3, 0.6, 1.0), (0.1, 0.2, 0.35, 0.6, 1.0)
 FILMS: list[dict[str, Any]] = [{"clearcoat": 1.0, "clearcoat_roughness": roughness} for roughness in FILM_ROUGHNESSES]
@@ -36,12 +36,12 @@ LAYERS: dict[str, list[dict[str, Any]]] = {
     "a sheet under a film": [{"transmission": 0.5} | film for film in FILMS]}
 BELOW: dict[str, dict[str, Any]] = {"matte": {"specular": 0.0}, "ior 1.5": {}, "ior 3": {"ior": 3.0},
                                     "half metal": {"metallic": 0.5}, "metal": {"metallic": 1.0}}
-#: Nearer to the horizon fits of albedos are less exact, and light from there is of no weight.
+#: Closer to the horizon the albedo fits are less accurate, and light from there has negligible weight.
 LAYER_COSINES = tuple(cosine for cosine in COSINES if cosine >= 0.03)
 
 
 class Reflected(NamedTuple):
-    """What white sends back, and what it should: 1, or without multiple scattering the albedo of one bounce."""
+    """Reflectance of a white material; exact: 1, or the single-bounce albedo without multiple scattering."""
 
     material: MetallicRoughness
     cosine: float
@@ -59,7 +59,7 @@ class Kept(NamedTuple):
 
 
 def measure_metals(device: Device, samples: int, smiths: Iterable[Smith] = SMITHS) -> Iterator[Reflected]:
-    """White metals without and with multiple scattering, of every roughness from every angle."""
+    """Measure white metals without and with multiple scattering, for every roughness and angle."""
     metals = [MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=roughness, smith=smith,
                                 multiple_scattering=multiple)
               for smith in smiths for multiple in (False, True) for roughness in ROUGHNESSES]
@@ -72,7 +72,7 @@ def measure_metals(device: Device, samples: int, smiths: Iterable[Smith] = SMITH
 
 
 def measure_plastics(device: Device, samples: int) -> Iterator[Reflected]:
-    """White bodies under gloss of every roughness and some indices, without metal and with, from every angle."""
+    """Measure white plastics of every roughness and several indices, without and with metal, for every angle."""
     plastics = [MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=metallic, roughness=roughness, ior=ior)
                 for metallic in (0.0, 0.5) for ior in IORS for roughness in ROUGHNESSES]
     subject, numbers = bsdfs(device, [*plastics]), evenly(samples)
@@ -82,7 +82,7 @@ def measure_plastics(device: Device, samples: int) -> Iterator[Reflected]:
 
 
 def measure_layers(device: Device, samples: int, name: str, step: int = 1) -> Iterator[Reflected]:
-    """White below layers of a name of LAYERS, of every step-th roughness."""
+    """Measure white materials below the layers of a name of LAYERS, using every step-th roughness."""
     whites = [MetallicRoughness(color=WHITE, roughness=roughness, **below, **layer) for layer in LAYERS[name]
               for below in BELOW.values() for roughness in ROUGHNESSES[::step]]
     subject, numbers = bsdfs(device, [*whites]), evenly(samples)
@@ -92,7 +92,7 @@ def measure_layers(device: Device, samples: int, name: str, step: int = 1) -> It
 
 
 def measure_glass(device: Device, samples: int, glasses: Sequence[Dielectric] = GLASSES) -> Iterator[Kept]:
-    """White glasses seen from both sides, from every angle."""
+    """Measure white glasses from both sides, for every angle."""
     subject, numbers = bsdfs(device, [*glasses]), evenly(samples)
     for which, glass in enumerate(glasses):
         for front in (True, False):
@@ -102,7 +102,7 @@ def measure_glass(device: Device, samples: int, glasses: Sequence[Dielectric] = 
 
 
 def inexact(device: Device, samples: int) -> tuple[int, int]:
-    """How many samples of diffuse and mirror weigh other than their color, and how many there were."""
+    """Count samples of diffuse and mirror whose weight is not their color, and all samples."""
     subject, numbers = bsdfs(device, [Diffuse(color=COLOR), Mirror(color=COLOR)]), evenly(samples)
     weights = [_weights(subject, which, cosine, numbers) for which in (0, 1) for cosine in COSINES]
     wrong = sum(int(np.any(weight != np.array(COLOR, np.float32), axis=1).sum()) for weight in weights)
@@ -110,13 +110,13 @@ def inexact(device: Device, samples: int) -> tuple[int, int]:
 
 
 def evenly(count: int) -> Doubles:
-    """(count, 3) numbers that fill the unit cube evenly, as float32 holds them: Hammersley's points."""
+    """Return (count, 3) Hammersley points in the unit cube, exact in float32."""
     points = np.column_stack([(np.arange(count) + 0.5) / count, _reversed_digits(count, 2), _reversed_digits(count, 3)])
     return np.asarray(np.floor(points * (1 << 24)) / (1 << 24))
 
 
 def _reversed_digits(count: int, base: int) -> Doubles:
-    """(count,) 0, 1, 2 … with their digits mirrored at the point."""
+    """Return the radical inverses of 0, 1, 2 …, (count,)."""
     number, place, mirrored = np.arange(count), 1.0, np.zeros(count)
     while number.any():
         place /= base

@@ -1,5 +1,4 @@
-"""Whether answers depend on what they must not (the tree's layout and builder, the traversal, the device), and
-whether float64 says the same."""
+"""Whether hits are independent of BVH layout, builder, traversal and device, and agree with float64."""
 
 from __future__ import annotations
 
@@ -22,10 +21,10 @@ from .workloads import Mesh, bumpy_ball
 
 
 class Effort(NamedTuple):
-    """rays: of each kind; subdivisions: of the meshes; soup: its triangles.
+    """Extent of a measurement. rays: per kind; subdivisions: of the meshes; soup: its number of triangles.
 
-    list_tests, exact_tests: most rays times triangles without a tree and in float64; where all rays would be more, as
-    many are taken evenly out of them.
+    list_tests, exact_tests: most rays times triangles for brute force and for float64; beyond that, an evenly spaced
+    subset of the rays is used.
     """
 
     rays: int
@@ -39,7 +38,7 @@ FULL, QUICK = Effort(1 << 18, 6, 3000, 1 << 28, 1 << 29), Effort(1 << 12, 3, 300
 
 
 class Case(NamedTuple):
-    """A mesh; closed: all rays from its inside hit it."""
+    """A mesh. closed: all rays from its inside hit it."""
 
     name: str
     mesh: Mesh
@@ -47,7 +46,7 @@ class Case(NamedTuple):
 
 
 class Way(NamedTuple):
-    """How rays are answered. device: an index."""
+    """Configuration of a query. device: an index."""
 
     device: int
     layout: str
@@ -56,7 +55,7 @@ class Way(NamedTuple):
 
 
 def measure_hits(*, quick: bool = False, device: str | int | None = None) -> Iterator[dict[str, Any]]:
-    """The figures of `clrt bench hits`, mesh by mesh: see `measure_case`. device: left out, all but simulators."""
+    """Yield the results of `clrt bench hits` by mesh: see `measure_case`. device: default all except simulators."""
     devices = [choose(device)[0].index] if device is not None else [
         info.index for info, _ in find_devices() if info.usable and info.type != "simulator"]
     effort = QUICK if quick else FULL
@@ -66,12 +65,12 @@ def measure_hits(*, quick: bool = False, device: str | int | None = None) -> Ite
 
 
 def measure_case(case: Case, devices: list[int], effort: Effort) -> dict[str, Any]:
-    """Of one mesh `ways`, `exact`, escaped: rays from its inside that hit nothing; flat: hits where there is no area.
+    """Measure one mesh: `ways`, `exact`; escaped: rays from its inside that miss; flat: hits on triangles of zero area.
 
-    ways: of each, how many rays it answered (`rays`), and for how many of each kind (`differ`) t, primitive, u and v
-    are not bit by bit the first way's, or any_hit is not what they say; or the `error` it ended in. exact: how many of
-    the first way's answers float64 was asked for (`rays`), for how many of these only one is possible (`decided`), and
-    how many are impossible (`wrong`).
+    ways: for each configuration the number of rays (`rays`), and by kind (`differ`) for how many of them t, primitive,
+    u and v are not bitwise equal to the first configuration's, or any_hit contradicts them; or the `error` that
+    occurred. exact: how many of the first configuration's hits were compared with float64 (`rays`), how many of these
+    have a single possible result (`decided`), and how many are impossible (`wrong`).
     """
     kinds = rays_of_kinds(*case.mesh, effort.rays)
     rays, triangles = all_rays(kinds), len(case.mesh[1])
@@ -82,7 +81,7 @@ def measure_case(case: Case, devices: list[int], effort: Effort) -> dict[str, An
         try:
             hits, blocked = _answers(case.mesh, way, every(step, rays))
         except UsageError:
-            continue    # not every builder makes every layout
+            continue    # not every builder supports every layout
         except ClrtError as error:
             ways.append({**way._asdict(), "error": str(error)})
             continue
@@ -100,7 +99,7 @@ def measure_case(case: Case, devices: list[int], effort: Effort) -> dict[str, An
 
 
 def _ways(devices: list[int]) -> Iterator[Way]:
-    """The first one is what all others are compared with."""
+    """Yield all configurations; the first is the reference of the others."""
     for device in devices:
         for layout in TREES:
             for builder in ("sah",) if layout in TREELESS else BUILDER_NAMES:
@@ -114,7 +113,7 @@ def _answers(mesh: Mesh, way: Way, rays: Rays) -> tuple[NDArray[Any], NDArray[np
 
 
 def _checked(mesh: Mesh, rays: Rays, hits: NDArray[Any], step: int) -> dict[str, int]:
-    """Of one ray of `step`; hits on what has no area, which float64 never meets, are counted apart."""
+    """Check every step-th ray. Hits on zero-area triangles, which float64 never reports, are counted separately."""
     some, found = every(step, rays), hits[::step]
     bounds = closest_bounds(*mesh, some)
     return {"rays": len(bounds.low), "decided": int(np.sum(bounds.primitive != UNDECIDED)),
@@ -122,6 +121,6 @@ def _checked(mesh: Mesh, rays: Rays, hits: NDArray[Any], step: int) -> dict[str,
 
 
 def _on_flat(mesh: Mesh, hits: NDArray[Any]) -> NDArray[np.bool_]:
-    """Which hits are on triangles whose corners lie in one line: they close the seam between their neighbours."""
+    """Return which hits are on triangles with collinear vertices: they close the seam between their neighbors."""
     flat = np.append(areas(mesh[0][mesh[1]].astype(np.float64)) == 0, False)
     return np.asarray(flat[hits["primitive"]])

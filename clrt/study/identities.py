@@ -1,6 +1,6 @@
-"""Identities that the pictures of any scene obey: sums of lights, equal means by every strategy, symmetries.
+"""Identities that the images of any scene satisfy: sums of lights, equal means of all strategies, symmetries.
 
-A property makes sides of a scene. The picture of each of them equals that of the first one, but for noise.
+A property generates sides from a scene. The image of each side equals that of the first, except for noise.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ Lit = TypeVar("Lit", Mesh, Instance, Sphere)
 
 @dataclass(frozen=True)
 class Side:
-    """One side of an equation: `scale` times the sum of the scenes' pictures.
+    """One side of an equation: `scale` times the sum of the scenes' images.
 
-    files: kernel files in place of the program's own, by their name in `#include NAME`; mirrored: left and right are
+    files: kernel files that replace the program's own, by their name in `#include NAME`; mirrored: left and right are
     exchanged.
     """
 
@@ -45,29 +45,29 @@ Property = Callable[[Scene, Draws], list[Side]]
 
 
 def additivity(scene: Scene, draws: Draws) -> list[Side]:
-    """The picture in all lights is the sum of the pictures in each light alone."""
+    """The image in all lights is the sum of the images in each light alone."""
     return [Side("all lights", [scene]), Side("one light each", list(single_lights(scene)))]
 
 
 def strategies(scene: Scene, draws: Draws) -> list[Side]:
-    """BSDF sampling and light sampling alone have the mean of both together (MIS).
+    """BSDF sampling and light sampling alone have the mean of both combined (MIS).
 
-    Each leaves to the other what it cannot find: delta lights, specular directions, and skies below their mean.
+    Each leaves to the other what it cannot sample: delta lights, specular directions, environments below their mean.
     """
     return [Side("both", [scene]), Side("BSDF sampling", [scene], {"MIS_WEIGHTS": ["study/bsdf_sampling.cl"]}),
             Side("light sampling", [scene], {"MIS_WEIGHTS": ["study/light_sampling.cl"]})]
 
 
 def choice(scene: Scene, draws: Draws) -> list[Side]:
-    """The mean does not depend on the probabilities with which lights are chosen."""
+    """The mean does not depend on the light selection probabilities."""
     return [Side("by importance", [scene]), Side("uniformly", [scene], {"LIGHT_CHOICE": ["study/uniform_choice.cl"]})]
 
 
 def integrators(scene: Scene, draws: Draws) -> list[Side]:
-    """Paths of depth 2 carry direct lighting, as `direct`, `local` and `raster` compute it.
+    """Paths of depth 2 give the direct lighting that `direct`, `local` and `raster` compute.
 
-    Without the environment, which is unoccluded ambient light in the last two, and with Lambertian materials in place
-    of those that they evaluate in another form.
+    The environment is left out, as it is unoccluded ambient light in the last two, and materials with another form in
+    the local integrators are replaced by Lambertian ones.
     """
     plain = with_materials(replace(scene, environment=Environment()), _without_local_form)
     plain = replace(plain, render=replace(scene.render, max_depth=2))
@@ -77,19 +77,19 @@ def integrators(scene: Scene, draws: Draws) -> list[Side]:
 
 
 def brightness(scene: Scene, draws: Draws) -> list[Side]:
-    """Multiplying all light by a factor multiplies the picture."""
+    """Scaling all light by a factor scales the image."""
     factor = draws.decades(-3.0, 3.0)
     return [Side("as it is", [scene]), Side(f"{factor:g} times the light", [brighter(scene, factor)], scale=1 / factor)]
 
 
 def similarity(scene: Scene, draws: Draws) -> list[Side]:
-    """A scene moved, rotated, mirrored and scaled with its camera has the same picture."""
+    """A scene that is moved, rotated, mirrored and scaled together with its camera has the same image."""
     similar = random_similarity(scene, draws)
     return [Side("as it is", [scene]), Side(str(similar), [similar.of(scene)], mirrored=similar.mirrored)]
 
 
 def partition(scene: Scene, draws: Draws) -> list[Side]:
-    """Meshes may be cut in two or be instances, and instances may be meshes."""
+    """Meshes may be split in two or replaced by instances, and instances by meshes."""
     halves = [half for mesh in scene.meshes for half in _halves(mesh)]
     placed = [_as_instance(mesh, draws) for mesh in scene.meshes]
     return [Side("as it is", [scene]), Side("cut in two", [replace(scene, meshes=halves)]),
@@ -98,9 +98,9 @@ def partition(scene: Scene, draws: Draws) -> list[Side]:
 
 
 def bystanders(scene: Scene, draws: Draws) -> list[Side]:
-    """Objects that are not seen change nothing, though the program contains their materials.
+    """Objects outside the view change nothing, although the program contains their materials.
 
-    One of a type of the scene's own, the parameters of which lie beside those of the other.
+    One of them has a material type of the scene, with its own parameters.
     """
     own = [type(each) for each in _materials(scene)]
     kinds: list[type[Material]] = [draws.one_of(MATERIALS), draws.one_of(own)]
@@ -112,12 +112,12 @@ def bystanders(scene: Scene, draws: Draws) -> list[Side]:
 #: Properties by name.
 PROPERTIES: dict[str, Property] = {each.__name__: each for each in (
     additivity, strategies, choice, integrators, brightness, similarity, partition, bystanders)}
-#: Those whose scenes are moderate (see Draws), because one side does without a sampling strategy.
+#: Properties with moderate scenes (see Draws), because one side does without a sampling strategy.
 MODERATE = {"strategies", "choice", "integrators"}
 
 
 def single_lights(scene: Scene) -> Iterator[Scene]:
-    """Yield the scene in each of its lights alone: those without a surface, the environment, each emissive material."""
+    """Yield the scene in each light alone: those without a surface, the environment, each emissive material."""
     dark = brighter(scene, 0.0)
     for i, light in enumerate(scene.lights):
         yield replace(dark, lights=[light])
@@ -129,7 +129,7 @@ def single_lights(scene: Scene) -> Iterator[Scene]:
 
 
 def brighter(scene: Scene, factor: float) -> Scene:
-    """Return the scene with all light multiplied by a factor; without lights where that is 0."""
+    """Return the scene with all light multiplied by a factor; without lights if that is 0."""
     sky, lights = scene.environment, list[Light]()
     for light in scene.lights if factor else ():
         scaled: dict[str, Any] = {each.name: _scaled(getattr(light, each.name), factor) for each in fields(light)
@@ -140,7 +140,7 @@ def brighter(scene: Scene, factor: float) -> Scene:
 
 
 def brightest(scene: Scene) -> float:
-    """Return the largest radiance that rays find."""
+    """Return the largest radiance that rays can find."""
     sky = scene.environment
     found = [each.radiance for each in scene.lights if isinstance(each, DirectionalLight) and each.angle_degrees]
     found += [each.radiance for each in _materials(scene)]
@@ -194,7 +194,7 @@ def _without_local_form(material: Material) -> Material:
 def _halves(mesh: Mesh) -> list[Mesh]:
     """Return two meshes with every other face each.
 
-    A mesh with a normal map stays whole: its tangents are averaged over neighbouring faces.
+    A mesh with a normal map is not split: its tangents are averaged over adjacent faces.
     """
     if len(mesh.faces) < 2 or mesh.material.bent_by is not None:
         return [mesh]
@@ -203,7 +203,7 @@ def _halves(mesh: Mesh) -> list[Mesh]:
 
 
 def _as_instance(mesh: Mesh, draws: Draws) -> Instance:
-    """Return an instance of the mesh before a random transform, which the instance applies."""
+    """Return an instance with a random transform, of the mesh transformed by its inverse."""
     x, y, z = draws.vector(0.3, 3.0)
     matrix = translation(draws.vector()) @ rotation(draws.vector(-180, 180)) @ scaling((x, y, -z))
     return Instance(transform_mesh(mesh, np.linalg.inv(matrix).astype(np.float64)), matrix, name=mesh.name)

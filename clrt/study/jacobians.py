@@ -1,6 +1,6 @@
-"""Densities by the rule for changing variables: 1 over what the map from random numbers to directions does to areas.
+"""Check of pdfs by change of variables: 1 over the Jacobian determinant of the map from random numbers to directions.
 
-The maps are differentiated on the device's own samples, by central differences of order six.
+The maps are differentiated on the device's own samples, by central differences of sixth order.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from .probe import Doubles
 
 STEP = 2.0**-6
 #: f' ≈ Σ WEIGHTS[k]·(f(x + (k + 1)·step) − f(x − (k + 1)·step))/step. With twice the step the error is 64 times larger;
-#: an eighth of the difference between the two is thus more than the error of the finer one.
+#: an eighth of the difference between the two is thus an upper bound for the error of the finer one.
 WEIGHTS = np.array([45, -9, 1]) / 60
-#: To all places that the differences take.
+#: Offsets of all points of the differences.
 MOVES = STEP * np.array([k * np.eye(2)[axis] for k in (-6, -4, -3, -2, -1, 1, 2, 3, 4, 6) for axis in (0, 1)])
-#: Rounding of unit vectors, a few units in the last place, as it comes out of the differences.
+#: Rounding of unit vectors, a few units in the last place, propagated through the differences.
 NOISE = 3 * 2.0**-24 * 2 * np.abs(WEIGHTS).sum() / STEP
-#: Samples whose area is not known better than this tell nothing.
+#: Samples with a larger relative error of the area are ignored.
 LEAST_KNOWN = 0.05
-#: Random numbers that choose the lobe: as many are tried.
+#: How many values are tried of the random number that selects the lobe.
 LOBES = 1 << 8
 
 
 class Areas(NamedTuple):
-    """scale: of the area around each point; error: relative, at most. (n,) each."""
+    """Area scale of a map around each point, and its maximum relative error; (n,) each."""
 
     scale: Doubles
     error: Doubles
 
 
 def areas(mapping: Callable[[Doubles], Doubles], u: Doubles) -> Areas:
-    """What a map of u (n, 2) -> unit vectors (n, 3) does to areas at u, which is farther than 6·STEP from 0 and 1."""
+    """Return the area scale of a map u (n, 2) -> unit vectors (n, 3) at u, which is at least 6·STEP from 0 and 1."""
     fine, coarse = _slopes(mapping, u, STEP), _slopes(mapping, u, 2 * STEP)
     scale, rough = (np.linalg.norm(np.cross(slopes[:, 0], slopes[:, 1]), axis=1) for slopes in (fine, coarse))
     longest = np.linalg.norm(fine, axis=2).max(axis=1)
@@ -43,7 +43,7 @@ def areas(mapping: Callable[[Doubles], Doubles], u: Doubles) -> Areas:
 
 
 def _slopes(mapping: Callable[[Doubles], Doubles], u: Doubles, step: float) -> Doubles:
-    """(n, 2, 3): the derivatives of the map by both numbers."""
+    """Return the partial derivatives of the map, (n, 2, 3)."""
     moves = np.array([(axis, sign * (k + 1) * step) for axis in (0, 1) for k in range(3) for sign in (1, -1)])
     moved = u[:, None, :] + np.where(np.arange(2) == moves[:, :1], moves[:, 1:], 0)
     w = mapping(moved.reshape(-1, 2)).reshape(len(u), 2, 3, 2, 3)
@@ -51,24 +51,24 @@ def _slopes(mapping: Callable[[Doubles], Doubles], u: Doubles, step: float) -> D
 
 
 def grid(side: int = 12) -> Doubles:
-    """(side², 2) points well inside the unit square that float32 holds."""
+    """Return (side², 2) points well inside the unit square, exact in float32."""
     inside = (0.2 + 0.6 * (np.arange(side) + 0.5) / side).astype(np.float32).astype(np.float64)
     return np.stack(np.meshgrid(inside, inside), axis=-1).reshape(-1, 2)
 
 
 def missed(mapping: Callable[[Doubles], Doubles], u: Doubles, density: Doubles) -> float:
-    """By what part the density of a map of u (n, 2) misses 1/area at most, beyond the error of that, if it is known."""
+    """Return the largest relative deviation of a map's pdf from 1/area beyond the area's error, where known."""
     area = areas(mapping, u)
     known = area.error < LEAST_KNOWN
     return float(np.max((np.abs(1 - density * area.scale) - area.error)[known], initial=0.0))
 
 
 class Checked(NamedTuple):
-    """known: of how many samples the area is known; lobes: how many maps there are; error: by what part the density
-    reported for a sample misses 1/area at most, beyond the error of that.
+    """Result of a check. known: samples whose area is known; lobes: number of maps; error: the largest relative
+    deviation of a sample's reported pdf from 1/area beyond the error of the area.
 
-    Where there are several maps, or one that folds, one's 1/area times its probability is but a part of the density:
-    then `error` is what the density lacks of that part.
+    If there are several maps, or one that folds, 1/area times a map's probability is only a part of the pdf: `error` is
+    then how much the pdf falls below that part.
     """
 
     known: int
@@ -77,7 +77,7 @@ class Checked(NamedTuple):
 
 
 def check_density(bsdfs: Bsdfs, which: int, cosine: float) -> Checked:
-    """Compares the densities of one material's samples, seen from `cosine`, with the areas of its maps."""
+    """Compare the pdfs of one material's samples, seen from `cosine`, with the areas of its maps."""
     wo, u = view(cosine), grid()
 
     def draw(at: Doubles, lobe: Doubles | float) -> tuple[Doubles, Doubles]:
@@ -94,7 +94,7 @@ def check_density(bsdfs: Bsdfs, which: int, cosine: float) -> Checked:
         single = not folds and bool((every == every[:, :1]).all())
         told = (pdf > 0) & (wi[:, 2] != 0) & (area.error < LEAST_KNOWN)
         moved = draw((u[:, None] + MOVES).reshape(-1, 2), lobe)[0].reshape(len(u), -1, 3)
-        told &= (moved[..., 2] * wi[:, 2:] > 0).all(axis=1)    # where a lobe ends in between, slopes mean nothing
+        told &= (moved[..., 2] * wi[:, 2:] > 0).all(axis=1)    # slopes are meaningless if a lobe ends in between
         same = np.all(every == wi[:, None], axis=2).sum(axis=1)[told]
         part = np.ones(len(same)) if single else np.maximum(same - 1, 0) / LOBES
         lacks = np.where(part > 0, 1 - pdf[told] * area.scale[told] / np.maximum(part, 1 / LOBES), 0)
@@ -105,6 +105,6 @@ def check_density(bsdfs: Bsdfs, which: int, cosine: float) -> Checked:
 
 
 def _numbers_of_lobes(wi: Doubles, tried: Doubles) -> list[float]:
-    """One of the numbers tried (n,) for each of the lobes, from its middle; wi (n, 3): what the numbers choose."""
+    """Return one of the numbers tried (n,) per lobe, from its middle; wi (n, 3): the direction each number selects."""
     _, lobe, counts = np.unique(wi, axis=0, return_inverse=True, return_counts=True)
     return [float(tried[np.flatnonzero(lobe.ravel() == i)[count // 2]]) for i, count in enumerate(counts)]

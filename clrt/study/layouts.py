@@ -1,4 +1,4 @@
-"""Tree layouts side by side: the same rays through the same triangles, in turns; the answers must be the same bits."""
+"""BVH layouts compared: the same rays and triangles, in interleaved runs; the hits must be bitwise equal."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .rays import Floats, Run, differing, every
 from .visits import visits_a_ray
 from .workloads import Faces, Workload, closed_room, workloads
 
-#: Layout and traversal.
+#: Layout and traversal by name.
 CONTESTANTS: dict[str, tuple[str, str | None]] = {
     **{f"bvh8, {traversal}": ("bvh8", traversal) for traversal in TRAVERSALS},
     "bvh2": ("bvh2", None), "cwbvh": ("cwbvh", None),
     **{layout: (layout, None) for layout in TREELESS}}
 SIZE, QUICK_SIZE = (800, 800), (128, 128)
-#: Rays times triangles without a tree, which gets as many of all rays, evenly.
+#: Most rays times triangles for brute force, which traces an evenly spaced subset of the rays.
 LIST_TESTS = 1 << 24
 COUNTED = 16
 ROUNDS, QUICK_ROUNDS = 7, 3
@@ -30,12 +30,12 @@ ROUNDS, QUICK_ROUNDS = 7, 3
 
 def measure_layouts(vertices: Floats, faces: Faces, *, layout: str | None = None, builder: str | None = None,
                     quick: bool = False, **options: Any) -> dict[str, Any]:
-    """The figures of `clrt bench rays` without rays from a file: the mesh in a closed room, see `workloads`.
+    """Return the results of `clrt bench rays` without a ray file: the mesh in a closed room, see `workloads`.
 
-    vertices: (n, 3); faces: (m, 3); layout: this one alone; builder: for layouts that are trees; options: see
-    RayQuery. trees: of each contestant; kinds: for each kind of rays what `race` returns of each contestant, and
-    mrays_call: whole calls from Python; hits: the part of its rays that hit; differ: for how many of its rays the
-    answer is not bit by bit the first contestant's; nodes, tests: see `visits_a_ray`, of every COUNTED-th ray.
+    vertices: (n, 3); faces: (m, 3); layout: only this one; builder: for BVH layouts; options: see RayQuery. trees: by
+    contestant; kinds: for each kind of rays the result of `race` for each contestant, and mrays_call: including the
+    call from Python; hits: the fraction of its rays that hit; differ: for how many of its rays the result is not
+    bitwise equal to the first contestant's; nodes, tests: see `visits_a_ray`, for every COUNTED-th ray.
     """
     scene = closed_room(vertices, faces)
     chosen = CONTESTANTS if layout is None else {layout: (layout, None)}
@@ -54,7 +54,7 @@ def measure_layouts(vertices: Floats, faces: Faces, *, layout: str | None = None
 
 
 def _tree(query: RayQuery, seconds: float, triangles: int) -> dict[str, Any]:
-    """build_seconds: of the query, from arrays to the tree on the device; tree_seconds: of the tree."""
+    """Describe a BVH. build_seconds: of the query, from arrays to the BVH on the device; tree_seconds: of the BVH."""
     tree = query.tree
     return {"layout": tree.name, "builder": tree.builder, "build_seconds": seconds, "tree_seconds": tree.build_seconds,
             "nodes": tree.nodes, "depth": tree.depth, "stack": tree.stack, "sah_cost": tree.sah_cost,

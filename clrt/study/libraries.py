@@ -1,8 +1,8 @@
-"""Ray libraries as Python programs call them: numpy arrays in and out, each with all it takes to convert them.
+"""Ray casting libraries as called from Python: numpy arrays in and out, including all conversions.
 
-A library is a function from vertices (n, 3) float32 and faces (m, 3) int32 to a function that finds closest hits. That
-one takes origins and directions (k, 3) float32; it returns the first triangles (k,), −1 for none, and what t they are
-at (k,) where the library says so. ImportError where the library is missing.
+A library is a function from vertices (n, 3) float32 and faces (m, 3) int32 to a function that finds closest hits. The
+latter takes origins and directions (k, 3) float32; it returns the first triangles (k,), −1 for a miss, and their t (k,)
+if the library reports it. Raises ImportError if the library is not installed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Call = Callable[[Floats, Floats], Answer]
 
 
 class Library(NamedTuple):
-    """prepare: see above; package: what pip calls it; rays: how many it can take in a second or so."""
+    """A library. prepare: see above; package: its pip name; rays: about as many as it traces in a second."""
 
     prepare: Callable[[Floats, Faces], Call]
     package: str
@@ -31,7 +31,7 @@ class Library(NamedTuple):
 
 
 def clrt(query: RayQuery) -> Call:
-    """clrt, whose query is there already."""
+    """Wrap an existing query of clrt."""
     def call(origins: Floats, directions: Floats) -> Answer:
         hits = query.closest_hit(origins, directions)
         return hits["primitive"], hits["t"]
@@ -40,7 +40,7 @@ def clrt(query: RayQuery) -> Call:
 
 
 def embreex(vertices: Floats, faces: Faces) -> Call:
-    """Embree's Python binding. One thread."""
+    """Prepare Embree's Python binding; single-threaded."""
     scene = import_module("embreex.rtcore_scene").EmbreeScene()
     import_module("embreex.mesh_construction").TriangleMesh(scene, vertices, faces)
 
@@ -52,18 +52,18 @@ def embreex(vertices: Floats, faces: Faces) -> Call:
 
 
 def trimesh_embreex(vertices: Floats, faces: Faces) -> Call:
-    """trimesh's engine over embreex."""
+    """Prepare trimesh's engine on top of embreex."""
     return _trimesh("trimesh.ray.ray_pyembree", vertices, faces)
 
 
 def trimesh_rtree(vertices: Floats, faces: Faces) -> Call:
-    """trimesh's own engine, numpy over rtree, which it would import at the first ray."""
+    """Prepare trimesh's own engine, numpy on top of rtree, which it would import at the first ray."""
     import_module("rtree")
     return _trimesh("trimesh.ray.ray_triangle", vertices, faces)
 
 
 def open3d(vertices: Floats, faces: Faces) -> Call:
-    """Open3D's RaycastingScene, over Embree. All threads."""
+    """Prepare Open3D's RaycastingScene, on top of Embree; multithreaded."""
     library = import_module("open3d")
     scene = library.t.geometry.RaycastingScene()
     scene.add_triangles(vertices, faces.astype(np.uint32))
@@ -76,7 +76,7 @@ def open3d(vertices: Floats, faces: Faces) -> Call:
 
 
 def warp(vertices: Floats, faces: Faces) -> Call:
-    """NVIDIA's Warp on the processor: a kernel over its Mesh. One thread."""
+    """Prepare NVIDIA's Warp on the CPU: a kernel over its Mesh; single-threaded."""
     library = import_module("warp")
     library.config.log_level = library.LOG_ERROR
     vector, device = library.vec3, "cpu"

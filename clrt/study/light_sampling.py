@@ -1,4 +1,4 @@
-"""Samples of lights against their densities: lamps of all sizes, skies, and the choices among many lights."""
+"""Light sampling against its pdf: emitters of all sizes, environment maps, and the selection among many lights."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from .warps import triangle_test, uniform_test
 
 LAMP = Diffuse(emission=(1.0, 1.0, 1.0))
 UP = (0.0, 1.0, 0.0)
-#: Centers and radii, seen from the origin: large, one that almost touches it, small, tiny and far.
+#: Centers and radii of spheres seen from the origin: large, almost touching it, small, tiny and far.
 SPHERES = (((0.0, 0.0, 3.0), 2.0), ((0.0, 0.0, 1.0001), 1.0), ((3.0, -4.0, 12.0), 2.0), ((3.0, -4.0, 12.0), 0.05),
            ((0.0, 0.0, 1e4), 1.0), ((0.0, 0.0, 10.0), 1e-6), ((0.0, 0.0, 1e5 + 1.0), 1e5))
-#: Corners of triangles that face the origin: large and near, grazing, a sliver, small and far.
+#: Vertices of triangles that face the origin: large and near, grazing, a sliver, small and far.
 TRIANGLES = (((-2.0, -1.0, 1.0), (0.5, 2.0, 1.5), (3.0, -1.0, 2.0)),
              ((-1.0, 0.01, 1.0), (1.0, 0.01, 1.0), (0.0, 0.012, 3.0)),
              ((-1.0, 0.0, 2.0), (0.0, 1e-4, 2.0), (1.0, 0.0, 2.0)),
              ((-1e-3, -1e-3, 1e2), (0.0, 1e-3, 1e2), (1e-3, -1e-3, 1e2)))
-#: Cells of a texel along each side.
+#: Cells per texel along each side.
 PARTS = 2
 
 
 class LightTest(NamedTuple):
-    """density: chi-square of samples by their density, p; error: by what part that density misses its closed form at
-    most, or its integral 1.
+    """Result of a test. density: p-value of the chi-square test of samples against their pdf; error: the largest
+    relative deviation of that pdf from its closed form, or of its integral from 1.
     """
 
     name: str
@@ -41,12 +41,12 @@ class LightTest(NamedTuple):
 
 
 def light_tests(device: Device, samples: int, seed: int) -> list[LightTest]:
-    """Each light's samples, and the choices among several."""
+    """Test the samples of each light, and the selection among several."""
     return [test for measure in (lamps, picks, skies) for test in measure(device, samples, seed)]
 
 
 def lamps(device: Device, samples: int, seed: int, changes: Mapping[str, str] | None = None) -> Iterator[LightTest]:
-    """SPHERES and TRIANGLES; changes: see Probe."""
+    """Test SPHERES and TRIANGLES; changes: see Probe."""
     for k, (center, radius) in enumerate(SPHERES):
         probe = Probe(device, Scene(spheres=[Sphere(center=center, radius=radius, material=LAMP)]), changes=changes)
         wi, pdf = _sampled(probe, samples, seed + k)
@@ -58,14 +58,14 @@ def lamps(device: Device, samples: int, seed: int, changes: Mapping[str, str] | 
 
 
 def _sampled(probe: Probe, samples: int, seed: int) -> tuple[Doubles, Doubles]:
-    """wi (n, 3) and pdf (n,) of light samples from the origin."""
+    """Return wi (n, 3) and pdf (n,) of light samples from the origin."""
     origin = probe.compiled.frame.points(np.zeros(3))
     out = probe("light_sample", 12, np.tile([*origin, *UP], (samples, 1)), seed=seed)
     return out[:, :3], out[:, 6]
 
 
 def _cone(wi: Doubles, pdf: Doubles, center: Doubles, radius: float) -> tuple[float, float]:
-    """Uniform in 1 − cos of the angle from the sphere's middle, and around it."""
+    """Test for uniformity in 1 − cos of the angle to the sphere's center, and in the azimuth around it."""
     center = center.astype(np.float32).astype(np.float64)
     sin2_max = (np.float64(np.float32(radius)) / np.linalg.norm(center))**2
     height = sin2_max / (1 + np.sqrt(1 - sin2_max))
@@ -77,7 +77,7 @@ def _cone(wi: Doubles, pdf: Doubles, center: Doubles, radius: float) -> tuple[fl
 
 
 def _area(wi: Doubles, pdf: Doubles, corners: Doubles) -> tuple[float, float]:
-    """Uniform over the triangle, where wi meets its plane; pdf = d²/(cos θ·area)."""
+    """Test for uniformity over the triangle, where wi intersects its plane; pdf = d²/(cos θ·area)."""
     p0, e1, e2 = corners[0], corners[1] - corners[0], corners[2] - corners[0]
     n = np.cross(e1, e2)
     t = p0 @ n / (wi @ n)
@@ -91,7 +91,7 @@ def _off(found: Doubles, exact: Doubles | float) -> float:
 
 
 def skies(device: Device, samples: int, seed: int, changes: Mapping[str, str] | None = None) -> Iterator[LightTest]:
-    """Over parts of texels, in each of which pdf·sin θ is the same everywhere."""
+    """Test environment maps over parts of texels, in each of which pdf·sin θ is constant."""
     for k, (name, (image, degrees)) in enumerate(_pictures().items()):
         probe = Probe(device, Scene(environment=Environment(image=image, rotation_degrees=degrees)), changes=changes)
         rows, columns = PARTS * image.shape[0], PARTS * image.shape[1]
@@ -106,7 +106,7 @@ def skies(device: Device, samples: int, seed: int, changes: Mapping[str, str] | 
 
 
 def _pictures() -> dict[str, tuple[NDArray[np.float32], float]]:
-    """Pictures (height, width, 3), and by how many degrees they are turned."""
+    """Return environment maps (height, width, 3), and their rotations in degrees."""
     rng = np.random.default_rng(1)
     uneven = (rng.uniform(0.1, 2.0, (16, 32, 3)) * rng.random((16, 32, 1))**8).astype(np.float32)
     sun = uneven.copy()
@@ -115,19 +115,19 @@ def _pictures() -> dict[str, tuple[NDArray[np.float32], float]]:
 
 
 def _direction(u: Doubles, v: Doubles, degrees: float) -> Doubles:
-    """(n, 3): u = atan2(x, −z)/2·pi, v = acos(y)/pi, then turned about +Y, counter-clockwise seen from above."""
+    """Return (n, 3): u = atan2(x, −z)/2·pi, v = acos(y)/pi, rotated about +Y, counter-clockwise seen from above."""
     sine, phi = np.sin(np.pi * v), 2 * np.pi * u - np.radians(degrees)
     return np.column_stack([sine * np.sin(phi), np.cos(np.pi * v), -sine * np.cos(phi)])
 
 
 def _place(wi: Doubles, degrees: float) -> tuple[Doubles, Doubles]:
-    """u and v of directions (n, 3)."""
+    """Return u and v of directions (n, 3)."""
     x, y, z = wi.T
     return (np.arctan2(x, -z) + np.radians(degrees)) / (2 * np.pi) % 1, np.arctan2(np.hypot(x, z), y) / np.pi
 
 
 def picks(device: Device, samples: int, seed: int, changes: Mapping[str, str] | None = None) -> Iterator[LightTest]:
-    """Lights are chosen by the probability that each says it has, and these add up to 1: at the origin, facing up."""
+    """Test that lights are selected by their reported probabilities, which sum to 1: at the origin, facing up."""
     for k, (name, lights) in enumerate(_lights().items()):
         probe = Probe(device, Scene(lights=lights), changes=changes)
         rows = np.tile([0.0, 0.0, 0.0, *UP], (max(samples, len(lights)), 1))
@@ -138,7 +138,7 @@ def picks(device: Device, samples: int, seed: int, changes: Mapping[str, str] | 
 
 
 def _lights() -> dict[str, list[Light]]:
-    """Point lights all around and infinite ones."""
+    """Return point lights in all directions, and infinite lights."""
     rng = np.random.default_rng(7)
     suns: list[Light] = [DirectionalLight(direction=(x, -1.0, 0.5), irradiance=(1.0, 0.5, 1.0)) for x in range(3)]
     return {f"{count} lights, {k} infinite": [*_points(rng, count), *suns[:k]]
@@ -146,7 +146,7 @@ def _lights() -> dict[str, list[Light]]:
 
 
 def _points(rng: np.random.Generator, count: int) -> list[Light]:
-    """About half of them out of the origin's sight, and some in the same place."""
+    """Return point lights, about half of them below the surface at the origin, and some at the same position."""
     places = rng.normal(size=(count, 3))
     places[:2, 1], places[:count // 10] = 1.0, places[0]
     return [PointLight(position=(x, y, z), intensity=(power, power, power))

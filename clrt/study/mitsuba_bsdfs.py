@@ -1,7 +1,7 @@
-"""Materials as Mitsuba 3 is told of them: its own plugins where they mean the same, with `height_correlated` over them
-(mitsuba_smith.py) where their Smith term is another, and `gltf` (mitsuba_gltf.py).
+"""Conversion of materials to Mitsuba 3: its own plugins where they are equivalent, wrapped in `height_correlated`
+(mitsuba_smith.py) where their Smith term differs, and `gltf` (mitsuba_gltf.py).
 
-To add a material, write what it is in BSDFS.
+To add a material, write its conversion in BSDFS.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from ..scene.textures import Texture, Wrap, untextured
 Plugin = dict[str, Any]
 Floats = NDArray[np.float32]
 
-#: An alpha up to which the separable Smith term takes less than 4e-4 of even light that the height-correlated leaves.
+#: Largest alpha for which the separable Smith term loses less than 4e-4 of the height-correlated albedo.
 NEARLY_SMOOTH = 0.09
-#: So many times finer is what cut-outs are cut from, each way.
+#: Cut-outs are upsampled by this factor in each dimension before thresholding.
 CUTS = 4
 CHANNELS = ("red", "green", "blue", "alpha")
 
 
 def bsdf(owner: Mesh | Sphere) -> Plugin:
-    """The owner's material, with vertex colours. UsageError names what has no counterpart."""
+    """Return the plugin of the owner's material, with vertex colors. Raises UsageError for an unsupported feature."""
     material = owner.material
     if type(material) not in BSDFS:
         raise UsageError(f"{owner.name}: Mitsuba is not told of {material.kernel} yet")
@@ -41,7 +41,8 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
         if isinstance(owner, Mesh) and owner.colors is not None:
             plugin = _painted(plugin, material)
         if material.normal_map is not None:
-            # Its shadows of bumps (Estevez et al. 2019) lie on gloss, too, ours do not; nor are flipped normals ours.
+            # Mitsuba's bump shadowing (Estevez et al. 2019) affects specular lobes, too, ours does not; nor do we flip
+            # normals.
             if plugin["type"] == "gltf":
                 plugin |= {"bumps": True}
             plugin = {"type": "normalmap", "normalmap": _bend(material.normal_map), "bsdf": plugin,
@@ -61,21 +62,21 @@ def rgb(values: Any) -> Plugin:
 
 
 def color(value: Any) -> Plugin:
-    """A colour, of which a texture is a picture that Mitsuba need not decode."""
+    """Return a color; a texture becomes a bitmap that is already linear."""
     if not isinstance(value, Texture):
         return rgb(value)
     return _bitmap(value, linear_from_srgb(_channels(value, "red", "green", "blue")) * np.array(as_color(value.factor)))
 
 
 def number(value: Any) -> Any:
-    """Likewise."""
+    """Return a number; a texture becomes a bitmap."""
     if not isinstance(value, Texture):
         return float(value)
     return _bitmap(value, _channels(value, *[value.channel] * 3) * np.max(value.factor))
 
 
 def medium(material: Dielectric) -> Plugin | None:
-    """What is inside, where it absorbs."""
+    """Return the interior medium if the material absorbs."""
     if material.attenuation_distance is None:
         return None
     rates = np.array(material.parameters()["absorption"])
@@ -84,12 +85,15 @@ def medium(material: Dielectric) -> Plugin | None:
 
 
 def _channels(texture: Texture, *names: str) -> Floats:
-    """(h, w, names), from 0 to 1."""
+    """Return the named channels, (h, w, names), in [0, 1]."""
     return np.asarray(texture.picture.texels[..., [CHANNELS.index(name) for name in names]] / 255, np.float32)
 
 
 def _opacity(material: Material) -> Any:
-    """What is cut out is cut finely beforehand, since Mitsuba would filter the cut. (Passing one is an edge there.)"""
+    """Return the opacity. A cut-out is thresholded at a higher resolution, since Mitsuba would filter the result.
+
+    (In Mitsuba, passing a cut-out counts towards the path depth.)
+    """
     texture, cutoff = material.opacity, material.alpha_cutoff
     if cutoff is None or not isinstance(texture, Texture):
         return number(texture if cutoff is None or isinstance(texture, Texture) else float(texture >= cutoff))
@@ -98,7 +102,7 @@ def _opacity(material: Material) -> Any:
 
 
 def finer(texels: Any, wrap: tuple[Wrap, Wrap], times: int) -> Any:
-    """(h, w, channels) between its texels' middles: (times·h, times·w, channels)."""
+    """Upsample (h, w, channels) by linear interpolation to (times·h, times·w, channels)."""
     for axis in (0, 1):
         size = texels.shape[axis]
         at = (np.arange(times * size) + 0.5) / times - 0.5
@@ -110,7 +114,7 @@ def finer(texels: Any, wrap: tuple[Wrap, Wrap], times: int) -> Any:
 
 
 def _bend(texture: Texture) -> Plugin:
-    """A normal map: linear, with the factor in it, and bent along u and v."""
+    """Return a linear normal map that includes the factor, in the frame of u and v."""
     axes = texture.image_axes   # Mitsuba bends along u and v, however to_uv turns the image
     if np.abs(np.abs(axes) - 0.5).max() < 0.499:
         raise ValueError(f"the normal map {texture.picture.name}, which is not turned by quarters")
@@ -129,7 +133,7 @@ def _bitmap(texture: Texture, texels: Any) -> Plugin:
 
 
 def _painted(plugin: Plugin, material: Material) -> Plugin:
-    """With vertex colours in the place of a colour that is white."""
+    """Replace a white color by vertex colors."""
     if not isinstance(material, Diffuse) or material.color != (1.0, 1.0, 1.0):
         raise ValueError("vertex colours but of diffuse, whose color is [1, 1, 1]")
     return plugin | {"reflectance": {"type": "mesh_attribute", "name": "vertex_color"}}
@@ -144,7 +148,7 @@ def _mirror(material: Mirror) -> Plugin:
 
 
 def _metallic_roughness(material: MetallicRoughness) -> Plugin:
-    """`principled` is GGX under Schlick's Fresnel term with the separable Smith term, if metallic is 1, exactly."""
+    """Return `principled`, exactly GGX, Schlick's Fresnel and separable Smith for pure metals; otherwise `gltf`."""
     if material.features() & {"THROUGH", "SPECULAR"}:
         raise ValueError("metallic_roughness with transmission or specular")
     if material.smith not in ("separable", "height_correlated"):
@@ -189,7 +193,7 @@ def _conductor(material: Conductor) -> Plugin:
 
 
 def _rough(plugin: Plugin, roughness: float | Texture) -> Plugin:
-    """With GGX and the height-correlated Smith term."""
+    """Add GGX and the height-correlated Smith term to a plugin."""
     alpha = max(untextured(roughness)**2, ALPHA_MIN)
     plugin = plugin | {"distribution": "ggx", "alpha": alpha}
     return plugin if alpha <= NEARLY_SMOOTH else {"type": "height_correlated", "alpha": alpha, "bsdf": plugin}

@@ -1,10 +1,10 @@
-"""Scenes of github.com/mitsuba-renderer/mitsuba-data beside their references, as Mitsuba's own test_renders.py does.
+"""Scenes of github.com/mitsuba-renderer/mitsuba-data against their references, as in Mitsuba's own test_renders.py.
 
-Each reference is a mean over REFERENCE_SPP samples, with the variance of one for every pixel. A picture of BUDGET
-samples passes by Mitsuba's rule if at most 1 − ACCEPTED of its pixels and channels are further off than chance allows
-at LEVEL, corrected for their number (Šidák). That leaves biases of a pixel's standard error unseen; so the luminances
-of blocks are tested as well, by the spread of pictures with different seeds. (Not their colors: white is 1.0011,
-0.9997, 0.9997 in the references of white skies.)
+Each reference is a mean over REFERENCE_SPP samples, with the variance of a single one for every pixel. An image of
+BUDGET samples passes Mitsuba's test if at most 1 − ACCEPTED of its pixels and channels deviate more than chance allows
+at LEVEL, corrected for their number (Šidák). Biases below a pixel's standard error pass unnoticed; so the luminances of
+blocks are tested as well, by the spread of images with different seeds. (Not their colors: white is 1.0011, 0.9997,
+0.9997 in the references of white environments.)
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ from .significance import FAMILY, corrected, mean_test, sidak, t_test
 Doubles = NDArray[np.float64]
 Part = TypeVar("Part", Mesh, Sphere)
 
-#: Mitsuba's own: samples of a picture, of a reference, the least variance that is believed, significance, and what
-#: part of the pixels and channels must pass.
+#: Mitsuba's own: samples of an image, of a reference, the smallest variance assumed, significance level, and the
+#: fraction of pixels and channels that must pass.
 BUDGET, REFERENCE_SPP, LEAST_VARIANCE, LEVEL, ACCEPTED = 2_000_000, 32_000, 1e-4, 0.01, 0.9975
-#: Pictures with seeds of their own that the budget is split into, and pixels along a block's side.
+#: Images with different seeds that the budget is split into, and the side of a block in pixels.
 SEEDS, BLOCK = 16, 8
-#: What stands in for surfaces that clrt lacks, and samples that tell where they show.
+#: Replacement of surfaces that clrt does not support, and the samples per pixel that determine where they are visible.
 BLACK, MASK_SPP = Diffuse(color=(0.0, 0.0, 0.0)), 64
-#: Of a value: most references were rounded to half precision.
+#: Relative tolerance: most references were rounded to half precision.
 HALF = 2.0**-11
 
 
 class Case(NamedTuple):
-    """A scene, and the pictures of its mean and its variance in linear Rec. 709."""
+    """A scene, and the images of its mean and its variance in linear Rec. 709."""
 
     scene: Path
     mean: Path
@@ -54,12 +54,12 @@ class Case(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Folder and file, without ending."""
+        """Folder and file name, without extension."""
         return f"{self.scene.parent.name}/{self.scene.stem}"
 
 
 class Judged(NamedTuple):
-    """A line of the table, and ours beside theirs, (h, w, 3) each, where there is a picture."""
+    """A row of the table, and our image and the reference, (h, w, 3) each, if rendered."""
 
     row: dict[str, Any]
     ours: NDArray[np.float32] | None = None
@@ -67,7 +67,7 @@ class Judged(NamedTuple):
 
 
 def cases(folder: Path) -> list[Case]:
-    """Those of a checkout: scenes that have a reference. UsageError where there are none."""
+    """Return a checkout's scenes that have a reference. Raises UsageError if there are none."""
     found = []
     for scene in sorted((folder / "tests" / "scenes").glob("*/*.xml")):
         stem = scene.parent / "refs" / f"{scene.stem.rpartition('_')[0]}_ref_rgb"
@@ -80,7 +80,7 @@ def cases(folder: Path) -> list[Case]:
 
 
 def judge(found: list[Case], budget: int = BUDGET, device: str | int | None = None) -> Iterator[Judged]:
-    """Each case in turn: rendered and tested, or what it needs that clrt lacks."""
+    """Yield each case in turn, rendered and tested, or the features that clrt does not support."""
     number = choose(device)[0].index
     for case in found:
         row: dict[str, Any] = {"scene": case.name}
@@ -95,8 +95,8 @@ def judge(found: list[Case], budget: int = BUDGET, device: str | int | None = No
 
 
 def _read(path: Path) -> MitsubaScene:
-    """The scene; if its light is direct, with black surfaces in the place of those that clrt lacks: no other pixel
-    shows what they reflect. UnsupportedError where these are all that the scene shows."""
+    """Read the scene; if it has direct lighting only, unsupported surfaces become black, which affects no other pixels.
+    Raises UnsupportedError if only these are visible."""
     try:
         read = read_mitsuba(path)
     except UnsupportedError as error:
@@ -111,7 +111,7 @@ def _read(path: Path) -> MitsubaScene:
 
 
 def _judges_others(read: MitsubaScene) -> bool:
-    """Whether surfaces are shown that nothing stands in for, and do not depend on those that something does."""
+    """Return whether supported surfaces are visible, and do not depend on replaced ones."""
     scene = read.scene
     parts: list[Mesh | Sphere] = [*scene.meshes, *scene.spheres]
     shown = {part.name for part in parts if not any(part.material.radiance)}
@@ -120,7 +120,7 @@ def _judges_others(read: MitsubaScene) -> bool:
 
 
 def _shown(read: MitsubaScene, device: int) -> NDArray[np.bool_]:
-    """Which pixels, (h, w), show nothing that another surface stands in for, nor do those around them."""
+    """Return which pixels, (h, w), show no replaced surface, nor do their neighbors."""
     scene = read.scene
 
     def masked(part: Part) -> Part:
@@ -158,17 +158,17 @@ def _rendered(row: dict[str, Any], case: Case, read: MitsubaScene, budget: int, 
 
 
 def pixel_test(spp: int, ours: Doubles, theirs: Doubles, variance: Doubles) -> dict[str, Any]:
-    """Mitsuba's rule for pixels (n, 3) in XYZ. passes; rejected, tests: pixels and channels."""
+    """Apply Mitsuba's test to pixels (n, 3) in XYZ. passes; rejected, tests: numbers of pixels and channels."""
     p = mean_test(ours, np.maximum(variance, LEAST_VARIANCE), spp, theirs)
     rejected = np.count_nonzero(p <= sidak(LEVEL, p.size // 3))
     return {"passes": bool(p.size - rejected >= ACCEPTED * p.size), "rejected": int(rejected), "tests": p.size}
 
 
 def block_test(ours: Doubles, theirs: Doubles, variance: Doubles) -> dict[str, Any]:
-    """The same reference beside the means of blocks in pictures with different seeds, (seeds, h, w, 3).
+    """Compare the reference with the means of blocks in images with different seeds, (seeds, h, w, 3).
 
-    block_p: the least p-value by Student's t, corrected; blocks_rejected of `blocks`; noise: the median standard error
-    of a block over its mean.
+    block_p: the smallest p-value by Student's t, corrected; blocks_rejected of `blocks`; noise: the median standard
+    error of a block relative to its mean.
     """
     own = np.array([block_means(each, BLOCK)[..., 1] for each in ours])
     expected = block_means(theirs, BLOCK)[..., 1]

@@ -1,9 +1,9 @@
-"""glTF's metallic-roughness as a plugin of Mitsuba 3, which has none: after docs/scene-format.md, for all of its ways.
+"""Plugin for Mitsuba 3 of glTF's metallic-roughness, which it lacks: after docs/scene-format.md, with all its variants.
 
-    f = F(wi·h)·G·D/(4·cos wi·cos wo) + coupling·albedo/pi, and what further bounces between microfacets reflect
+    f = F(wi·h)·G·D/(4·cos wi·cos wo) + coupling·albedo/pi, and multiple scattering between microfacets
 
-Albedos of the gloss are interpolated between integrals, not the kernels' fits. It draws half of its directions by their
-cosine, and half from Mitsuba's own visible normals.
+The directional albedos are interpolated between integrals, instead of the kernels' fits. Half of the directions are
+sampled by the cosine, half by Mitsuba's own visible normals.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from ..scene.material import ALPHA_MIN
 from ..scene.metallic_roughness import Smith
 from ..scene.microfacets import Doubles, albedos
 
-#: Albedos are known at so many roughnesses, and roots of cosines.
+#: Tabulated roughnesses, and tabulated roots of cosines.
 SIDE = 128
-#: What keeps quotients of zeros zero.
+#: Avoids division by zero.
 TINY = 1e-20
 
 
 @cache
 def albedo_grid(smith: Smith) -> Doubles:
-    """(SIDE, SIDE, 2) of `albedos` by roughness and √cos, in the middles of SIDE intervals each."""
+    """Return `albedos` (SIDE, SIDE, 2) by roughness and √cos, at the midpoints of SIDE intervals each."""
     middles = (np.arange(SIDE) + 0.5) / SIDE
     return np.array([np.transpose(albedos(middles**2, max(roughness**2, ALPHA_MIN), smith)) for roughness in middles])
 
 
 def register(mi: Any) -> None:
-    """Makes the plugin "gltf" known to `mi`, the module of Mitsuba with its variant chosen.
+    """Register the plugin "gltf" with `mi`, the Mitsuba module with its variant chosen.
 
-    color, metallic, roughness: colours or textures; f0: of the dielectric part; smith, coupling: see
-    `MetallicRoughness`; multiple: whether light bounces on between microfacets; bumps: within a normal map, whose bumps
-    shadow what is matte. There the unbent normal is taken for the geometric one, which it is on flat meshes.
+    color, metallic, roughness: colors or textures; f0: of the dielectric part; smith, coupling: see
+    `MetallicRoughness`; multiple: whether there is multiple scattering between microfacets; bumps: in a normal map,
+    whose bumps shadow the diffuse part; the unperturbed normal then replaces the geometric one (equal for flat meshes).
     """
     dr = import_module("drjit")
 
@@ -97,7 +97,7 @@ def register(mi: Any) -> None:
             return 2 / (1 + dr.sqrt(1 + dr.minimum((1 / bend - 1) / 8, 1) * (1 / up - 1)))
 
         def _body(self, si: Any, cos_o: Any, cos_h: Any, f0: Any, color: Any, metallic: Any, active: Any) -> Any:
-            """Of what is below the gloss, and of further bounces: f·pi."""
+            """Evaluate the part below the specular lobe, and multiple scattering: f·pi."""
             cos_i, roughness = mi.Frame3f.cos_theta(si.wi), self.roughness.eval_1(si, active)
             albedo = (1 - metallic) * color
             angles = [self.albedos.eval([dr.sqrt(dr.maximum(cosine, 0)), roughness]) for cosine in (cos_i, cos_o)]
@@ -118,7 +118,7 @@ def register(mi: Any) -> None:
             return crossing * albedo + bounced * lost[0] * lost[1] / dr.maximum(lost[2], TINY)
 
         def traverse(self, callback: Any) -> None:
-            """Nothing of it changes."""
+            """Expose no parameters."""
 
         def to_string(self) -> str:
             return "Gltf[]"

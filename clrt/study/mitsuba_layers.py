@@ -1,9 +1,10 @@
-"""A clear film and fibres over glTF's metallic-roughness as a plugin of Mitsuba 3, after docs/scene-format.md.
+"""Plugin for Mitsuba 3 of clearcoat and sheen over glTF's metallic-roughness, after docs/scene-format.md.
 
     film + min(film left)·fibres + min(T)·gloss + R(wi)·R(wo)/(pi·mean R)
 
-Here T(c) is what film and fibres leave of light from an angle, and R = T·r + ∫ lobe·max(T(wo) − T(wi), 0) dwi of gloss,
-and of fibres below the film. All integrals are sums over midpoints of its own. Parameters are numbers, not textures.
+T(c) is the fraction of light that clearcoat ("film") and sheen ("fibres") transmit at an angle, and
+R = T·r + ∫ lobe·max(T(wo) − T(wi), 0) dwi for the specular lobe ("gloss"), and for sheen below the clearcoat. All
+integrals are midpoint sums of its own. Parameters are numbers, not textures.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ import numpy as np
 from ..scene.material import ALPHA_MIN
 from ..scene.microfacets import Doubles, albedos
 
-#: Angles that are tabulated, even in the root of the cosine, and those of an integral, each way.
+#: Tabulated angles, uniform in the root of the cosine, and those of an integral in each dimension.
 SIDE, POINTS = 128, 192
 FILM_F0 = 0.04
-#: Smoother fibres count as this.
+#: Lower bound of the sheen roughness.
 SMOOTHEST = 0.1
 TINY = 1e-20
 ROOTS = (np.arange(SIDE) + 0.5) / SIDE
@@ -27,7 +28,7 @@ MIDDLES = (np.arange(POINTS) + 0.5) / POINTS
 
 
 def layer_table(values: dict[str, Any]) -> Doubles:
-    """(SIDE, 6) at ROOTS: what the film leaves, T, the unbounded albedo of white fibres, and R by channel."""
+    """Return (SIDE, 6) at ROOTS: the film's transmission, T, the unbounded albedo of white sheen, and R by channel."""
     cosines, color, f0 = ROOTS**2, np.array(values["color"]), np.array(values["f0"])
     metallic, sheen = values["metallic"], np.array(values["sheen_color"])
     film_alpha, alpha = (max(values[name]**2, ALPHA_MIN) for name in ("clearcoat_roughness", "roughness"))
@@ -48,8 +49,8 @@ def layer_table(values: dict[str, Any]) -> Doubles:
 
 
 def fibres(n: float) -> tuple[Doubles, Doubles, Doubles]:
-    """(1, POINTS) cosines, (SIDE, POINTS) of light from ROOTS that white fibres send there, bounded, and (SIDE,)
-    unbounded albedos. n: the power of sin θh.
+    """Return cosines (1, POINTS), the bounded light (SIDE, POINTS) that white sheen scatters there from ROOTS, and its
+    unbounded albedos (SIDE,). n: the power of sin θh.
     """
     def sent(o: Doubles) -> Doubles:
         i, phi = MIDDLES**2, np.pi * MIDDLES[:, None, None]
@@ -65,10 +66,10 @@ def fibres(n: float) -> tuple[Doubles, Doubles, Doubles]:
 
 
 def gloss(alpha: float) -> tuple[Doubles, Doubles, Doubles]:
-    """(SIDE, POINTS²) cosines of where GGX's microfacets send light from ROOTS, how much for F = 1, and (1 − wo·h)^5.
+    """Return cosines (SIDE, POINTS²) of directions that GGX reflects from ROOTS, weights for F = 1, and (1 − wo·h)^5.
 
-    Normals are drawn by their visible area: a disc, whose part is pressed up by the slant of wo (Heitz 2018, "Sampling
-    the GGX Distribution of Visible Normals").
+    Normals are sampled by their visible area: a disc, part of which is compressed according to the slant of wo (Heitz
+    2018, "Sampling the GGX Distribution of Visible Normals").
     """
     o = (ROOTS**2)[:, None]
     radius, phi = (each.ravel() for each in np.meshgrid(np.sqrt(MIDDLES), 2 * np.pi * MIDDLES))
@@ -88,16 +89,16 @@ def gloss(alpha: float) -> tuple[Doubles, Doubles, Doubles]:
 
 
 def taken_by(left: Doubles, cos_i: Doubles, sent: Doubles) -> Doubles:
-    """(SIDE,) Σ sent·max(T(wo) − T(wi), 0) of T (SIDE,) at ROOTS."""
+    """Return Σ sent·max(T(wo) − T(wi), 0), (SIDE,), for T (SIDE,) at ROOTS."""
     there = np.interp(np.sqrt(np.maximum(cos_i, 0)), ROOTS, left)
     return np.asarray(np.sum(sent * np.maximum(left[:, None] - there, 0), axis=1))
 
 
 def register(mi: Any) -> None:
-    """Makes the plugin "gltf_layers" known to `mi`, the module of Mitsuba with its variant chosen.
+    """Register the plugin "gltf_layers" with `mi`, the Mitsuba module with its variant chosen.
 
-    It has the parameters of `layer_table`. It draws a third of its directions each by the cosine, and by the visible
-    normals of the gloss and of the film.
+    Its parameters are those of `layer_table`. A third of the directions each is sampled by the cosine, by the visible
+    normals of the specular lobe, and by those of the film.
     """
     dr = import_module("drjit")
 
@@ -157,12 +158,12 @@ def register(mi: Any) -> None:
             return fresnel * facets.eval(h) * shadowing / dr.maximum(4 * mi.Frame3f.cos_theta(wi), TINY)
 
         def _fibres(self, i: Any, o: Any, cos_h: Any, albedo: Any) -> Any:
-            """White ones' f·cos wo."""
+            """Evaluate f·cos wo of white sheen."""
             d = (2 + self.power) / (2 * dr.pi) * dr.maximum(1 - dr.square(cos_h), 0) ** (self.power / 2)
             return d * o / dr.maximum(4 * (i + o - i * o) * dr.maximum(albedo, 1), TINY)
 
         def traverse(self, callback: Any) -> None:
-            """Nothing of it changes."""
+            """Expose no parameters."""
 
         def to_string(self) -> str:
             return "GltfLayers[]"

@@ -1,4 +1,4 @@
-"""Mitsuba 3 as a contestant: `pip install mitsuba`, in its variant for all cores if there is an LLVM for it."""
+"""Mitsuba 3 as a contestant: `pip install mitsuba`, in its parallel LLVM variant if an LLVM library is found."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from .mitsuba_bsdfs import Plugin
 from .mitsuba_scene import mitsuba_scene
 
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
-#: How its samples are drawn, by what is added to its name.
+#: Samplers by suffix of the contestant's name.
 SAMPLERS = {"": "independent", ", multijitter": "multijitter"}
-#: Those before cannot compile what Mitsuba asks for, and end the process.
+#: Older versions cannot compile Mitsuba's code, and terminate the process.
 OLDEST_LLVM = 17
 LLVM_FOLDERS = ("usr/lib", "usr/lib64", "usr/lib/*-linux-gnu", "usr/lib/llvm*/lib", "usr/local/lib")
 
 
 def contestants(scene: Scene) -> dict[str, Contestant]:
-    """Mitsuba with each of SAMPLERS. ImportError where it is not installed, UsageError for what it cannot draw."""
+    """Return Mitsuba with each of SAMPLERS. Raises ImportError if not installed, UsageError for unsupported scenes."""
     library, name = load()
     return {name + suffix: Mitsuba(library, mitsuba_scene(scene, sampler)) for suffix, sampler in SAMPLERS.items()}
 
 
 class Mitsuba:
-    """A contestant that renders what `mitsuba_scene` describes."""
+    """Contestant that renders the result of `mitsuba_scene`."""
 
     def __init__(self, library: Any, plugins: Plugin) -> None:
         self._library, self._plugins = library, plugins
@@ -41,11 +41,11 @@ class Mitsuba:
 
     def __call__(self, spp: int, seed: int) -> Picture:
         scene = self._scene
-        if spp not in self._compiled:  # Mitsuba compiles for every number of samples anew
+        if spp not in self._compiled:  # Mitsuba recompiles for every number of samples
             self._compiled.add(spp)
             self(spp, seed)
         sampler = scene.sensors()[0].sampler()
-        sampler.set_sample_count(spp)  # or more: multijitter's are a grid
+        sampler.set_sample_count(spp)  # or more: multijitter uses a grid
         start, cpu = time.perf_counter(), time.process_time()
         pixels = np.array(self._library.render(scene, spp=spp, seed=seed))
         return Picture(sampler.sample_count(), time.perf_counter() - start, time.process_time() - cpu, pixels)
@@ -56,14 +56,14 @@ class Mitsuba:
 
 
 def newest_llvm(root: Path = Path("/")) -> tuple[int, Path | None]:
-    """Version and file of the newest LLVM library in LLVM_FOLDERS; 0 and None where there is none."""
+    """Return version and file of the newest LLVM library in LLVM_FOLDERS; 0 and None if there is none."""
     found = {int(version[1]): file for folder in LLVM_FOLDERS for file in root.glob(f"{folder}/libLLVM*")
              if (version := re.match(r"libLLVM(?:-|\.so\.)(\d+)", file.name))}
     return max(found.items(), default=(0, None))
 
 
 def load() -> tuple[Any, str]:
-    """The module with its variant chosen, and a name: compiled for all cores, or without an LLVM for that scalar."""
+    """Return the module with its variant chosen, and a name: parallel with LLVM, otherwise scalar."""
     version, file = newest_llvm()
     if version >= OLDEST_LLVM:
         os.environ.setdefault(LLVM_VARIABLE, str(file))
@@ -77,7 +77,7 @@ def load() -> tuple[Any, str]:
 
 
 def _native(library: Any, value: Any) -> Any:
-    """Mitsuba's objects for the values that `mitsuba_scene` leaves to it."""
+    """Convert the values of `mitsuba_scene` to Mitsuba's objects."""
     match value:
         case {"type": "mesh"}:
             return _mesh(library, **{name: _native(library, entry) for name, entry in value.items() if name != "type"})
@@ -92,7 +92,7 @@ def _native(library: Any, value: Any) -> Any:
 
 def _mesh(library: Any, *, vertices: Any, faces: Any, normals: Any, uv: Any = None, colors: Any = None,
           **plugins: Any) -> Any:
-    """A mesh with its bsdf and emitter; flat where it has no normals."""
+    """Return a mesh with its BSDF and emitter; flat-shaded if it has no normals."""
     properties = library.Properties()
     properties["face_normals"] = normals is None
     for name, plugin in plugins.items():

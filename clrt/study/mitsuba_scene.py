@@ -1,8 +1,8 @@
-"""A scene as Mitsuba 3 is told of it: dictionaries of plugins by the names of its manual, for its `rgb` variants.
+"""Conversion of a scene to Mitsuba 3: dictionaries of plugins by the names of its manual, for its `rgb` variants.
 
-Numbers, names and numpy arrays only, so that nothing of Mitsuba is needed here: 4x4 arrays are transforms, arrays of
-three dimensions pictures, and a plugin of type "mesh" has the arrays of one (mitsuba_renderer.py builds it). What
-materials are there is in mitsuba_bsdfs.py.
+The result has numbers, strings and numpy arrays only, so that Mitsuba is not required here: 4x4 arrays are transforms,
+3-dimensional arrays are images, and a plugin of type "mesh" has a mesh's arrays (mitsuba_renderer.py builds it).
+Materials are converted in mitsuba_bsdfs.py.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from ..scene.model import Camera, Environment, Mesh, Scene, Sphere
 from ..scene.textures import Texture
 from .mitsuba_bsdfs import Plugin, bsdf, color, medium, rgb
 
-#: How near and far the camera sees, of the distance to where it looks.
+#: Near and far clip distances, relative to the distance of the look-at point.
 NEAR, FAR = 1e-4, 1e6
-#: How far away the disc of a sun is, of that distance.
+#: Distance of a sun's disc, relative to that distance.
 SUN_DISTANCE = 1e5
-#: Of the picture that a spot throws, in which its falloff is told: texels a side, and the widest cone.
+#: The texture that represents a spot light's falloff: texels per side, and the widest cone.
 SPOT_TEXELS, SPOT_DEGREES = 2048, 80
-#: The widest sun whose disc is no larger than twice its distance.
+#: Largest angular diameter of a sun, for which the disc's diameter is twice its distance.
 SUN_DEGREES = 90
 
 
 def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
-    """The plugins of `scene` with its own settings. UsageError names what has no counterpart in Mitsuba."""
+    """Return the plugins of `scene` with its own settings. Raises UsageError for an unsupported feature."""
     if scene.render.filter != "box":
         raise UsageError(f'{scene.name}: Mitsuba is compared with filter = "box"')
     if scene.render.integrator not in ("path", "direct"):
@@ -56,7 +56,7 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
 
 
 def single_bounces(scene: Scene) -> Scene:
-    """The scene with rough glass that follows a single bounce between microfacets, as Mitsuba's does."""
+    """Return the scene with rough glass restricted to a single microfacet bounce, as in Mitsuba."""
     for material in materials_of(scene).values():
         if isinstance(material, Dielectric) and material.scatters_again:
             scene = with_material(scene, material, replace(material, multiple_scattering=False))
@@ -64,7 +64,7 @@ def single_bounces(scene: Scene) -> Scene:
 
 
 def _sensor(scene: Scene, sampler: str) -> Plugin:
-    """The camera and its film: pixels are means over their own squares."""
+    """Return the camera and its film with a box filter one pixel wide."""
     camera, (width, height) = scene.camera, scene.render.size
     distance = _distance(camera)
     to_world = _frame(camera.position, np.subtract(camera.look_at, camera.position), camera.up)
@@ -73,7 +73,7 @@ def _sensor(scene: Scene, sampler: str) -> Plugin:
         raise UsageError(f"{scene.name}: Mitsuba has no equirectangular camera")
     if camera.projection == "orthographic":
         tall = camera.view_height or 2 * distance * tan(radians(camera.fov_degrees) / 2)
-        lens = {"type": "orthographic"}    # of -1 to 1 in its x
+        lens = {"type": "orthographic"}    # x from -1 to 1
         to_world = to_world @ np.diag([tall * width / height / 2, tall * width / height / 2, 1, 1])
     elif camera.aperture_radius:
         lens |= {"type": "thinlens", "aperture_radius": camera.aperture_radius,
@@ -85,7 +85,7 @@ def _sensor(scene: Scene, sampler: str) -> Plugin:
 
 
 def _frame(position: Any, direction: Any, up: Any = (0.0, 1.0, 0.0)) -> NDArray[np.float64]:
-    """Local to world, of cameras and spots: Mitsuba's look along +z, with +x to the picture's left."""
+    """Return the local-to-world matrix of cameras and spot lights, which look along +z with +x to the image's left."""
     forward = np.asarray(direction, np.float64)
     forward /= np.linalg.norm(forward)
     left = np.cross(np.asarray(up, np.float64), forward)
@@ -96,7 +96,7 @@ def _frame(position: Any, direction: Any, up: Any = (0.0, 1.0, 0.0)) -> NDArray[
 
 
 def _surface(owner: Mesh | Sphere) -> Plugin:
-    """A mesh or sphere with its material, what is inside, and its light where it has any."""
+    """Return a mesh or sphere with its BSDF, interior medium, and emission if it has any."""
     shape = _mesh(owner) if isinstance(owner, Mesh) else _sphere(owner)
     shape["bsdf"] = bsdf(owner)
     if isinstance(owner.material, Dielectric) and (inside := medium(owner.material)):
@@ -123,14 +123,14 @@ def _mesh(mesh: Mesh) -> Plugin:
 
 
 def _sphere(sphere: Sphere) -> Plugin:
-    """Turned so that its texture coordinates are ours: from its z down, and round from −x, the middle, towards −y."""
+    """Return a sphere rotated to clrt's texture coordinates: from z down, and from −x, the middle, towards −y."""
     place = np.eye(4)
     place[:3] = np.column_stack([(0, 0, -sphere.radius), (-sphere.radius, 0, 0), (0, sphere.radius, 0), sphere.center])
     return {"type": "sphere", "to_world": place}
 
 
 def _distance(camera: Camera) -> float:
-    """From the camera to where it looks."""
+    """Return the distance from the camera to its look-at point."""
     return float(np.linalg.norm(np.subtract(camera.look_at, camera.position)))
 
 
@@ -147,7 +147,7 @@ def _light(light: Light, camera: Camera) -> Plugin:
 
 
 def _sun(light: DirectionalLight, camera: Camera) -> Plugin:
-    """A disc so far away that it is seen in one direction from everywhere; Mitsuba has no emitter for it."""
+    """Return a disc so far away that its direction is the same everywhere; Mitsuba has no emitter for a sun."""
     if light.angle_degrees > SUN_DEGREES:
         raise UsageError(f"light: Mitsuba is compared with suns of up to {SUN_DEGREES} degrees; this one has "
                          f"angle_degrees = {light.angle_degrees:g}")
@@ -160,12 +160,12 @@ def _sun(light: DirectionalLight, camera: Camera) -> Plugin:
 
 
 def _up_for(direction: Any) -> tuple[float, float, float]:
-    """An axis that is not along the direction."""
+    """Return an axis that is not parallel to the direction."""
     return (0.0, 1.0, 0.0) if abs(direction[1]) < 0.9 * float(np.linalg.norm(direction)) else (1.0, 0.0, 0.0)
 
 
 def _spot(light: SpotLight) -> Plugin:
-    """Mitsuba's falls off evenly in the angle; ours is told as a picture that one of even strength throws."""
+    """Return a spot light. Mitsuba's falloff is linear in the angle; ours is represented by a projected texture."""
     if light.outer_degrees > SPOT_DEGREES:
         raise UsageError(f"spot: Mitsuba is told of cones up to {SPOT_DEGREES} degrees from their axis")
     across = (np.arange(SPOT_TEXELS) * 2 + 1) / SPOT_TEXELS - 1
@@ -179,7 +179,7 @@ def _spot(light: SpotLight) -> Plugin:
 
 
 def _environment(environment: Environment) -> Plugin:
-    """No plugin where the sky is black, since Mitsuba samples all lights alike."""
+    """Return the environment; no plugin if it is black, since Mitsuba samples all emitters equally."""
     color = environment.strength * np.asarray(environment.color)
     if environment.image is None:
         return {"sky": {"type": "constant", "radiance": rgb(color)}} if color.any() else {}
@@ -191,10 +191,10 @@ def _environment(environment: Environment) -> Plugin:
 
 
 def rows_at_poles(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The same sky, interpolated linearly as well, of 2h + 1 rows of which the first and the last are the poles.
+    """Resample an environment map to 2h + 1 rows, the first and last at the poles, with the same linear interpolation.
 
-    Ours, (h, w, 3), has rows at (row + ½)/h; Mitsuba's H rows are at row/(H − 1). Of the new ones each second is one of
-    ours, and between them is what both would interpolate.
+    Ours, (h, w, 3), has rows at (row + ½)/h; Mitsuba's H rows are at row/(H − 1). Every other new row is one of ours;
+    those between them are what both interpolate.
     """
     padded = np.concatenate([image[:1], image, image[-1:]])
     rows = np.empty((2 * len(image) + 1, *image.shape[1:]), np.float32)

@@ -1,6 +1,6 @@
-"""The height-correlated Smith term for those of Mitsuba's microfacet materials that have the separable one.
+"""Height-correlated Smith term for those of Mitsuba's microfacet BSDFs that use the separable one.
 
-Both have G1 of either direction, by which their quotient is known: G2 = g·g'/(g + g' − g·g') over g·g' (Heitz 2014,
+Both follow from G1 of the two directions, and so does their quotient: G2 = g·g'/(g + g' − g·g') over g·g' (Heitz 2014,
 "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs", eq. 98 and 99).
 """
 
@@ -11,10 +11,10 @@ from typing import Any
 
 
 def register(mi: Any) -> None:
-    """Makes the plugin "height_correlated" known to `mi`, the module of Mitsuba with its variant chosen.
+    """Register the plugin "height_correlated" with `mi`, the Mitsuba module with its variant chosen.
 
-    alpha: of GGX; bsdf: a roughconductor or roughdielectric with it, whose values are multiplied by the quotient. It
-    draws directions as before.
+    alpha: of GGX; bsdf: a roughconductor or roughdielectric with this alpha, whose values are multiplied by the
+    quotient. Sampling is unchanged.
     """
     dr = import_module("drjit")
 
@@ -43,7 +43,7 @@ def register(mi: Any) -> None:
             return dr.select(g_i + g_o > 0, 1 / (g_i + g_o - g_i * g_o), 0)
 
         def traverse(self, callback: Any) -> None:
-            """Nothing of it changes."""
+            """Expose no parameters."""
 
         def to_string(self) -> str:
             return "HeightCorrelated[]"

@@ -1,4 +1,4 @@
-"""Hard cases of geometry, light and machines: how many answers are wrong, and how exact the others are."""
+"""Hard cases of geometry, light transport and devices: the number of wrong results, and the accuracy of the others."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ GEOMETRY: tuple[Callable[..., Iterator[Row]], ...] = (
 
 
 def chosen_devices(device: str | int | None) -> list[int]:
-    """The index of the device, or of all but simulators."""
+    """Return the index of the device, or of all except simulators."""
     if device is not None:
         return [choose(device)[0].index]
     return [info.index for info, _ in find_devices() if info.usable and info.type != "simulator"]
 
 
 def measure_device(device: int, *, quick: bool) -> Iterator[Row]:
-    """All rows of one device, by its default tests. What it fails to run is a row with a wrong answer."""
+    """Yield all rows of one device with its default tests. A measurement that fails gives a row with a wrong answer."""
     for measure in GEOMETRY:
         yield from _or_error(measure.__name__, lambda: measure(Subject(device), quick=quick))
     yield from _or_error("measure_pictures", lambda: measure_pictures(Subject(device), quick=quick))
@@ -44,7 +44,7 @@ def measure_device(device: int, *, quick: bool) -> Iterator[Row]:
 
 
 def measure_together(devices: list[int], *, quick: bool) -> Iterator[Row]:
-    """Whether trees and devices agree on hits, and devices on pictures."""
+    """Yield rows for the agreement of BVHs and devices on hits, and of devices on images."""
     for mesh in measure_hits(quick=quick, device=devices[0] if len(devices) == 1 else None):
         rays = sum(way.get("rays", 0) for way in mesh["ways"])
         differ = sum(sum(way["differ"].values()) for way in mesh["ways"] if "differ" in way)

@@ -1,6 +1,6 @@
-"""clrt beside other ray libraries: the same rays through the same triangles, in turns within one run.
+"""clrt compared with other ray casting libraries: the same rays and triangles, in interleaved runs.
 
-Kernels: clrt's alone against Embree's functions alone. Calls: whole calls from Python, numpy arrays in and out.
+Kernels: only clrt's kernels against only Embree's functions. Calls: including the call from Python with numpy arrays.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from .race import Contestant, race
 from .rays import Floats, Run
 from .workloads import Faces, Mesh, Workload, closed_room, rotated_copies, subdivide, workloads
 
-#: Of Embree: robust scene, width of packets, rays said to be coherent.
+#: Embree configurations: robust scene, packet width, coherent flag.
 EMBREE = {"embree 1": (False, 1, False), "embree 8": (False, 8, False), "embree 8 coherent": (False, 8, True),
           "embree 1 robust": (True, 1, False), "embree 8 robust": (True, 8, False),
           "embree 8 robust coherent": (True, 8, True)}
 SIZE, QUICK_SIZE = (800, 800), (256, 256)
 LARGE, COPIES = 1_000_000, 20
-#: Hits agree whose t differ by less than this part of the longest.
+#: Relative to the largest t: hits agree if their t differ by less.
 TOLERANCE = 1e-5
 
 
 def measure_peers(vertices: Floats, faces: Faces, *, quick: bool = False,
                   device: str | int | None = None) -> Iterator[dict[str, Any]]:
-    """The figures of `clrt bench peers`, scene by scene. vertices: (n, 3); faces: (m, 3).
+    """Yield the results of `clrt bench peers`, scene by scene. vertices: (n, 3); faces: (m, 3).
 
-    trees: seconds and bytes of each; hits: the part of each kind of rays that hits something; kernels, and in the first
-    scene calls: for each kind what `race` returns; missing: why a library is not among them.
+    trees: build seconds and bytes of each BVH; hits: the fraction of each kind of rays that hit; kernels, and in the
+    first scene calls: for each kind the result of `race`; missing: why a library is not included.
     """
     for name, scene, target in _scenes(vertices, faces, quick):
         query = RayQuery(*scene, device=device)
@@ -54,13 +54,13 @@ def measure_peers(vertices: Floats, faces: Faces, *, quick: bool = False,
 
 
 def versions() -> dict[str, str]:
-    """Of clrt and of the libraries that are installed."""
+    """Return the versions of clrt and the installed libraries."""
     packages = {"clrt", "trimesh", *(library.package for library in LIBRARIES.values())}
     return {each.name: each.version for each in metadata.distributions() if each.name in packages}
 
 
 def _scenes(vertices: Floats, faces: Faces, quick: bool) -> Iterator[tuple[str, Mesh, Floats]]:
-    """Name, triangles, and the vertices to look at: the mesh in a room, its triangles subdivided, copies of it."""
+    """Yield name, triangles, and vertices to look at: the mesh in a room, its triangles subdivided, copies of it."""
     yield "room", closed_room(vertices, faces), vertices
     if quick:
         return
@@ -99,7 +99,7 @@ def _kernel_contestants(query: RayQuery, embree: dict[bool, EmbreeScene], kind: 
 
 
 def _measure_calls(scene: Mesh, query: RayQuery, kinds: list[Workload]) -> tuple[dict[str, Any], dict[str, str]]:
-    """For each kind of closest hits what `race` returns, and the libraries that are missing."""
+    """Return the result of `race` for each kind of closest hits, and the missing libraries."""
     calls, missing = {"clrt": (clrt(query), len(kinds[0].rays[2]))}, {}
     for name, library in LIBRARIES.items():
         try:
@@ -110,7 +110,7 @@ def _measure_calls(scene: Mesh, query: RayQuery, kinds: list[Workload]) -> tuple
 
 
 def _call_contestants(query: RayQuery, calls: dict[str, tuple[Call, int]], kind: Workload) -> dict[str, Contestant]:
-    """Each call with as many rays as it can take, evenly out of all."""
+    """Return each call with as many rays as it can handle, an evenly spaced subset."""
     origins, directions, _ = kind.rays
     contestants = {}
     for name, (call, limit) in calls.items():
@@ -128,9 +128,9 @@ def _timed_call(call: Call, rays: tuple[Floats, Floats]) -> tuple[float, float]:
 
 
 def agreement(ours: NDArray[Any], primitive: NDArray[Any], t: Floats | None) -> float:
-    """The part of rays whose hits are as good as ours: both miss, or both hit at the same t, so near edges as well.
+    """Return the fraction of rays whose hits are equivalent to ours: both miss, or hit at the same t (also near edges).
 
-    ours: records of `RayQuery.closest_hit`; primitive, t: see `libraries`. Without t it must be the same triangle.
+    ours: records of `RayQuery.closest_hit`; primitive, t: see `libraries`. Without t the triangle must be the same.
     """
     miss, hit = (ours["primitive"] < 0) & (primitive < 0), (ours["primitive"] >= 0) & (primitive >= 0)
     if t is None:

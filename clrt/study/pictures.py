@@ -1,6 +1,6 @@
-"""Hard light with known answers: L3, L5 and L9, whole pictures against closed forms and quadrature in float64.
+"""Difficult lighting with known results: L3, L5 and L9, images against closed forms and quadrature in float64.
 
-A camera that sees next to a point makes all pixels one experiment; its mean must lie within some standard errors.
+A camera that practically sees one point makes all pixels one experiment; its mean must be within some standard errors.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from .shapes import icosphere
 from .workloads import Doubles
 
 ALBEDO = 0.5
-#: A mean is wrong that is this many standard errors from what it must be; one in 300 000 would be by chance.
+#: A mean is wrong if it is off by more standard errors; the probability of a false alarm is 1 in 300 000.
 SIGMAS = 4.5
-#: What part of the light a white ball's picture may lose whose normals are interpolated; it gains none.
+#: Fraction of light that a white mesh with interpolated normals may lose; it must not gain any.
 LOST = 0.02
 POINT = Camera(position=(0, 3, 0.001), look_at=(0, 0, 0), up=(0, 0, -1), fov_degrees=0.01)
 FLOOR = Mesh(np.array([[-9, 0, -9], [-9, 0, 9], [9, 0, 9], [9, 0, -9]], np.float32),
@@ -29,7 +29,7 @@ FLOOR = Mesh(np.array([[-9, 0, -9], [-9, 0, 9], [9, 0, 9], [9, 0, -9]], np.float
 
 
 def measure_pictures(subject: Subject, *, quick: bool) -> Iterator[Row]:
-    """How many means are wrong, and by how many standard errors they are off."""
+    """Count the wrong means, and measure their deviations in standard errors."""
     settings = RenderSettings(size=(32, 32), spp=64 if quick else 4096, max_depth=2, sampler="independent")
     for case, what, scene, expected in lit_points():
         film = subject.film(replace(scene, camera=POINT, render=settings))
@@ -48,7 +48,7 @@ def measure_pictures(subject: Subject, *, quick: bool) -> Iterator[Row]:
 
 
 def lit_points() -> Iterator[tuple[str, str, Scene, float]]:
-    """Case, what, a scene with a floor, and the radiance of the floor's middle."""
+    """Yield case, description, a scene with a floor, and the expected radiance of the floor's center."""
     lamp = PointLight(position=(1, 2, 0.5), intensity=(30, 30, 30))
     d2 = 1 + 4 + 0.25
     yield "L9", "a point light", Scene(meshes=[FLOOR], lights=[lamp]), ALBEDO / np.pi * 30 * 2 / d2**1.5
@@ -67,7 +67,7 @@ def lit_points() -> Iterator[tuple[str, str, Scene, float]]:
 
 
 def sky_irradiance(texels: Doubles, fine: int = 8) -> float:
-    """Of a floor that looks up, by bilinear texels (h, w) at fine² points each, u around and v clamped at the poles."""
+    """Return a floor's irradiance by quadrature: fine² bilinear points per texel (h, w), v clamped at the poles."""
     height, width = texels.shape
     row = (np.arange(height * fine // 2) + 0.5) / fine - 0.5   # up to the horizon
     column = (np.arange(width * fine) + 0.5) / fine - 0.5
@@ -81,7 +81,7 @@ def sky_irradiance(texels: Doubles, fine: int = 8) -> float:
 
 
 def mirrored_lamp() -> Scene:
-    """The picture is filled by a mirror, and that by a lamp."""
+    """Return a scene whose image is filled by a mirror that reflects an area light."""
     mirror = Mesh(FLOOR.vertices, FLOOR.faces, Mirror())
     camera = Camera(position=(0, 3, 3), look_at=(0, 0, 0), fov_degrees=10)
     return Scene(meshes=[mirror], spheres=[_lamp((0, 4, -4), 2.5, 2.5)], camera=camera,
@@ -89,7 +89,7 @@ def mirrored_lamp() -> Scene:
 
 
 def white_ball(side: int) -> Scene:
-    """A coarse ball with the normals of a sphere, of white, in a white sky."""
+    """Return a coarse white mesh with the normals of a sphere, in a white environment."""
     vertices, faces = icosphere(1)
     ball = Mesh(vertices, faces, Diffuse(color=(1, 1, 1)), normals=vertices.copy())
     camera, settings = Camera(position=(0, 0, 5), fov_degrees=26), RenderSettings(size=(side, side), max_depth=50)

@@ -1,4 +1,4 @@
-"""Experiments drawn by matplotlib, which is an extra."""
+"""Plots of experiments, by matplotlib (an extra)."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from .families import FIGURES
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Zero errors are drawn here, below all that was counted.
+#: Zero errors are drawn here, below all nonzero ones.
 ZERO = 1e-3
-#: Okabe and Ito's, which most colour-blind eyes tell apart.
+#: Okabe and Ito's palette, which is distinguishable with most kinds of color blindness.
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#f0e442")
 
 
 def plot_families(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
-    """Error against speed of every test in `results` ({device, families}), a row a device, a column a figure that the
-    family is judged by. Returns the path."""
+    """Plot error against speed of every test in `results` ({device, families}) and return the path.
+
+    There is a row per device, and a column per family with its primary criterion."""
     from matplotlib.figure import Figure
 
     judged = [(family, next(iter(figures.items()))) for family, figures in FIGURES.items()]
@@ -41,10 +42,11 @@ def plot_families(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
 
 
 def plot_convergence(path: Path, results: Sequence[Mapping[str, Any]], devices: Sequence[str]) -> Path:
-    """What `measure_convergence` found, a column a scene: √relMSE against seconds and against samples a pixel, the mean
-    of the seeds with a band from the least to the greatest. devices: what is written below of them. Returns the path.
+    """Plot the results of `measure_convergence`, a column per scene, and return the path.
 
-    Dotted lines fall as errors of independent samples do; the grey one is the reference's own error.
+    √relMSE against seconds and against samples per pixel: the mean over seeds, with a band from minimum to maximum.
+    Dotted lines have the slope of independent samples; the grey line is the reference's own error. devices: text in the
+    legend.
     """
     from matplotlib.figure import Figure
 
@@ -66,7 +68,7 @@ def plot_convergence(path: Path, results: Sequence[Mapping[str, Any]], devices: 
 
 
 def _draw_convergence(axis: Axes, result: Mapping[str, Any], names: Sequence[str], key: str) -> None:
-    """Curves over `key`; a contestant has its colour and mark by its place in `names`."""
+    """Draw curves over `key`; a contestant's color and marker depend on its position in `names`."""
     slope: list[tuple[float, float]] = []
     for place, name in enumerate(names):
         row = result["contestants"].get(name)
@@ -85,8 +87,8 @@ def _draw_convergence(axis: Axes, result: Mapping[str, Any], names: Sequence[str
 
 
 def plot_theses(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
-    """What `measure_theses` found: for each ratio two bars, ours and theirs; then, over the depth of mirrors, frames a
-    second relative to depth 4, whose logarithm is the same wherever they were measured. Returns the path."""
+    """Plot the results of `measure_theses` and return the path: for each ratio two bars, ours and theirs; and frames
+    per second over the depth of mirrors, relative to depth 4, so that machines are comparable."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 3.9), layout="constrained")
@@ -120,5 +122,5 @@ def _draw_ratios(axis: Axes, results: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _depths(result: Mapping[str, Any], key: str = "seconds") -> list[tuple[int, float]]:
-    """Depth and seconds of the rows that have both."""
+    """Return depth and seconds of the rows that have both."""
     return [(row["depth"], row[key]) for row in result["rows"].values() if row["depth"] and row[key]]

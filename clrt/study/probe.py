@@ -1,4 +1,4 @@
-"""Calls functions of the kernels on arrays: a scene's program with kernels/study/probe.cl in place of path.cl."""
+"""Calls kernel functions on arrays: a scene's program with kernels/study/probe.cl in place of path.cl."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ Doubles = NDArray[np.float64]
 
 
 def choices(device: Device, **chosen: Any) -> Choices:
-    """The device's own choices, but for those given: fields of Choices and of HitTests."""
+    """Return the device's own choices with the given changes: fields of Choices and of HitTests."""
     tests = HitTests(**{name: chosen.pop(name) for name in ("triangle", "box", "sphere") if name in chosen})
     return replace(Choices(device.lanes, device.layout, tests=tests), **chosen)
 
 
 class Probe:
-    """One scene on one device.
+    """A scene's program on a device, with entry points for single functions.
 
-    defines: C text put in front of the program; changes: texts of the kernels, and what stands in their places instead,
-    for finding out whether a test notices; chosen: see `choices`.
+    defines: C text that precedes the program; changes: replacements of kernel text, to check that a test detects them;
+    chosen: see `choices`.
     """
 
     def __init__(self, device: Device, scene: Scene, defines: str = "", changes: Mapping[str, str] | None = None,
@@ -45,9 +45,9 @@ class Probe:
         self._scene = [on_device(device, array) for _, array in self.compiled.buffers.values()]
 
     def __call__(self, entry: str, rows: int, *inputs: ArrayLike, **scalars: int) -> Doubles:
-        """Runs the kernel probe_`entry` and returns its (n, rows) output.
+        """Run the kernel probe_`entry` and return its (n, rows) output.
 
-        inputs: (n,) or (n, k) each, side by side what the kernel reads, as float32. scalars: the kernel's last
+        inputs: (n,) or (n, k) each, the columns that the kernel reads, as float32. scalars: the kernel's last
         arguments, each a uint, in its order.
         """
         device, given = self._device, np.ascontiguousarray(np.column_stack(inputs).T, np.float32)

@@ -1,4 +1,4 @@
-"""Contestants in turns: what a busy machine does meets all of them alike, so ratios hold where seconds do not."""
+"""Interleaved timing of contestants: load from other processes affects all equally, so ratios remain reliable."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ ROUNDS = 7
 
 
 class Contestant(NamedTuple):
-    """run: does the work once, returns its seconds and processor seconds; rays: how many that were.
+    """A contestant. run: does the work once, and returns its seconds and processor seconds; rays: their number.
 
-    agrees: the part of the rays for which it finds what the first contestant does.
+    agrees: the fraction of rays for which its result agrees with the first contestant's.
     """
 
     run: Callable[[], tuple[float, float]]
@@ -21,10 +21,10 @@ class Contestant(NamedTuple):
 
 
 def race(contestants: dict[str, Contestant], rounds: int = ROUNDS) -> dict[str, dict[str, Any]]:
-    """Of each contestant the medians over rounds in which all run once; they should be warm.
+    """Return each contestant's medians over rounds in which all run once; they should be warmed up.
 
-    ratio, cpu_ratio: rays a second, and a processor second, of the first contestant over this one's; rounds: what the
-    medians are of.
+    ratio, cpu_ratio: rays per second, and per processor second, of the first contestant over this one's; rounds: the
+    measurements of each round.
     """
     taken: dict[str, list[tuple[float, float]]] = {name: [] for name in contestants}
     for _ in range(rounds):

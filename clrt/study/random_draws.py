@@ -1,4 +1,4 @@
-"""Random values for the fields of dataclasses, by type: new fields are drawn without being named here."""
+"""Random values for the fields of dataclasses, by type: new fields need no change here."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from .bsdfs import NUMBERS
 
 Drawn = TypeVar("Drawn")
 
-#: Probabilities that a field keeps its default: each batch has one of them, so that there are plain scenes, too.
+#: Probabilities that a field keeps its default. Each batch uses one of them, so that some scenes are simple.
 USUAL = (0.3, 0.7, 0.95)
-#: Of fields that do not: probabilities that a parameter is a texture, that a flag is set, and that an optional field is
+#: For other fields: the probabilities that a parameter is a texture, that a flag is set, and that an optional field is
 #: None.
 TEXTURED, RAISED, ABSENT = 0.25, 0.5, 0.3
-#: And that a number is the low or the high end of its range, or inside.
+#: Probabilities that a number is the low or the high end of its range, or inside.
 PLACES = {"low": 0.15, "high": 0.2, "inside": 0.65}
-#: Ranges of moderate draws, by the end of a field's name: one strategy alone hardly finds narrower lobes and lights.
+#: Ranges of moderate draws, by suffix of the field name: a single strategy hardly samples narrower lobes and lights.
 WIDE = {"roughness": (0.4, 1.0), "shininess": (0.0, 30.0), "angle_degrees": (30.0, 180.0)}
-#: Least texel of moderate draws, out of 255.
+#: Smallest texel of moderate draws, out of 255.
 DIM = 140
-#: Texels along a texture's side.
+#: Texels per side of a texture.
 TEXELS = 4
 
 
 class Draws:
-    """The random choices of one scene of a batch.
+    """Random choices of one scene of a batch.
 
-    All that programs depend on (types, words, flags, which parameters are textures or at an end of their range) is
-    equal in all scenes of a batch, which thus share programs; numbers are each scene's own. moderate: without the
-    extremes for which a single sampling strategy needs too many samples.
+    All that programs depend on (types, strings, flags, which parameters are textures or at an end of their range) is
+    equal for all scenes of a batch, which thus share programs; numbers differ per scene. moderate: without the extremes
+    for which a single sampling strategy needs too many samples.
     """
 
     def __init__(self, seed: int, batch: int, number: int, moderate: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Whether the kernels' random numbers are uniform, and unrelated over pixels, samples, dimensions and seeds."""
+"""Whether the kernels' random numbers are uniform, and independent over pixels, samples, dimensions and seeds."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from numpy.typing import ArrayLike
 from .probe import Doubles, Probe
 from .significance import chi2_test, mean_test
 
-#: (n, 2) numbers of pixels, samples, dimensions and seeds.
+#: Returns (n, 2) random numbers for pixels, samples, dimensions and seeds.
 Draw = Callable[[ArrayLike, ArrayLike, ArrayLike, ArrayLike], Doubles]
 
-#: The middles of the runs of indices: none, where float32 can no longer count, the end of an 8192² picture, and where
-#: 31 and 32 bits end; there the indices go on from 0.
+#: Middles of the ranges of indices: an ordinary one, where float32 can no longer count, the end of an 8192² image, and
+#: where 31 and 32 bits overflow; there the indices wrap around to 0.
 MIDDLES = (1 << 23, 1 << 24, 1 << 26, 1 << 31, 1 << 32)
-#: (pixel, sample, dimension, seed) from one number to the next: neighbours, diagonals, picture rows, powers of two.
+#: Offsets (pixel, sample, dimension, seed) of compared numbers: neighbors, diagonals, image rows, powers of two.
 STEPS = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (2, 0, 0, 0), (64, 0, 0, 0), (1920, 0, 0, 0),
          (8192, 0, 0, 0), (1 << 16, 0, 0, 0), (1 << 30, 0, 0, 0), (0, 64, 0, 0), (0, 1 << 30, 0, 0), (0, 0, 2, 0),
          (0, 0, 0, 1 << 30), (1, 1, 0, 0), (1, -1, 0, 0), (1, 0, -1, 0), (0, 1, -1, 0), (1, 0, 0, -1), (0, 1, 0, -1))
-#: Cells along each side of a square, and of a hypercube.
+#: Cells per side of a square, and of a hypercube.
 SIDE, EDGE = 16, 6
-#: Of samples, dimensions and seeds that are tried for each pixel.
+#: Number of samples, dimensions and seeds that are tested per pixel.
 FEW = 64
 
 
 def draw_on(probe: Probe) -> Draw:
-    """next_2d for indices that broadcast, taken modulo 2^32; one launch for each dimension and seed."""
+    """Return next_2d for indices that broadcast, taken modulo 2^32; one launch per dimension and seed."""
 
     def draw(pixel: ArrayLike, sample: ArrayLike, dimension: ArrayLike, seed: ArrayLike) -> Doubles:
         grid = [np.asarray(a, np.int64) % (1 << 32) for a in np.broadcast_arrays(pixel, sample, dimension, seed)]
@@ -44,8 +44,8 @@ def draw_on(probe: Probe) -> Draw:
 
 
 def uniformity(draw: Draw, count: int) -> dict[str, float]:
-    """p-values of pairs of numbers filling the square evenly along every index; of each bit being 1 half of the time;
-    and of two consecutive pairs, along pixels and dimensions, filling the hypercube."""
+    """Return p-values of pairs filling the square evenly along every index; of each bit being 1 half of the time; and
+    of two consecutive pairs, along pixels and dimensions, filling the hypercube."""
     p_values = {}
     for middle in MIDDLES:
         for name, walk in _walks(middle - count // 2, count).items():
@@ -62,7 +62,7 @@ def uniformity(draw: Draw, count: int) -> dict[str, float]:
 
 
 def independence(draw: Draw, count: int) -> dict[str, float]:
-    """p-values of numbers one of STEPS apart being independent (chi-square) and uncorrelated."""
+    """Return p-values of numbers that are one of STEPS apart being independent (chi-square) and uncorrelated."""
     p_values = {}
     for middle in MIDDLES:
         i = np.arange(count)
@@ -79,9 +79,9 @@ def independence(draw: Draw, count: int) -> dict[str, float]:
 
 
 def repetitions(draw: Draw, side: int) -> int:
-    """Equal pairs among those of side² pixels and samples, and of as many more with the two exchanged or a seed away.
+    """Count equal pairs among those of side² pixels and samples, and of as many with the two exchanged or a seed away.
 
-    By chance fewer than one: pairs have 48 bits.
+    The expected number is below one: pairs have 48 bits.
     """
     pixel, sample = (grid.ravel() for grid in np.meshgrid(np.arange(side), np.arange(side) + 1_000_000))
     u = np.concatenate([draw(pixel, sample, 0, 0), draw(sample, pixel, 0, 0), draw(pixel, sample, 0, 1),
@@ -91,7 +91,7 @@ def repetitions(draw: Draw, side: int) -> int:
 
 
 def _walks(start: int, count: int) -> dict[str, tuple[ArrayLike, ...]]:
-    """(pixel, sample, dimension, seed) along which numbers are drawn."""
+    """Return (pixel, sample, dimension, seed) along which numbers are drawn, by name."""
     i = start + np.arange(count)
     few, many = np.arange(count) % FEW, start + np.arange(count) // FEW
     return {"pixels": (i, 3, 2, 1), "samples": (7, i, 2, 1), "pixels and samples": (many, few, 0, 0),

@@ -1,8 +1,8 @@
-"""Random scenes of everything in the registries: materials, lights, cameras, textures, with all optional fields.
+"""Random scenes that cover the registries: materials, lights, cameras, textures, with all optional fields.
 
-Some objects and instances stand on a floor below a few lights. Scenes of a batch (see Draws) consist of the same
-things; where these are and how bright differs. Additions to MATERIALS and LIGHTS, and new fields of these, of Texture,
-Camera and RenderSettings, are drawn without being named here.
+Some objects and instances stand on a floor below a few lights. Scenes of a batch (see Draws) have the same kinds of
+objects and lights, with different positions and intensities. Additions to MATERIALS and LIGHTS, and new fields of
+these, of Texture, Camera and RenderSettings, need no change here.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from .shapes import icosphere
 
 #: Scenes per batch.
 BATCH = 4
-#: Size of the pictures in pixels.
+#: Size of the images in pixels.
 SIZE = (32, 24)
 SHAPES = ("ball", "solid", "sheet", "copies")
 LAMPS = ("ball", "sheet", "solid")
 SKIES = (None, "constant", "smooth", "uneven")
-#: Rows and columns of an image sky.
+#: Rows and columns of an environment map.
 SKY_SIZE = (8, 16)
-#: Path depths; Russian roulette begins before the last.
+#: Path depths; Russian roulette starts before the last.
 DEPTHS = (2, 3, 4, 7)
 BLACK = (0.0, 0.0, 0.0)
-#: Positions around the middle of the floor.
+#: Positions around the center of the floor.
 PLACES = ((-1.0, 0.0), (0.9, 0.4), (-0.1, -1.1), (0.1, 1.2))
-#: Subdivisions of a solid, and of one with copies: smaller ones would become meshes (scene.instancing).
+#: Subdivisions of a solid, and of one with copies: smaller ones would be converted to meshes (scene.instancing).
 SOLID, COPIED = 1, 6
 
 
@@ -109,9 +109,9 @@ class _Stage:
         self._add(shape, material, middle, size)
 
     def _lamp_place(self, number: int) -> Vector:
-        """Return where a lamp hangs: in moderate draws, apart from other lamps and from the objects.
+        """Return the position of an emitter: in moderate draws, apart from other emitters and from the objects.
 
-        Light sampling alone has infinite variance where a lamp touches a surface.
+        Light sampling alone has infinite variance if an emitter touches a surface.
         """
         draws = self.draws
         if not draws.moderate:
@@ -120,11 +120,11 @@ class _Stage:
         return 1.7 * cos(turn), draws.between(3.4, 4.2), 1.7 * sin(turn)
 
     def _hang(self, shape: str, middle: Vector, material: Material) -> None:
-        """Add a lamp, a flat one with its front down."""
+        """Add an emissive object; a flat one faces down."""
         self._add(shape, material, middle, self.draws.between(0.3, 0.7), (180.0, 0.0, 0.0))
 
     def _add(self, shape: str, material: Material, middle: Vector, size: float, upright: Vector | None = None) -> None:
-        """Add an object; upright: how it is turned before it is tilted a little; None for a flat one on its edge."""
+        """Add an object. upright: its rotation before a small random tilt; None places a flat one on its edge."""
         draws = self.draws
         if shape == "ball":
             self.spheres.append(Sphere(center=middle, radius=size, material=material, name=f"ball {len(self.spheres)}"))
@@ -156,7 +156,7 @@ class _Stage:
         return self._coordinates(Mesh(vertices, faces, material, normals=normals, name=name))
 
     def _coordinates(self, mesh: Mesh) -> Mesh:
-        """Add texture coordinates, and maybe colours, some of them with alpha."""
+        """Add texture coordinates, and sometimes vertex colors, some of them with alpha."""
         draws, flat = self.draws, mesh.vertices[:, [0, 2]] + mesh.vertices[:, [1, 1]] * np.float32(0.7)
         uv, uv1 = flat * np.float32(draws.between(0.5, 2)), flat[:, ::-1] * np.float32(draws.between(0.5, 2))
         colors: FloatArray | None = None
@@ -198,7 +198,7 @@ def _known(kind: Any, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _product(*matrices: Any) -> Any:
-    """Return the product of transforms, the first of which acts first."""
+    """Return the product of transforms, the first of which is applied first."""
     result = np.eye(4)
     for matrix in matrices:
         result = matrix @ result

@@ -1,4 +1,4 @@
-"""What a camera sees first, rasterised and traced through the same places (kernels/study/raster_hits.cl)."""
+"""First hits of a camera, rasterized and traced through the same positions (kernels/study/raster_hits.cl)."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from ..rendering.tiles import TILE_PIXELS, tiles_of
 from ..scene.model import Scene
 from .probe import choices
 
-#: x, y: the place, from −1 to 1; t, u, v, primitive, instance: the hit as the kernels have it.
+#: x, y: position in the image, from −1 to 1; t, u, v, primitive, instance: the hit as in the kernels.
 SEEN = record(x="f4", y="f4", t="f4", u="f4", v="f4", primitive="i4", instance="i4", pad="i4")
 
 
 def seen_both_ways(device: Device, scene: Scene, sample: int = 0, **chosen: Any) -> tuple[NDArray[Any], NDArray[Any]]:
-    """(height, width) SEEN records, rasterised and traced, of a sample of each pixel; chosen: see `probe.choices`."""
+    """Return (height, width) SEEN records, rasterized and traced, one sample per pixel; chosen: see `choices`."""
     scene = replace(scene, render=replace(scene.render, integrator="raster"))
     compiled = compile_scene(scene, choices(device, first_hits=True, **chosen), device=device)
     width, height = size = scene.render.size
@@ -37,7 +37,7 @@ def seen_both_ways(device: Device, scene: Scene, sample: int = 0, **chosen: Any)
     program = build(device, compiled.source_of("study/raster_hits.cl", typedefs({"Seen": SEEN})))
     kernel = make_kernel(device, program, "raster_hits")
     seen = [empty_array(device, SEEN, width * height) for _ in range(2)]
-    given = [*(each.buffer for each in seen), on_device(device, tiles), launch[0]]   # kernels keep no arguments alive
+    given = [*(each.buffer for each in seen), on_device(device, tiles), launch[0]]   # kernels keep no references
     bins = Bins(device, compiled, arguments)
     kernel.set_args(*arguments, *given, *bins.of(launch, {}))
     run_kernel(device, kernel, -(-len(tiles) * TILE_PIXELS // (compiled.choices.lanes * device.local_size)))

@@ -1,4 +1,4 @@
-"""Rays a second: closest hits and shadow rays of one mesh, the kernels alone and whole calls from Python."""
+"""Ray throughput: closest hits and shadow rays of one mesh, the kernels alone and calls from Python."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ Rays = tuple[Floats, Floats, Floats]
 
 
 class Run:
-    """Calls of one method of a query with the same rays. answers: those of a first call, to warm up; calls: the seconds
-    of each call after it, numpy arrays in and out."""
+    """Calls of one method of a query with the same rays. answers: results of a first call, for warm-up; calls: seconds
+    of each later call, including conversion from and to numpy arrays."""
 
     def __init__(self, query: RayQuery, ask: Callable[..., NDArray[Any]], rays: Rays) -> None:
         self._query, self._ask, self._rays = query, ask, rays
@@ -32,7 +32,7 @@ class Run:
         self.calls: list[float] = []
 
     def __call__(self) -> tuple[float, float]:
-        """Seconds of the kernels, and processor seconds of all threads but this, which hands rays over and waits."""
+        """Return the kernels' seconds, and processor seconds of all threads except this one."""
         kernel, others, start = self._query.kernel_seconds, _others(), time.perf_counter()
         self._ask(*self._rays)
         self.calls.append(time.perf_counter() - start)
@@ -41,7 +41,7 @@ class Run:
 
 def measure_rays(vertices: Floats, faces: NDArray[np.int32], rays: Rays, *, repeats: int = 7,
                  **options: Any) -> dict[str, Any]:
-    """The figures of `clrt bench rays` with rays from a file: medians of `repeats` calls after one to warm up.
+    """Return the results of `clrt bench rays` with rays from a file: medians of `repeats` calls after a warm-up call.
 
     vertices: (n, 3); faces: (m, 3); rays: origins (k, 3), directions (k, 3), t_max (k,). options: see RayQuery.
     """
@@ -61,9 +61,9 @@ def measure_rays(vertices: Floats, faces: NDArray[np.int32], rays: Rays, *, repe
 
 
 def load_rays(path: Path) -> Rays:
-    """origins (k, 3), directions (k, 3) and t_max (k,), float32, of an .npz file with arrays as `RayQuery` takes them.
+    """Read origins (k, 3), directions (k, 3) and t_max (k,), float32, from an .npz file with arrays as for `RayQuery`.
 
-    SceneError for what is none and for an empty one.
+    Raises SceneError if it is malformed or empty.
     """
     remedy = "store origins, directions and t_max with numpy.savez"
     try:
@@ -84,7 +84,7 @@ def load_rays(path: Path) -> Rays:
 
 
 def load_triangles(path: Path) -> tuple[Floats, NDArray[np.int32]]:
-    """All meshes of a model file as one: vertices (n, 3), faces (m, 3)."""
+    """Read all meshes of a model file as one: vertices (n, 3), faces (m, 3)."""
     vertices, faces, first = [], [], 0
     for mesh in read_mesh(path, "flat"):
         vertices.append(mesh.vertices)
@@ -94,7 +94,7 @@ def load_triangles(path: Path) -> tuple[Floats, NDArray[np.int32]]:
 
 
 def scattered_rays(vertices: Floats, count: int = 1 << 20, seed: int = 0) -> Rays:
-    """Rays from all around a mesh through its box: half of them start inside it, in random directions."""
+    """Return random rays through a mesh's bounding box: half of them start inside it."""
     rng = np.random.default_rng(seed)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     inside = rng.uniform(low, high, (count, 3))
@@ -106,17 +106,17 @@ def scattered_rays(vertices: Floats, count: int = 1 << 20, seed: int = 0) -> Ray
 
 
 def every(step: int, rays: Rays) -> Rays:
-    """One ray of `step`."""
+    """Return every step-th ray."""
     origins, directions, t_max = (np.ascontiguousarray(array[::step]) for array in rays)
     return origins, directions, t_max
 
 
 def differing(expected: NDArray[Any], answers: NDArray[Any]) -> NDArray[np.bool_]:
-    """(n,) Which records are not the same bits."""
+    """Return which records are not bitwise equal, (n,)."""
     one, other = (np.ascontiguousarray(each).view(np.uint8).reshape(len(answers), -1) for each in (expected, answers))
     return np.asarray((one != other).any(axis=1))
 
 
 def _others() -> float:
-    """Processor seconds of this process, without this thread's."""
+    """Return the processor seconds of this process without this thread's."""
     return time.process_time() - time.thread_time()

@@ -1,7 +1,7 @@
-"""What pictures are measured against: a scene rendered long enough once, and kept between runs.
+"""Reference images for error measurements: a scene rendered with many samples once, and cached between runs.
 
-It is the mean of steps, renders of STEP_SPP samples each with a seed of its own. From how far these differ follows how
-far their mean is from the truth, whatever numbers the samples are drawn with; and a kept one goes on where it ended.
+A reference is the mean of steps, renders of STEP_SPP samples each with different seeds. The variance between steps
+gives the error of their mean, whatever the sampler; and a cached reference can be extended by further steps.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from ..rendering.renderer import Renderer
 from ..scene.model import Scene
 
 STEP_SPP = 128
-#: Of the first step; each next one has the seed below. Renders that are measured count up from 0.
+#: Seed of the first step; the seeds of later ones count down. Measured renders count up from 0.
 FIRST_SEED = 2**32 - 1
 
 
 @dataclass(frozen=True)
 class Reference:
-    """total, squares: (h, w, 3) float64, of the steps' pictures and of their squares; means: (steps, 3), of each.
+    """Reference image. total, squares: (h, w, 3) float64, sums of images and of their squares; means: (steps, 3).
 
-    step_spp: samples a pixel of a step.
+    step_spp: samples per pixel of a step.
     """
 
     means: NDArray[np.float64]
@@ -40,40 +40,40 @@ class Reference:
 
     @property
     def steps(self) -> int:
-        """How many pictures it is the mean of."""
+        """Number of steps."""
         return len(self.means)
 
     @property
     def spp(self) -> int:
-        """Samples a pixel."""
+        """Samples per pixel."""
         return self.steps * self.step_spp
 
     @property
     def pixels(self) -> NDArray[np.float32]:
-        """(h, w, 3) float32, linear Rec. 709."""
+        """Image (h, w, 3), float32, linear Rec. 709."""
         return (self.total / self.steps).astype(np.float32)
 
     @property
     def relmse(self) -> float:
-        """Its own, estimated from the variance between steps; it takes two of them."""
+        """Its own relMSE, estimated from the variance between steps; requires at least two."""
         mean = self.total / self.steps
         variance = np.maximum(self.squares / self.steps - mean**2, 0) / (self.steps - 1)
         return float(np.mean(variance / (mean**2 + RELMSE_FLOOR)))
 
     def plus(self, picture: NDArray[np.float64]) -> Reference:
-        """With one more step."""
+        """Return the reference with one more step."""
         return Reference(np.append(self.means, [picture.mean((0, 1))], 0), self.total + picture,
                          self.squares + picture**2, self.step_spp)
 
 
 def render_reference(scene: Scene, steps: int, *, device: str | int | None = None, step_spp: int = STEP_SPP,
                      on_step: Callable[[int], None] = lambda step: None) -> Reference:
-    """The reference of `scene` with at least `steps` steps (2 or more), as far as possible from the cache.
+    """Return the reference of `scene` with at least `steps` steps (2 or more), from the cache as far as possible.
 
-    step_spp: samples a pixel of a step; the more, the sooner errors fall, as a step's samples know of each other.
+    step_spp: samples per pixel of a step; the larger, the faster errors fall, as samples are stratified within a step.
 
-    Kept by all that makes the picture: kernels, buffers, size, depth and camera; a damaged file counts as none.
-    on_step hears the number of each step that has to be rendered. Raises what `Renderer` does.
+    The cache key covers all that the image depends on: kernels, buffers, size, depth and camera; a damaged file is
+    ignored. on_step: called with the number of each step that has to be rendered. Raises what `Renderer` raises.
     """
     renderer = Renderer(scene, device=device)
     width, height = renderer.settings.size
@@ -98,7 +98,7 @@ def _digest(renderer: Renderer, step_spp: int) -> str:
     digest = hashlib.sha256(compiled.source.encode())
     digest.update(repr((step_spp, settings.size, settings.max_depth, settings.integrator, compiled.camera)).encode())
     for array in [compiled.counts, *(array for _, array in compiled.buffers.values())]:
-        if isinstance(array, np.ndarray):  # trees built on the device stay there; no picture depends on them
+        if isinstance(array, np.ndarray):  # BVHs built on the device stay there; images do not depend on them
             digest.update(array.tobytes())
     return digest.hexdigest()
 
@@ -110,7 +110,7 @@ def _keep(name: str, reference: Reference) -> None:
 
 
 def _kept(name: str, shape: tuple[int, ...], step_spp: int) -> Reference | None:
-    """What is kept under `name`; None where nothing is, or nothing that can be read (archives have checksums)."""
+    """Return the reference cached under `name`; None if there is none or it is damaged (archives have checksums)."""
     content = read_file(name)
     if content is None:
         return None

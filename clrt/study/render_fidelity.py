@@ -1,10 +1,10 @@
-"""clrt beside the path tracers of glTF-Render-Fidelity (`fidelity_suite`): is it as close to them as they are to each
-other?
+"""clrt compared with the path tracers of glTF-Render-Fidelity (`fidelity_suite`): is it as close to them as they are to
+each other?
 
-Two questions, whose measures are of what a display shows, after the suite's tone mapping. FLIP: is clrt's mean distance
-to the others at most that of the one that is furthest from the rest? Mean luminance, of the whole image and of each
-material's region: is it within the range of theirs, widened by MARGIN? (A fifth renderer like four others lies outside
-of their range by chance in two cases of five.)
+Both criteria apply to display values, after the suite's tone mapping. FLIP: clrt's mean distance to the others must be
+at most that of the one that is furthest from the rest. Mean luminance, of the whole image and of each material's
+region, must be within the range of the others, widened by MARGIN. (A fifth renderer equivalent to the other four would
+lie outside of their range by chance in two cases of five.)
 """
 
 from __future__ import annotations
@@ -32,30 +32,29 @@ from ..scene.validate import validate
 from .fidelity_suite import (WEBSITE_WIDTH, Floats, Scenario, compressed, files_of, golden, over_white, reduced, shrunk,
                              tone_mapped)
 
-#: By how much a mean may be beyond those of the others; the part of an image that a region has at least.
+#: Relative tolerance of a mean beyond the range of the others; smallest fraction of an image that counts as a region.
 MARGIN, LEAST = 0.05, 0.005
-#: Is added to means: lossy compression lets white bleed into the black beside it.
+#: Added to means: lossy compression lets white bleed into adjacent black.
 DARK = 0.02
-#: Path edges; the environment map's middle is +X in three.js and Cycles, +Z in clrt.
+#: Path depth; the center of the environment map is +X in three.js and Cycles, +Z in clrt.
 DEPTH, ROTATION = 16, 90.0
-#: A pixel belongs to a region where the model covers all of it; the others' alphas were stored lossily.
+#: A pixel belongs to a region if the model covers all of it; the other images' alphas were compressed lossily.
 COVERED, STORED_COVERED = 0.999, 0.98
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 Means = Mapping[str, float]
 
 
 class Judged(NamedTuple):
-    """A line of the table; the display's linear light by renderer, clrt's first, where there are images."""
+    """A row of the table; and the display's linear light by renderer, clrt's first, if there are images."""
 
     row: dict[str, Any]
     images: dict[str, Floats]
 
 
 class Effort(NamedTuple):
-    """Pixels in a row (None: as many as the scenario has), samples per pixel, what takes their noise away, and the
-    device's number.
+    """Image width in pixels (None: the scenario's own), samples per pixel, denoiser, and the device's index.
 
-    Tone mapping bends: noise, and text and highlights smaller than a pixel, change means of what a display shows.
+    Tone mapping is nonlinear: noise, and text and highlights smaller than a pixel, change means of display values.
     """
 
     width: int | None
@@ -66,11 +65,10 @@ class Effort(NamedTuple):
 
 def judge(found: Sequence[Scenario], width: int | None, spp: int, denoise: bool = False,
           device: str | int | None = None) -> Iterator[Judged]:
-    """Each scenario in turn, rendered with `width` pixels in a row, the scenario's own where that is None, and compared
-    at no more than the website's. UsageError without flip-evaluator.
+    """Yield each scenario, rendered `width` pixels wide (None: its own) and compared at the website's size or less.
 
-    The row's result: inside or outside of the others' spread; no spread where fewer than two have an image; missing
-    where files are, not read where clrt cannot, `problems` says what.
+    The row's result: inside or outside of the others' spread; no spread if fewer than two have an image; missing if
+    files are; not read if clrt cannot, with `problems`. Raises UsageError without flip-evaluator.
     """
     try:
         import flip_evaluator  # noqa: F401
@@ -95,7 +93,7 @@ def judge(found: Sequence[Scenario], width: int | None, spp: int, denoise: bool 
 
 @contextmanager
 def _warnings() -> Iterator[list[str]]:
-    """What readers of scenes warn of meanwhile, without the file's name."""
+    """Collect the warnings of scene readers, without the file's name."""
     heard: list[str] = []
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: heard.append(record.getMessage().partition(": ")[2])  # type: ignore[method-assign]
@@ -108,7 +106,7 @@ def _warnings() -> Iterator[list[str]]:
 
 
 def _scene(scenario: Scenario, width: int | None) -> Scene:
-    """The model with its own lights, in the scenario's light and before its camera."""
+    """Return the model with its own lights, with the scenario's environment and camera."""
     model = read_model(scenario.model)
     scene = Scene(meshes=model.meshes, instances=model.instances, lights=model.lights, camera=scenario.camera,
                   environment=Environment(image=read_picture(scenario.lighting), rotation_degrees=ROTATION),
@@ -147,7 +145,7 @@ def _judged(row: dict[str, Any], scenario: Scenario, scene: Scene, effort: Effor
 
 
 def _wholly(part: NDArray[np.bool_], size: tuple[int, int]) -> NDArray[np.bool_]:
-    """The pixels of a smaller image that lie in a part of a larger one."""
+    """Return the pixels of a smaller image that lie entirely within a region of a larger one."""
     return np.asarray(reduced(part[..., None].astype(np.float32), size)[..., 0] > COVERED)
 
 
@@ -156,7 +154,7 @@ def _material_name(mesh: Mesh) -> str:
 
 
 def _rendered(scene: Scene, effort: Effort) -> tuple[Floats, NDArray[np.int32]]:
-    """The pixels, and the numbers of the objects seen first."""
+    """Return the pixels, and the object ids of the first hits."""
     renderer = Renderer(scene, device=effort.device, spp=effort.spp, aovs="object",
                         first_hits=effort.denoiser is not None)
     *_, state = renderer.passes(spp=effort.spp)
@@ -168,9 +166,9 @@ def _rendered(scene: Scene, effort: Effort) -> tuple[Floats, NDArray[np.int32]]:
 
 
 def _without_background(scene: Scene, pixels: Floats, effort: Effort) -> tuple[Floats, Floats]:
-    """The surfaces' light, (h, w, 3), and the part of each pixel that they cover, (h, w, 1).
+    """Return the surfaces' radiance, (h, w, 3), and their coverage of each pixel, (h, w, 1).
 
-    A pixel's light is that of the surfaces and the rest of the background's; tone mapping is of the first alone.
+    A pixel mixes surfaces and background by coverage; tone mapping applies to the surfaces only.
     """
     def white(material: Material) -> Diffuse:
         return Diffuse(color=(1.0, 1.0, 1.0), opacity=material.opacity, alpha_cutoff=material.alpha_cutoff)
@@ -190,8 +188,9 @@ def _without_background(scene: Scene, pixels: Floats, effort: Effort) -> tuple[F
 
 
 def verdict(images: Mapping[str, Floats], means: Mapping[str, Means]) -> dict[str, Any]:
-    """result; flip: clrt's to each; mean_flip: their mean, spread: the largest such mean of theirs; means: by region,
-    "" the whole, with `beyond`, by how much clrt's is outside of the range of theirs (1 inside, below 1 too dark)."""
+    """Return result; flip: clrt's distance to each; mean_flip: their mean, spread: the largest such mean of the others;
+    means: by region ("" is the whole image), with `beyond`, clrt's factor outside their range (1 inside, < 1 too dark).
+    """
     others = [name for name in images if name != "clrt"]
     distances = {(a, b): _flip(images[a], images[b]) for i, a in enumerate(images) for b in [*images][i + 1:]}
     mean_flip = {a: float(np.mean([value for pair, value in distances.items() if a in pair and (

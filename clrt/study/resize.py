@@ -1,4 +1,4 @@
-"""The same surface in more or in fewer triangles."""
+"""Resampling of a mesh to more or fewer triangles."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from .workloads import Faces, Mesh, subdivide
 
 #: Cells of the finest grid along the largest extent.
 FINEST = 1 << 20
-#: Meshes of no more triangles are as simple as can be.
+#: Meshes with at most this many triangles are not simplified.
 SIMPLE = 1000
 
 
 def resized(vertices: Floats, faces: Faces, triangles: int) -> Mesh:
-    """The mesh in little more than so many triangles: simplified, subdivided, or first the one and then the other."""
+    """Return the mesh with slightly more than this number of triangles: simplified, subdivided, or both."""
     times = 0
     while len(faces) * 4**times < triangles:
         times += 1
@@ -26,11 +26,11 @@ def resized(vertices: Floats, faces: Faces, triangles: int) -> Mesh:
 
 
 def simplified(vertices: Floats, faces: Faces, triangles: int) -> Mesh:
-    """The mesh in little more than so many triangles; one of no more than SIMPLE stays as it is.
+    """Return the mesh with slightly more than this number of triangles; one with at most SIMPLE is unchanged.
 
-    By the coarsest grid that leaves them: vertices in one of its cubic cells become one, at their mean, and triangles
-    that fall together vanish (Rossignac and Borrel 1993, "Multi-resolution 3D approximations for rendering complex
-    scenes").
+    Uses the coarsest grid that leaves enough triangles: the vertices in a cubic cell are merged to their mean, and
+    triangles that degenerate are removed (Rossignac and Borrel 1993, "Multi-resolution 3D approximations for rendering
+    complex scenes").
     """
     if len(faces) <= max(triangles, SIMPLE):
         return vertices, faces
@@ -45,7 +45,7 @@ def simplified(vertices: Floats, faces: Faces, triangles: int) -> Mesh:
 
 
 def _cells(vertices: Floats, number: int) -> NDArray[np.int64]:
-    """(n,) the cell of each vertex, `number` of them along the largest extent."""
+    """Return the cell of each vertex, (n,), with `number` cells along the largest extent."""
     low = vertices.min(axis=0).astype(np.float64)
     extent = float((vertices.max(axis=0) - low).max())
     x, y, z = np.minimum(((vertices - low) * (number / extent)).astype(np.int64), number - 1).T
@@ -53,6 +53,6 @@ def _cells(vertices: Floats, number: int) -> NDArray[np.int64]:
 
 
 def _stays(corners: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Which triangles (m, 3) have three different corners."""
+    """Return which triangles (m, 3) have three different vertices."""
     a, b, c = corners.T
     return np.asarray((a != b) & (b != c) & (c != a))

@@ -1,4 +1,4 @@
-"""A line of `clrt bench numerics`."""
+"""Result row of `clrt bench numerics`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Row:
-    """What one hard case gave. case: its number, "G1" … "L10"; what: the setting, in words.
+    """Result of one hard case. case: its number, "G1" … "L10"; what: the setting, in words.
 
-    wrong: how many of `count` answers cannot be right: 0 is asked of the defaults. figure, unit: what else was
-    measured, if anything, such as the largest error of t in units in the last place ("ulp").
+    wrong: how many of `count` results are impossible; defaults must have 0. figure, unit: a further measurement, if
+    any, such as the largest error of t in units in the last place ("ulp").
     """
 
     case: str

@@ -1,4 +1,4 @@
-"""Hard cases of light and samples: furnaces, samplers against their densities, sums, random numbers."""
+"""Hard cases of sampling: furnace tests, samplers against their pdfs, film accumulation, random numbers."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from .scattering import QUADRATURE, ROUNDING, Scattered, cases, reciprocity, sca
 from .significance import family_row
 from .warps import warp_density_errors, warp_p_values, warp_probe
 
-#: What furnaces may be off the albedo of one bounce, and 1 with multiple scattering.
+#: Tolerance of furnace tests, against the single-bounce albedo, or 1 with multiple scattering.
 FURNACE = 1e-3
-#: What furnaces of rough glass and of layers may be off 1.
+#: Tolerances of furnace tests of rough glass and of layers, against 1.
 GLASS_FURNACE, LAYER_FURNACE = 2e-3, 2.5e-3
-#: What a density may miss 1/area and a closed form by, and a mean of the film the true one.
+#: Tolerances of a pdf against 1/area and against its closed form, and of the film's mean against the true one.
 AREA, DENSITY, MEAN = 2e-3, 1e-5, 1e-6
 LAMP_SAMPLES = 64
 
 
 class Effort(NamedTuple):
-    """Samples of each case of a kind, and of what there is the part that is taken: of materials one case in `step`, of
-    forms of shadowing the first `smiths`, of repeated numbers those of side² pixels and samples.
+    """Samples per case of each kind, and the subset of cases: every `step`-th material, the first `smiths` Smith terms;
+    repetitions are searched among side² pixels and samples.
     """
 
     scattered: int
@@ -56,7 +56,7 @@ QUICK = Effort(scattered=1 << 14, step=7, furnace=1 << 14, smiths=1, warped=1 <<
 
 
 def measure_samplers(device: Device, *, quick: bool) -> Iterator[Row]:
-    """Rows of cases L1, L2, L6, L7 and L8 on one device."""
+    """Yield the rows of cases L1, L2, L6, L7 and L8 on one device."""
     effort = QUICK if quick else FULL
     yield from _furnaces(device, effort)
     yield from _materials(device, effort)
@@ -101,7 +101,7 @@ def _materials(device: Device, effort: Effort) -> Iterator[Row]:
 
 
 def scattering_rows(found: list[Scattered], samples: int) -> Iterator[Row]:
-    """What `scatter` found of all cases, each with `samples` samples."""
+    """Yield rows for the results of `scatter` for all cases, each with `samples` samples."""
     count = len(found) * samples
     yield family_row("L2", "directions of materials follow their densities",
                      {s.name: s.density for s in found if not s.specular})
@@ -156,7 +156,7 @@ def _dropped(device: Device, probe: Probe) -> Iterator[Row]:
 
 
 def _lamp(device: Device, radiance: float) -> Film:
-    """The film of a lamp before the black, which covers a part of the picture."""
+    """Return the film of an emissive sphere on black, which covers a part of the image."""
     scene = Scene(spheres=[Sphere(material=Diffuse(emission=(radiance, radiance, radiance)))],
                   camera=Camera(position=(0.0, 0.0, 5.0)), render=RenderSettings(size=(32, 32), max_depth=1))
     *_, last = Renderer(scene, device=device.info.index).passes(spp=LAMP_SAMPLES)

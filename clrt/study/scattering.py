@@ -1,4 +1,4 @@
-"""Whether the materials' samples, densities and values fit each other, for every material from every angle."""
+"""Consistency of the materials' samples, pdfs and values, for every material and angle."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from .bsdfs import Bsdfs, layered_variants, plain_variants, uniform, view, views
 from .probe import Doubles
 from .significance import chi2_test, mean_test
 
-#: Two computations of one float32 formula whose products a compiler may fuse or not: some dozen roundings apart.
+#: Relative difference of two float32 evaluations of a formula with different contraction (FMA): a dozen roundings.
 ROUNDING = 2e-6
-#: The quadrature of densities, at directions that are rounded to float32; seen at the narrowest lobes.
+#: Error of the quadrature of pdfs, at directions rounded to float32; reached with the narrowest lobes.
 QUADRATURE = 5e-4
-#: By what the fits of albedos are off at most (kernels/bsdf/ggx_albedo.cl): what white may reflect too much.
+#: Largest error of the albedo fits (kernels/bsdf/ggx_albedo.cl), which white materials may reflect in excess.
 FITTED = 1e-3
-#: Views of what differs in words only.
+#: Cosines for variants that differ in strings or layers only.
 FEW = (0.6, 0.1)
-#: Makes a direction above the surface one below it.
+#: Mirrors a direction above the surface to one below it.
 FLIP = np.array([1.0, 1.0, -1.0])
 
 
 class Scattered(NamedTuple):
-    """What samples of one material seen from one angle showed. p-values of single directions are 1.
+    """Results for samples of one material from one angle. For specular materials, `density` is 1.
 
-    density: chi-square of the samples over cells of the sphere, and one for the failed ones, p; integral: of the
-    density; failed: part of the samples below the horizon; energy: that no channel of the furnace exceeds 1, one-sided
-    p; weight: largest relative error of the weights, times spread, as value over density; wrong: samples that are no
-    unit vectors, are below the horizon without having failed or the other way around (but of materials that light
-    goes through), or are specular and have more than one direction a side, or a density elsewhere.
+    density: p-value of the chi-square test of samples over cells of the sphere, with a cell for failed ones; integral:
+    of the pdf; failed: fraction of samples below the horizon; energy: one-sided p-value of no furnace channel exceeding
+    1; weight: largest relative error of the weights, times spread, against value over pdf; wrong: samples that are not
+    unit vectors, that are below the horizon without having failed or vice versa (except for transmissive materials), or
+    that are specular with more than one direction per side, or with a pdf elsewhere.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Scattered(NamedTuple):
 
 
 def cases(kinds: Iterable[type[Material]] = MATERIALS) -> list[tuple[Material, float]]:
-    """Materials with the cosines from which they are seen."""
+    """Return the materials with the cosines from which they are seen."""
     found: list[tuple[Material, float]] = []
     for kind in kinds:
         found += [(material, cosine) for material in plain_variants(kind) for cosine in views(material)]
@@ -58,7 +58,7 @@ def cases(kinds: Iterable[type[Material]] = MATERIALS) -> list[tuple[Material, f
 
 
 def scatter(bsdfs: Bsdfs, which: int, cosine: float, samples: int, seed: int) -> Scattered:
-    """Draws `samples` directions of a material seen from `cosine`."""
+    """Sample `samples` directions of a material seen from `cosine`, and test them."""
     wo = view(cosine)
     wi, weight, pdf, specular = bsdfs.sample(which, wo, uniform(samples, seed))
     name = f"cos {cosine:.3g}: {bsdfs.materials[which]}"
@@ -84,14 +84,14 @@ def scatter(bsdfs: Bsdfs, which: int, cosine: float, samples: int, seed: int) ->
 
 @dataclass(frozen=True)
 class Chart:
-    """Cells of the hemisphere above, and of that below for what is `through`: around `center`, or as above if None."""
+    """Cells of the upper hemisphere and, if `through`, of the lower: around `center`, or as above if that is None."""
 
     wo: Doubles
     through: bool = False
     center: Doubles | None = None
 
     def count(self, wi: Doubles) -> NDArray[np.int64]:
-        """(cells,) how many of the unit vectors wi (n, 3) lie in each."""
+        """Count the unit vectors wi (n, 3) in each cell, (cells,)."""
         if not self.through:
             return directions.count(self.wo, wi)
         down = wi[:, 2] < 0
@@ -100,7 +100,7 @@ class Chart:
         return np.concatenate([directions.count(self.wo, wi[~down]), under])
 
     def integrate(self, density: Callable[[Doubles], Doubles]) -> Doubles:
-        """(cells,) integrals over solid angle of density(wi (n, 3)) -> (n,)."""
+        """Integrate density(wi (n, 3)) -> (n,) over solid angle, for each cell, (cells,)."""
         above = directions.integrate(density, self.wo, self.through)
         if not self.through:
             return above
@@ -110,7 +110,7 @@ class Chart:
 
 
 def chart_of(bsdfs: Bsdfs, which: int, wo: Doubles) -> Chart:
-    """The chart for a material's lobes seen from wo. What is bent gathers at the median of some samples of its own."""
+    """Return the chart for a material's lobes seen from wo. The center for refraction is the median of some samples."""
     if "TRANSMISSION" not in bsdfs.materials[which].features():
         return Chart(wo)
     wi, _, pdf, _ = bsdfs.sample(which, wo, uniform(1 << 12, 1))
@@ -122,24 +122,24 @@ def chart_of(bsdfs: Bsdfs, which: int, wo: Doubles) -> Chart:
 
 
 def density_test(chart: Chart, wi: Doubles, expected: Doubles, samples: int) -> float:
-    """p-value of wi (n, 3), those of `samples` directions that did not fail, by their density's integrals."""
+    """Return the p-value of wi (n, 3), the successful ones of `samples` directions, given their pdf's integrals."""
     rest = max(1 - float(expected.sum()), 0.0)
     return chi2_test([*chart.count(wi), samples - len(wi)], samples * np.array([*expected, rest]) + 1e-9)
 
 
 def _energy(weight: Doubles) -> float:
-    """One-sided p-value of every channel's mean weight being at most 1, or what multiple scattering is fitted to."""
+    """Return the one-sided p-value of every channel's mean weight being at most 1, up to the error of the fits."""
     mean, variance = weight.mean(axis=0), weight.var(axis=0)
     p = mean_test(mean, np.maximum(variance, 1e-12), len(weight), 1 + FITTED)
     return float(np.where(mean > 1 + FITTED, p / 2, 1).min())
 
 
 def reciprocity(bsdfs: Bsdfs, which: int, count: int, seed: int) -> Doubles:
-    """(count,) |f(wo, wi) − f(wi, wo)| over their sum, at pairs all over the sphere, half of them grazing.
+    """Return |f(wo, wi) − f(wi, wo)| over their sum, (count,), for pairs all over the sphere, half of them grazing.
 
-    Through the surface: of f(wo, wi) and of f(wi, wo) as seen from behind, times the spread, since it is radiance over
-    the square of the index of refraction that takes the same way back. There the difference is in units of the smaller
-    cosine at the microfacet, to which float32 knows both of them.
+    With transmission, f(wo, wi) is compared with f(wi, wo) as seen from behind, times the spread, since the reciprocal
+    quantity is radiance over the squared index of refraction. That difference is relative to the smaller cosine at the
+    microfacet, which limits the accuracy of both in float32.
     """
     wo, wi = above(count, seed), above(count, seed + 1)
     there, back = bsdfs.value(which, wo, wi)[0] / wi[:, 2:], bsdfs.value(which, wi, wo)[0] / wo[:, 2:]
@@ -158,7 +158,7 @@ def reciprocity(bsdfs: Bsdfs, which: int, count: int, seed: int) -> Doubles:
 
 
 def above(count: int, seed: int) -> Doubles:
-    """(count, 3) unit vectors of the upper hemisphere as float32 holds them: half uniform, half with z down to 1e-4."""
+    """Return (count, 3) unit vectors of the upper hemisphere in float32: half uniform, half with z down to 1e-4."""
     rng = np.random.default_rng(seed)
     z = np.where(np.arange(count) % 2, rng.uniform(1e-3, 1, count), 10**rng.uniform(-4, -1, count))
     azimuth, sine = rng.uniform(0, 2 * np.pi, count), np.sqrt(1 - z * z)

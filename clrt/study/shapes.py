@@ -1,4 +1,4 @@
-"""Meshes on which rays are hard to trace alike: many edges under the rays, copies, triangles without an area."""
+"""Meshes that are hard to intersect consistently: many edges hit by rays, duplicates, triangles of zero area."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from .workloads import Mesh, subdivide
 
-#: Coordinates of the soup are multiples of this, so that corners in a line are in it exactly.
+#: Coordinates of the soup are multiples of this, so that collinear vertices are exactly collinear.
 GRAIN = 2.0**-12
 
 
 def icosphere(subdivisions: int) -> Mesh:
-    """The unit sphere in 20·4^subdivisions triangles, closed: an icosahedron, subdivided and blown up in turns."""
+    """Return a closed unit sphere of 20·4^subdivisions triangles: an icosahedron, subdivided and projected."""
     golden = (1 + 5**0.5) / 2
     vertices = np.array([p for a in (-1, 1) for b in (-golden, golden) for p in ((0, a, b), (a, b, 0), (b, 0, a))])
     i, j, k = np.array([(i, j, k) for i in range(12) for j in range(i) for k in range(j)]).T
@@ -25,10 +25,10 @@ def icosphere(subdivisions: int) -> Mesh:
 
 
 def soup(count: int, seed: int = 0) -> Mesh:
-    """`count` triangles of all sizes that cut each other, in a cube of edge 2.
+    """Return `count` intersecting triangles of all sizes in a cube of edge 2.
 
-    A tenth has no area: half of these name a corner twice, half have their corners in a line. An eighth are further
-    copies of others, three of each, and all stand in random order.
+    A tenth has zero area: half of these repeat a vertex, half have collinear vertices. An eighth are duplicates of
+    others, three of each, and all are in random order.
     """
     rng = np.random.default_rng(seed)
     sizes = 10 ** rng.uniform(-2, 0, (count, 1, 1))

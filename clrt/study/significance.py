@@ -1,6 +1,6 @@
-"""Statistical tests with p-values, for checking what is random without guessed tolerances.
+"""Statistical tests with p-values, to check random quantities without ad hoc tolerances.
 
-A p-value is uniform in [0, 1] where the hypothesis holds; a test that rejects below `sidak(alpha, tests)` errs in a
+A p-value is uniform in [0, 1] under the null hypothesis; rejecting below `sidak(alpha, tests)` gives a false alarm in a
 fraction alpha of all runs of `tests` tests.
 """
 
@@ -18,37 +18,37 @@ from .row import Row
 
 Numbers = float | NDArray[Any]
 
-#: What a family of tests may reject by chance.
+#: False-alarm probability of a family of tests.
 FAMILY = 1e-3
 
 
 def sidak(alpha: float, tests: int) -> float:
-    """The significance for each of `tests` independent tests so that all together err with probability alpha."""
+    """Return the significance level of each of `tests` independent tests for a joint false-alarm probability alpha."""
     return float(-np.expm1(np.log1p(-alpha) / tests))
 
 
 def rejected(p_values: Mapping[str, float], alpha: float = FAMILY) -> dict[str, float]:
-    """Those of a family of tests that are rejected, so that a right family is with probability alpha."""
+    """Return the rejected tests of a family; a valid family has any with probability alpha."""
     limit = sidak(alpha, max(1, len(p_values)))
     return {name: p for name, p in p_values.items() if not p >= limit}
 
 
 def corrected(p: float, tests: int) -> float:
-    """The p-value of the least of `tests` independent ones: below alpha where p is below `sidak(alpha, tests)`."""
+    """Return the corrected p-value of the smallest of `tests`: below alpha if p is below `sidak(alpha, tests)`."""
     return -math.expm1(tests * math.log1p(-p)) if p < 1 else 1.0
 
 
 def family_row(case: str, what: str, p_values: Mapping[str, float]) -> Row:
-    """How many of a family of tests are rejected; the figure is the least p-value, corrected for their number."""
+    """Count the rejected tests of a family; the figure is the smallest p-value, corrected for their number."""
     least = corrected(min(p_values.values()), len(p_values))
     return Row(case, what, len(p_values), len(rejected(p_values)), least, "least p, corrected")
 
 
 def chi2_test(observed: ArrayLike, expected: ArrayLike, min_expected: float = 5.0) -> float:
-    """Pearson's chi-square: the p-value of the observed counts of cells, given their expected counts (any shape).
+    """Pearson's chi-square test: return the p-value of cells' observed counts, given their expected counts (any shape).
 
-    Both must have the same total: where samples can fail, give the failures a cell. The cells that expect least are
-    pooled until every one expects at least `min_expected`. A count where none can be gives 0.
+    Both must have the same total: if samples can fail, the failures need a cell. The cells that expect least are pooled
+    until every one expects at least `min_expected`. A nonzero count in a cell that expects 0 gives 0.
     """
     counts, means = np.ravel(observed).astype(np.float64), np.ravel(expected).astype(np.float64)
     if np.any(counts[means == 0] > 0):
@@ -60,10 +60,10 @@ def chi2_test(observed: ArrayLike, expected: ArrayLike, min_expected: float = 5.
 
 
 def mean_test(mean: Numbers, variance: Numbers, count: Numbers, expected: Numbers) -> NDArray[np.float64]:
-    """Two-sided z-test: the p-value of each sample mean, given the samples' variance and number, and the true mean.
+    """Two-sided z-test: return the p-value of sample means, given the samples' variance and number, and true mean.
 
-    Arguments broadcast. `count` must be large enough for the mean to be normal. Where the variance is 0 the p-value is
-    1 for the exact mean and 0 for any other.
+    Arguments broadcast. `count` must be large enough for the mean to be normal. For zero variance the p-value is 1 if
+    the mean is exact and 0 otherwise.
     """
     error = np.sqrt(np.divide(variance, count, dtype=np.float64))
     difference = np.abs(np.subtract(mean, expected, dtype=np.float64))
@@ -73,9 +73,9 @@ def mean_test(mean: Numbers, variance: Numbers, count: Numbers, expected: Number
 
 
 def t_test(t: float, freedom: float) -> float:
-    """Two-sided: the p-value of Student's t, a mean over its standard error as `freedom` (>= 1) numbers tell that.
+    """Two-sided t-test: return the p-value of t (mean over standard error) for `freedom` >= 1 degrees of freedom.
 
-    With t = √freedom·tan θ its density is as cos^(freedom − 1) θ, whose integral from θ on is divided by the whole.
+    With t = √freedom·tan θ its density is proportional to cos^(freedom − 1) θ, integrated from θ over the total.
     """
     nodes, weights = _gauss()
 
@@ -105,7 +105,7 @@ def _pooled(counts: NDArray[np.float64], means: NDArray[np.float64],
 
 
 def _upper_gamma(a: float, x: float) -> float:
-    """Q(a, x) = Γ(a, x)/Γ(a): a series below x = a + 1, a continued fraction above (Press et al. 2007, 6.2)."""
+    """Return Q(a, x) = Γ(a, x)/Γ(a): a series below x = a + 1, else a continued fraction (Press et al. 2007, 6.2)."""
     if x <= 0:
         return 1.0
     front = math.exp(a * math.log(x) - x - math.lgamma(a))

@@ -1,4 +1,4 @@
-"""Similarity transforms of scenes with their cameras and lights, which keep the picture."""
+"""Similarity transforms of scenes with their cameras and lights, which leave the image unchanged."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Similarity:
-    """Mirror in x = 0 or not, then rotate by `turn` (see scene.transform.rotation), then move and scale to `frame`."""
+    """Optional mirroring in x = 0, rotation by `turn` (scene.transform.rotation), translation and scale to `frame`."""
 
     mirrored: bool
     turn: tuple[float, float, float]
@@ -25,11 +25,11 @@ class Similarity:
 
     @property
     def linear(self) -> Matrix:
-        """Everything but the frame, (4, 4)."""
+        """Linear part, without the frame, (4, 4)."""
         return rotation(self.turn) @ np.diag([-1.0 if self.mirrored else 1.0, 1.0, 1.0, 1.0])
 
     def of(self, scene: Scene) -> Scene:
-        """Return the transformed scene, whose picture is mirrored if the scene is."""
+        """Return the transformed scene; its image is mirrored if `mirrored`."""
         linear = self.linear
         turned = replace(
             scene, meshes=[transform_mesh(mesh, linear) for mesh in scene.meshes],
@@ -49,7 +49,7 @@ class Similarity:
 
 
 def random_similarity(scene: Scene, draws: Draws) -> Similarity:
-    """Return one that keeps the picture: image skies rotate about +Y alone, textured spheres not at all."""
+    """Return one that preserves the image: environment maps rotate about +Y only, textured spheres not at all."""
     fixed = any(sphere.material.textures() for sphere in scene.spheres)
     mirrored, turn = draws.chance(0.5), draws.vector(-180.0, 180.0)
     if fixed:

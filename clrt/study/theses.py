@@ -1,8 +1,8 @@
-"""Two theses' experiments, run again: a frame with and without a tree, rasterised and traced, by the depth of mirrors.
+"""Experiments of two theses, repeated: frames with and without a BVH, rasterized and traced, by depth of mirrors.
 
 N: Nadolny, "Ray Tracing w czasie rzeczywistym", Toruń 2026, tables 5.1 and 5.2. S: Suchiński, "Implementation of the
-Ray Tracing algorithm in Vulkan technology", Łódź 2022, 7.5. Their scenes are not to be had; these are like them (see
-theses_scenes.py). A frame is what the device does, from the first launch to the end of the last; nothing is shown.
+Ray Tracing algorithm in Vulkan technology", Łódź 2022, 7.5. Their scenes are not available; these are similar (see
+theses_scenes.py). A frame is the device's work, from the first launch to the end of the last; nothing is displayed.
 """
 
 from __future__ import annotations
@@ -20,24 +20,23 @@ from ..scene.model import Scene
 from .theses_scenes import GLASS, STONE, dragon_scene, hall, tree_scene
 
 MACHINES = {"N": "Radeon RX 9070 XT", "S": "GeForce RTX 2060 mobile, ray tracing in hardware"}
-#: Edges of a path: the camera's ray and one after each bounce.
+#: Path depths: the camera ray and one segment per bounce.
 TEN_BOUNCES, TWO_BOUNCES = 11, 3
 RASTER: dict[str, Any] = {"integrator": "raster", "shadows": False, "max_depth": 2}
-#: Name, title, material of the statue, whether it is far away, and their frames a second at DEPTHS.
+#: Name, title, material of the statue, whether it is far away, and their frames per second at DEPTHS.
 MIRRORS: list[tuple[str, str, Material, bool, tuple[float, ...]]] = [
     ("mirrors", "S 7.5, shot 2: between two parallel mirrors", STONE, False, (446, 440, 435)),
     ("mirror", "S 7.5, shot 2, the statue a mirror", GLASS, False, (215, 187, 174)),
     ("far", "S 7.5, shot 3, the statue a mirror, less of it in view", GLASS, True, (300, 277, 268))]
-#: By how much the camera moves to and fro.
+#: Distance by which the camera alternates between frames.
 STEP = 1e-4
 DEPTHS, MORE_DEPTHS = (4, 10, 25), (1, 2, 4, 7, 10, 16, 25, 40)
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One row. theirs: seconds a frame there; part: the picture is rendered in so many times less width and height, as
-    it would take too long, and the time multiplied by its square; depth: what a curve is drawn over; options: of
-    Renderer."""
+    """One row. theirs: seconds per frame in the thesis; part: factor by which width and height are reduced, as the full
+    image would take too long; times are multiplied by its square; depth: abscissa of a curve; options: of Renderer."""
 
     name: str
     scene: Scene
@@ -48,18 +47,18 @@ class Variant:
 
     @property
     def max_depth(self) -> int:
-        """Path edges."""
+        """Path depth."""
         return int(self.options.get("max_depth", self.scene.render.max_depth))
 
     @property
     def shared(self) -> str:
-        """The same of variants that one renderer will do for: all but the depth."""
+        """Key that is equal for variants that can share a renderer: they differ in depth only."""
         return repr((self.part, sorted((name, value) for name, value in self.options.items() if name != "max_depth")))
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """ratios: names of variants: how many times as long the first takes as the second."""
+    """An experiment. ratios: pairs of variants: how many times as long the first takes as the second."""
 
     name: str
     title: str
@@ -69,8 +68,8 @@ class Experiment:
 
 
 class Effort(NamedTuple):
-    """seconds: for all frames of a variant, about; rounds: frames, at most; detail: of the hall; smaller: what width
-    and height are divided by; part: of pictures without a tree; depths: of curves."""
+    """Extent of a measurement. seconds: for all frames of a variant, roughly; rounds: most frames; detail: of the hall;
+    smaller: divisor of width and height; part: of images without a BVH; depths: of curves."""
 
     seconds: float = 6.0
     rounds: int = 200
@@ -85,7 +84,7 @@ QUICK = Effort(seconds=0.3, rounds=5, detail=1, smaller=4, part=4, depths=DEPTHS
 
 @dataclass(frozen=True)
 class Models:
-    """Files in the place of the generated figures."""
+    """Model files that replace the generated models."""
 
     dragon: Path | None = None
     tree: Path | None = None
@@ -93,7 +92,7 @@ class Models:
 
 
 def experiments(effort: Effort = Effort(), models: Models = Models()) -> Iterator[Experiment]:
-    """All of them, in the order of the theses."""
+    """Yield all experiments, in the order of the theses."""
     part = effort.part
     yield _with_and_without("dragon", "N table 5.1: a dragon of 19 332 triangles, 2200x1331, 10 bounces, 6 rays",
                             dragon_scene(models.dragon), effort, 19.54e-3, None, part, 697e-3)
@@ -107,7 +106,7 @@ def experiments(effort: Effort = Effort(), models: Models = Models()) -> Iterato
 
 def _with_and_without(name: str, title: str, scene: Scene, effort: Effort, theirs: float, without: float | None,
                       part: int, less: float | None = None) -> Experiment:
-    """less: their time without a tree for two bounces and one ray a pixel."""
+    """Return an experiment with and without a BVH. less: their time without, for two bounces and one ray per pixel."""
     scene = _smaller(scene, effort)
     all_of_it, few = {"max_depth": TEN_BOUNCES, "spp": 6}, {"max_depth": TWO_BOUNCES, "spp": 1}
     variants = [Variant("with a tree", scene, all_of_it, theirs),
@@ -146,12 +145,12 @@ def _smaller(scene: Scene, effort: Effort) -> Scene:
 
 def measure_theses(effort: Effort = Effort(), models: Models = Models(), *, device: str | int | None = None,
                    say: Callable[[str], None] = lambda message: None) -> Iterator[dict[str, Any]]:
-    """The figures of `clrt bench theses`, experiment by experiment.
+    """Yield the results of `clrt bench theses`, experiment by experiment.
 
-    name, title, thesis, machine (theirs), device, device_type, platform; triangles, size; rows: of each variant
-    `seconds` of a frame, the median, `cpu_seconds` and `mean`, `frames` measured, `frames_per_second`, `rays` and
-    `samples` of a frame, `theirs` (seconds), `part`, `depth` and `layout`; ratios: `of`, `over`, `ours`, `cpu` (of
-    processor time), `theirs`. say hears what is being rendered. Raises what `Renderer` does.
+    name, title, thesis, machine (theirs), device, device_type, platform; triangles, size; rows: for each variant
+    `seconds` per frame, the median, `cpu_seconds` and `mean`, `frames` measured, `frames_per_second`, `rays` and
+    `samples` per frame, `theirs` (seconds), `part`, `depth` and `layout`; ratios: `of`, `over`, `ours`, `cpu` (of
+    processor time), `theirs`. say: called with what is being rendered. Raises what `Renderer` raises.
     """
     for experiment in experiments(effort, models):
         renderers: dict[str, Renderer] = {}
@@ -165,7 +164,7 @@ def measure_theses(effort: Effort = Effort(), models: Models = Models(), *, devi
 
 
 def _renderer(variant: Variant, variants: Sequence[Variant], device: str | int | None) -> Renderer:
-    """For all that share it: some devices must know the deepest."""
+    """Return a renderer for all variants that share it: some devices must know the largest depth."""
     width, height = variant.scene.render.size
     depths = [other.max_depth for other in variants if other.shared == variant.shared]
     return Renderer(variant.scene, device=device, **{"spp": 1, **variant.options, "max_depth": max(depths)},
@@ -173,14 +172,14 @@ def _renderer(variant: Variant, variants: Sequence[Variant], device: str | int |
 
 
 class Taken(NamedTuple):
-    """By a frame; cpu_seconds: of all processors."""
+    """Time of a frame. cpu_seconds: of all processors."""
 
     seconds: float
     cpu_seconds: float
 
 
 class Run:
-    """Frames of a variant, after one that warms up."""
+    """Frames of a variant, after a warm-up frame."""
 
     def __init__(self, variant: Variant, renderer: Renderer) -> None:
         self.variant, self.renderer, self.spp = variant, renderer, variant.options.get("spp", 1)
@@ -190,7 +189,7 @@ class Run:
         self.rays, self.samples = film.rays * variant.part**2, film.samples * variant.part**2
 
     def frame(self) -> Taken:
-        """What a frame of the whole picture takes. The camera moves, so that nothing is kept from the last one."""
+        """Render a frame and return the time of a full image. The camera moves, so that nothing can be reused."""
         session, camera = self.renderer.session, self.renderer.scene.camera
         self._step = -self._step
         x, y, z = camera.position
@@ -205,7 +204,7 @@ class Run:
 
 
 def _take_turns(runs: Mapping[str, Run], effort: Effort) -> dict[str, list[Taken]]:
-    """The frames of each, one after another, as long as each has time left."""
+    """Return the frames of each run, interleaved, within the time limit of each."""
     taken: dict[str, list[Taken]] = {name: [] for name in runs}
     for _ in range(effort.rounds):
         for name, run in runs.items():

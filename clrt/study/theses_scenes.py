@@ -1,7 +1,7 @@
-"""Scenes of the theses' experiments, as far as these tell and licences allow: figures are generated, or files.
+"""Scenes of the theses' experiments, as far as described and licensed: models are generated, or read from files.
 
-The dragon and the tree stand among balls under a sky, lit by nothing else (Nadolny 2026, 5.2); the statue in a hall, in
-the light of one point, between two parallel mirrors if it has them (Suchiński 2022, 7.4 and 7.5).
+The dragon and the tree stand among spheres under a sky, the only light (Nadolny 2026, 5.2); the statue stands in a
+hall, lit by a point light, optionally between two parallel mirrors (Suchiński 2022, 7.4 and 7.5).
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ REACH, HALF, HEIGHT = 2.6, 4.5, 4.5
 
 
 def outdoors(figure: list[Mesh], name: str) -> Scene:
-    """A figure, about 3 wide or high, among balls under the default sky."""
+    """Return a model, about 3 units wide or high, among spheres under the default sky."""
     return Scene(meshes=[*figure, _quad("ground", [(-40, 0, -40), (-40, 0, 40), (40, 0, 40), (40, 0, -40)], GROUND)],
                  spheres=BALLS, environment=default_sky(), name=name,
                  camera=Camera(position=(1.0, 1.55, 5.2), look_at=(0.0, 0.75, 0.0), fov_degrees=34.0),
@@ -41,14 +41,14 @@ def outdoors(figure: list[Mesh], name: str) -> Scene:
 
 
 def dragon_scene(file: Path | None = None) -> Scene:
-    """The dragon of 19 332 triangles, or the model in a file."""
+    """Return a scene of the dragon of 19 332 triangles, or of the model in a file."""
     material = MetallicRoughness(color=(0.2, 0.45, 0.32), roughness=0.35)
     figure = _standing(file, material, 1.9) if file else [_smooth("dragon", dragon(), material)]
     return outdoors(figure, "dragon")
 
 
 def tree_scene(file: Path | None = None) -> Scene:
-    """The tree of 264 triangles, or the model in a file."""
+    """Return a scene of the tree of 264 triangles, or of the model in a file."""
     wood, leaves = (Mesh(*arrays, material=Diffuse(color=color), name=name) for arrays, color, name in zip(
         tree(), ((0.3, 0.19, 0.1), (0.16, 0.42, 0.1)), ("wood", "leaves")))
     scene = outdoors(_standing(file, None, 3.0) if file else [wood, leaves], "tree")
@@ -57,10 +57,10 @@ def tree_scene(file: Path | None = None) -> Scene:
 
 def hall(detail: int, file: Path | None = None, *, mirrors: bool = False, figure: Material = STONE,
          far: bool = False) -> Scene:
-    """The statue, or the model in a file, among four columns: 700 thousand triangles at detail 4.
+    """Return a scene of the statue, or the model in a file, among four columns: 700 thousand triangles at detail 4.
 
-    mirrors: whether the ends of the hall are mirrors; figure: what the statue is of; far: seen from the side, where it
-    is small in the picture.
+    mirrors: whether the ends of the hall are mirrors; figure: the statue's material; far: seen from the side, where it
+    is small in the image.
     """
     made = _standing(file, figure, 2.1) if file else [_smooth("statue", statue(detail), figure)]
     shaft = _smooth("column", column(detail), STONE)
@@ -87,7 +87,7 @@ def _smooth(name: str, arrays: Arrays, material: Material) -> Mesh:
 
 
 def _standing(file: Path, material: Material | None, size: float) -> list[Mesh]:
-    """The model in a file, its largest extent `size`, standing on the ground around the origin."""
+    """Read a model, scaled to a largest extent of `size`, standing on the ground at the origin."""
     model = read_model(file)
     low = np.min([mesh.vertices.min(axis=0) for mesh in model.meshes], axis=0)
     high = np.max([mesh.vertices.max(axis=0) for mesh in model.meshes], axis=0)

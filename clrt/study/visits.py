@@ -1,4 +1,4 @@
-"""How much of a tree rays visit, counted by their own traversal (kernels/traverse/visits.cl)."""
+"""Traversal statistics: nodes and intersection tests per ray, counted by the traversal (kernels/traverse/visits.cl)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from ..device.records import record
 from ..tree_query import TreeQuery
 from .rays import Rays
 
-#: nodes: those whose children's boxes are met; tests: of what is in leaves, a triangle or a pack.
+#: nodes: those whose children's boxes are intersected; tests: intersection tests in leaves, of a triangle or a pack.
 VISITS = record(nodes="u4", tests="u4", pad="2u4")
 
 
 class _Counting(TreeQuery):
-    """A query that answers as another one does, and counts; up to 2^32 visits."""
+    """Query with the same results as another one that also counts; up to 2^32 visits."""
 
     def __init__(self, query: TreeQuery) -> None:
         tree = replace(query.tree, buffers={**query.tree.buffers, "visits": np.zeros(1, VISITS)})
@@ -24,7 +24,7 @@ class _Counting(TreeQuery):
 
 
 def visits_a_ray(query: TreeQuery, rays: Rays, *, any_hit: bool) -> dict[str, float]:
-    """`nodes` and `tests` a ray, for closest hits or for any hit."""
+    """Return `nodes` and `tests` per ray, for closest hits or for any hit."""
     counting = _Counting(query)
     (counting.any_hit if any_hit else counting.closest_hit)(*rays)
     counted = counting.tree.buffers["visits"].read(query.device)[0]

@@ -1,4 +1,4 @@
-"""The warps of the unit square against their densities: chi-square over cells of known probability."""
+"""Warps of the unit square against their pdfs: chi-square tests over cells of known probability."""
 
 from __future__ import annotations
 
@@ -15,31 +15,31 @@ from .jacobians import grid, missed
 from .probe import Doubles, Probe
 from .significance import chi2_test
 
-#: 1 − cos of the cones' half angles: from a whole sphere of directions down to a sun of 1e-5 degrees.
+#: 1 − cos of the cones' half angles: from the whole sphere of directions down to a sun of 1e-5 degrees.
 HEIGHTS = (2.0, 1.0, 0.3, 1e-3, 1e-7, 1e-14)
 ALPHAS = (ALPHA_MIN, 1e-3, 0.01, 0.1, 0.36, 1.0)
 COSINES = (1.0, 0.6, 0.1, 1e-2, 1e-3, 1e-4)
-#: Cells along each side of a square, or of a chart.
+#: Cells per side of a square, or of a chart.
 SIDE = 16
 
 
 def warp_probe(device: Device, changes: Mapping[str, str] | None = None) -> Probe:
-    """A program with all warps; changes: see Probe."""
+    """Return a program with all warps; changes: see Probe."""
     return Probe(device, Scene(spheres=[Sphere(material=MetallicRoughness())]), changes=changes)
 
 
 def warp_p_values(probe: Probe, samples: int, seed: int) -> dict[str, float]:
-    """One for each warp and each of its parameters."""
+    """Return a p-value for each warp and each of its parameters."""
     return dict(_closed_forms(probe, samples, seed)) | dict(_visible_normals(probe, samples, seed))
 
 
 def _closed_forms(probe: Probe, samples: int, seed: int) -> Iterator[tuple[str, float]]:
-    """Those whose inverse is known: it makes their samples uniform again."""
+    """Test warps with a known inverse, which maps their samples back to uniform ones."""
     u = uniform(samples, seed)[:, :2]
     for height in HEIGHTS:
         out = probe("warps", 12, u, np.full(samples, height))
         wi = out[:, 4:7]
-        # Taken from the sine: of the small cones cos θ itself is 1 in float32.
+        # Computed from the sine: for small cones cos θ is 1 in float32.
         sin2 = wi[:, 0]**2 + wi[:, 1]**2
         yield f"cone of 1 - cos = {height:g}", uniform_test(
             np.where(wi[:, 2] > 0, sin2 / (1 + np.abs(wi[:, 2])), 1 - wi[:, 2]) / height, turn(wi))
@@ -48,7 +48,7 @@ def _closed_forms(probe: Probe, samples: int, seed: int) -> Iterator[tuple[str, 
 
 
 def warp_density_errors(probe: Probe) -> dict[str, float]:
-    """By what part each warp's density misses 1/area at most, beyond the error of that (see jacobians)."""
+    """Return the largest relative deviation of each warp's pdf from 1/area, beyond the area's error (see jacobians)."""
     u = grid()
     errors = {}
     for height in HEIGHTS:
@@ -70,19 +70,19 @@ def warp_density_errors(probe: Probe) -> dict[str, float]:
 
 
 def uniform_test(x: Doubles, y: Doubles) -> float:
-    """p-value of points being uniform over the unit square."""
+    """Return the p-value of points being uniform over the unit square."""
     cells = [np.clip((SIDE * a).astype(int), 0, SIDE - 1) for a in (x, y)]
     return chi2_test(np.bincount(cells[0] * SIDE + cells[1], minlength=SIDE**2), np.full(SIDE**2, len(x) / SIDE**2))
 
 
 def triangle_test(b1: Doubles, b2: Doubles) -> float:
-    """p-value of points being uniform over b1 + b2 <= 1: with every other one folded over, they fill the square."""
+    """Return the p-value of points being uniform over b1 + b2 <= 1: mirroring every other one fills the square."""
     folded = np.arange(len(b1)) % 2 == 1
     return uniform_test(np.where(folded, 1 - b1, b1), np.where(folded, 1 - b2, b2))
 
 
 def turn(wi: Doubles) -> Doubles:
-    """Azimuth as a fraction of a turn."""
+    """Return the azimuth as a fraction of a turn."""
     return np.asarray(np.arctan2(wi[:, 1], wi[:, 0]) / (2 * np.pi) % 1)
 
 
@@ -100,10 +100,10 @@ def _visible_normals(probe: Probe, samples: int, seed: int) -> Iterator[tuple[st
 
 
 def visible_normals(alpha: float, wo: Doubles) -> Doubles:
-    """(SIDE, SIDE) probabilities of normals visible from wo in cells of psi and azimuth, tan θ = alpha·tan psi.
+    """Return (SIDE, SIDE) probabilities of visible normals from wo, in cells of psi and azimuth; tan θ = alpha·tan psi.
 
     D·max(0, wo·h)/(cos wo·(1 + Λ)) dωh = (1 + k·tan psi)⁺·2 sin psi cos psi dpsi dphi/(2·pi·(1 + Λ)), with
-    k = alpha·tan θo·cos phi; exact in psi, by Gauss–Legendre points in phi gathered at the edges of cells.
+    k = alpha·tan θo·cos phi; exact in psi, by Gauss–Legendre points in phi clustered at the edges of cells.
     """
     t, weight = np.polynomial.legendre.leggauss(64)
     inside, weight = (2 + t * (3 - t * t)) / 4, 0.75 * (1 - t * t) * weight
@@ -118,7 +118,7 @@ def visible_normals(alpha: float, wo: Doubles) -> Doubles:
 
 
 def _density(h: Doubles, alpha: float, wo: Doubles) -> Doubles:
-    """(n,) D·max(0, wo·h)/(cos wo·(1 + Λ)) of unit normals h (n, 3)."""
+    """Return D·max(0, wo·h)/(cos wo·(1 + Λ)), (n,), for unit normals h (n, 3)."""
     a2 = float(np.float32(alpha))**2
     d = a2 / (np.pi * (h[:, 0]**2 + h[:, 1]**2 + a2 * h[:, 2]**2)**2)
     stretched = np.sqrt(a2 * (wo[0]**2 + wo[1]**2) + wo[2]**2)

@@ -1,6 +1,6 @@
-"""Scenes and rays to measure traversal with: closed rooms, so that every ray meets something, and four kinds of rays.
+"""Scenes and rays for traversal benchmarks: closed rooms, so that every ray hits something, and four kinds of rays.
 
-All is numpy and seeded; the hits that later rays start from come from a function handed in.
+Everything is numpy and seeded; the hits that secondary rays start from come from a function argument.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ Faces = NDArray[np.int32]
 Mesh = tuple[Floats, Faces]
 #: From origins, directions and t_max to the records of `RayQuery.closest_hit`.
 Tracer = Callable[[Floats, Floats, Floats], NDArray[Any]]
-#: How far from a surface its rays start, and before a light they end, as parts of the scene's extent.
+#: Offset of ray origins from a surface, and of shadow rays' ends from the light, relative to the scene's extent.
 GAP = 1e-5
 FOV_DEGREES = 45.0
-#: From the middle of the mesh, in its largest extents; both inside its room.
+#: From the center of the mesh, in units of its largest extent; both inside its room.
 CAMERA = np.array([0.6, 0.4, 1.3])
 LIGHT = np.array([0.6, 1.2, 0.4])
 
 
 class Workload(NamedTuple):
-    """Rays of one kind; any_hit: whether they ask for anything in their way, or for the closest hit."""
+    """Rays of one kind. any_hit: whether they query any hit, or the closest hit."""
 
     name: str
     any_hit: bool
@@ -35,7 +35,7 @@ class Workload(NamedTuple):
 
 
 def bumpy_ball(subdivisions: int = 7) -> Mesh:
-    """A ball with waves, of 12·4^subdivisions triangles (196 608): a box, subdivided and blown up."""
+    """Return a sphere with waves of 12·4^subdivisions triangles (196 608): a box, subdivided and projected."""
     mesh = _box(np.zeros(3), 1.0)
     for _ in range(subdivisions):
         mesh = subdivide(*mesh)
@@ -45,13 +45,13 @@ def bumpy_ball(subdivisions: int = 7) -> Mesh:
 
 
 def closed_room(vertices: Floats, faces: Faces) -> Mesh:
-    """The mesh in the middle of a cube of 12 triangles, whose half edge is 1.5 times the mesh's largest extent."""
+    """Return the mesh centered in a cube of 12 triangles, whose half edge is 1.5 times the mesh's largest extent."""
     center, extent = _frame(vertices)
     return joined([(vertices, faces), _box(center, 1.5 * extent)])
 
 
 def subdivide(vertices: Floats, faces: Faces) -> Mesh:
-    """Each triangle as four of the same plane, by the middles of its edges; edges that shared vertices still do."""
+    """Split each triangle into four coplanar ones at its edges' midpoints; shared vertices stay shared."""
     edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
     keys, middle = np.unique(edges[:, 0] * len(vertices) + edges[:, 1], return_inverse=True)
     middles = (vertices[keys // len(vertices)] + vertices[keys % len(vertices)]) / 2
@@ -62,7 +62,7 @@ def subdivide(vertices: Floats, faces: Faces) -> Mesh:
 
 
 def rotated_copies(vertices: Floats, faces: Faces, count: int, seed: int = 0) -> Mesh:
-    """Copies of the mesh, each turned at random, in cells of a cubic grid picked at random; neighbours may overlap."""
+    """Return randomly rotated copies of the mesh, in random cells of a cubic grid; neighbors may overlap."""
     rng = np.random.default_rng(seed)
     center, extent = _frame(vertices)
     side = int(np.ceil(count ** (1 / 3)))
@@ -72,10 +72,10 @@ def rotated_copies(vertices: Floats, faces: Faces, count: int, seed: int = 0) ->
 
 def workloads(vertices: Floats, faces: Faces, target: Floats, trace: Tracer, size: tuple[int, int],
               seed: int = 0) -> Iterator[Workload]:
-    """primary: from a camera; bounce: on from its hits; shadow, occluded: from its hits to a light.
+    """Yield rays. primary: from a camera; bounce: on from its hits; shadow, occluded: from its hits to a light.
 
-    The light of `occluded` is in the middle of the target, which hides it from most sides. target: the vertices (n, 3)
-    that the camera looks at; size: width and height in pixels.
+    The light of `occluded` is at the center of the target, which occludes it from most sides. target: the vertices (n,
+    3) that the camera looks at; size: width and height in pixels.
     """
     center, extent = _frame(target)
     primary = camera_rays(center + extent * CAMERA, center, size)
@@ -88,7 +88,7 @@ def workloads(vertices: Floats, faces: Faces, target: Floats, trace: Tracer, siz
 
 
 def camera_rays(position: Doubles, look_at: Doubles, size: tuple[int, int]) -> Rays:
-    """One ray through the middle of each pixel, plain rows from the top, without an end."""
+    """Return one ray through the center of each pixel, in rows from the top, with infinite t_max."""
     width, height = size
     forward = _unit(look_at - position)
     right = _unit(np.cross(forward, [0.0, 1.0, 0.0]))
@@ -101,9 +101,9 @@ def camera_rays(position: Doubles, look_at: Doubles, size: tuple[int, int]) -> R
 
 
 def surface_points(vertices: Floats, faces: Faces, rays: Rays, hits: NDArray[Any]) -> tuple[Doubles, Doubles]:
-    """Where rays hit, and the triangles' unit normals on the side they came from: (k, 3) float64 each.
+    """Return the hit points, and the triangles' unit normals on the rays' side: (k, 3) float64 each.
 
-    Rays that hit nothing, or a triangle without an area, are left out.
+    Rays that miss, or hit a triangle of zero area, are left out.
     """
     corners = vertices.astype(np.float64)[faces[hits["primitive"]]]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -116,14 +116,14 @@ def surface_points(vertices: Floats, faces: Faces, rays: Rays, hits: NDArray[Any
 
 
 def bounce_rays(points: Doubles, normals: Doubles, seed: int = 0) -> Rays:
-    """A direction at each point with density cosθ/π around its normal: normal + a point of the unit sphere."""
+    """Return a direction at each point with pdf cosθ/π around its normal: normal + a point on the unit sphere."""
     sphere = _unit(np.random.default_rng(seed).normal(size=points.shape))
     directions = _unit(normals + sphere)
     return points.astype(np.float32), directions.astype(np.float32), np.full(len(points), np.inf, np.float32)
 
 
 def light_rays(points: Doubles, normals: Doubles, light: Doubles) -> Rays:
-    """To just before the light, from the points whose normals are on its side: a renderer asks for no others."""
+    """Return shadow rays that end just before the light, from the points whose normals face it, as in a renderer."""
     points = points[np.einsum("ij,ij->i", normals, light - points) > 0]
     distances = np.linalg.norm(light - points, axis=1)
     directions = (light - points) / distances[:, None]
@@ -131,27 +131,27 @@ def light_rays(points: Doubles, normals: Doubles, light: Doubles) -> Rays:
 
 
 def _frame(vertices: Floats) -> tuple[Doubles, float]:
-    """Middle and largest extent of the box around the vertices."""
+    """Return the center and the largest extent of the vertices' bounding box."""
     low, high = vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)
     return (low + high) / 2, float((high - low).max())
 
 
 def _box(center: Doubles, half: float) -> Mesh:
-    """A cube of 12 triangles."""
+    """Return a cube of 12 triangles."""
     corners = np.stack(np.unravel_index(np.arange(8), (2, 2, 2)), axis=1) * 2 - 1
     sides = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]], np.int32)
     return ((center + half * corners).astype(np.float32), np.concatenate([sides[:, [0, 1, 2]], sides[:, [0, 2, 3]]]))
 
 
 def joined(meshes: list[tuple[NDArray[Any], Faces]]) -> Mesh:
-    """All in one mesh."""
+    """Join all meshes into one."""
     first = np.cumsum([0] + [len(vertices) for vertices, _ in meshes]).astype(np.int32)
     return (np.concatenate([vertices for vertices, _ in meshes]).astype(np.float32),
             np.concatenate([faces + start for (_, faces), start in zip(meshes, first)]))
 
 
 def _rotation(rng: np.random.Generator) -> Doubles:
-    """A rotation, each as likely: of a normal quaternion (Shoemake, Uniform random rotations, 1992)."""
+    """Return a uniformly distributed rotation from a normal quaternion (Shoemake, Uniform random rotations, 1992)."""
     w, x, y, z = _unit(rng.normal(size=4))
     return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],

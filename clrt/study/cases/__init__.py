@@ -1,1 +1,1 @@
-"""Hard cases of geometry, a file each: answers are known by another method, and what is not so is counted."""
+"""Hard geometric cases, one module each: results are checked against another method, and failures are counted."""

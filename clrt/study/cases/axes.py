@@ -1,4 +1,4 @@
-"""G6 and G7: rays along axes and in planes of boxes, and 200 thousand triangles in one plane."""
+"""G6 and G7: axis-parallel rays in the planes of box faces, and a plane of 200 thousand coplanar triangles."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from ..row import Row
 from ..workloads import Mesh
 from .subject import Subject, endless, ulps
 
-#: Cubes a side of the lattice, and squares a side of the plane.
+#: Cubes along each side of the lattice, and squares along each side of the plane.
 LATTICE, SIDE = 5, 316
 HEIGHT = 3.0
 
 
 def measure_axes(subject: Subject, *, quick: bool) -> Iterator[Row]:
-    """Rays along the axes through cubes at whole numbers, half of them in the planes of faces; then onto a plane."""
+    """Measure axis-parallel rays through cubes at integer positions, half of them in planes of faces; then a plane."""
     mesh, count = lattice(), 1 << (12 if quick else 18)
     rays = rays_of_kinds(*mesh, count)["axes"]
     hits = subject.query(mesh).closest_hit(*rays)
@@ -47,7 +47,7 @@ def _onto_plane(subject: Subject, count: int) -> Iterator[Row]:
 
 
 def lattice() -> Mesh:
-    """LATTICE³ cubes of edge 1 with corners at whole numbers, one apart along x and touching along y and z."""
+    """Return LATTICE³ unit cubes with integer corners, 1 apart along x and touching along y and z."""
     cells = np.stack(np.unravel_index(np.arange(LATTICE**3), (LATTICE,) * 3), axis=1) * [2, 1, 1]
     cube = np.stack(np.unravel_index(np.arange(8), (2, 2, 2)), axis=1)
     sides = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
@@ -57,7 +57,7 @@ def lattice() -> Mesh:
 
 
 def plane(side: int) -> Mesh:
-    """2·side² triangles that fill the square [0, side]² of the plane y = 0, at whole numbers."""
+    """Return 2·side² triangles with integer vertices that fill the square [0, side]² of the plane y = 0."""
     z, x = np.divmod(np.arange((side + 1)**2), side + 1)
     corner = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()[:, None]
     faces = np.concatenate([corner + [0, side + 1, side + 2], corner + [0, side + 2, 1]])

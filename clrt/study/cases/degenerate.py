@@ -1,4 +1,4 @@
-"""G8 and G12: meshes that builders stumble over, and numbers that are no coordinates."""
+"""G8 and G12: degenerate meshes that are hard for BVH builders, and invalid coordinates and indices."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MANY, COPIES = 10_000, 64
 
 
 def measure_degenerate(subject: Subject, *, quick: bool) -> Iterator[Row]:
-    """Hits that float64 rules out, and the entries that the tree's stack needs; then what must be refused."""
+    """Count the hits that float64 rules out and report the BVH's stack size; then count invalid meshes not refused."""
     count = 1 << (9 if quick else 13)
     for name, mesh in meshes().items():
         rays = scattered_rays(mesh[0] if len(mesh[1]) else bumpy_ball(0)[0], count)
@@ -32,7 +32,7 @@ def measure_degenerate(subject: Subject, *, quick: bool) -> Iterator[Row]:
 
 
 def meshes() -> dict[str, Mesh]:
-    """Meshes that are valid, however odd."""
+    """Return meshes that are valid but degenerate or extreme, by name."""
     rng = np.random.default_rng(0)
     corners, few = rng.random((60, 3, 3)), rng.random((1, 3, 3))
     around = rng.normal(size=(MANY, 1, 3))
@@ -53,7 +53,7 @@ def meshes() -> dict[str, Mesh]:
 
 
 def no_meshes() -> dict[str, Mesh]:
-    """Meshes that are not."""
+    """Return invalid meshes by name."""
     vertices, faces = bumpy_ball(0)
     bad = {"NaN": np.nan, "infinity": np.inf}
     return {**{name: (_with(vertices, value), faces) for name, value in bad.items()},
@@ -62,7 +62,7 @@ def no_meshes() -> dict[str, Mesh]:
 
 
 def loose(corners: np.ndarray) -> Mesh:
-    """Triangles (m, 3, 3) that share no vertices."""
+    """Return a mesh of triangles (m, 3, 3) that share no vertices."""
     return corners.reshape(-1, 3).astype(np.float32), np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3)
 
 

@@ -1,4 +1,4 @@
-"""G9: far from the origin nothing shadows itself, and no light comes into a closed box."""
+"""G9: far from the origin, surfaces do not shadow themselves and closed boxes do not leak light."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ from ..workloads import Doubles
 from .subject import Subject
 from .watertight import AWAY, words
 
-#: What the scene is multiplied by, and sizes by which it is then moved. At 1e7 float32 knows few places but those of a
-#: level plane.
+#: (Scale factor, translation in scene sizes). At 1e7, float32 is too coarse for anything but a level plane.
 PLACES = ((1.0, 0.0), (1.0, 1e3), (1.0, 1e6), (1.0, 1e7), (1e-5, 0.0), (1e5, 0.0))
 SIDE, QUICK_SIDE, SEEDS = 1024, 128, 2
 LEVEL, TILTED = np.eye(3), np.linalg.qr([[0.6, 0.5, -0.3], [0.2, 0.7, 0.4], [-0.5, 0.3, 0.8]])[0]
 
 
 def measure_departures(subject: Subject, *, quick: bool) -> Iterator[Row]:
-    """Lit points that are found dark, of 2^21 a scene and place, and dark ones that are found lit."""
+    """Count lit points rendered dark, out of 2^21 per scene and place, and dark points that are rendered lit."""
     for factor, sizes in PLACES:
         place, where = 2 * factor * sizes * AWAY, words(sizes, factor)
         scenes = lit_scenes(place, factor, level_only=sizes > 1e6) | held_scenes(place, factor, level_only=sizes > 1e6)
@@ -33,7 +32,7 @@ def measure_departures(subject: Subject, *, quick: bool) -> Iterator[Row]:
 
 
 def wrong_pixels(subject: Subject, scene: Scene, quick: bool, *, lit: bool) -> tuple[int, int]:
-    """How many pixels of one sample were made, and how many of them are lit or dark."""
+    """Return how many pixels were rendered with one sample each, and how many of them are lit (`lit`) or dark."""
     side, found, seeds = (QUICK_SIDE, 0, 1) if quick else (SIDE, 0, SEEDS)
     for seed in range(seeds):
         settings = replace(scene.render, size=(side, side), seed=seed)
@@ -43,7 +42,7 @@ def wrong_pixels(subject: Subject, scene: Scene, quick: bool, *, lit: bool) -> t
 
 
 def lit_scenes(place: Doubles, factor: float, *, level_only: bool) -> dict[str, Scene]:
-    """Scenes of about size 2·factor around a place that fill the picture, with nothing in the light's way."""
+    """Return scenes of about size 2·factor around `place` that fill the image, with unoccluded lights."""
     level = _scene(place, factor, LEVEL, PLANE, [0.3, 1, 0.2], [0.2, 2, 0.3])
     scenes = {"level plane": level, "grazed plane": replace(level, lights=[_light(LEVEL, [1, 0.01, 0.2])])}
     if level_only:
@@ -56,7 +55,7 @@ def lit_scenes(place: Doubles, factor: float, *, level_only: bool) -> dict[str, 
 
 
 def held_scenes(place: Doubles, factor: float, *, level_only: bool) -> dict[str, Scene]:
-    """What the device cannot move back: scenes beside a ball on the other side of the origin; and a huge ground."""
+    """Return scenes the device can't recenter: with a sphere on the other side of the origin; or with a huge ground."""
     if not place.any():
         ground = Sphere(center=(0, -1e6 * factor, 0), radius=1e6 * factor)
         level = lit_scenes(place, factor, level_only=True)["level plane"]
@@ -67,7 +66,7 @@ def held_scenes(place: Doubles, factor: float, *, level_only: bool) -> dict[str,
 
 
 def dark_box(place: Doubles, factor: float) -> Scene:
-    """Seen from inside, a sky around it."""
+    """Return a closed box around the camera, with a sky outside."""
     corners = np.stack(np.unravel_index(np.arange(8), (2, 2, 2)), axis=1) * 2.0 - 1
     sides = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
     faces = np.concatenate([sides[:, [0, 1, 2]], sides[:, [0, 2, 3]]]).astype(np.int32)
@@ -77,7 +76,7 @@ def dark_box(place: Doubles, factor: float) -> Scene:
                  render=RenderSettings(max_depth=8))
 
 
-#: A triangle around the origin of the plane y = 0, and two that are walls at x = 0 and y = 0.
+#: PLANE: a triangle around the origin in the plane y = 0; WALLS: two triangles, walls at x = 0 and y = 0.
 PLANE = np.array([[[-20, 0, -12], [0, 0, 24], [20, 0, -12]]])
 WALLS = np.array([[[0, 0, -20], [0, 0, 20], [40, 0, 0]], [[0, 0, -20], [0, 40, 0], [0, 0, 20]]])
 

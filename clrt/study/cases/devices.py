@@ -1,4 +1,4 @@
-"""M1: the same scene with the same seed on every device."""
+"""M1: the same scene rendered with the same seed on every device."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ..row import Row
 from ..workloads import bumpy_ball
 from .subject import Subject
 
-#: Pixels may differ by this part of their brightness: where a path takes another turn, they differ by more.
+#: Relative tolerance of a pixel; pixels with a path that took a different branch differ by more.
 ROUNDING = 1e-4
 
 
 def measure_devices(devices: list[int], *, quick: bool) -> Iterator[Row]:
-    """For each device but the first: pixels that are not the first's, and how much their mean differs."""
+    """Compare every further device with the first: pixels that differ, and the relative difference of the mean."""
     scene = everything((48, 48) if quick else (256, 256))
     first, *others = (Subject(device).picture(scene, 4 if quick else 16).astype(np.float64) for device in devices)
     for device, picture in zip(devices[1:], others):
@@ -27,7 +27,7 @@ def measure_devices(devices: list[int], *, quick: bool) -> Iterator[Row]:
 
 
 def everything(size: tuple[int, int]) -> Scene:
-    """Triangles and spheres of all materials under a sky with a sun."""
+    """Return a scene with triangles, spheres and several materials under an environment map with a sun."""
     vertices, faces = bumpy_ball(3)
     sky = np.full((16, 32, 3), 0.5, np.float32)
     sky[4, 5] = 200

@@ -1,4 +1,4 @@
-"""G5: how exact t is, from near and far and at grazing angles, against the plane's equation in float64."""
+"""G5: accuracy of t for near, far and grazing hits, against the plane equation in float64."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .subject import Subject, endless, ulps, unit_vectors
 
 DISTANCES = (1e-3, 1e-1, 1e1, 1e3, 1e5, 1e7)
 ANGLES_DEGREES = (0.0, 60.0, 85.0, 89.0, 89.9, 89.999)
-#: A triangle is at least this part of its distance large: float32 directions cannot aim better at smaller ones.
+#: Smallest triangle size relative to its distance: float32 directions cannot aim accurately enough at smaller ones.
 SMALLEST = 1e-4
-#: Where fewer than this are left, far away at grazing angles, nothing is said.
+#: Fewest hits that are evaluated: cases with fewer, far away at grazing angles, are skipped.
 FEWEST = 100
 
 
 def measure_distances(subject: Subject, *, quick: bool) -> Iterator[Row]:
-    """For each distance and angle: hits that are lost, the largest error of t, and one that 99.9 % stay below."""
+    """Measure for each distance and angle the lost hits, and the largest error of t and its 99.9 % quantile."""
     count = 1 << (12 if quick else 17)
     for distance in DISTANCES:
         for angle in ANGLES_DEGREES:
@@ -37,9 +37,9 @@ def measure_distances(subject: Subject, *, quick: bool) -> Iterator[Row]:
 
 def distances(subject: Subject, distance: float, angle_degrees: float,
               count: int) -> tuple[NDArray[np.float32], Doubles, NDArray[np.bool_]]:
-    """t of `count` rays that are aimed at a triangle: found, exact, and whether it must be found; of unit directions.
+    """Return computed t, exact t, and whether there must be a hit, for `count` rays of unit direction at a triangle.
 
-    angle_degrees: between the rays and the triangle's normal. exact: by the plane's equation.
+    angle_degrees: between the rays and the triangle's normal. exact: by the plane equation.
     """
     rng = np.random.default_rng(0)
     normal, side = unit_vectors(rng, 2)

@@ -1,4 +1,4 @@
-"""G11: instances by hard transforms are hit like triangles that were transformed in float64, and shadow nothing."""
+"""G11: instances with difficult transforms are hit like triangles transformed in float64, without shadow acne."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .departures import lit_scenes, wrong_pixels
 from .subject import Subject
 
 INSTANCES = 12
-#: A plane of 4^8 triangles, three of which are stored as one, is worth being instances (scene/instancing.py).
+#: A plane of 4^8 triangles, used three times, is large enough to be kept as instances (scene/instancing.py).
 SUBDIVISIONS, LOWER = 8, 50.0
 
 
 def measure_instances(subject: Subject, *, quick: bool) -> Iterator[Row]:
-    """Hits that float64 rules out, for each kind of transform."""
+    """Count the hits that float64 rules out, for each kind of transform."""
     count = 1 << (10 if quick else 14)
     vertices, faces = bumpy_ball(1)
     for kind, transforms in transforms_of_kinds().items():
@@ -42,8 +42,8 @@ def measure_instances(subject: Subject, *, quick: bool) -> Iterator[Row]:
 
 
 def lit_plane(to_world: Doubles) -> Scene:
-    """A tilted plane that fills the picture, as an instance by this transform, with nothing in the light's way: two
-    more lie below."""
+    """Return a tilted plane instanced with this transform that fills the image, with an unoccluded light. Two more
+    instances lie below."""
     scene = lit_scenes(to_world[:, 3], 1.0, level_only=False)["tilted plane"]
     plane, matrix = scene.meshes[0], np.vstack([to_world, [0, 0, 0, 1]])
     vertices, faces = plane.vertices, plane.faces
@@ -56,7 +56,7 @@ def lit_plane(to_world: Doubles) -> Scene:
 
 
 def _edges(plane: Mesh) -> Doubles:
-    """Two directions in a plane, (2, 3), whose cross product is its normal."""
+    """Return two unit vectors in a plane, (2, 3), whose cross product is its normal."""
     corners = plane.vertices[plane.faces[0]].astype(np.float64)
     first, second = corners[1] - corners[0], corners[2] - corners[0]
     side = np.cross(np.cross(first, second), first)
@@ -64,7 +64,7 @@ def _edges(plane: Mesh) -> Doubles:
 
 
 def transforms_of_kinds() -> dict[str, Doubles]:
-    """(INSTANCES, 3, 4) of each kind, as float32 holds them."""
+    """Return transforms (INSTANCES, 3, 4) by kind, rounded to float32."""
     rng = np.random.default_rng(0)
     turns = np.linalg.qr(rng.normal(size=(INSTANCES, 3, 3)))[0]
     moves = rng.uniform(-8, 8, (INSTANCES, 3, 1))

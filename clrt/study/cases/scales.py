@@ -1,4 +1,4 @@
-"""G3: tiny and huge meshes have the hits of float64, and a tiny mesh in a large scene is as closed as any."""
+"""G3: tiny and huge meshes have the hits of float64, and a tiny mesh in a large scene stays watertight."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ..workloads import Mesh, bumpy_ball, closed_room
 from .subject import Subject, endless, unit_vectors
 
 FACTORS = (1e-20, 1e-10, 1e10, 1e15)
-#: Of the tiny ball in a room of size 1; its edges are 1e-7.
+#: Radius and subdivisions of the tiny sphere mesh in a room of size 1; its edges are 1e-7 long.
 TINY_RADIUS, TINY_SUBDIVISIONS = 5e-6, 6
 
 
 def measure_scales(subject: Subject, *, quick: bool) -> Iterator[Row]:
-    """Hits that float64 rules out; rays that leave the tiny ball, and those that miss its middle from afar."""
+    """Count the hits that float64 rules out, rays that escape the tiny mesh, and rays at its center that miss it."""
     mesh, count = bumpy_ball(2), 1 << (12 if quick else 17)
     for factor in FACTORS:
         points = (mesh[0].astype(np.float64) * factor).astype(np.float32)
@@ -43,7 +43,7 @@ def measure_scales(subject: Subject, *, quick: bool) -> Iterator[Row]:
 
 
 def tiny_ball_in_room() -> Mesh:
-    """A ball's triangles, off the middle of a cube of edge 1, and then the cube's 8 vertices and 12 triangles."""
+    """Return a tiny sphere mesh off the center of a unit cube, followed by the cube's 8 vertices and 12 triangles."""
     ball, faces = icosphere(TINY_SUBDIVISIONS)
     points = (ball * TINY_RADIUS + [0.03, -0.02, 0.05]).astype(np.float32)
     ends = np.array([[-1, 0, 0], [1, 0, 0]], np.float32) / np.float32(6)

@@ -1,4 +1,4 @@
-"""G4: slivers and fans: triangles a million times as long as wide, and a hundred at one edge."""
+"""G4: slivers a million times longer than wide, and fans of a hundred triangles around one edge."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BLADES = 100
 
 
 def measure_slivers(subject: Subject, *, quick: bool) -> Iterator[Row]:
-    """Rays that leave a closed tube of slivers; hits on a fan that float64 rules out; rays that miss its edge."""
+    """Count rays that escape a tube of slivers, hits on a fan that float64 rules out, and rays that miss its edge."""
     count, rng = 1 << (12 if quick else 20), np.random.default_rng(0)
     tube = sliver_tube(64 if quick else 1 << 16)
     hits = subject.query(tube).closest_hit(*inside_rays(*tube, count, rng))
@@ -33,7 +33,7 @@ def measure_slivers(subject: Subject, *, quick: bool) -> Iterator[Row]:
 
 
 def sliver_tube(sides: int) -> Mesh:
-    """A closed prism around z, of radius 1: 2·sides slivers a million times as long as wide, and a fan at each end."""
+    """Return a closed prism of radius 1 around z: 2·sides slivers of aspect ratio 1e6, and a fan at each end."""
     turn = 2 * np.pi * np.arange(sides) / sides
     ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     half = 1e6 * np.pi / sides
@@ -47,7 +47,7 @@ def sliver_tube(sides: int) -> Mesh:
 
 
 def fan() -> Mesh:
-    """Triangles around the edge from the origin to (0, 1, 0), like the leaves of an open book."""
+    """Return triangles around the edge from the origin to (0, 1, 0), like the pages of an open book."""
     turn = np.linspace(0, 2 * np.pi, BLADES, endpoint=False)
     tips = np.stack([np.cos(turn), np.full(BLADES, 0.5), np.sin(turn)], axis=1)
     vertices = np.concatenate([[[0, 0, 0], [0, 1, 0]], tips]).astype(np.float32)

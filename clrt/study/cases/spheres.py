@@ -1,4 +1,4 @@
-"""G10: spheres tiny and far, giant and near, from inside, touching and grazed, against extended precision."""
+"""G10: tiny distant, huge near, enclosing, tangent and grazed spheres, against extended precision."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from ..row import Row
 from ..workloads import Doubles
 from .subject import Subject, endless, ulps, unit_vectors
 
-#: A hit is open where the ray passes the silhouette by less than this part of the way to the centre.
+#: A hit is undecided if the ray passes the silhouette within this fraction of the distance to the center.
 OPEN = 2.0**-40
-#: Hits farther in than this part of the radius are grazing no more.
+#: Hits are steep, not grazing, if the ray passes the center within this fraction of the radius.
 STEEP = 0.9
 
 
@@ -22,7 +22,7 @@ Extended = NDArray[np.longdouble]
 
 
 class Case(NamedTuple):
-    """One sphere of float32 numbers, and rays. direction: of unit length."""
+    """One sphere, in float32 numbers, and rays at it. direction: of unit length."""
 
     what: str
     center: Doubles
@@ -32,7 +32,7 @@ class Case(NamedTuple):
 
 
 def measure_spheres(subject: Subject, *, quick: bool) -> Iterator[Row]:
-    """Hits found where there is none or none where there is one; the largest error of t of hits that do not graze."""
+    """Count false hits and false misses, and measure the largest error of t of all hits and of those that are steep."""
     count = 1 << (12 if quick else 18)
     for case in cases(count):
         table = np.append(case.center, case.radius).astype(np.float32)[None]
@@ -51,7 +51,7 @@ def measure_spheres(subject: Subject, *, quick: bool) -> Iterator[Row]:
 
 
 def cases(count: int) -> Iterator[Case]:
-    """`count` rays each, a part of them past the sphere, and half of the others near its silhouette."""
+    """Yield cases of `count` rays each. Some rays miss the sphere; half of the aimed ones pass near its silhouette."""
     rng, origin = np.random.default_rng(0), np.zeros(3)
     for distance in (1e1, 1e4, 1e5, 1e6):
         center = distance * np.array([0.6, -0.48, 0.64])
@@ -65,7 +65,7 @@ def cases(count: int) -> Iterator[Case]:
 
 
 def _aimed(rng: np.random.Generator, what: str, center: Doubles, radius: float, origin: Doubles) -> Case:
-    """Towards points beside the centre, at up to 1.1 radii, as they look from the origin; half of them near 1."""
+    """Aim at points up to 1.1 radii off the center, as seen from the origin; half of them near 1 radius."""
     count = len(origin)
     beside = np.where(np.arange(count) % 2, 1.1 * np.sqrt(rng.random(count)),
                       1 + rng.choice([-1, 1], count) * 10 ** rng.uniform(-7, -1, count))
@@ -79,9 +79,9 @@ def _aimed(rng: np.random.Generator, what: str, center: Doubles, radius: float, 
 
 
 def exact_hits(sphere: Extended, origin: Extended, direction: Extended) -> tuple[Extended, Extended, Extended]:
-    """t of the nearest hit at t > 0, or inf; how far the line passes the centre; and how exactly float32 can know that.
+    """Return t of the nearest hit at t > 0, or inf; the line's distance from the center; the uncertainty of float32.
 
-    sphere: centre and radius; all extended precision. By the foot of the perpendicular from the centre.
+    sphere: center and radius; all in extended precision. Computed from the foot of the perpendicular from the center.
     """
     along = direction / np.sqrt(np.sum(direction**2, axis=1, keepdims=True))
     to_center = sphere[:3] - origin

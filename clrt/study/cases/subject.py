@@ -1,4 +1,4 @@
-"""Who is asked: a device, and by which tests it intersects."""
+"""The device and the intersection tests under study."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NO_MESH: Mesh = (np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
 
 @dataclass(frozen=True)
 class Subject:
-    """device: an index of `clrt.devices()`; the rest: see RayQuery and Renderer."""
+    """A configuration under study. device: index into `clrt.devices()`; other fields: see RayQuery and Renderer."""
 
     device: int
     layout: str | None = None
@@ -30,7 +30,7 @@ class Subject:
     offset: str = "bound"
 
     def query(self, mesh: Mesh = NO_MESH, spheres: ArrayLike | None = None, **options: Any) -> RayQuery:
-        """The mesh and spheres to shoot at; options: further ones of RayQuery."""
+        """Return a query of the mesh and spheres; options: further arguments of RayQuery."""
         options = {"device": self.device, "layout": self.layout, "triangle": self.triangle, "box": self.box,
                    **options}
         if spheres is not None:
@@ -38,11 +38,11 @@ class Subject:
         return RayQuery(*mesh, **options)
 
     def picture(self, scene: Scene, spp: int = 1) -> Floats:
-        """(height, width, 3): the scene after `spp` samples a pixel."""
+        """Render the scene with `spp` samples per pixel and return the image (height, width, 3)."""
         return self.film(replace(scene, render=replace(scene.render, spp=spp))).mean.astype(np.float32)
 
     def film(self, scene: Scene) -> Film:
-        """The scene by its own settings."""
+        """Render the scene with its own settings and return the film."""
         renderer = Renderer(scene, device=self.device, layout=self.layout, triangle=self.triangle, box=self.box,
                             sphere=self.sphere, offset=self.offset)
         *_, last = renderer.passes(spp=scene.render.spp)
@@ -50,18 +50,18 @@ class Subject:
 
 
 def unit_vectors(rng: np.random.Generator, count: int) -> Doubles:
-    """(count, 3) directions, each as likely."""
+    """Return (count, 3) uniformly distributed unit vectors."""
     w = rng.normal(size=(count, 3))
     return np.asarray(w / np.linalg.norm(w, axis=1, keepdims=True))
 
 
 def endless(origins: Doubles, directions: Doubles) -> tuple[Floats, Floats, Floats]:
-    """Rays without an end, rounded to float32."""
+    """Return rays with infinite t_max, rounded to float32."""
     return origins.astype(np.float32), directions.astype(np.float32), np.full(len(origins), np.inf, np.float32)
 
 
 def ulps(found: Floats, exact: Doubles) -> Doubles:
-    """How many units in the last place float32 answers are off; inf for what is not finite."""
+    """Return the errors of float32 results in units in the last place; inf if a result is not finite."""
     with np.errstate(invalid="ignore", over="ignore"):
         off = np.abs(found.astype(np.float64) - exact) / np.spacing(np.abs(exact).astype(np.float32)).astype(np.float64)
     return np.asarray(np.where(np.isfinite(found), off, np.inf))

@@ -1,7 +1,7 @@
-"""G1: from inside a closed mesh no ray gets out, wherever the mesh stands and however large it is.
+"""G1: no ray escapes from a closed mesh, wherever the mesh is and however large it is.
 
-Rays are aimed from inside at vertices, at points of edges and of faces, as float32 has them. Far from the origin
-vertices fall together, but those that neighbours share stay shared, so the mesh stays closed.
+Rays start inside and are aimed, in float32, at vertices and at points on edges and faces. Far from the origin
+vertices coincide, but neighbors still share them, so the mesh stays closed.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from ..shapes import icosphere
 from ..workloads import Mesh, bumpy_ball
 from .subject import Subject
 
-#: (sizes by which the mesh is moved, what it is multiplied by).
+#: (Translation in mesh sizes, scale factor).
 PLACES = ((0, 1), (1e3, 1), (1e4, 1), (1e5, 1), (1e6, 1), (0, 1e-6), (0, 1e6))
 AWAY = np.array([1.0, -0.7, 0.4])
 RAYS = 1 << 20
 
 
 def measure_watertight(subject: Subject, *, quick: bool, rays: float = 1e8) -> Iterator[Row]:
-    """Rays that get out, of each mesh in each place; of `rays` in all, or 2e6."""
+    """Count the escaped rays for each mesh and place, with `rays` rays in total, or 2e6 if `quick`."""
     meshes = {"icosphere": icosphere(4 if quick else 8), "bumpy ball": bumpy_ball(4 if quick else 7)}
     rays = 2e6 if quick else rays
     for name, mesh in meshes.items():
@@ -34,14 +34,14 @@ def measure_watertight(subject: Subject, *, quick: bool, rays: float = 1e8) -> I
 
 
 def placed(mesh: Mesh, sizes: float, factor: float) -> Mesh:
-    """The mesh moved by so many of its sizes along AWAY, then multiplied; in float32 again."""
+    """Move the mesh by `sizes` of its sizes along AWAY, then scale it; rounded to float32."""
     points = mesh[0].astype(np.float64)
     points = factor * (points + sizes * np.ptp(points, axis=0).max() * AWAY)
     return points.astype(np.float32), mesh[1]
 
 
 def misses(subject: Subject, mesh: Mesh, count: int) -> int:
-    """How many of `count` rays from inside the closed mesh meet nothing."""
+    """Return how many of `count` rays from inside the closed mesh miss it."""
     query, rng, missed = subject.query(mesh), np.random.default_rng(0), 0
     for first in range(0, count, RAYS):
         rays = inside_rays(*mesh, min(RAYS, count - first), rng)
@@ -50,5 +50,5 @@ def misses(subject: Subject, mesh: Mesh, count: int) -> int:
 
 
 def words(sizes: float, factor: float) -> str:
-    """What was done to a scene that was multiplied by a factor and moved by so many sizes."""
+    """Describe a scene's scale factor and its translation in scene sizes."""
     return f"moved by {sizes:g} sizes" if sizes else f"times {factor:g}" if factor != 1 else "in its place"
