@@ -112,7 +112,7 @@ def test_thin_glass_is_the_sum_of_its_bounces(device: Device) -> None:
         assert share == pytest.approx(float((2 * f / (1 + f))[0]), abs=4 * np.sqrt(0.25 / len(numbers)))
 
 
-def _plane(z: float, material: Dielectric | Diffuse, half: float = 99.0) -> Mesh:
+def _plane(z: float, material: Material, half: float = 99.0) -> Mesh:
     """The square around the z axis at this height, seen from above."""
     return quad([(-half, -half, z), (half, -half, z), (half, half, z), (-half, half, z)], material)
 

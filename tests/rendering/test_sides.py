@@ -78,7 +78,7 @@ def test_a_furnace_of_the_inner_side(device: Device, as_mesh: bool) -> None:
 
 
 def test_an_inner_side_seen_through_a_transparent_near_side_lights_all_the_same(device: Device) -> None:
-    """Of a ball of opacity a above the ground a ray sees L·a on the near side, and (1 − a)·L·a on the far one's inside."""
+    """Of a ball of opacity a a ray sees L·a on the near side, and (1 − a)·L·a on the far one's inside."""
     def lit(opacity: float) -> Film:
         ball = Sphere(center=(0, 1.5, 0), material=Diffuse(color=BLACK, emission=(1, 1, 1), opacity=opacity,
                                                            double_sided=True))
