@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..scene.model import Mesh
 from ..scene.pictures import linear_from_srgb
-from ..scene.textures import Texture
+from ..scene.textures import Texture, Wrap
 
 Doubles = NDArray[np.float64]
 
@@ -31,10 +31,8 @@ def mean_texels(texture: Texture, uv: Doubles) -> Doubles:
     linear = linear_from_srgb(encoded).astype(np.float64)
     size = np.array(linear.shape[1::-1])
     placed = (uv @ texture.to_picture[:, :2].T + texture.to_picture[:, 2]) * size
-    placed -= np.floor(placed[:, :1] / size) * size   # by whole pictures, so that the first corner lies inside
-    low, high = np.floor(placed.min(axis=1) - 1).astype(np.int64), np.ceil(placed.max(axis=1) + 1).astype(np.int64)
-    outside = (low < 0) | (high > size)
-    low, high = np.where(outside, 0, low), np.where(outside, size, high)
+    boxes = [_texels(placed[..., axis], int(size[axis]), texture.wrap[axis]) for axis in range(2)]
+    low, high = (np.column_stack(ends) for ends in zip(*boxes))
     sums = np.zeros((size[1] + 1, size[0] + 1, 3))
     sums[1:, 1:] = linear.cumsum(axis=0).cumsum(axis=1)
     (left, top), (right, bottom) = low.T, high.T
@@ -42,3 +40,19 @@ def mean_texels(texture: Texture, uv: Doubles) -> Doubles:
     # Differences of long sums may miss 0 by rounding; one level of one texel is 3e-4.
     mean = inside / ((right - left) * (bottom - top))[:, None]
     return np.asarray(np.where(inside > 1e-5, mean, 0.0))
+
+
+def _texels(at: Doubles, size: int, wrap: Wrap) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The columns or rows that triangles read, from the first to before the last, (m,) each; all where their box leaves
+    the picture. at: (m, corners), in texels, as far as they go."""
+    if wrap == "clamp":
+        at = np.clip(at, 0, size)
+    else:   # by whole pictures, so that the first corner lies inside, or in the mirrored one after it
+        period = size if wrap == "repeat" else 2 * size
+        at = at - np.floor(at[:, :1] / period) * period
+        at = np.where(at[:, :1] >= size, 2 * size - at, at)
+    low, high = np.floor(at.min(axis=1) - 1).astype(np.int64), np.ceil(at.max(axis=1) + 1).astype(np.int64)
+    if wrap == "clamp":     # beyond the edge are its own texels
+        low, high = np.maximum(low, 0), np.minimum(high, size)
+    outside = (low < 0) | (high > size)
+    return np.where(outside, 0, low), np.where(outside, size, high)
