@@ -60,17 +60,21 @@ class ShapeReader:
         look = self._lit(plugin, self._look(plugin))
         if plugin.value("flip_normals", bool, False):
             plugin.refuse("flip_normals is not supported", "turn the shape's faces", "flip_normals")
+        mirrored = bool(np.linalg.det(to_world[:3, :3]) < 0)
         if plugin.kind == "sphere":
             to_world = to_world @ _ball(plugin)
-            if ball := _sphere(to_world, look, plugin.where):
+            inwards = mirrored and (any(look.material.radiance) or "TRANSMISSION" in look.material.features())
+            if not inwards and (ball := _sphere(to_world, look, plugin.where)):
                 yield ball
                 return
         elif plugin.kind == "cylinder":
             to_world = to_world @ _between(plugin)
         if plugin.kind in PRIMITIVES:
-            pieces: list[tuple[Mesh, Attributes]] = [(PRIMITIVES[plugin.kind](), {})]
+            mesh = PRIMITIVES[plugin.kind]()
+            turns = mirrored and plugin.kind == "sphere"
+            pieces: list[tuple[Mesh, Attributes]] = [(_turned(mesh) if turns else mesh, {})]
         else:
-            pieces = list(_from_file(plugin))
+            pieces = list(_from_file(plugin, mirrored))
         for mesh, attributes in pieces:
             yield _dressed(transform_mesh(mesh, to_world), look, attributes, plugin)
 
@@ -158,8 +162,15 @@ def _sphere(to_world: Doubles, look: Look, name: str) -> Sphere | None:
     return Sphere(center=(x, y, z), radius=radius, material=look.material, name=name)
 
 
-def _from_file(plugin: Plugin) -> Iterator[tuple[Mesh, Attributes]]:
-    """The meshes of a file, with smooth normals where it has none, as Mitsuba makes them."""
+def _turned(mesh: Mesh) -> Mesh:
+    """The mesh with its front where its back was."""
+    return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]),
+                   normals=None if mesh.normals is None else -mesh.normals)
+
+
+def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attributes]]:
+    """The meshes of a file, with smooth normals where it has none, as Mitsuba makes them: in the world, where triangles
+    are wound the other way if its transform is `mirrored`. A file's own normals keep their side."""
     path = Path(plugin.value("filename", str, ""))
     flat = plugin.value("face_normals", bool, False)
     downward = plugin.value("flip_tex_coords", bool, plugin.kind == "obj")
@@ -170,7 +181,9 @@ def _from_file(plugin: Plugin) -> Iterator[tuple[Mesh, Attributes]]:
         mesh.colors, mesh.tangents = None, None
         if flat:
             mesh.normals = None
-        elif mesh.normals is None:
+        if mirrored and mesh.normals is None:
+            mesh = _turned(mesh)
+        if not flat and mesh.normals is None:
             mesh.normals = smooth_normals(mesh.vertices, mesh.faces)
         yield mesh, attributes
 
