@@ -1,4 +1,4 @@
-"""Which side of a shape is its front where Mitsuba's transforms mirror: as Mitsuba 3.9 itself lets lamps there shine."""
+"""Which side of a shape is its front where Mitsuba's transforms mirror: as Mitsuba 3.9 lets lamps there shine."""
 
 from __future__ import annotations
 
