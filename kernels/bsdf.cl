@@ -95,10 +95,11 @@ static inline ireal is_lit_from_behind(const Bsdf *bsdf) {
 #include HORIZON_FILE
 
 #if ATTENUATION
-// What is absorbed of light beyond the surface, per unit of length.
-static inline real3 absorption_beyond(const Bsdf *bsdf) {
-    real3 absorption = splat(ZERO);
-#define ABSORBING(name, number) absorption = choose(bsdf->type == number, bsdf->name.absorption, absorption);
+// What is absorbed of light beyond the surface, per unit of length: as much as `here` where it has no inside.
+static inline real3 absorption_beyond(const Bsdf *bsdf, real3 here) {
+    real3 absorption = here;
+#define ABSORBING(name, number) \
+    absorption = choose(bsdf->type == number, name##_absorption(&bsdf->name, here), absorption);
     ABSORBING_TYPES(ABSORBING)
     return absorption;
 }

@@ -119,7 +119,7 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
     ray->wi = light.wi;
     ray->infinite = light.infinite;
 #if ATTENUATION
-    real3 absorption = choose(dot3(light.wi, surface->ng) > 0.0f, path->absorption, absorption_beyond(&shading->bsdf));
+    real3 absorption = absorption_along(shading, surface, light.wi, path->absorption);
     real distance = light.infinite ? (real)(INFINITY) : length3(sub(light.target, ray->origin));
     contribution = mul(contribution, attenuated(absorption, distance));
 #endif
@@ -154,7 +154,7 @@ static inline ireal go_on(Path *path, const Surface *surface, const Shading *sha
     path->spread *= sample.spread;
 #endif
 #if ATTENUATION
-    path->absorption = choose(dot3(path->wi, surface->ng) < 0.0f, absorption_beyond(&shading->bsdf), path->absorption);
+    path->absorption = absorption_along(shading, surface, path->wi, path->absorption);
 #endif
     path->origin = offset_origin(surface->p, surface->p_error, surface->ng, path->wi);
 

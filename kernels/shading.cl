@@ -3,6 +3,7 @@
 //   shading_eval(shading, surface, wi)           bsdf_eval: value and density, 0 where wi is not on the side of the geometric
 //                                                surface that it belongs to: reflected light above, transmitted light below
 //   shading_sample(shading, surface, u, lobe)    bsdf_sample, its wi in the world frame, with a density of 0 where it failed
+//   absorption_along(shading, surface, wi, here) what is absorbed along wi, per unit of length, where it is `here` on wo's side
 //
 // wi: unit, world frame. HORIZON: what lobes around a bent or interpolated normal send to the wrong side is not lost
 // (horizon.cl).
@@ -105,6 +106,12 @@ static inline BsdfSample shading_sample(const Shading *shading, const Surface *s
     sample.pdf = same_side(belongs, dot3(sample.wi, surface->ng)) ? sample.pdf : ZERO;
     return sample;
 }
+
+#if ATTENUATION
+static inline real3 absorption_along(const Shading *shading, const Surface *surface, real3 wi, real3 here) {
+    return choose(dot3(wi, surface->ng) < 0.0f, absorption_beyond(&shading->bsdf, here), here);
+}
+#endif
 
 // The normal by which lights are chosen: no light behind it contributes anything.
 static inline real3 choosing_normal(const Shading *shading) {

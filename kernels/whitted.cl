@@ -26,11 +26,15 @@ static inline real3 seen_light(const Scene *scene, real3 origin, real3 direction
 }
 
 #if LIGHTS
-// 2. One light's, by way of a shadow ray.
+// 2. One light's, by way of a shadow ray. absorption: on the side that the surface is seen from, per unit of length.
 static inline real3 light_of_one(const Scene *scene, int light, const Surface *surface, const Shading *shading,
-                                 ireal active, real2 u, ureal *rays) {
+                                 real3 absorption, ireal active, real2 u, ureal *rays) {
     LightSample sample = sample_of_light(scene, (ireal)(light), surface->p, u);
     real3 contribution = scale(mul(shading_eval(shading, surface, sample.wi).value, sample.radiance), 1.0f / sample.pdf);
+#if ATTENUATION
+    real distance = sample.infinite ? (real)(INFINITY) : length3(sub(sample.target, surface->p));
+    contribution = mul(contribution, attenuated(absorption_along(shading, surface, sample.wi, absorption), distance));
+#endif
     ireal useful = active & (sample.pdf > 0.0f) & carries_light(contribution);
     if (!ANY(useful)) return splat(ZERO);
 #if NO_SHADOWS
@@ -44,8 +48,8 @@ static inline real3 light_of_one(const Scene *scene, int light, const Surface *s
 }
 #endif
 
-static inline real3 shade(const Scene *scene, const Surface *surface, const Shading *shading, ireal active, Sampler *sampler,
-                          ureal *rays) {
+static inline real3 shade(const Scene *scene, const Surface *surface, const Shading *shading, real3 absorption, ireal active,
+                          Sampler *sampler, ureal *rays) {
     real3 L = splat(ZERO);
 #if SKY
     real pdf;
@@ -54,7 +58,7 @@ static inline real3 shade(const Scene *scene, const Surface *surface, const Shad
 #endif
 #if LIGHTS
     for (int light = 0; light < scene->counts.lights - scene->counts.sky_lights; ++light)
-        L = add(L, light_of_one(scene, light, surface, shading, active, next_2d(sampler), rays));
+        L = add(L, light_of_one(scene, light, surface, shading, absorption, active, next_2d(sampler), rays));
 #endif
     return choose(active, L, splat(ZERO));
 }
@@ -62,10 +66,7 @@ static inline real3 shade(const Scene *scene, const Surface *surface, const Shad
 // Along camera rays; closest: what they hit first, where that was rasterised.
 static inline real3 local_light(const Scene *scene, const Launch *launch, const CameraRay *ray, const Hits *closest,
                                 ireal active, Sampler *sampler, ureal *rays) {
-    real3 L = splat(ZERO), beta = splat(ONE), origin = ray->origin, direction = ray->direction;
-#if ATTENUATION
-    real3 absorption = splat(ZERO);
-#endif
+    real3 L = splat(ZERO), beta = splat(ONE), origin = ray->origin, direction = ray->direction, absorption = splat(ZERO);
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
         Surface surface;
@@ -87,7 +88,7 @@ static inline real3 local_light(const Scene *scene, const Launch *launch, const 
         Shading shading = shading_at(scene, direction, &surface);
         real2 u = next_2d(sampler), choice = next_2d(sampler);
         BsdfSample sample = shading_sample(&shading, &surface, u, choice.x);
-        L = add(L, mul(beta, shade(scene, &surface, &shading, active & !sample.specular, sampler, rays)));
+        L = add(L, mul(beta, shade(scene, &surface, &shading, absorption, active & !sample.specular, sampler, rays)));
 
         // 3. Go on from mirrors and glass.
         direction = sample.wi;
@@ -97,7 +98,7 @@ static inline real3 local_light(const Scene *scene, const Launch *launch, const 
         beta = choose(active, scale(beta, sample.spread), beta);
 #endif
 #if ATTENUATION
-        absorption = choose(dot3(direction, surface.ng) < 0.0f, absorption_beyond(&shading.bsdf), absorption);
+        absorption = absorption_along(&shading, &surface, direction, absorption);
 #endif
         origin = offset_origin(surface.p, surface.p_error, surface.ng, direction);
 #endif

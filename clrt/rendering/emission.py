@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..scene.model import Mesh
 from ..scene.pictures import linear_from_srgb
-from ..scene.textures import Texture
+from ..scene.textures import Texture, Wrap
 
 Doubles = NDArray[np.float64]
 
@@ -29,18 +29,10 @@ def mean_texels(texture: Texture, uv: Doubles) -> Doubles:
     """Return (m, 3), the same for texture coordinates (m, corners, 2)."""
     encoded = texture.picture.texels[..., :3].astype(np.float32) / np.float32(255)
     linear = linear_from_srgb(encoded).astype(np.float64)
-    clamped = np.array([wrap == "clamp" for wrap in texture.wrap])
-    placed = (uv @ texture.to_picture[:, :2].T + texture.to_picture[:, 2]) * linear.shape[1::-1]
-    for axis, wrap in zip((1, 0), texture.wrap):
-        if wrap == "mirror":    # the same as repeating the picture and its mirror image
-            linear = np.concatenate([linear, np.flip(linear, axis)], axis)
     size = np.array(linear.shape[1::-1])
-    # By whole periods, so that the first corner lies inside; beyond a picture that is clamped are its outermost texels.
-    placed -= np.where(clamped, 0, np.floor(placed[:, :1] / size) * size)
-    low, high = np.floor(placed.min(axis=1) - 1), np.ceil(placed.max(axis=1) + 1)
-    outside = ((low < 0) | (high > size)) & ~clamped
-    low = np.where(outside, 0, np.clip(low, 0, size - 1)).astype(np.int64)
-    high = np.where(outside, size, np.clip(high, 1, size)).astype(np.int64)
+    placed = (uv @ texture.to_picture[:, :2].T + texture.to_picture[:, 2]) * size
+    boxes = [_texels(placed[..., axis], int(size[axis]), texture.wrap[axis]) for axis in range(2)]
+    low, high = (np.column_stack(ends) for ends in zip(*boxes))
     sums = np.zeros((size[1] + 1, size[0] + 1, 3))
     sums[1:, 1:] = linear.cumsum(axis=0).cumsum(axis=1)
     (left, top), (right, bottom) = low.T, high.T
@@ -48,3 +40,21 @@ def mean_texels(texture: Texture, uv: Doubles) -> Doubles:
     # Differences of long sums may deviate from 0 by rounding; one level of one texel is 3e-4.
     mean = inside / ((right - left) * (bottom - top))[:, None]
     return np.asarray(np.where(inside > 1e-5, mean, 0.0))
+
+
+def _texels(at: Doubles, size: int, wrap: Wrap) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first and end (m,) of the columns or rows that triangles read; all if their box leaves the image.
+
+    at: (m, corners), unwrapped coordinates in texels.
+    """
+    if wrap == "clamp":
+        at = np.clip(at, 0, size)
+    else:   # by whole images, so that the first corner lies inside, or in the mirrored one after it
+        period = size if wrap == "repeat" else 2 * size
+        at = at - np.floor(at[:, :1] / period) * period
+        at = np.where(at[:, :1] >= size, 2 * size - at, at)
+    low, high = np.floor(at.min(axis=1) - 1).astype(np.int64), np.ceil(at.max(axis=1) + 1).astype(np.int64)
+    if wrap == "clamp":     # beyond the edge are its own texels
+        low, high = np.maximum(low, 0), np.minimum(high, size)
+    outside = (low < 0) | (high > size)
+    return np.where(outside, 0, low), np.where(outside, size, high)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -31,17 +30,6 @@ FILES = ("obj", "ply")
 UNEVEN = 1e-5
 Part = Mesh | Sphere
 Attributes = Mapping[str, FloatArray]
-
-
-class Piece(NamedTuple):
-    """A mesh, its attributes, and whether Mitsuba turns it inside out under a mirroring transform.
-
-    Mitsuba takes the emitting side from the shape's normals, or else from the winding in world space.
-    """
-
-    mesh: Mesh
-    attributes: Attributes
-    turns: bool
 
 
 class ShapeReader:
@@ -72,21 +60,24 @@ class ShapeReader:
         look = self._lit(plugin, self._look(plugin))
         if plugin.value("flip_normals", bool, False):
             plugin.refuse("flip_normals is not supported", "turn the shape's faces", "flip_normals")
+        mirrored = bool(np.linalg.det(to_world[:3, :3]) < 0)
         if plugin.kind == "sphere":
             to_world = to_world @ _ball(plugin)
-            if ball := _sphere(to_world, look, plugin.where):
+            inwards = mirrored and (any(look.material.radiance) or "TRANSMISSION" in look.material.features())
+            if not inwards and (ball := _sphere(to_world, look, plugin.where)):
                 yield ball
                 return
         elif plugin.kind == "cylinder":
             to_world = to_world @ _between(plugin)
         mirrored = float(np.linalg.det(to_world[:3, :3])) < 0
         if plugin.kind in PRIMITIVES:
-            pieces = [Piece(PRIMITIVES[plugin.kind](), {}, turns=plugin.kind == "sphere")]
+            mesh = PRIMITIVES[plugin.kind]()
+            turns = mirrored and plugin.kind == "sphere"
+            pieces: list[tuple[Mesh, Attributes]] = [(_turned(mesh) if turns else mesh, {})]
         else:
-            pieces = list(_from_file(plugin))
-        for mesh, attributes, turns in pieces:
-            moved = transform_mesh(mesh, to_world)
-            yield _dressed(_turned(moved) if mirrored and turns else moved, look, attributes, plugin)
+            pieces = list(_from_file(plugin, mirrored))
+        for mesh, attributes in pieces:
+            yield _dressed(transform_mesh(mesh, to_world), look, attributes, plugin)
 
     def _look(self, plugin: Plugin) -> Look:
         """Return the material of the shape's BSDF and interior medium; or `stand_in` if it is not supported."""
@@ -184,8 +175,11 @@ def _turned(mesh: Mesh) -> Mesh:
                    normals=None if mesh.normals is None else -mesh.normals)
 
 
-def _from_file(plugin: Plugin) -> Iterator[Piece]:
-    """Yield the meshes of a file, with smooth normals if it has none, as in Mitsuba."""
+def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attributes]]:
+    """Yield the meshes of a file, with smooth normals if it has none, as in Mitsuba.
+
+    Those follow the winding in world space, which a mirroring transform inverts; a file's own normals keep their side.
+    """
     path = Path(plugin.value("filename", str, ""))
     flat = plugin.value("face_normals", bool, False)
     downward = plugin.value("flip_tex_coords", bool, plugin.kind == "obj")
@@ -194,12 +188,13 @@ def _from_file(plugin: Plugin) -> Iterator[Piece]:
         if mesh.uv is not None and downward != (own is None):
             mesh.uv[:, 1] = 1 - mesh.uv[:, 1]
         mesh.colors, mesh.tangents = None, None
-        turns = flat or mesh.normals is None
         if flat:
             mesh.normals = None
-        elif mesh.normals is None:
+        if mirrored and mesh.normals is None:
+            mesh = _turned(mesh)
+        if not flat and mesh.normals is None:
             mesh.normals = smooth_normals(mesh.vertices, mesh.faces)
-        yield Piece(mesh, attributes, turns)
+        yield mesh, attributes
 
 
 def _ply(path: Path) -> tuple[Mesh, Attributes] | None:

@@ -5,7 +5,7 @@
 // THIN_DIELECTRIC: a sheet whose two faces lie together. Of a wave that bounces between them
 //   F + (1 − F)²·c²F/(1 − c²F²) is reflected, 2F/(1 + F) for c = 1, and (1 − F)²·c/(1 − c²F²) passes without being bent,
 // c = color being what is left of light from face to face. A rough one spreads both ways alike (as glTF's transmission).
-// ATTENUATION: light is absorbed inside, as Beer and Lambert say (path.cl).
+// ATTENUATION: light is absorbed inside, as Beer and Lambert say (path.cl). A sheet leaves what is absorbed around it.
 #include "bsdf/interface.cl"
 
 static inline real fresnel_of_cosines(real cos_o, real cos_t, real eta) {
@@ -46,6 +46,12 @@ struct dielectric {
 #define IS_THIN(m) ((m)->thin)
 #else
 #define IS_THIN(m) NO_LANES
+#endif
+
+#if ATTENUATION
+static inline real3 dielectric_absorption(const struct dielectric *m, real3 here) {
+    return choose(IS_THIN(m), here, m->absorption);
+}
 #endif
 
 static inline real3 dielectric_albedo(const struct dielectric *m) { return m->color; }

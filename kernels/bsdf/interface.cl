@@ -11,8 +11,8 @@
 // m: const struct NAME *. wo, wi: unit, local frame, both pointing away from the surface, +z the shading normal on the
 // side of wo; surface->front: whether that is the outside. wi.z < 0 goes through it: then the material has the feature
 // TRANSMISSION; TRANSMISSION_LOBES, too, where eval knows directions beyond the surface, with NAME_transmits(m): whether it
-// can be other than 0 there; and ATTENUATION with a real3 `absorption` in its struct, where light is absorbed
-// there.
+// can be other than 0 there; and ATTENUATION, where light is absorbed there, with NAME_absorption(m, here): how much, per
+// unit of length, where it is `here` on the side of wo. What has no ATTENUATION has no inside either.
 #include "surface.cl"
 
 // The preamble says of each parameter whether some material of its type reads it from a texture: READ_kind_name is

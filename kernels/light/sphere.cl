@@ -1,6 +1,7 @@
 // A sphere that shines outwards: a direction uniform over the cone it fills (Shirley et al. 1996). World frame.
 //
-// One that shines inwards, too, is found there by the BSDF's directions alone: it lies in all of them.
+// One that shines inwards, too, is found there by the BSDF's directions alone: it lies in all of them. So is that inner side from
+// outside, where its near side lets light through: points are drawn on the near side.
 #include "light/interface.cl"
 #include OPACITY_FILE
 
@@ -47,7 +48,7 @@ static inline LightSample sphere_light_sample(const Scene *scene, ireal index, r
 static inline real sphere_light_pdf(const Scene *scene, ireal index, real3 p, real3 wi, real t, const Surface *surface) {
     real3 center = GATHER3(scene->sphere_lights, index, .center);
     real height = sphere_light_cone(center, GATHER(real, scene->sphere_lights, index, .radius), sub(center, p));
-    return height > 0.0f ? cone_pdf(height) : ZERO;
+    return ((height > 0.0f) & (dot3(wi, surface->ng) < 0.0f)) ? cone_pdf(height) : ZERO;
 }
 
 static inline real3 sphere_light_radiance(const Scene *scene, ireal index, real3 wi, const Surface *surface) {

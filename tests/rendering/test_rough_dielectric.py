@@ -12,8 +12,8 @@ from clrt.device.open import Device
 from clrt.rendering.choices import Choices
 from clrt.rendering.compile import compile_scene
 from clrt.scene.lights import Light, PointLight
-from clrt.scene.materials import Dielectric, Diffuse
-from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
+from clrt.scene.materials import Dielectric, Diffuse, Material, MetallicRoughness
+from clrt.scene.model import Camera, Environment, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
 from clrt.study.bsdfs import bsdfs, uniform, view
 from clrt.study.probe import Doubles
 from clrt.study.scattering import above
@@ -112,7 +112,7 @@ def test_thin_glass_is_the_sum_of_its_bounces(device: Device) -> None:
         assert share == pytest.approx(float((2 * f / (1 + f))[0]), abs=4 * np.sqrt(0.25 / len(numbers)))
 
 
-def _plane(z: float, material: Dielectric | Diffuse, half: float = 99.0) -> Mesh:
+def _plane(z: float, material: Material, half: float = 99.0) -> Mesh:
     """The square around the z axis at this height, seen from above."""
     return quad([(-half, -half, z), (half, -half, z), (half, half, z), (-half, half, z)], material)
 
@@ -156,9 +156,23 @@ def test_glass_absorbs_by_the_way_inside(device: Device) -> None:
     assert np.allclose(picture.mean.mean(axis=(0, 1)), expected, rtol=1e-6, atol=noise)
 
 
+@pytest.mark.parametrize(("sheet", "integrator"), [
+    (Dielectric(ior=1.0, thin=True), "path"), (Dielectric(ior=1.0, thin=True), "local"),
+    (MetallicRoughness(color=(1.0, 1.0, 1.0), ior=1.0, roughness=0.0, transmission=1.0), "path")])
+def test_a_sheet_does_not_end_what_absorbs(device: Device, sheet: Material, integrator: Integrator) -> None:
+    """A slab that bends nothing, 2 thick, with a clear sheet across it: color^(2/distance) of a white sky."""
+    glass = Dielectric(ior=1.0, attenuation_color=COLOR, attenuation_distance=0.5)
+    back = quad([(-99, 99, -2), (99, 99, -2), (99, -99, -2), (-99, -99, -2)], glass)
+    picture = film(device, Scene(meshes=[_plane(0.0, glass), back, _plane(-0.7, sheet)], camera=DOWN, environment=WHITE,
+                                 render=RenderSettings(size=(8, 8), spp=1, integrator=integrator)))
+    assert np.allclose(picture.mean, np.array(COLOR)**4, rtol=2e-3)
+
+
+@pytest.mark.parametrize("integrator", ["path", "local", "raster"])
 @pytest.mark.parametrize("placed", [False, True])
 @pytest.mark.parametrize("scale", [1.0, 2.0**30])
-def test_light_inside_is_absorbed_on_its_way_too(device: Device, scale: float, placed: bool) -> None:
+def test_light_inside_is_absorbed_on_its_way_too(device: Device, scale: float, placed: bool,
+                                                 integrator: Integrator) -> None:
     """A point in a box that bends nothing lights its floor: albedo·I/(pi·d²)·color^((d + way to the eye)/distance)."""
     box = Dielectric(ior=1.0, attenuation_color=COLOR, attenuation_distance=scale)
     floor = _plane(-scale, Diffuse(color=(0.5, 0.5, 0.5)), 2 * scale)
@@ -167,7 +181,7 @@ def test_light_inside_is_absorbed_on_its_way_too(device: Device, scale: float, p
     parts: dict[str, Any] = {"meshes": [floor], "instances": [Instance(lid)]} if placed else {"meshes": [lid, floor]}
     picture = film(device, Scene(**parts, lights=[light],
                                  camera=replace(DOWN, position=(0.0, 0.0, 4.0 * scale)),
-                                 render=RenderSettings(size=(8, 8), spp=4, max_depth=3)))
+                                 render=RenderSettings(size=(8, 8), spp=4, max_depth=3, integrator=integrator)))
     expected = 0.5 / np.pi * 7 / 0.25 * np.array(COLOR)**1.5
     assert np.allclose(picture.mean, expected, rtol=1e-4)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from clrt.device.open import Device
+from clrt.rendering.film import Film
 from clrt.scene.materials import Diffuse
 from clrt.scene.model import Camera, Integrator, Mesh, RenderSettings, Scene, Sphere
 from clrt.study.probe import Probe
@@ -15,7 +16,7 @@ from clrt.study.significance import mean_test, sidak
 
 from . import rays
 from .lamps import directions
-from .pictures import film
+from .pictures import film, quad
 from .test_lights import (COUNT, FAMILY, LAMP, POINTS, RADIANCE, assert_mean, irradiances, rectangle,
                           rectangle_irradiance)
 
@@ -74,6 +75,21 @@ def test_a_furnace_of_the_inner_side(device: Device, as_mesh: bool) -> None:
     samples, mean = found.samples, found.mean.mean(axis=(0, 1))
     variance = found.variance.mean(axis=(0, 1)) * 256 + samples * (1e-6 * 0.4)**2    # roundings, too
     assert mean_test(mean, variance, samples, 0.4).min() > sidak(FAMILY, 3), mean
+
+
+def test_an_inner_side_seen_through_a_transparent_near_side_lights_all_the_same(device: Device) -> None:
+    """Of a ball of opacity a a ray sees L·a on the near side, and (1 − a)·L·a on the far one's inside."""
+    def lit(opacity: float) -> Film:
+        ball = Sphere(center=(0, 1.5, 0), material=Diffuse(color=BLACK, emission=(1, 1, 1), opacity=opacity,
+                                                           double_sided=True))
+        return film(device, Scene(meshes=[ground], spheres=[ball], render=render,
+                                  camera=Camera(position=(0, 0.3, 3), look_at=(0, 0, 1.5), fov_degrees=5)))
+
+    ground = quad([(-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2)], Diffuse())
+    render = RenderSettings(size=(8, 8), spp=1024, max_depth=2)
+    solid, half = lit(1.0).mean[..., 0].mean(), lit(0.5)
+    error = np.sqrt(half.variance[..., 0].sum()) / 64
+    assert abs(half.mean[..., 0].mean() - 0.75 * solid) < 5 * error < 0.05 * solid
 
 
 def test_code_for_both_sides_is_compiled_where_a_light_has_them(device: Device) -> None:

@@ -1,0 +1,40 @@
+"""Which side of a shape is its front where Mitsuba's transforms mirror: as Mitsuba 3.9 lets lamps there shine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from .test_mitsuba_xml import scene
+
+
+@pytest.mark.parametrize(("normals", "flat", "facing"),
+                         [(False, False, -1), (False, True, -1), (True, False, 1), (True, True, -1)])
+def test_a_mirror_turns_files_inside_out_but_for_their_own_normals(tmp_path: Path, normals: bool, flat: bool,
+                                                                   facing: int) -> None:
+    """A triangle that faces +z, mirrored in x: Mitsuba 3.9 winds it in the world, and lets it shine towards −z."""
+    own = "vn 0 0 1\n" if normals else ""
+    corner = "//1" if normals else ""
+    (tmp_path / "one.obj").write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\n{own}f 1{corner} 2{corner} 3{corner}\n")
+    mesh = scene(tmp_path, f"""<shape type="obj"><string name="filename" value="one.obj"/>
+        <boolean name="face_normals" value="{str(flat).lower()}"/>
+        <transform name="to_world"><scale x="-1"/></transform></shape>""").meshes[0]
+    a, b, c = mesh.vertices[mesh.faces[0]]
+    assert np.allclose(np.cross(b - a, c - a), [0, 0, facing])
+    assert (mesh.normals is None) == flat
+    assert mesh.normals is None or np.allclose(mesh.normals, [0, 0, facing])
+
+
+def test_a_mirror_turns_spheres_inside_out(tmp_path: Path) -> None:
+    """What shines shines inwards, as in Mitsuba 3.9; of what has no sides nothing shows."""
+    mirrored = '<shape type="sphere"><transform name="to_world"><scale y="-2" x="2" z="2"/></transform>{}</shape>'
+    assert not scene(tmp_path, mirrored.format("")).meshes
+    for inside in ('<emitter type="area"/>', '<bsdf type="dielectric"/>'):
+        mesh, = scene(tmp_path, mirrored.format(inside)).meshes
+        triangles = mesh.vertices[mesh.faces].astype(np.float64)
+        outwards = np.einsum("ij,ij->i", np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]),
+                             triangles.mean(axis=1))
+        assert outwards.max() <= 1e-9 > outwards.min()
+        assert mesh.normals is not None and np.allclose(mesh.normals, -mesh.vertices / 2, atol=1e-6)
