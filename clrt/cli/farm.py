@@ -30,7 +30,7 @@ def farm_options(command: F) -> F:
     """Add the options that select a cluster instead of this machine's devices."""
     for option in [
         click.option("--local-cluster", type=click.IntRange(min=1), metavar="N",
-                     help="Render with N processes on this machine; needs clrt[farm]."),
+                     help="Render with N processes on this machine; needs Dask."),
         click.option("--scheduler", metavar="ADDRESS",
                      help="Render on the workers of a Dask scheduler, tcp://… or tls://…; --device is of theirs."),
     ]:

@@ -232,7 +232,7 @@ def _check_dask() -> None:
         import dask
         import distributed  # noqa: F401
     except ImportError:
-        raise UsageError("a farm needs Dask: pip install 'clrt[farm]'") from None
+        raise UsageError("a farm needs Dask: pip install distributed cryptography") from None
     # Else each connection keeps its last thousand messages, with all that was in them.
     dask.config.set({"distributed.admin.low-level-log-length": LOG_LENGTH})
     for name in ("distributed", "distributed.client"):    # Dask gives the latter a level of its own

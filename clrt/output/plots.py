@@ -33,7 +33,7 @@ def check_plot(path: Path) -> None:
         raise OutputError(f"{path}: plots are written as {', '.join(EXTENSIONS[:-1])} or {EXTENSIONS[-1]}; "
                           "name such a file")
     if find_spec("matplotlib") is None:
-        raise UsageError("plots need matplotlib: install it with `pip install 'clrt[plot]'`")
+        raise UsageError("plots need matplotlib: install it with `pip install matplotlib`")
 
 
 def plot_history(path: Path, title: str, history: Iterable[Mapping[str, Any]]) -> Path:

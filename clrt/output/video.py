@@ -51,7 +51,7 @@ def check_video(path: Path, size: tuple[int, int], fps: float) -> None:
                              "last; write an .mp4, or raise --fps")
         return
     if find_spec("imageio_ffmpeg") is None:
-        raise UsageError(f"{path}: {path.suffix} videos need ffmpeg: install it with `pip install 'clrt[video]'`, or "
+        raise UsageError(f"{path}: {path.suffix} videos need ffmpeg: run `pip install 'imageio[ffmpeg]'`, or "
                          "write a .gif")
     if width % 2 or height % 2:
         raise UsageError(f"{path}: {path.suffix} videos have an even width and height; use --size "

@@ -23,7 +23,7 @@ def decompress(data: GltfData, primitive: gltf.Primitive, user: str) -> None:
         if position.bufferView is not None and position.bufferView != compressed.bufferView:
             return
         raise SceneError(f"{user}: is compressed with Draco, whose decoder is not installed; "
-                         "pip install 'clrt[draco]', or export without compression")
+                         "pip install DracoPy, or export without compression")
     try:
         arrays, _ = decode("draco", data.view(compressed.bufferView, user).tobytes(), ".drc")
     except SceneError as error:

@@ -73,7 +73,7 @@ def judge(found: Sequence[Scenario], width: int | None, spp: int, denoise: bool 
     try:
         import flip_evaluator  # noqa: F401
     except ImportError:
-        raise UsageError("FLIP needs flip-evaluator; run pip install 'clrt[flip]' (for Python 3.11 to 3.13, not for "
+        raise UsageError("FLIP needs flip-evaluator; run pip install flip-evaluator (for Python 3.11 to 3.13, not for "
                          "Linux on ARM)") from None
     effort = Effort(width, spp, Denoiser() if denoise else None, choose(device)[0].index)
     for scenario in found:

@@ -12,13 +12,13 @@ NO_DISPLAY = ("no window can be opened: {}. Run it on a desktop, through `ssh -X
 
 
 def check_window() -> None:
-    """Raise UsageError unless the packages of `clrt[view]` are installed, OutputError if there is no display."""
+    """Raise UsageError unless the packages of the extra `view` are installed, OutputError if there is no display."""
     try:
         import imgui_bundle  # noqa: F401
         import OpenGL  # noqa: F401
     except ImportError as fault:
         raise UsageError(f"the window needs the packages imgui-bundle and PyOpenGL ({fault}): install them with "
-                         "`pip install 'clrt[view]'`") from fault
+                         "`pip install imgui-bundle PyOpenGL`") from fault
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise no_display("there is no display, as neither DISPLAY nor WAYLAND_DISPLAY is set")
 

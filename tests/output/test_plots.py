@@ -76,4 +76,4 @@ from clrt.cli import main
 main({[*command, "--plot", "plot.png"]!r})
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, cwd=tmp_path)
-    assert done.returncode == 2 and "pip install 'clrt[plot]'" in done.stderr and "Traceback" not in done.stderr
+    assert done.returncode == 2 and "pip install matplotlib" in done.stderr and "Traceback" not in done.stderr

@@ -13,7 +13,7 @@ import pytest
 @pytest.mark.parametrize("before, options, environment, code, message", [
     ("", [], {"DISPLAY": ""}, 6, "neither DISPLAY nor WAYLAND_DISPLAY is set"),
     ("", [], {"DISPLAY": ":4711"}, 6, "no window can be opened"),
-    ("sys.modules['imgui_bundle'] = None; ", [], {}, 2, "pip install 'clrt[view]'"),
+    ("sys.modules['imgui_bundle'] = None; ", [], {}, 2, "pip install imgui-bundle PyOpenGL"),
     ("", ["--integrator", "pth"], {}, 2, 'did you mean "path"?'),
     ("", ["--view", "agy"], {}, 2, "did you mean agx?"),
     ("", ["--device", "abacus"], {}, 4, "no usable device matches")],
