@@ -24,7 +24,7 @@ ITEM_TURNS = 1024
 #: Maximum number of items per launch and compute unit. On a CPU, where PoCL compiles a kernel again for launches with
 #: an offset other than 0, as many as take a tenth of a second.
 LAUNCH_ITEMS = {"cpu": 1 << 20, "gpu": 1 << 17}
-#: Work-items that scan cooperatively where that pays, as in build/scan.cl, and the minimum number of elements they get.
+#: Work-items that scan cooperatively where that pays, as in build/scan.cl, and the number of elements per work-group.
 SCAN_ITEMS, SCAN_PART = 256, 8192
 
 
@@ -109,8 +109,10 @@ class Blocks:
         return -(-count // self.block(count))
 
     def run(self, name: str, count: int, *arguments: Any) -> None:
-        """Runs kernel `name` over `count` items, of which a launch takes so many that it is short. Python's ints are
-        passed as uint, floats as float. A kernel may ask for its global id alone."""
+        """Run kernel `name` over `count` items, in launches that are each short.
+
+        Python ints are passed as uint, floats as float. The only index that kernels may use is their global id.
+        """
         block, local = self.block(count), self.device.local_size
         values = np.uint32(count), np.uint32(block), *map(_scalar, arguments)
         groups = -(-self.number(count) // local)
