@@ -1,4 +1,4 @@
-"""Floats are added, multiplied and rounded as IEEE 754 says, and divided as well as OpenCL says."""
+"""Check float arithmetic: sums, products and rounding by IEEE 754, division within OpenCL's limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from .floats import EXACT, LANES, LIMITS, NORMAL, float_rows, operands
 
 
 def check_arithmetic(device: Device, findings: Findings) -> None:
-    """Sums, products and fma to the bit, division and roots within limits; facts where a driver may choose."""
+    """Check sums, products and fma to the bit, division and roots within limits; record what is implementation-defined.
+    """
     for lanes in LANES:
         _check_exact(device, lanes, findings)
         _check_limits(device, lanes, findings)
@@ -43,7 +44,7 @@ def _check_limits(device: Device, lanes: int, findings: Findings) -> None:
 
 
 def _check_denormals(device: Device, lanes: int, findings: Findings) -> None:
-    """Numbers below the normal ones may be taken for zero, coming in or going out."""
+    """Check that denormals are kept or flushed to zero, as inputs or results."""
     a = np.float32(2.0**-126) * np.array([1, 1.5, 0.75, 0.5, 2.0**-20, 1.25], np.float32)
     b = np.roll(a, 1)
     rows = float_rows(device, lanes, a, b, a)

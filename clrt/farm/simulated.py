@@ -60,8 +60,8 @@ async def _run(address: str, count: int) -> None:
     import dask
     from distributed import Worker
 
-    # By default each profiles its stack a hundred times per second, and its machine twice: too much for many in one
-    # process.
+    # By default each profiles its stack a hundred times per second, and polls its machine twice: too much for many in
+    # one process.
     dask.config.set({"distributed.worker.profile.enabled": False, "distributed.admin.system-monitor.interval": "60s"})
     workers = [Worker(address, nthreads=1, memory_limit=0, host="127.0.0.1", dashboard=False) for _ in range(count)]
     await asyncio.gather(*workers)
