@@ -22,8 +22,8 @@ NODES_AT_ONCE = 4096
 class OpenNodes:
     """k nodes and their P primitives; the primitives of a node are contiguous, in the order of the nodes.
 
-    boxes: (6, P) float32, the primitives' min and negated max, so that a union is one `minimum`. ids: (P,) int32.
-    first: (k,) int32, where a node's primitives begin in the final order. count: (k,) int32.
+    boxes: (6, P) float32, the primitives' min and negated max, so that a union is one `minimum`.
+    ids: (P,) int32. first: (k,) int32, where a node's primitives begin in the final order. count: (k,) int32.
     """
 
     boxes: FloatArray

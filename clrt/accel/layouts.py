@@ -67,10 +67,11 @@ LEAF_SIZES = {"sah": 4, "midpoint": 2}
 class Layout:
     """A scene's primitives and the BVH over them, ready to be copied to a device or already there.
 
-    buffers: records by name, in a numpy array or, from a builder on the device, in a DeviceArray. stack: stack entries
-    that a traversal needs (see Tree.stack_bound), 0 without a BVH. builder: its name. depth and sah_cost are those of
-    the traversed BVH; build_seconds includes packing. work: sah_cost, or a function that computes it, for BVHs in
-    device memory. level_sizes: number of nodes per level, from the root, if `nodes` is in level order; else ().
+    buffers: records by name, in a numpy array or, from a builder on the device, in a DeviceArray.
+    stack: stack entries that a traversal needs (see Tree.stack_bound), 0 without a BVH. builder: its name.
+    depth and sah_cost are those of the traversed BVH; build_seconds includes packing. work: sah_cost, or a function
+    that computes it, for BVHs in device memory.
+    level_sizes: number of nodes per level, from the root, if `nodes` is in level order; else ().
     peak_bytes: peak memory of a builder on the device, 0 for one in numpy.
     """
 

@@ -30,10 +30,10 @@ class Tree:
     A BVH over p primitives has at most 2p − 1 nodes. The empty BVH is one interior node that is its own child and whose
     box is inverted (min +inf, max −inf), so that no ray enters it.
 
-    aabb_min, aabb_max: (n, 3) float32. count: (n,) int32, primitives of a leaf, 0 for an interior node. left_first:
-    (n,) int32, the left child (the right one is next to it), or the leaf's first entry in its order. spheres: (n,)
-    bool, whether the leaf's entries are in `sphere_order` instead of `order`. order, sphere_order: (p,) and (s,) int32,
-    permutations of the triangles and of the spheres.
+    aabb_min, aabb_max: (n, 3) float32. count: (n,) int32, primitives of a leaf, 0 for an interior node.
+    left_first: (n,) int32, the left child (the right one is next to it), or the leaf's first entry in its order.
+    spheres: (n,) bool, whether the leaf's entries are in `sphere_order` instead of `order`.
+    order, sphere_order: (p,) and (s,) int32, permutations of the triangles and of the spheres.
     """
 
     aabb_min: FloatArray

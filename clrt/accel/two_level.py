@@ -40,9 +40,9 @@ class TwoLevels:
 
     meshes: triangles (m, 3, 3) each, all of sizes near 1. mesh: (k,) int32 indices of `meshes`, one per instance.
     triangle: the test that the leaves are for. spheres: (s, 4), in the last mesh's object space and part of its BVH,
-    with primitive numbers after its own. Without a device the BVHs stay in numpy. The upper level comes first in the
-    array of nodes, with room for the largest BVH over this many instances. Raises UsageError for a layout that does not
-    support an upper level.
+    with primitive numbers after its own. Without a device the BVHs stay in numpy.
+    The upper level comes first in the array of nodes, with room for the largest BVH over this many instances.
+    Raises UsageError for a layout that does not support an upper level.
     """
 
     def __init__(self, device: Device | None, layout: str, builder: str | None, meshes: Sequence[FloatArray],

@@ -20,9 +20,10 @@ class Form(NamedTuple):
     """Requirements of two-level BVHs on a layout.
 
     node: its record. leaves: the buffer of leaves. room: the maximum number of nodes of a BVH over this many instances.
-    pack: packs a BVH with one instance per leaf; also returns the instance for each leaf number, (k,). shift: adds
-    offsets to all references to nodes and to leaf records of triangles, in place. References to spheres count from the
-    first sphere and stay, but in cwbvh from the first triangle, and so move with the last mesh's triangles.
+    pack: packs a BVH with one instance per leaf; also returns the instance for each leaf number, (k,).
+    shift: adds offsets to all references to nodes and to leaf records of triangles, in place. References to spheres
+    count from the first sphere and stay, but in cwbvh from the first triangle, and so move with the last mesh's
+    triangles.
     """
 
     node: np.dtype[np.void]

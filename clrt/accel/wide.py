@@ -24,9 +24,9 @@ class Wide:
 
     aabb_min, aabb_max: (k, width, 3) float32, the children's boxes; inverted (min +inf, max −inf) in unused slots. Such
     a box is never hit if near and far planes are selected by the signs of the ray's direction; with the min and max of
-    the distances to both planes it would be all of space. child: (k, width) int32: a node's index, ~(first << 4 |
-    sphere << 3 | count − 1) for a leaf, EMPTY if unused. order, sphere_order: the orders that a leaf's `first` indexes,
-    as in the binary BVH.
+    the distances to both planes it would be all of space.
+    child: (k, width) int32: a node's index, ~(first << 4 | sphere << 3 | count − 1) for a leaf, EMPTY if unused.
+    order, sphere_order: the orders that a leaf's `first` indexes, as in the binary BVH.
     """
 
     aabb_min: FloatArray
@@ -118,8 +118,8 @@ def collapse(tree: Tree, width: int = 8, pack: int = 1) -> Wide:
 def _plan(tree: Tree, width: int, pack: int) -> tuple[BoolArray, NDArray[np.int8]]:
     """Plan how to represent each node's subtree by at most b roots, b = 0 … width, at the least cost.
 
-    opened: (n + 1, width + 1) bool, whether to replace the node by the roots of its two children. share: (n + 1, width
-    + 1) int8, how many of the b roots the left child then gets.
+    opened: (n + 1, width + 1) bool, whether to replace the node by the roots of its two children.
+    share: (n + 1, width + 1) int8, how many of the b roots the left child then gets.
 
     Least cost with b roots: for a leaf its own; for an opened node, the best split of b between its children; for a
     node that is kept, as one root, its area plus its cost opened with `width` roots.

@@ -32,7 +32,7 @@ class Verdict:
     """
 
     passed: bool
-    failures: list[str] = field(hash=False)     # lists and dicts are not hashable
+    failures: list[str] = field(hash=False)     # lists and dicts are unhashable; equality still implies equal hashes
     when: str
     seconds: float
     kernels: str
