@@ -50,8 +50,7 @@ def _midpoint_cut(nodes: OpenNodes) -> BoolArray:
 
 
 def _half_centroids(boxes: FloatArray) -> FloatArray:
-    """Return half the centroids (3, p) from min and negated max (6, p); half, so that no difference of two overflows.
-    """
+    """Return half the centroids (3, p) from min and negated max (6, p); half, so that differences do not overflow."""
     quarter = np.float32(0.25)
     return quarter * boxes[:3] - quarter * boxes[3:]
 
@@ -89,8 +88,7 @@ class _Sweep:
         return right
 
     def _best(self, nodes: OpenNodes, node: Integers, order: Integers, pack: int) -> tuple[Integers, Doubles]:
-        """Return the position in `order` of the last primitive on the left, (k,), and the split's cost times the area,
-        (k,)."""
+        """Return the index in `order` of the left side's last primitive, and the split's cost times the area, (k,)."""
         areas = [_half_area(union) for union in self._unions(node, self.box.take(nodes.ids[order], axis=1))]
         left_count = np.arange(1, len(node) + 1) - nodes.spread(nodes.start)
         right_count = nodes.spread(nodes.count) - left_count

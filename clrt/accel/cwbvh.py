@@ -111,8 +111,7 @@ def quantise(aabb_min: FloatArray, aabb_max: FloatArray) -> tuple[FloatArray, By
 
 
 def in_slots(wide: Wide) -> Wide:
-    """Return the BVH with the children of every node in their octants' slots, and its nodes in breadth-first order
-    again."""
+    """Return the BVH with every node's children in their octants' slots, and nodes in breadth-first order again."""
     used = wide.child != EMPTY
     low, high = wide.aabb_min.min(axis=1, keepdims=True), wide.aabb_max.max(axis=1, keepdims=True)
     twice = [_doubles(a, used) + _doubles(b, used) for a, b in ((wide.aabb_min, wide.aabb_max), (low, high))]

@@ -60,8 +60,7 @@ def _groups(aabb_min: FloatArray, aabb_max: FloatArray, size: int) -> list[NDArr
 
 
 def _joined(low: Doubles, high: Doubles) -> BoolArray:
-    """Return the (2n − 1, n) members of all clusters as boxes are merged, each time the pair with the smallest merged
-    box."""
+    """Return the members, (2n − 1, n), of all clusters as the boxes with the smallest union are merged two by two."""
     count = len(low)
     low, high, members = low.copy(), high.copy(), np.eye(count, dtype=bool)
     area = _half_area(np.minimum(low[:, None], low), np.maximum(high[:, None], high))

@@ -61,8 +61,7 @@ class OpenNodes:
                 for cut, low, high in zip(cuts, edges[:-1], edges[1:])]
 
     def split(self, right: BoolArray) -> OpenNodes:
-        """Return the children, left and right alternating: a stable partition of each node's primitives by `right`
-        (P,)."""
+        """Return the children, left and right alternating: a stable partition of each node by `right` (P,)."""
         rights = self.reduce(np.add, right.astype(np.int32))
         lefts = self.count - rights
         rank = np.cumsum(right, dtype=np.int32) - self.spread(np.cumsum(rights, dtype=np.int32) - rights)

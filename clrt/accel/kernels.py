@@ -52,8 +52,7 @@ def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
 
 
 def tree_defines(tree: Layout) -> dict[str, int]:
-    """Return the defines PACK_SIZE and STACK_SIZE, and COUNT_VISITS if there is a buffer to count in
-    (kernels/traverse/visits.cl).
+    """Return the defines PACK_SIZE and STACK_SIZE, and COUNT_VISITS if visits are counted (kernels/traverse/visits.cl).
 
     STACK_SIZE suffices for the traversal; it is rounded up to a multiple of 64 so that BVHs share programs.
     """
@@ -64,8 +63,7 @@ def tree_defines(tree: Layout) -> dict[str, int]:
 
 
 def tree_features(triangles: bool, spheres: bool, lone: bool = False, rays: bool = True) -> dict[str, bool]:
-    """Return the feature flags of kernels/traverse. lone: the spheres are not in the BVH; rays: whether any ray is
-    traced."""
+    """Return the feature flags of kernels/traverse. lone: spheres are not in the BVH; rays: whether rays are traced."""
     return {"TRIANGLES": triangles, "LEAF_SPHERES": rays and spheres and not lone,
             "LONE_SPHERES": rays and spheres and lone, "IN_TREE": rays and (triangles or (spheres and not lone)),
             "PRIMITIVES": triangles or spheres}

@@ -179,8 +179,7 @@ def _tree(builder: str, triangles: FloatArray, spheres: FloatArray, leaf_size: i
 
 
 def triangle_boxes(triangles: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return aabb_min, aabb_max (m, 3) float32 of triangles (m, 3, 3), padded for the intersection test: see
-    TRIANGLE_PAD."""
+    """Return aabb_min, aabb_max (m, 3) float32 of triangles (m, 3, 3), padded for their test: see TRIANGLE_PAD."""
     p0, p1, p2 = triangles.transpose(1, 0, 2)
     low, high = np.minimum(np.minimum(p0, p1), p2), np.maximum(np.maximum(p0, p1), p2)
     pad = TRIANGLE_PAD * (high - low).max(axis=1, keepdims=True, initial=0).astype(np.float64)
@@ -234,8 +233,7 @@ def _leaf_triangles(triangles: FloatArray, order: IntArray) -> Records:
 
 
 def leaf_spheres(spheres: FloatArray, order: IntArray, first_primitive: int) -> Records:
-    """Return LEAF_SPHERE records of spheres (s, 4) float32 in this order, with primitive numbers from `first_primitive`
-    on."""
+    """Return LEAF_SPHERE records of spheres (s, 4) float32 in this order, numbered from `first_primitive` on."""
     records = np.zeros(len(order), LEAF_SPHERE)
     records["center"], records["radius"] = spheres[order, :3], spheres[order, 3]
     records["primitive"] = first_primitive + order

@@ -17,8 +17,7 @@ from .wide import EMPTY
 
 
 class Recipe(NamedTuple):
-    """How a layout is refitted. file: kernel that refits a level; node, leaf: its records; leaves: the buffer of
-    leaves.
+    """How a layout is refitted. file: the kernel for a level; node, leaf: its records; leaves: the buffer of leaves.
 
     gap: unused nodes between the root and the level below it.
     """
@@ -35,8 +34,7 @@ RECIPES = {"bvh8": Recipe("build/refit_bvh8.cl", BVH8_NODE, TRIANGLE_PACK, "pack
 
 
 def can_refit(tree: Layout) -> bool:
-    """Return whether the BVH can be refitted: a layout in RECIPES, in level order, with triangles stored as corners, no
-    spheres."""
+    """Return whether the BVH can be refitted: a layout in RECIPES, in level order, leaves with corners, no spheres."""
     if tree.name not in RECIPES or not tree.level_sizes or "leaf_spheres" in tree.buffers:
         return False
     recipe = RECIPES[tree.name]

@@ -35,8 +35,7 @@ class Leveled:
 
 
 def reinsert(work: Blocks, primitives: Primitives, tree: BinaryTree, passes: int) -> BinaryTree:
-    """Return the BVH after some passes, each of which moves subtrees to where the sum of surface areas decreases. Frees
-    `tree`.
+    """Return the BVH after some passes of moving subtrees to reduce the sum of surface areas. Frees `tree`.
 
     A pass never increases the sum. Leaves become at most 1.5 times as deep as they were, or DEEP.
     """

@@ -15,8 +15,7 @@ BoolArray = NDArray[np.bool_]
 
 
 class Triangles(Protocol):
-    """(m, 3, 3) float32 corners: an array, or an object that creates one on conversion, so that it need not stay in
-    memory."""
+    """(m, 3, 3) float32 corners: an array, or an object that creates one on conversion, to save memory."""
 
     def __len__(self) -> int: ...
 
@@ -77,8 +76,7 @@ class Tree:
         return self.depth + 1
 
     def sah_cost(self, pack: int = 1) -> float:
-        """Return the expected cost of a ray that hits the root's box (Nadolny 2026, 2.7): 1 per node and 1 per
-        intersection.
+        """Return the expected cost of a ray that hits the root's box (Nadolny 2026, 2.7): 1 per node, 1 per test.
 
         `pack` triangles of a leaf are intersected at the cost of one; spheres are not packed.
         """
@@ -92,8 +90,7 @@ def intersections(count: IntArray, spheres: BoolArray, pack: int) -> IntArray:
 
 
 def half_area(aabb_min: FloatArray, aabb_max: FloatArray) -> NDArray[np.float64]:
-    """Return half the surface area of boxes, (..., 3) float32 to (...); 0 if inverted. No float32 box overflows
-    float64."""
+    """Return half the surface area of boxes, (..., 3) float32 to (...); 0 if inverted. float64, so none overflows."""
     x, y, z = np.moveaxis(np.maximum(aabb_max.astype(np.float64) - aabb_min, 0), -1, 0)
     area: NDArray[np.float64] = x * y + y * z + z * x
     return area

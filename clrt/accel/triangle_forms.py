@@ -41,8 +41,7 @@ def _precomputed(p0: Doubles, p1: Doubles, p2: Doubles) -> dict[str, Doubles]:
 
 
 def _baldwin_weber(p0: Doubles, p1: Doubles, p2: Doubles) -> dict[str, Doubles]:
-    """Return the rows of the transform of Baldwin and Weber 2016, which maps p0 to the origin, e1 to u, e2 to v, and
-    `free` to w.
+    """Return the rows of Baldwin and Weber's transform (2016): p0 to the origin, e1 to u, e2 to v, and `free` to w.
 
     free: the axis on which the normal is largest. The rows are those of the inverse of (e1, e2, free), with a shift by
     −p0.
@@ -72,8 +71,7 @@ FORMS = {"precomputed": Form(PRECOMPUTED_TRIANGLE, PRECOMPUTED_PACK, _precompute
 
 
 def in_form(tree: Layout, triangle: str, device: Device | None) -> Layout:
-    """Convert the BVH's triangles from corners to the form of the test `triangle`; device: that of the buffers, if any.
-    """
+    """Convert the BVH's triangles from corners to the form of the test `triangle`; device: the buffers', if any."""
     if triangle not in FORMS:
         return tree
     start, form = time.perf_counter(), FORMS[triangle]

@@ -1,5 +1,4 @@
-"""Two-level BVHs: one BVH per mesh (lower level), and one over their instances (upper level), each placed by a
-transform.
+"""Two-level BVHs: one BVH per mesh (lower level), and one over instances (upper level), meshes placed by transforms.
 
 A ray is transformed to the mesh's object space and traverses its BVH there: ten thousand instances take the memory of
 one.
@@ -107,8 +106,7 @@ class TwoLevels:
 
 
 def world_boxes(boxes: Doubles, to_world: Doubles) -> tuple[FloatArray, FloatArray]:
-    """Return aabb_min, aabb_max (k, 3) float32 of transformed boxes (k, 2, 3), padded for the rounding of transforms.
-    """
+    """Return aabb_min, aabb_max (k, 3) float32 of transformed boxes (k, 2, 3), padded for the transforms' rounding."""
     corners = np.stack([boxes[:, [x, y, z], [0, 1, 2]] for x in (0, 1) for y in (0, 1) for z in (0, 1)], axis=1)
     world = np.einsum("kij,kcj->kci", to_world[..., :3], corners) + to_world[:, None, :, 3]
     to_object = inverse(to_world)

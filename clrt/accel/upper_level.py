@@ -1,5 +1,4 @@
-"""The upper level of a two-level BVH: a BVH over boxes whose leaves are instances, for each layout that supports one.
-"""
+"""The upper level of a two-level BVH: a BVH over boxes with instances as leaves, for each layout that supports one."""
 
 from __future__ import annotations
 

@@ -70,8 +70,7 @@ class Wide:
         return bound
 
     def sah_cost(self, pack: int = 1) -> float:
-        """Return the cost as Tree.sah_cost: 1 per wide node, and 1 per intersection of `pack` triangles or of one
-        sphere."""
+        """Return the cost as Tree.sah_cost: 1 per wide node, and 1 per test of `pack` triangles or of one sphere."""
         nodes = half_area(self.aabb_min.min(axis=1), self.aabb_max.max(axis=1))
         leaf = self.child < 0
         _, sphere, count = leaf_fields(self.child[leaf])

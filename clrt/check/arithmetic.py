@@ -11,8 +11,7 @@ from .floats import EXACT, LANES, LIMITS, NORMAL, float_rows, operands
 
 
 def check_arithmetic(device: Device, findings: Findings) -> None:
-    """Check sums, products and fma to the bit, division and roots within limits; record what is implementation-defined.
-    """
+    """Check sums, products and fma to the bit, division and roots within limits; record implementation choices."""
     for lanes in LANES:
         _check_exact(device, lanes, findings)
         _check_limits(device, lanes, findings)
@@ -44,7 +43,7 @@ def _check_limits(device: Device, lanes: int, findings: Findings) -> None:
 
 
 def _check_denormals(device: Device, lanes: int, findings: Findings) -> None:
-    """Check that denormals are kept or flushed to zero, as inputs or results."""
+    """Check that denormals are kept, or flushed to zero as inputs or results."""
     a = np.float32(2.0**-126) * np.array([1, 1.5, 0.75, 0.5, 2.0**-20, 1.25], np.float32)
     b = np.roll(a, 1)
     rows = float_rows(device, lanes, a, b, a)

@@ -12,10 +12,10 @@ SPECIAL = np.array([0.0, -0.0, 1.0, -1.0, 2.5, -3.75, np.inf, -np.inf, np.nan], 
 
 
 def check_comparisons(device: Device, findings: Findings) -> None:
-    """Check that NaN compares false, that minimum and maximum then return their second operand, and that masks are 0 or
-    1 (−1 in vectors).
+    """Check that NaN compares false, so that minimum and maximum return their second operand; check masks.
 
-    Also checks the arithmetic of box tests for rays parallel to an axis: 1/0 = inf, 0·inf = NaN.
+    Masks are 0 or 1, and −1 in vectors. Also checks the arithmetic of box tests for rays parallel to an axis: 1/0 =
+    inf, 0·inf = NaN.
     """
     a, b, c = (grid.ravel() for grid in np.meshgrid(SPECIAL, SPECIAL, SPECIAL))
     for lanes in LANES:

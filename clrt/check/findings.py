@@ -39,8 +39,7 @@ class Findings:
 
     def at_most(self, limit: float, errors: NDArray[np.float64], what: str, unit: str,
                 *operands: NDArray[Any]) -> None:
-        """Record the largest of `errors` (n,) in all calls for `what` as a figure, and a failure if one is above
-        `limit`."""
+        """Record the largest of all `errors` (n,) for `what` as a figure, and a failure if one is above `limit`."""
         figure = f"{what}, {unit}"
         worst = float(np.max(errors, where=np.isfinite(errors), initial=float(self.figures.get(figure, 0.0))))
         self.figures[figure] = round(worst, 3)

@@ -67,8 +67,7 @@ def float_rows(device: Device, lanes: int, a: Floats, b: Floats, c: Floats) -> d
 
 
 def operands() -> tuple[Floats, Floats, Floats]:
-    """Return a, b, c, (COUNT,) each, whose sums and products round up, down and from halfway, and a·b + c nearly
-    vanishes.
+    """Return a, b, c, (COUNT,) each, whose sums and products round up, down and from halfway; a·b + c nearly vanishes.
 
     No result leaves the range of normal floats.
     """

@@ -22,8 +22,7 @@ SIGMAS = 5.0
 
 
 def check_furnace(device: Device, findings: Findings) -> None:
-    """Check a furnace test: under a white sky, a plane that does not see itself has exactly its own colour, and the sky
-    is white.
+    """Furnace test: under a white sky, a plane that does not see itself has exactly its colour, and the sky is white.
 
     In the middle half of the image: diffuse on the left, mirror on the right, white above and coloured below.
     """
@@ -40,8 +39,7 @@ def check_furnace(device: Device, findings: Findings) -> None:
 
 
 def check_lamp(device: Device, findings: Findings) -> None:
-    """Check a floor, a wall and a point light: black behind the wall, else color/π · I · cos θ/d² for some point of the
-    pixel."""
+    """Check a floor, a wall and a point light: black behind the wall, else color/π · I · cos θ/d² within the pixel."""
     color, intensity, (x, height, z) = (0.8, 0.5, 0.2), (60.0, 40.0, 20.0), (0.75, 3.0, 0.5)
     material = Diffuse(color=color)
     floor = _quad((-9.0, 0.0, 9.0), (18.0, 0.0, 0.0), (0.0, 0.0, -18.0), material)
@@ -86,8 +84,7 @@ def check_ball(device: Device, findings: Findings) -> None:
 
 
 def check_room(device: Device, findings: Findings) -> None:
-    """Check a closed room in which all surfaces emit e and reflect with albedo a: depth d gives e·(1 + a + … + a^(d −
-    1)).
+    """Check a closed room whose surfaces all emit e and reflect with albedo a: depth d gives e·(1 + a + … + a^(d − 1)).
 
     With walls, a diffuse and a mirror sphere: light sampling of triangles and spheres, BSDF sampling, MIS weights, and
     Russian roulette must all add up to that.
@@ -117,8 +114,7 @@ def _quad(corner: ArrayLike, side: ArrayLike, other: ArrayLike, material: Materi
 
 
 def _film(device: Device, findings: Findings, scene: Scene, spp: int, max_depth: int = 8, size: int = SIZE) -> Film:
-    """Return the scene's film of size² pixels after `spp` samples each, fewer on a slow device; record a failure if
-    some are lost."""
+    """Return the film of size² pixels with `spp` samples each, fewer on a slow device; lost samples are a failure."""
     spp = share(device, spp, 2)
     renderer = Renderer(scene, device=device.info.id, size=(size, size), max_depth=max_depth)
     *_, state = renderer.passes(spp=spp)

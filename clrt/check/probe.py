@@ -33,8 +33,7 @@ class Probe:
 
     def run(self, kernel: str, count: int, *arguments: NDArray[Any] | int,
             out: Sequence[tuple[DTypeLike, int]]) -> list[NDArray[Any]]:
-        """Run `kernel` over `count` items; return its output arrays, initially zero, with the dtypes and sizes in
-        `out`.
+        """Run `kernel` over `count` items; return its output arrays, zero before, with the dtypes and sizes in `out`.
 
         The kernel's parameters are count and block, then `arguments`, then the output arrays.
         """

@@ -21,8 +21,7 @@ ROUNDINGS = 30.0
 
 
 def check_rays(device: Device, findings: Findings) -> None:
-    """Check the device's own layout with rays in surface order and shuffled, which take different code paths
-    (tree_query.py)."""
+    """Check the device's own layout with coherent and shuffled rays, which take different paths (tree_query.py)."""
     star = _star(device)
     query, inside = _query(device, star), _rays(device, star)
     for rays in (inside, _shuffled(inside), rays_from_elsewhere(star, share(device, ELSEWHERE, FEW_RAYS))):
@@ -50,8 +49,7 @@ def _star(device: Device) -> Star:
 
 
 def _rays(device: Device, star: Star) -> Rays:
-    """Return rays from inside through all parts of each triangle, or as many of these as suit the device, evenly
-    spaced."""
+    """Return rays from inside through all parts of each triangle, or an evenly spaced subset for a slow device."""
     rays = rays_from_inside(star)
     n = len(rays.t)
     return rays.take(np.linspace(0, n - 1, share(device, n, FEW_RAYS)).astype(np.int64))
@@ -66,8 +64,7 @@ def _query(device: Device, star: Star, **options: Any) -> RayQuery:
 
 
 def _check_hits(query: RayQuery, star: Star, rays: Rays, findings: Findings) -> NDArray[Any]:
-    """Check whether, what and where each ray hits, and the same for rays that end before or behind the hit; return the
-    hits."""
+    """Check whether, what and where each ray hits, also with rays that end before or behind it; return the hits."""
     hits = query.closest_hit(rays.origins, rays.directions)
     meets = np.isfinite(rays.t)
     shown = ("from", rays.origins), ("along", rays.directions), ("gave", hits)
@@ -86,8 +83,7 @@ def _check_hits(query: RayQuery, star: Star, rays: Rays, findings: Findings) -> 
 
 
 def _errors(star: Star, rays: Rays, hits: NDArray[Any]) -> Doubles:
-    """Return the distances of the points at t and at (u, v) from the exact hit, (n,), in roundings of the coordinates.
-    """
+    """Return the distances of the points at t and at (u, v) from the exact hit, (n,), in coordinate roundings."""
     both = np.isfinite(rays.t) & (hits["primitive"] >= 0)
     t, t_exact = np.where(both, hits["t"], 0.0)[:, None], np.where(both, rays.t, 0.0)[:, None]
     u, v = hits["u"].astype(np.float64), hits["v"].astype(np.float64)

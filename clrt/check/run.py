@@ -53,8 +53,7 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
 
 
 def _told(child: subprocess.Popen[str], clock: AwakeClock, limit: float) -> Iterator[dict[str, Any]]:
-    """Yield the child's results until it ends; raises Empty at the limit. Nothing here waits for a process that hangs.
-    """
+    """Yield the child's results until it ends. Raises Empty at the limit, and never waits for a process that hangs."""
     lines: SimpleQueue[str] = SimpleQueue()
 
     assert child.stdout is not None

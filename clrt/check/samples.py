@@ -29,8 +29,7 @@ def check_random_numbers(device: Device, findings: Findings) -> None:
 
 
 def pcg4d(*words: Words | np.uint32) -> tuple[Words, Words]:
-    """Return the second and third word of pcg4d (Jarzynski and Olano 2020, listing 4), including its first step on the
-    four words."""
+    """Return the second and third word of pcg4d (Jarzynski and Olano 2020, listing 4), including its LCG step."""
     with np.errstate(over="ignore"):
         x, y, z, w = (np.uint32(1664525) * v + np.uint32(1013904223) for v in words)
         x, y, z, w = (x + y * w, y, z, w)

@@ -66,8 +66,7 @@ def make_star(squares: int = SQUARES) -> Star:
 
 
 def rays_from_inside(star: Star) -> Rays:
-    """Return rays from the origin through each triangle in turn: to its vertices, the middles of its edges, and its
-    interior."""
+    """Return rays from the origin through each triangle: to its vertices, its edges' middles, and its interior."""
     n = len(star.faces) * len(WEIGHTS)
     directions = np.einsum("wk,fkx->fwx", WEIGHTS, star.vertices[star.faces]).reshape(n, 3)
     zeros = 0.0 * np.random.default_rng(8).choice([1, -1], (n, 3))
@@ -76,8 +75,7 @@ def rays_from_inside(star: Star) -> Rays:
 
 
 def rays_from_elsewhere(star: Star, count: int) -> Rays:
-    """Return up to `count` rays between integer points in and around the surface, tested exactly against all triangles.
-    """
+    """Return up to `count` rays between integer points in and around the surface, tested exactly with all triangles."""
     rng, size = np.random.default_rng(9), int(np.abs(star.vertices).max())
     origins, targets = rng.integers(-2 * size, 2 * size, (2, count, 3))
     origins[::2] //= 16

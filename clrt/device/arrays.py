@@ -88,8 +88,7 @@ def on_host(device: Device, array: NDArray[Any] | DeviceArray) -> NDArray[Any]:
 
 
 def same_content(one: NDArray[Any] | DeviceArray | None, other: NDArray[Any] | DeviceArray | None) -> bool:
-    """Return whether two arrays are the same object or, if both are numpy arrays, hold the same bytes. No device is
-    read."""
+    """Return whether two arrays are the same object or, if in numpy, hold the same bytes. No device is read."""
     if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
         return one is other
     if one is other or (one.dtype, one.shape) != (other.dtype, other.shape):

@@ -27,8 +27,7 @@ LARGE = 1 << 25
 
 
 def compile_aside(device_id: str, source: str, options: list[str], seconds: float) -> None:
-    """Compile `source` in the compile process, within `seconds`. Errors are ignored: compiling here reports them again.
-    """
+    """Compile `source` in the compile process, within `seconds`. Errors are ignored: compiling here reports them."""
     give_back()     # packing's freed memory: both processes run at the same time for a while
     with suppress(OSError), tempfile.TemporaryFile() as given:
         given.write(json.dumps([source, options]).encode())
@@ -45,8 +44,10 @@ def compile_aside(device_id: str, source: str, options: list[str], seconds: floa
 
 
 def quietly_built(program: cl.Program, options: list[str]) -> cl.Program:
-    """Build and return the program without compiler warnings. pyopencl warns of any compiler output, and Intel's
-    compiler always writes some."""
+    """Build and return the program.
+
+    pyopencl warns of any compiler output, and Intel's compiler always writes some, so its warnings are ignored.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", cl.CompilerWarning)
         program.build(options=options, cache_dir=False)  # type: ignore[arg-type]  # False: pyopencl's own cache off

@@ -1,5 +1,4 @@
-"""Compilers run in a background thread, so that signals are handled meanwhile and a hanging compiler can be abandoned.
-"""
+"""Run compilers in a background thread, so that signals are handled meanwhile and a hung compiler can be abandoned."""
 
 from __future__ import annotations
 

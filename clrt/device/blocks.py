@@ -68,8 +68,7 @@ class Blocks:
         return array
 
     def lend(self, values: NDArray[Any]) -> cl.Buffer:
-        """Return a buffer that kernels may read `values` from until `finish`: on a CPU the array itself, elsewhere a
-        copy."""
+        """Return a buffer to read `values` from until `finish`: on a CPU the array itself, elsewhere a copy."""
         if not values.size:
             return self.upload(values)
         return self._counted(lent(self.device, np.ascontiguousarray(values)))
@@ -121,8 +120,10 @@ class Blocks:
             self._launch(name, min(most, groups - first), local, values, first)
 
     def run_together(self, name: str, *arguments: Any) -> None:
-        """Run kernel `name` in a single work-group of SCAN_ITEMS work-items, or one where a group gives no speed-up,
-        but no more than the kernel's registers allow."""
+        """Run kernel `name` in a single work-group.
+
+        It has SCAN_ITEMS work-items, or one if larger groups do not pay, limited by the kernel's register use.
+        """
         values = tuple(map(_scalar, arguments))
         with driver_errors():
             most = self._kernel(name, values).get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE,
@@ -130,8 +131,7 @@ class Blocks:
         self._launch(name, 1, min(self._group, most), values)
 
     def scan(self, values: cl.Buffer, count: int, arrays: int = 1) -> None:
-        """Compute an exclusive prefix sum, in place, of each of `arrays` consecutive arrays of `count` numbers in
-        `values`.
+        """Compute exclusive prefix sums, in place, of `arrays` consecutive arrays of `count` numbers in `values`.
 
         The sum of each array is then in `totals`.
         """

@@ -72,8 +72,7 @@ def describe(device: cl.Device, index: int = 0) -> DeviceInfo:
 
 
 def size_of(device: cl.Device) -> int:
-    """Estimate the device's throughput: compute units times clock, and on a CPU times SIMD width, as not every platform
-    uses it."""
+    """Estimate throughput: compute units times clock, and on a CPU times SIMD width, as not every platform uses it."""
     vectors = device.native_vector_width_float if _type(device) == "cpu" else 1
     return int(device.max_compute_units * device.max_clock_frequency * vectors)
 

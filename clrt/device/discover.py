@@ -50,8 +50,7 @@ def find_devices(again: bool = False, preference: Preference | None = None) -> F
 
 
 def devices() -> list[dict[str, Any]]:
-    """Return what `clrt devices --json` prints: a dict per device, best first. Raises UsageError as `preferred_device`.
-    """
+    """Return what `clrt devices --json` prints, a dict per device, best first. UsageError as `preferred_device`."""
     return [as_dict(info) for info, _ in find_devices(again=True, preference=preferred_device())]
 
 
@@ -156,8 +155,10 @@ def _real(infos: list[DeviceInfo]) -> list[DeviceInfo]:
 
 
 def _same_hardware(one: DeviceInfo, other: DeviceInfo) -> bool:
-    """Return whether two platforms offer the same hardware: always for CPUs, as a machine has one kind; else by UUID,
-    PCI address, or at least name."""
+    """Return whether two platforms offer the same hardware.
+
+    CPUs are always the same, as a machine has one kind; others by UUID, PCI address, or at least name.
+    """
     if one.type != other.type or one.type == "simulator":
         return False
     if one.type == "cpu":
@@ -180,8 +181,11 @@ def _failures(info: DeviceInfo) -> str:
 
 
 def _matching(found: Found, selector: str | int | None) -> Found:
-    """Return the candidates for a selector: the best device of a type, preferably one that did not fail; devices by
-    name, else by platform."""
+    """Return the candidates for a selector.
+
+    A type selects its best device, preferably one that passed its check; other text selects devices by name, else by
+    platform.
+    """
     text = str(selector).strip().lower()
     if selector is None or text in ("cpu", "gpu"):
         of_kind = [pair for pair in found

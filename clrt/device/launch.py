@@ -98,8 +98,8 @@ class Launches:
         return len(self._running) >= IN_FLIGHT
 
     def poll(self) -> bool:
-        """Return whether the first launch in flight has ended, and retire it if so. Raises DeviceError if it failed or
-        hangs."""
+        """Retire the first launch in flight if it has ended; return whether it had. DeviceError if it failed or hung.
+        """
         if not self._running or not self._wait.is_over(self._running[0][1]):
             return False
         self._finish_one()
@@ -122,8 +122,10 @@ class Launches:
 
 
 def run_seconds(event: cl.Event) -> float:
-    """Return the run time of a finished launch by the device's clock, or 0 if that is not available: with rusticl all
-    take a nanosecond."""
+    """Return the run time of a finished launch by the device's clock, or 0 if it is not available.
+
+    With rusticl all launches take a nanosecond.
+    """
     try:
         nanoseconds = event.profile.end - event.profile.start
     except cl.Error:

@@ -34,8 +34,7 @@ class LentBuffer(cl.Buffer):
 
 
 class _Loan(weakref.ref[LentBuffer]):
-    """A weak reference to a lent buffer that owns the array behind it, and the marker to complete once the buffer is
-    destroyed."""
+    """A weak reference to a lent buffer that owns its array, and the marker to complete once the buffer is gone."""
 
     def __new__(cls, buffer: LentBuffer, array: NDArray[Any], queue: cl.CommandQueue) -> _Loan:
         return super().__new__(cls, buffer, _begin_return)
@@ -70,8 +69,7 @@ _lent: dict[int, _Loan | _Copy] = {}
 
 
 def lend(device: Device, array: NDArray[Any], access: int) -> LentBuffer:
-    """Return a buffer that wraps the contiguous array, with `access` of mem_flags. The array must not be written
-    meanwhile."""
+    """Return a buffer that wraps the contiguous array, with `access` of mem_flags. The array must then not change."""
     buffer = LentBuffer(device.context, access | cl.mem_flags.USE_HOST_PTR, hostbuf=array)
     buffer.loan = _Loan(buffer, array, device.queue)
     _lent[id(buffer.loan)] = buffer.loan    # before any command can use it, in case of an interrupt
@@ -125,7 +123,6 @@ def _has_ended(event: cl.Event) -> bool:
 
 @atexit.register
 def _keep_for_good() -> None:
-    """Keep all arrays alive when Python exits: commands may be in flight, and destroyed buffers no longer run Python
-    code."""
+    """Keep all arrays alive at exit: commands may be in flight, and destroyed buffers no longer run Python code."""
     kept = [*_lent.values(), *(each() for each in _lent.values() if isinstance(each, _Loan))]
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(kept))

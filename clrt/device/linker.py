@@ -32,8 +32,7 @@ exec {tcc} -shared -nostdlib -o "$library" "$object"
 
 
 def lacks_linker(device: cl.Device) -> bool:
-    """Return whether the device's compiler would find no linker, after adding one that pip installed to the end of
-    PATH."""
+    """Return whether the device's compiler would find no linker, after adding pip's to the end of PATH if needed."""
     return "PoCL 3." in device.platform.version and not _found() and not _provided()
 
 

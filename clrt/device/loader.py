@@ -48,8 +48,7 @@ def load_all(added: Sequence[str]) -> list[cl.Platform]:
 
 
 def library() -> ctypes.CDLL:
-    """Return the ICD loader that pyopencl is linked with, for calls that pyopencl lacks or makes while it holds the
-    GIL."""
+    """Return the ICD loader that pyopencl is linked with, for calls that pyopencl lacks or makes holding the GIL."""
     if sys.platform == "win32":     # where a library does not export the symbols of those that it is linked with
         bundled = Path(cl.__file__).parents[1].glob("pyopencl.libs/opencl-*.dll")
         return ctypes.CDLL(next(map(str, bundled), "OpenCL.dll"))
@@ -75,8 +74,7 @@ def _platforms() -> list[cl.Platform]:
 
 
 def devices_of(platform: cl.Platform) -> list[cl.Device]:
-    """Return the devices of a platform; none on an error, so that one platform without devices does not hide the
-    others."""
+    """Return the devices of a platform; none on an error, so that it does not hide the other platforms' devices."""
     try:
         return platform.get_devices()
     except cl.Error:

@@ -45,8 +45,7 @@ def part_records(itemsize: int, part_bytes: int) -> int:
 
 
 def needed_parts(arrays: Iterable[Any], info: DeviceInfo) -> int | None:
-    """Return the device's largest buffer if one of the arrays is larger, so that all are split into parts; else None.
-    """
+    """Return the device's largest buffer if one of the arrays is larger, so that all are split to parts; else None."""
     sizes = [(array.nbytes, array.dtype.itemsize) for array in arrays]
     if all(size <= info.max_alloc_bytes for size, _ in sizes):
         return None
@@ -67,8 +66,7 @@ def part_count(array: Any, part_bytes: int | None) -> int:
 
 
 def check_memory(info: DeviceInfo, needs: Mapping[str, int], parameter_bytes: int, most_parameter_bytes: int) -> None:
-    """Check that buffers of these sizes fit the device, and that a kernel can take as many arguments as there are
-    parts.
+    """Check that buffers of these sizes fit the device, and that a kernel can take an argument for each part.
 
     Raises NoRoomError, with the numbers, otherwise. parameter_bytes: size of the kernel's parameters.
     """

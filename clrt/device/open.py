@@ -46,14 +46,12 @@ class Device:
 
     @property
     def vectors(self) -> bool:
-        """Return whether kernels use explicit vectors: on a CPU, unless its driver vectorises across work-items as a
-        GPU does."""
+        """Return whether kernels use explicit vectors: on a CPU, unless its driver vectorises over work-items."""
         return self.info.type == "cpu" and self.cl.native_vector_width_float > 1
 
     @property
     def lanes(self) -> int:
-        """Return the SIMD width: the number of paths per work-item, 1 on a GPU, whose hardware vectorises across
-        work-items."""
+        """Return the SIMD width, in paths per work-item: 1 on a GPU, whose hardware vectorises over work-items."""
         return 8 if self.vectors else 1
 
     @property
@@ -63,8 +61,7 @@ class Device:
 
     @property
     def packs(self) -> bool:
-        """Return whether lanes are compacted by one instruction (kernels/mask.cl), which wavefront path tracing needs.
-        """
+        """Return whether one instruction compacts lanes (kernels/mask.cl), which wavefront path tracing needs."""
         return self.vectors and self.is_pocl and platform.machine().lower() in ("x86_64", "amd64")
 
     @property
@@ -80,8 +77,7 @@ class Device:
 
     @property
     def layout(self) -> str:
-        """Return the BVH layout for the device: "bvh8" (eight boxes per SIMD test) with explicit vectors, else
-        compressed "cwbvh"."""
+        """Return the BVH layout: "bvh8" (eight boxes per SIMD test) with explicit vectors, else "cwbvh"."""
         return "bvh8" if self.vectors else "cwbvh"
 
 

@@ -85,8 +85,8 @@ def _name(driver: Driver) -> str:
 
 
 def _state(driver: Driver) -> list[Any]:
-    """Return what a probe's result depends on: the driver's files and the machine, as some drivers are partly in its
-    kernel."""
+    """Return what a probe's result depends on: the driver's files, the machine and its kernel (part of some drivers).
+    """
     files = []
     for path in (driver.library, driver.source):
         try:

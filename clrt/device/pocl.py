@@ -1,5 +1,4 @@
-"""Have PoCL 3.0, the version that pip installs, generate code for a processor that its built-in library was compiled
-for.
+"""Have PoCL 3.0, the version that pip installs, generate code for a processor that its own library was compiled for.
 
 Its library comes in variants: one for AVX2, compiled for Intel's Haswell, one for AVX-512, and so on. LLVM 14 inlines
 library functions only into code for the same processor, or one with a superset of its features. Otherwise, as for AMD's
@@ -72,8 +71,7 @@ def name_processor(device: cl.Device) -> bool:
 
 
 def _strings(address: int) -> list[tuple[int, str, str]]:
-    """Return (offset, string, string of the neighbouring pointer) of every pointer to text in the structure at
-    `address`.
+    """Return (offset, string, neighbouring pointer's string) of every pointer to text in the structure at `address`.
 
     Reads through /proc/self/mem, where a word that is not a pointer gives an error instead of a crash.
     """

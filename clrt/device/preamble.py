@@ -1,5 +1,4 @@
-"""The generated C text at the start of a program: records, a struct of the scene's buffers, type lists and feature
-macros."""
+"""The generated C text at the start of a program: records, the scene's buffers as one struct, types and features."""
 
 from __future__ import annotations
 
@@ -16,8 +15,7 @@ Buffers = Mapping[str, tuple[str, Any]]
 
 
 def scene_struct(buffers: Buffers, part_bytes: int | None = None) -> str:
-    """Return the struct `Scene`, the kernel parameters that fill it (SCENE_PARAMETERS) and its initialiser
-    (SCENE_ARGUMENTS).
+    """Return the struct `Scene`, its kernel parameters (SCENE_PARAMETERS) and its initialiser (SCENE_ARGUMENTS).
 
     The order of `buffers` is the order of the kernel's arguments; the counts come last. part_bytes: maximum size of the
     parts that all buffers are split into (kernels/arrays.cl), None for whole buffers.
@@ -45,8 +43,7 @@ def type_list(macro: str, types: Iterable[tuple[str, int]]) -> str:
 
 
 def defines(values: Mapping[str, int | float]) -> str:
-    """Return `#define NAME number` for each value; a Python float, which must be exact in float32, becomes a float
-    literal."""
+    """Return `#define NAME number` for each value; a Python float, exact in float32, becomes a float literal."""
     return "\n".join(f"#define {name} {value}{'f' * isinstance(value, float)}" for name, value in values.items())
 
 

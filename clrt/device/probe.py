@@ -1,5 +1,4 @@
-"""Probe whether drivers can be loaded, each in a child process, as a driver may crash or hang the process that loads
-it.
+"""Probe whether drivers can be loaded, each in a child process, as one may crash or hang the process that loads it.
 
 `python -m clrt.device.probe LIBRARY` is that process. It does everything that listing devices does, and prints the
 fault.
@@ -73,8 +72,7 @@ def _fault(child: subprocess.Popen[str], output: IO[bytes], errors: IO[bytes], l
 
 
 def main() -> None:
-    """Load the driver that the first argument names and print its fault. The driver's own output goes to standard
-    error."""
+    """Load the driver that the first argument names and print its fault. Its own output goes to standard error."""
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as result:
         os.dup2(2, 1)
         _no_core_dump()

@@ -86,8 +86,7 @@ def files_of(source: str) -> list[str]:
 
 
 def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
-    """Build `source` for the device, or take it from memory or the cache. Raises KernelError with the log if that
-    fails.
+    """Build `source` for the device, or take it from memory or the cache. Raises KernelError with the log on failure.
 
     PoCL caches compiled kernels itself; clrt's cache then holds bitcode, or an empty entry to record that a program was
     built. If the device has no fma instruction, kernels/fma.cl is prepended. data_bytes: approximate size of the

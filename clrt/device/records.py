@@ -14,8 +14,7 @@ C_TYPES = {np.dtype("f4"): "float", np.dtype("i4"): "int", np.dtype("u4"): "uint
 
 
 def c_typedef(name: str, dtype: np.dtype[Any]) -> str:
-    """Return the C declaration of a structured dtype, e.g. `typedef struct { float center[3]; float radius; } Sphere;`.
-    """
+    """Return the C typedef of a structured dtype, e.g. `typedef struct { float center[3]; float radius; } Sphere;`."""
     members = []
     for field in dtype.names or ():
         base, shape = dtype[field].subdtype or (dtype[field], ())

@@ -24,8 +24,7 @@ KIND = "check.json"
 
 @dataclass(frozen=True)
 class Verdict:
-    """The result of a device check. failures: one sentence per failure, empty if it passed. figures: measurements by
-    name.
+    """The result of a device check. failures: one sentence each, empty if it passed. figures: measurements by name.
 
     when: the time of the check in UTC (ISO 8601); seconds: its duration. kernels: digest of the kernels that were
     checked (sources.py).
@@ -74,8 +73,7 @@ def identity_of(info: DeviceInfo) -> dict[str, str]:
 
 
 def _verdict(stored: Mapping[str, Any]) -> Verdict:
-    """Return the verdict from parsed JSON. Raises ValueError, TypeError, LookupError or OverflowError if it is
-    malformed."""
+    """Return the verdict from parsed JSON; ValueError, TypeError, LookupError or OverflowError if it is malformed."""
     failures, figures = [str(failure) for failure in stored["failures"]], dict(stored["figures"])
     when, seconds, kernels = str(stored["when"]), float(stored["seconds"]), str(stored["kernels"])
     if stored["passed"] is not (not failures) or not all(isinstance(f, (int, float, str)) for f in figures.values()):

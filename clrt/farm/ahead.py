@@ -1,5 +1,4 @@
-"""Start the next pass before the current one has ended, so that workers wait neither for its last tasks nor for the
-client.
+"""Start the next pass before the current one ends, so that workers wait neither for its last tasks nor for the client.
 
 A tile that has all its samples of a pass may receive those of the next one: its pixels without these are kept until the
 next pass becomes the current one. So the image at the end of each pass is the same as if all had waited.

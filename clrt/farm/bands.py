@@ -1,5 +1,4 @@
-"""Images too large for the client's memory: each band is rendered by one worker, and stored in a file until all are
-there.
+"""Images too large for the client's memory: each band is rendered by one worker, and stored in a file until all exist.
 
 The client holds only the band that it just received. The file has the image's rows, 12 bytes per pixel, each at its
 offset; a manifest next to it lists the finished bands, so that an interrupted render can be resumed.

@@ -127,8 +127,7 @@ class Cluster:
         self._coming.discard(key)
 
     def is_late(self, key: str) -> None:
-        """Stop counting a late result as being fetched, so that it does not hold back others; another worker repeats
-        the task."""
+        """Let a late result no longer count as being fetched, so that it holds back no others: its task is repeated."""
         self._coming.discard(key)
 
     def hear(self, seconds: float) -> list[tuple[str, Result]]:
@@ -163,8 +162,7 @@ class Cluster:
         coming.add_done_callback(lambda result: heard.put((key, result)))
 
     def ask(self, worker: str, key: str, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Return a future of the function's answer (`remote.Answer`) on that worker, which fails if the worker ends
-        first."""
+        """Return a future of the function's answer (`remote.Answer`) on that worker; it fails if the worker ends."""
         return self._submit(worker, key, function, *arguments)
 
     def _submit(self, worker: str, key: str, function: Callable[..., Any], *arguments: Any) -> Future[Any]:

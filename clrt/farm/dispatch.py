@@ -34,8 +34,7 @@ _log = logging.getLogger(__name__)
 
 
 class Dispatch:
-    """The workers of a cluster, and their tasks from one source. Methods raise DeviceError if no usable worker is left.
-    """
+    """The workers of a cluster, and their tasks from one source. Raises DeviceError if no usable worker is left."""
 
     def __init__(self, cluster: Cluster, source: Source) -> None:
         self.cluster, self._source = cluster, source
@@ -51,8 +50,7 @@ class Dispatch:
         self.sent = 0
 
     def run(self) -> Iterator[None]:
-        """Run until the source has nothing left, with the tasks that follow queued on workers; yield at least every
-        TICK."""
+        """Run until the source has nothing left, keeping further tasks queued on workers; yield at least every TICK."""
         self._hand_out()
         while self._source.left():
             if not self.cluster.alive:

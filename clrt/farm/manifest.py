@@ -1,5 +1,4 @@
-"""Manifest of finished images: a file to which a line per image is appended, so that an interrupted render can be
-resumed.
+"""Manifest of finished images: a file with a line appended per image, so that an interrupted render can be resumed.
 
 The first line identifies the render, each other one names an image and the SHA-256 of what was stored of it. An
 incomplete line, the last one of a process that was killed, is ignored.

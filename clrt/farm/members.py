@@ -16,9 +16,10 @@ class BadResult(Exception):
 
 @dataclass(eq=False)
 class Member:
-    """A worker. facts: its answer to the introduction, None until it is ready. refused: why it is excluded; silent:
-    whether another worker had to repeat its task and it has not answered since.
+    """A worker of the cluster, with its state and speed.
 
+    facts: its answer to the introduction, None until it is ready. refused: why it is excluded; silent: whether another
+    worker had to repeat its task and it has not answered since.
     rate: units of work per second, 0 if unknown; load, work: number of queued tasks, and their work; done: the work
     that it did.
     """
@@ -66,8 +67,7 @@ class Task:
 
 @dataclass(eq=False)
 class Run:
-    """A task on a worker. key: that it was sent under; ahead: the worker's queued work at that time, including this
-    task."""
+    """A task on a worker. key: that it was sent under; ahead: the worker's queued work then, including this task."""
 
     key: str
     task: Task

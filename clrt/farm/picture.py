@@ -110,8 +110,7 @@ class FarmPicture(Accumulation):
         return self._busy
 
     def ahead(self, members: int) -> int:
-        """Return the tasks to queue per worker: the current one, the next, and those that keep it busy while the client
-        is away."""
+        """Return the tasks to queue per worker: the current, the next, and more to cover the client's absence."""
         return min(MOST_AHEAD, AHEAD + round(self._gap / self._task_seconds))
 
     def next(self, member: Member) -> Task | None:
@@ -145,8 +144,7 @@ class FarmPicture(Accumulation):
         self.moved_bytes += result.nbytes
 
     def _doubt(self, task: Task, result: NDArray[Any], member: Member) -> None:
-        """Raise BadResult for a worker that drops most samples, unless another got the same result: then the scene is
-        the cause."""
+        """Raise BadResult for a worker that drops most samples, unless another got the same result for the task."""
         other, found = self._doubted.pop(task, (None, None))
         if other is None or found is None or found.tobytes() != result.tobytes():
             self._doubted[task] = member, result
@@ -260,15 +258,13 @@ def _inside(size: tuple[int, int]) -> NDArray[np.bool_]:
 
 
 def evenly(most: int, work: Work) -> int:
-    """Round `most` samples of a tile's pixels, so that tasks of FEWEST_TILES tiles leave no small remainder of a pass.
-    """
+    """Round `most` samples of a tile's pixels, so that tasks of FEWEST_TILES tiles leave no small rest of a pass."""
     each, samples = max(1, most // FEWEST_TILES), int((work.then - work.samples).max())
     return most if samples <= each else FEWEST_TILES * -(-samples // round(samples / each))
 
 
 def check_pixels(found: NDArray[Any], before: NDArray[Any], inside: NDArray[np.bool_], more: int) -> int:
-    """Raise BadResult unless these can be the pixels with `more` more samples; return how many of these were dropped.
-    """
+    """Raise BadResult unless these can be the pixels with `more` more samples; return how many were dropped."""
     if not isinstance(found, np.ndarray) or found.shape != before.shape or found.dtype != before.dtype:
         raise BadResult("it returned something that is no pixels")
     if not all(np.isfinite(found[name]).all() for name in ("sum", "sum_error", "square", "square_error")):

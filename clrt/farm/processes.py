@@ -30,8 +30,7 @@ class Processes:
         return self._start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
 
     def add_workers(self, count: int = 1, preload: Path | None = None, **variables: str) -> None:
-        """Start `count` more workers, which are not restarted. preload: a module that each loads; variables: for their
-        environment."""
+        """Start `count` more workers, which are not restarted. preload: a module to load; variables: environment."""
         loaded = [] if preload is None else ["--preload", str(preload)]
         for _ in range(count):
             self.workers.append(self._start("distributed.cli.dask_worker", self.address, "--nthreads", "1",

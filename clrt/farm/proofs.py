@@ -1,5 +1,4 @@
-"""Worker check: each worker renders a few tiles of the scene, which must agree with the others', before it gets any
-work."""
+"""Worker check: before it gets any work, each worker renders a few tiles, which must agree with those of the others."""
 
 from __future__ import annotations
 
@@ -20,7 +19,7 @@ _log = logging.getLogger(__name__)
 
 
 class Proofs:
-    """The first worker's proof, and that of each kind of device."""
+    """The first worker's proof, and one for each kind of device."""
 
     def __init__(self) -> None:
         self._first: tuple[Member, NDArray[Any]] | None = None

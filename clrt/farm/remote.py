@@ -106,8 +106,7 @@ def prepare(client: dict[str, str], key: str, text: bytes, digests: list[str], *
 @answering
 def render_share(key: str, tiles: NDArray[Any], first: int, more: int,
                  pixels: NDArray[Any] | None) -> tuple[NDArray[Any], float]:
-    """Return the pixels (tiles, TILE_PIXELS) of these tiles with samples first … first + more − 1 added, and the
-    seconds taken.
+    """Return the pixels (tiles, TILE_PIXELS) with samples first … first + more − 1 added, and the seconds taken.
 
     pixels: their values before, None without samples. Raises DeviceError if no device can go on.
     """
@@ -124,8 +123,7 @@ def draw(key: str, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
 @answering
 def render_whole(client: dict[str, str], key: str, text: bytes, part: bytes, digests: list[str],
                  *arrays: NDArray[Any]) -> tuple[dict[str, Any], float]:
-    """Render a whole image, or a band of one, with its AOVs; return it with the seconds taken (see
-    `band_renderer.render`).
+    """Return a whole image, or a band of one, with its AOVs, and the seconds taken (see `band_renderer.render`).
 
     text: the order, identified by its key; part: its camera and band.
     """

@@ -79,8 +79,7 @@ def animation(scene: Scene, count: int, spp: int) -> Iterator[Row]:
 
 
 def kills(scene: Scene, spp: int, every: float) -> Iterator[Row]:
-    """Render on four workers undisturbed, and with one killed and replaced every `every` seconds; compare films and
-    time."""
+    """Compare renders on four workers undisturbed, and with one killed and replaced every `every` seconds."""
     alone = _run(Renderer(scene, spp=spp), spp)
     with farm(4) as processes, connect(processes.address) as cluster:
         for killing in (False, True):
@@ -107,8 +106,7 @@ def kills(scene: Scene, spp: int, every: float) -> Iterator[Row]:
 
 
 def overhead(scene: Scene, workers: int, seconds: float) -> Row:
-    """Measure simulated workers of a fixed speed: parallel efficiency, data moved, and CPU time of client and
-    scheduler."""
+    """Measure simulated workers: parallel efficiency, data moved, and CPU time of client and scheduler."""
     import psutil    # a dependency of Dask
 
     width, height = scene.render.size
