@@ -42,7 +42,7 @@ def can_refit(tree: Layout) -> bool:
 
 
 class Refitter:
-    """Refits one BVH, whose buffers are on the device, over faces (m, 3) int32 and n vertices."""
+    """Refitter of one BVH, whose buffers are on the device, over faces (m, 3) int32 and n vertices."""
 
     def __init__(self, device: Device, tree: Layout, faces: IntArray, vertices: int) -> None:
         self._device, self._recipe = device, RECIPES[tree.name]

@@ -37,7 +37,7 @@ def _check_limits(device: Device, lanes: int, findings: Findings) -> None:
     rows = {name: row.view(np.float32) for name, row in float_rows(device, lanes, a, b, c).items()}
     for name, (limit, exact) in LIMITS.items():
         findings.at_most(limit, ulps(rows[name], exact(x, y, t)), name, "ulp", a, b, c)
-    # x + (y − x)·t: the difference and the product round numbers up to 2 m, the sum one up to m.
+    # With m = max(x, |y|), x + (y − x)·t rounds the difference and the product, up to 2 m, and the sum, up to m.
     roundings = np.abs(rows["mix"] - (x + (y - x) * t)) / (np.maximum(x, np.abs(y)) * 2.0**-24)
     findings.at_most(5.0, roundings, "mix", "roundings", a, b, c)
 

@@ -85,8 +85,7 @@ def _name(driver: Driver) -> str:
 
 
 def _state(driver: Driver) -> list[Any]:
-    """Return what a probe's result depends on: the driver's files, the machine and its kernel (part of some drivers).
-    """
+    """Return what a probe's result depends on: the driver's files, the machine and its kernel (part of some driver)."""
     files = []
     for path in (driver.library, driver.source):
         try:

@@ -26,7 +26,7 @@ _kept: dict[str, Renderer] = {}
 
 
 class BandRenderer(Renderer):
-    """Renders some tile rows of an image, as if they were all of it: the size in pixels is the session's."""
+    """Renderer of some tile rows of an image, as if they were all of it: the size in pixels is the session's."""
 
     _team: Team | None = None
     _band = (0, 1)

@@ -11,7 +11,7 @@ NEWS = 0.5
 
 
 class BadResult(Exception):
-    """Raised if a worker returned an implausible result."""
+    """An implausible result of a worker."""
 
 
 @dataclass(eq=False)

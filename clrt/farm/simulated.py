@@ -23,7 +23,7 @@ PROOF_TILES = 16
 
 
 class Simulation:
-    """Stands in for a `ShareRenderer`."""
+    """Replacement of a `ShareRenderer`."""
 
     selectors = None
 
