@@ -18,9 +18,9 @@ Integers = NDArray[np.int64]
 def sah(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int, pack: int = 1) -> Tree:
     """Build by the surface area heuristic, over all splits of the primitives sorted by centroid on each axis.
 
-    Cost of a split (Nadolny 2026, 2.7; Wald 2007, "On fast construction of SAH-based bounding volume hierarchies"): 1 +
-    A_left/A ceil(n_left/pack) + A_right/A ceil(n_right/pack), against ceil(n/pack) for a leaf; `pack` primitives are
-    intersected at the cost of one. aabb_min, aabb_max: (p, 3) float32, finite. No leaf exceeds `leaf_size`.
+    Cost of a split (Nadolny 2026, 2.7; Wald 2007, "On fast construction of SAH-based bounding volume hierarchies"):
+    1 + A_left/A ceil(n_left/pack) + A_right/A ceil(n_right/pack), against ceil(n/pack) for a leaf; `pack` primitives
+    are intersected at the cost of one. aabb_min, aabb_max: (p, 3) float32, finite. No leaf exceeds `leaf_size`.
     """
     sweep = _Sweep.over(aabb_min, aabb_max)
     return grow(aabb_min, aabb_max, leaf_size, min(pack, leaf_size), lambda nodes: sweep.cut(nodes, leaf_size, pack))

@@ -98,8 +98,7 @@ class Launches:
         return len(self._running) >= IN_FLIGHT
 
     def poll(self) -> bool:
-        """Retire the first launch in flight if it has ended; return whether it has. DeviceError if it failed or hung.
-        """
+        """Retire the first launch in flight if it ended; return whether it did. DeviceError if it failed or hung."""
         if not self._running or not self._wait.is_over(self._running[0][1]):
             return False
         self._finish_one()
