@@ -1,1 +1,1 @@
-"""Trees over primitives: builders, wide layouts, statistics."""
+"""BVHs over primitives: builders, wide layouts, statistics."""

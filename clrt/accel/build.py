@@ -1,4 +1,4 @@
-"""From primitives to the tree on a device: the builder is chosen, and where it runs."""
+"""Build the BVH for a device: choose the builder, and run it in numpy or on the device."""
 
 from __future__ import annotations
 
@@ -15,22 +15,24 @@ from .layouts import LAYOUTS, LEAF_SPHERE, PACK, Layout, pack
 from .tree import FloatArray, Triangles
 from .triangle_forms import in_form
 
-#: Builders that run on the device, by the passes of reinsertion that follow.
+#: Builders that run on the device, with the number of reinsertion passes that follow.
 DEVICE_BUILDERS = {"ploc": 0, "reinsertion": 2}
-#: From so many primitives on a device's tree is done before numpy's, kernels loaded from the cache included.
+#: From this many primitives on, a build on the device is faster than numpy's, including loading its kernels from the
+#: cache.
 LARGE = 1 << 14
-#: Up to so many spheres are met one after another by all lanes' rays together (kernels/traverse/lone_spheres.cl).
+#: Up to this many spheres are intersected one after another, for all SIMD lanes together
+#: (kernels/traverse/lone_spheres.cl).
 FEW_SPHERES = 16
-#: Up to so many triangles are met without a tree as fast as with one, and up to half as many 1.5 times as fast, or 1.2
-#: times by halves of packs (kernels/geometry/wide.cl).
+#: Up to this many triangles, brute force is as fast as a BVH, and up to half as many 1.5 times as fast, or 1.2 times
+#: with half packs (kernels/geometry/wide.cl).
 FEW = 4 * PACK
 
 
 def fitting_layout(device: Device | None, triangles: int, spheres: int, triangle: str = "watertight",
                    instances: bool = False, tree: bool | None = None) -> str:
-    """The device's layout, or "packs" for vectors if what is to be in the tree, so many, is too little for one.
+    """Return the device's layout, or "packs" (brute force) if the SIMD layout would have too few primitives for a BVH.
 
-    tree: True for one however few they are, False for none however many.
+    triangles, spheres: how many are to be in the BVH. tree: True forces a BVH, False forces brute force.
     """
     layout = device.layout if device else "bvh8"
     packs = layout == "bvh8" and triangle == "watertight"
@@ -42,11 +44,11 @@ def fitting_layout(device: Device | None, triangles: int, spheres: int, triangle
 
 def build_tree(device: Device | None, layout: str, builder: str | None, triangles: Triangles,
                spheres: FloatArray | None = None, triangle: str = "watertight") -> Layout:
-    """The tree over triangles (m, 3, 3) and spheres (s, 4), float32, finite, of sizes near 1.
+    """Build the BVH over triangles (m, 3, 3) and spheres (s, 4), float32, finite, of sizes near 1.
 
-    builder: a name in BUILDERS or DEVICE_BUILDERS; None takes the fastest. Without a device, and for fewer than two
-    primitives, those on the device are stood in for by `sah`. triangle: the test that the leaves are for. Raises
-    UsageError for unknown names and for layouts that the builder, or the test, cannot use.
+    builder: a name in BUILDERS or DEVICE_BUILDERS; None selects the fastest. Without a device, and for fewer than two
+    primitives, `sah` replaces those that run on the device. triangle: the intersection test that the leaves are for.
+    Raises UsageError for unknown names and for layouts that the builder, or the test, does not support.
     """
     check_choice("layout", layout, LAYOUTS)
     if layout == "packs" and triangle != "watertight":
@@ -56,7 +58,10 @@ def build_tree(device: Device | None, layout: str, builder: str | None, triangle
 
 
 def builder_source(device: Device, layout: str, builder: str | None, triangles: int, spheres: int) -> str | None:
-    """The program that builds the tree over so many; None where that is done in numpy. UsageError as `build_tree`."""
+    """Return the program that builds the BVH over this many primitives, or None if numpy builds it.
+
+    Raises UsageError as `build_tree` does.
+    """
     builder = _fitting_builder(device, layout, builder, triangles + spheres)
     if builder not in DEVICE_BUILDERS:
         return None

@@ -1,4 +1,4 @@
-"""Where to cut a node: the builders by name. They are the reference; large trees are built on a device."""
+"""Reference builders by name, in numpy: each is a rule for splitting nodes. Large BVHs are built on a device."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ Integers = NDArray[np.int64]
 
 
 def sah(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int, pack: int = 1) -> Tree:
-    """Surface area heuristic over every cut of the primitives in the order of their centroids, on the three axes.
+    """Build by the surface area heuristic, over all splits of the primitives sorted by centroid on each axis.
 
-    Cost of a cut (Nadolny 2026, 2.7; Wald 2007, "On fast construction of SAH-based bounding volume hierarchies"):
+    Cost of a split (Nadolny 2026, 2.7; Wald 2007, "On fast construction of SAH-based bounding volume hierarchies"):
     1 + A_left/A ceil(n_left/pack) + A_right/A ceil(n_right/pack), against ceil(n/pack) for a leaf; `pack` primitives
-    are intersected at the price of one. aabb_min, aabb_max: (p, 3) float32, finite. No leaf exceeds `leaf_size`.
+    are intersected at the cost of one. aabb_min, aabb_max: (p, 3) float32, finite. No leaf exceeds `leaf_size`.
     """
     sweep = _Sweep.over(aabb_min, aabb_max)
     return grow(aabb_min, aabb_max, leaf_size, min(pack, leaf_size), lambda nodes: sweep.cut(nodes, leaf_size, pack))
 
 
 def midpoint(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int = 2, pack: int = 1) -> Tree:
-    """Cut in the middle of the longest axis of the centroids' bounds (Nadolny 2026, 5.4.4).
+    """Split in the middle of the longest axis of the centroid bounds (Nadolny 2026, 5.4.4).
 
-    Bounds of centroids, not of boxes: both sides then hold something unless all centroids coincide. There is no cost,
-    so `pack` changes nothing; it is there because all builders are called alike.
+    With centroid bounds, unlike box bounds, both sides are non-empty unless all centroids coincide. There is no cost,
+    so `pack` has no effect; it is there because all builders have the same signature.
     """
     return grow(aabb_min, aabb_max, leaf_size, leaf_size, _midpoint_cut)
 
@@ -50,17 +50,17 @@ def _midpoint_cut(nodes: OpenNodes) -> BoolArray:
 
 
 def _half_centroids(boxes: FloatArray) -> FloatArray:
-    """Min and negated max, (6, p), to half the centroids (3, p); half, so that no difference of two overflows."""
+    """Return half the centroids (3, p) from min and negated max (6, p); half, so that differences do not overflow."""
     quarter = np.float32(0.25)
     return quarter * boxes[:3] - quarter * boxes[3:]
 
 
 @dataclass(frozen=True, eq=False)
 class _Sweep:
-    """Ranks in place of numbers: being integers, those of each node can be moved apart, and back, without loss.
+    """Ranks instead of coordinates: as integers they can be offset per node, and back, without loss.
 
-    centroid: (3, p), of p primitives. box: (6, p), of min and negated max, counted on from row to row; value: (6p,),
-    the numbers that they stand for.
+    centroid: (3, p), ranks of the centroids of p primitives. box: (6, p), ranks of min and negated max, numbered
+    consecutively across rows; value: (6p,), the coordinates by rank.
     """
 
     centroid: Integers
@@ -74,7 +74,7 @@ class _Sweep:
         return _Sweep(_ranks(_half_centroids(boxes)), first + _ranks(boxes), value.ravel())
 
     def cut(self, nodes: OpenNodes, leaf_size: int, pack: int) -> BoolArray:
-        """The rule: which primitives go right."""
+        """Apply the rule: return which primitives go right."""
         node = nodes.spread(np.arange(len(nodes.count)))
         orders = [np.argsort(node * self.centroid.shape[1] + ranks[nodes.ids]) for ranks in self.centroid]
         lasts, costs = zip(*(self._best(nodes, node, order, pack) for order in orders))
@@ -88,7 +88,7 @@ class _Sweep:
         return right
 
     def _best(self, nodes: OpenNodes, node: Integers, order: Integers, pack: int) -> tuple[Integers, Doubles]:
-        """The place in `order` of the last primitive on the left, (k,), and the cut's cost times the area, (k,)."""
+        """Return the index in `order` of the left side's last primitive, and the split's cost times the area, (k,)."""
         areas = [_half_area(union) for union in self._unions(node, self.box.take(nodes.ids[order], axis=1))]
         left_count = np.arange(1, len(node) + 1) - nodes.spread(nodes.start)
         right_count = nodes.spread(nodes.count) - left_count
@@ -100,9 +100,10 @@ class _Sweep:
         return places[np.searchsorted(node[places], np.arange(len(least)))], least
 
     def _unions(self, node: Integers, boxes: Integers) -> tuple[Doubles, Doubles]:
-        """Boxes around all of a node's primitives up to each one, and around all from it on, (6, P).
+        """Return the boxes around each node's primitives up to each one, and from each one on, (6, P).
 
-        A running minimum of whole rows: between nodes the ranks are moved so far apart that each starts afresh.
+        A running minimum over whole rows: ranks of different nodes are offset so far apart that each node starts
+        afresh.
         """
         shift = node * self.centroid.shape[1]
         before = np.minimum.accumulate(boxes - shift, axis=1) + shift
@@ -111,7 +112,7 @@ class _Sweep:
 
 
 def _ranks(values: FloatArray) -> Integers:
-    """The place of each value in its sorted row; of equal ones the first comes first."""
+    """Return the position of each value in its sorted row; equal values keep their order."""
     ranks = np.empty(values.shape, np.int64)
     np.put_along_axis(ranks, np.argsort(values, axis=1, kind="stable"), np.arange(values.shape[1])[None], axis=1)
     return ranks
@@ -122,7 +123,7 @@ def _packs(count: NDArray[np.integer], pack: int) -> NDArray[np.integer]:
 
 
 def _half_area(boxes: Doubles) -> Doubles:
-    """Min and negated max, (6, ...), to (...)."""
+    """Return half the surface areas (...) of boxes given as min and negated max, (6, ...)."""
     x, y, z = -(boxes[:3] + boxes[3:])
     area: Doubles = x * y + y * z + z * x
     return area

@@ -1,7 +1,7 @@
-"""Compressed wide BVH: eight children a node in 80 bytes, in an order that a ray follows without sorting.
+"""Compressed wide BVH: eight children per node in 80 bytes, in an order that rays traverse without sorting.
 
 Ylitie, Karras, Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs"; `collapse` is its
-3.1, `octant_slots` its 3.2. How a ray meets such a node: kernels/traverse/cwbvh.cl.
+3.1, `octant_slots` its 3.2. Intersection of a ray with such a node: kernels/traverse/cwbvh.cl.
 """
 
 from __future__ import annotations
@@ -18,38 +18,38 @@ Bytes = NDArray[np.uint8]
 Records = NDArray[np.void]
 
 SLOTS = 8
-#: Primitives of a leaf: `meta` counts them in three bits.
+#: Maximum number of primitives per leaf: `meta` counts them in three bits.
 MAX_LEAF = 3
 
-#: Node 0 is the root. Read as five uint4, bytes in the order of addresses, the low one first.
+#: Node 0 is the root. Read as five uint4, in little-endian byte order.
 #:
-#: origin: p, the low corner of the box around the children.
-#: exponent: of the step s on each axis, as float32 stores it: s = 2^(exponent − 127), exponent in 1 … 254.
+#: origin: p, the minimum corner of the box around the children.
+#: exponent: of the quantisation step s per axis, biased as in float32: s = 2^(exponent − 127), exponent in 1 … 254.
 #: lo, hi: [axis][slot], the children's boxes p + lo·s … p + hi·s. They enclose the children up to one float32 rounding
 #:     of a plane's distance from p, which the traversal's padding covers: lo·s ≤ fl(min − p), hi·s ≥ fl(max − p).
-#: imask: bit i is set where slot i holds a node.
+#: imask: bit i is set if slot i holds a node.
 #: child: index of the first child node; the others follow it in the order of their slots.
-#: primitive: index of the node's first primitive. Primitives are numbered through: triangle i of `leaf_triangles` is i,
-#:     sphere i of `leaf_spheres` is i + the number of triangles.
-#: meta: of a slot with a node, 1 << 5 | 24 + slot. Of a leaf, its count in unary (001, 011, 111) << 5 | where its first
-#:     primitive stands behind `primitive`, 0 … 23. 0 in an empty slot, which no ray enters; there lo = 255 and hi = 0.
+#: primitive: index of the node's first primitive. Primitives are numbered consecutively: triangle i of `leaf_triangles`
+#:     is i, sphere i of `leaf_spheres` is i + the number of triangles.
+#: meta: of a slot with a node, 1 << 5 | 24 + slot. Of a leaf, its count in unary (001, 011, 111) << 5 | the offset of
+#:     its first primitive from `primitive`, 0 … 23. 0 in an empty slot, which no ray enters; there lo = 255 and hi = 0.
 #:
-#: A node's primitives are contiguous, in any order of leaves. Hence at most one node, the root, holds leaves of both
+#: A node's primitives are contiguous, its leaves in any order. Hence at most one node, the root, has leaves of both
 #: kinds; its triangles are the last ones and its spheres the first. Any slot may hold any child: the order of
-#: `octant_slots` makes rays meet near children first, no more.
+#: `octant_slots` only makes rays visit near children first.
 CWBVH_NODE = np.dtype([("origin", "f4", 3), ("exponent", "u1", 3), ("imask", "u1"), ("child", "u4"),
                        ("primitive", "u4"), ("meta", "u1", SLOTS), ("lo", "u1", (3, SLOTS)), ("hi", "u1", (3, SLOTS))])
 
-#: (slot, axis): the corner of a node that belongs to a slot; bit a of the slot is set on the high side of axis a.
+#: (slot, axis): the corner of a node that a slot corresponds to; bit a of the slot is set on the high side of axis a.
 _CORNERS = np.where(np.arange(SLOTS)[:, None] >> np.arange(3) & 1, 1.0, -1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Compressed:
-    """A tree as records. order, sphere_order: (m,), (s,) int32, the primitives as the records number them.
+    """A BVH as records. order, sphere_order: (m,), (s,) int32, the primitives in the records' numbering.
 
-    stack: groups of nodes that wait at most (see stack_bound). wide: the same tree before it was compressed, its slots
-    and nodes in the records' order.
+    stack: maximum number of node groups on the stack (see stack_bound). wide: the BVH before compression, with its
+    slots and nodes in the records' order.
     """
 
     nodes: Records
@@ -60,7 +60,7 @@ class Compressed:
 
 
 def compress(tree: Tree) -> Compressed:
-    """The records of a binary tree whose leaves hold up to MAX_LEAF primitives. SceneError as `collapse` raises it."""
+    """Compress a binary BVH whose leaves have up to MAX_LEAF primitives. Raises SceneError as `collapse` does."""
     wide = in_slots(collapse(tree, SLOTS))
     nodes = np.zeros(len(wide.child), CWBVH_NODE)
     nodes["origin"], nodes["exponent"], lo, hi = quantise(wide.aabb_min, wide.aabb_max)
@@ -75,12 +75,12 @@ def compress(tree: Tree) -> Compressed:
 
 
 def octant_slots(offset: NDArray[np.float64], used: BoolArray) -> IntArray:
-    """Which child stands in each slot, (k, 8), −1 for none; such that near children come first for all rays.
+    """Assign the children to slots, (k, 8), −1 for none, so that rays of any direction visit near children first.
 
-    offset: (k, 8, 3), child's centre − node's centre; used: (k, 8), which children there are. Rays that run towards −
-    on the axes of the bits of i visit the slots in the order of slot ^ i, so slot i should hold what lies farthest
-    towards its corner. Of all children and slots left, the pair with the largest offset · corner is taken, of equals
-    the lowest child and slot. (The best sum over all pairs costs more and made no ray faster that was timed.)
+    offset: (k, 8, 3), child's centre − node's centre; used: (k, 8), which children exist. A ray whose direction is
+    negative on the axes of the bits of i visits the slots in the order of slot ^ i, so slot i should hold the child
+    farthest towards its corner. Greedily, the pair of remaining child and slot with the largest offset · corner is
+    assigned, the lowest child and slot on ties. (The optimal assignment costs more and made no measured ray faster.)
     """
     gain = np.where(used[:, :, None], offset @ _CORNERS.T, -np.inf).reshape(len(offset), -1)
     slots, row = np.full(used.shape, -1, np.int32), np.arange(len(offset))
@@ -95,10 +95,11 @@ def octant_slots(offset: NDArray[np.float64], used: BoolArray) -> IntArray:
 
 
 def quantise(aabb_min: FloatArray, aabb_max: FloatArray) -> tuple[FloatArray, Bytes, Bytes, Bytes]:
-    """origin (k, 3), exponent (k, 3), lo (k, 8, 3) and hi (k, 8, 3) of CWBVH_NODE, for children's boxes (k, 8, 3).
+    """Quantise children's boxes (k, 8, 3): return origin (k, 3), exponent (k, 3), lo and hi (k, 8, 3) of CWBVH_NODE.
 
-    Inverted boxes are empty slots. The step is the power of two above extent / 255: one is always enough, and at
-    extent 0 the smallest normal number. The distances are float64, so nothing overflows and they enclose exactly.
+    Inverted boxes are empty slots. The step is the power of two above extent / 255, which always suffices, and the
+    smallest normal number for extent 0. The distances are float64, so nothing overflows and the quantised boxes are
+    conservative.
     """
     used = np.all(aabb_min <= aabb_max, axis=2)
     origin = np.where(used.any(axis=1)[:, None], aabb_min.min(axis=1), np.float32(0))
@@ -110,11 +111,11 @@ def quantise(aabb_min: FloatArray, aabb_max: FloatArray) -> tuple[FloatArray, By
 
 
 def in_slots(wide: Wide) -> Wide:
-    """The tree with the children of every node in their octants' slots, and its nodes in breadth-first order again."""
+    """Return the BVH with every node's children in their octants' slots, and nodes in breadth-first order again."""
     used = wide.child != EMPTY
     low, high = wide.aabb_min.min(axis=1, keepdims=True), wide.aabb_max.max(axis=1, keepdims=True)
     twice = [_doubles(a, used) + _doubles(b, used) for a, b in ((wide.aabb_min, wide.aabb_max), (low, high))]
-    slots = octant_slots(twice[0] - twice[1], used)  # where it says −1 the last child is taken, which is none
+    slots = octant_slots(twice[0] - twice[1], used)  # −1 selects the last child, which is then unused
     child = np.take_along_axis(wide.child, slots, axis=1)
     nodes = np.concatenate(list(replace(wide, child=child).levels()))
     interior = (child >= 0) & (child != EMPTY)
@@ -124,15 +125,15 @@ def in_slots(wide: Wide) -> Wide:
 
 
 def _doubles(boxes: FloatArray, used: BoolArray) -> NDArray[np.float64]:
-    """Boxes of children, (k, 8 or 1, 3), as (k, 8, 3) float64, 0 where no child is."""
+    """Return children's boxes, (k, 8 or 1, 3), as (k, 8, 3) float64, 0 in unused slots."""
     return np.where(used[..., None], boxes.astype(np.float64), 0.0)
 
 
 def stack_bound(wide: Wide) -> int:
-    """The most groups of nodes that wait while a ray is traced.
+    """Return the maximum number of node groups on the stack of a traversal.
 
-    The nodes below a node that a ray enters are one group, and it waits while one of them is visited, if others are
-    left. So a path down the tree leaves a group at each node with two or more nodes below it.
+    The child nodes of a node that a ray enters are one group, which is on the stack while one of them is visited if
+    others remain. So a path down the BVH leaves a group at each node with two or more child nodes.
     """
     waiting, inner = np.zeros(len(wide.child), np.intp), np.count_nonzero(wide.interior, axis=1)
     for nodes in wide.levels():
@@ -142,14 +143,14 @@ def stack_bound(wide: Wide) -> int:
 
 
 def _number_primitives(wide: Wide, nodes: Records) -> tuple[IntArray, IntArray]:
-    """Fills `primitive`, and `meta` of leaves; returns the triangles and the spheres in the order of the numbers."""
+    """Fill `primitive`, and `meta` of leaves; return the triangles and the spheres in the order of their numbers."""
     row, slot = np.nonzero(wide.child < 0)
     first, sphere, count = leaf_fields(wide.child[row, slot])
-    # Triangles before spheres, node by node, but the root's last among the triangles: there the two kinds may meet.
+    # Triangles before spheres, node by node, but the root's triangles last: the root may have leaves of both kinds.
     place = np.lexsort((slot, row, (row == 0) & ~sphere, sphere))
     row, slot, first, sphere, count = row[place], slot[place], first[place], sphere[place], count[place]
     number = np.cumsum(count) - count
-    nodes["primitive"][row[::-1]] = number[::-1]  # of several leaves of a node the first one stays
+    nodes["primitive"][row[::-1]] = number[::-1]  # the last assignment, that of a node's first leaf, remains
     nodes["meta"][row, slot] = (1 << count) - 1 << 5 | number - nodes["primitive"][row]
     source = np.arange(count.sum()) + np.repeat(first - number, count)
     triangles = len(wide.order)

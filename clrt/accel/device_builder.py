@@ -1,4 +1,4 @@
-"""Trees built on the device: clustering, the plan of the wide tree, its nodes and leaves (kernels/build)."""
+"""BVH construction on the device: clustering, planning the wide BVH, writing its nodes and leaves (kernels/build)."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from .wide import EMPTY, MAX_PRIMITIVES
 
 @dataclass(frozen=True)
 class Shape:
-    """What a layout asks of the builder. writer: the file that writes its records, `node` and `leaf`.
+    """Requirements of a layout on the builder. writer: the kernel file that writes its records, `node` and `leaf`.
 
-    children: of a node. leaf_size: most primitives of a leaf. pack: triangles that are intersected at the price of one.
-    leaves: the buffer of triangles' records. records: how many a node takes, and how many there are besides.
-    compressed: children stand in their octants' slots, leaves of a node are of one kind, nodes below one wait as one.
+    children: per node. leaf_size: maximum primitives per leaf. pack: triangles that are intersected at the cost of one.
+    leaves: the buffer of triangle records. records: node records per node, and additional ones. compressed: children
+    are in their octants' slots, a node's leaves are all of one kind, and its child nodes share a stack entry.
     """
 
     writer: str
@@ -46,10 +46,10 @@ class Shape:
     compressed: bool = False
 
 
-#: What makes shares of the scene's sides and area out of a box's: the factors, and what to add where it has none.
+#: Factors that turn a box's sides and area into fractions of the scene's, and values to add if the scene's is 0.
 WORLD = record(per_side="3f4", per_area="f4", no_side="3f4", no_area="f4")
 
-#: Bytes a primitive that the largest of all arrays takes at most, about: a pack for two triangles takes 160.
+#: Approximate maximum bytes per primitive of the largest array: packs of only two triangles take 160.
 LARGEST_ARRAY = 192
 
 SHAPES = {
@@ -63,7 +63,8 @@ SHAPES = {
 class DeviceTree:
     """Records on the device, with their numbers: nodes, leaf records of triangles, spheres.
 
-    nodes, depth, stack, sah_cost, level_sizes: as in Layout; the cost counts records where no box has an area.
+    nodes, depth, stack, sah_cost, level_sizes: as in Layout; if the root's box has no area, sah_cost is the number of
+    records.
     """
 
     arrays: tuple[cl.Buffer, cl.Buffer, cl.Buffer]
@@ -77,15 +78,15 @@ class DeviceTree:
 
 
 def fits(device: Device | None, count: int) -> bool:
-    """Whether the arrays for so many primitives are not larger than the device's largest buffer."""
+    """Return whether the arrays for this many primitives fit the device's largest buffer."""
     return device is not None and count * LARGEST_ARRAY <= device.info.max_alloc_bytes
 
 
 def build_tree(device: Device, shape: Shape, triangles: Triangles, spheres: FloatArray,
                reinsertions: int = 0) -> DeviceTree:
-    """The tree over at least two primitives: triangles, spheres (s, 4), coordinates finite, below 1e18.
+    """Build the BVH over at least two primitives: triangles, spheres (s, 4), with finite coordinates below 1e18.
 
-    reinsertions: passes that make it better. Raises SceneError for more than MAX_PRIMITIVES in all, and NoRoomError.
+    reinsertions: number of optimisation passes. Raises SceneError for more than MAX_PRIMITIVES in all, and NoRoomError.
     """
     if (count := len(triangles) + len(spheres)) > MAX_PRIMITIVES:
         raise SceneError(f"{count} primitives, but a device builds trees over {MAX_PRIMITIVES}: take the builder sah")
@@ -104,7 +105,7 @@ def build_tree(device: Device, shape: Shape, triangles: Triangles, spheres: Floa
 
 
 def program_source(shape: Shape, triangles: bool, spheres: bool, reinsertions: bool) -> str:
-    """The builder's program, for scenes with triangles, with spheres, and for trees that are made better."""
+    """Return the builder's program, for scenes with triangles, with spheres, and with reinsertion passes."""
     values = {"CHILDREN": shape.children, "LEAF_SIZE": shape.leaf_size, "PACK": shape.pack, "EMPTY": EMPTY,
               "SLOW": SLOW, "LANES": math.prod(shape.leaf["primitive"].shape), "TRIANGLES": int(triangles),
               "SPHERES": int(spheres), "GROUPS": int(shape.compressed),
@@ -117,7 +118,7 @@ def program_source(shape: Shape, triangles: bool, spheres: bool, reinsertions: b
 
 
 class _Plan(NamedTuple):
-    """A binary tree, and which of its nodes stay, become leaves or are opened. area: half the root's."""
+    """A binary BVH with a decision per node: kept, made a leaf, or opened. area: half the root's surface area."""
 
     primitives: Primitives
     tree: BinaryTree
@@ -126,15 +127,15 @@ class _Plan(NamedTuple):
 
     @property
     def arguments(self) -> Sequence[cl.Buffer | int]:
-        """What the kernels of a level begin with."""
+        """Return the first arguments of the kernels that process a level."""
         return *self.primitives.arguments, self.tree.nodes, self.plans
 
 
 @dataclass(frozen=True, eq=False)
 class _Level:
-    """`count` nodes of the wide tree: what is in them, its places, and how many entries wait on a stack above them.
+    """A level of the wide BVH: `count` nodes, their slots and record positions, and the stack entries above each.
 
-    records: how many nodes below, leaf records of triangles and spheres they take.
+    records: numbers of child nodes and of leaf records for triangles and spheres.
     """
 
     count: int
@@ -145,12 +146,12 @@ class _Level:
 
     @property
     def arrays(self) -> tuple[cl.Buffer, cl.Buffer, cl.Buffer]:
-        """All that is on the device."""
+        """Return the arrays on the device."""
         return self.slots, self.places, self.waiting
 
 
 def _plan(work: Blocks, shape: Shape, primitives: Primitives, tree: BinaryTree) -> _Plan:
-    """By rounds, each of which needs those before; a tree's last node is its root."""
+    """Plan the wide BVH in the rounds of the binary one, as each depends on those before. The last node is the root."""
     root, world = tree.count - 1, np.zeros(1, WORLD)
     top = work.download(tree.nodes, BINARY_NODE, 1, root)
     size, area = top["hi"] - top["lo"], half_area(top["lo"], top["hi"])
@@ -166,7 +167,7 @@ def _plan(work: Blocks, shape: Shape, primitives: Primitives, tree: BinaryTree) 
 
 
 def _open(work: Blocks, shape: Shape, plan: _Plan) -> tuple[list[_Level], int]:
-    """The wide tree's levels, and the most entries on a traversal's stack. It begins with a node above the root."""
+    """Return the levels of the wide BVH and its maximum traversal stack size. Starts at a node above the root."""
     slots = np.full(shape.children, EMPTY, np.int32)
     slots[0] = plan.tree.count - 1
     nothing, most = np.zeros(3, np.uint32), work.zeros(np.int32, 1)
@@ -183,7 +184,7 @@ def _open(work: Blocks, shape: Shape, plan: _Plan) -> tuple[list[_Level], int]:
 
 
 def _write(work: Blocks, shape: Shape, plan: _Plan, levels: list[_Level], stack: int) -> DeviceTree:
-    """Nodes and leaves, level by level."""
+    """Write nodes and leaves, level by level."""
     sizes, records = [level.count for level in levels], [level.records for level in levels]
     each, besides = shape.records
     counts = sum(sizes) * each + besides, sum(r[1] for r in records), sum(r[2] for r in records)

@@ -1,4 +1,4 @@
-"""A few triangles in groups, for where there is no tree: what stands together is met, or passed by, as a whole."""
+"""Group a few triangles for brute force, so that rays can cull a whole group by its box."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from .tree import FloatArray, IntArray
 
 Doubles = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-#: More are taken in their order.
+#: More triangles are taken in their order.
 MOST = 256
-#: What a ray pays for a group's box, where a pack of triangles costs 1.
+#: Cost of a ray–box test relative to intersecting a pack of triangles.
 BOX_COST = 0.1
 
 
 def packs_of(aabb_min: FloatArray, aabb_max: FloatArray, size: int) -> list[IntArray]:
-    """Triangles with boxes (n, 3) to packs of at most `size`, group by group, the members of each ascending."""
+    """Group triangles with boxes (n, 3) into packs of at most `size`, group by group, the members of each ascending."""
     count = len(aabb_min)
     together = _groups(aabb_min, aabb_max, size) if size < count <= MOST else [np.arange(count)]
     return [group[first:first + size].astype(np.int32) for group in together for first in range(0, len(group), size)]
 
 
 def _groups(aabb_min: FloatArray, aabb_max: FloatArray, size: int) -> list[NDArray[np.intp]]:
-    """Members of each group.
+    """Return the members of each group.
 
-    From one group of all on, that part of a group is made a group of its own which then saves most, as long as one
-    does: a room's walls stay together, and what stands in the room leaves them. A ray meets a group as often as the
-    surface of its box has to that of all, and pays for parts of packs as if they could be had: else nothing would be
-    gained by the first things that leave. The parts that are tried are those that arise as boxes are joined two by two,
-    each time to the smallest.
+    Greedily, starting from a single group, the part of a group that saves most expected cost is split off, while any
+    does: a room's walls stay together, and the objects in it become groups. The probability that a ray hits a group is
+    the ratio of its box's surface area to that of all. Packs are costed fractionally, at least one: otherwise splitting
+    off the first objects would gain nothing. Candidate parts are those of an agglomerative clustering that merges two
+    boxes into the smallest each time.
     """
     low, high = aabb_min.astype(np.float64), aabb_max.astype(np.float64)
     parts = _joined(low, high)
@@ -41,7 +41,7 @@ def _groups(aabb_min: FloatArray, aabb_max: FloatArray, size: int) -> list[NDArr
         return np.asarray(BOX_COST + area / everything * np.maximum(members.sum(axis=1) / size, 1))
 
     def best_part(group: BoolArray) -> tuple[float, BoolArray]:
-        """What is saved by it, and its members."""
+        """Return the cost that the best part saves, and its members."""
         inside = parts[~np.any(parts & ~group, axis=1) & np.any(group & ~parts, axis=1)]
         if not len(inside):
             return 0.0, group
@@ -60,7 +60,7 @@ def _groups(aabb_min: FloatArray, aabb_max: FloatArray, size: int) -> list[NDArr
 
 
 def _joined(low: Doubles, high: Doubles) -> BoolArray:
-    """(2n − 1, n) members of each single box, and of each that arises as two are joined to the smallest."""
+    """Return the members, (2n − 1, n), of all clusters as the boxes with the smallest union are merged two by two."""
     count = len(low)
     low, high, members = low.copy(), high.copy(), np.eye(count, dtype=bool)
     area = _half_area(np.minimum(low[:, None], low), np.maximum(high[:, None], high))

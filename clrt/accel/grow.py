@@ -1,4 +1,4 @@
-"""Top-down growth of a binary tree, all open nodes of a level at once; what a builder adds is where to cut them."""
+"""Top-down construction of a binary BVH, all open nodes of a level at once. A builder supplies the split rule."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 
 from .tree import BoolArray, FloatArray, IntArray, Tree, empty_tree
 
-#: Below this level nodes are cut at the middle of their order, so that depth <= MAX_FREE_DEPTH + ceil(log2 p).
+#: From this level on, nodes are split at the median of their order, so that depth <= MAX_FREE_DEPTH + ceil(log2 p).
 MAX_FREE_DEPTH = 40
-#: Nodes that a rule sees at once: its temporary arrays stay in the cache, and far below 64 MB.
+#: Nodes per call of a rule: its temporary arrays fit the cache, and are far below 64 MB.
 NODES_AT_ONCE = 4096
 
 
 @dataclass(frozen=True, eq=False)
 class OpenNodes:
-    """k nodes and their P primitives; the primitives of a node lie next to each other, in the order of the nodes.
+    """k nodes and their P primitives; the primitives of a node are contiguous, in the order of the nodes.
 
     boxes: (6, P) float32, the primitives' min and negated max, so that a union is one `minimum`.
-    ids: (P,) int32. first: (k,) int32, where a node's primitives begin in the finished order. count: (k,) int32.
+    ids: (P,) int32. first: (k,) int32, where a node's primitives begin in the final order. count: (k,) int32.
     """
 
     boxes: FloatArray
@@ -33,27 +33,27 @@ class OpenNodes:
 
     @property
     def start(self) -> IntArray:
-        """(k,) int32, where a node's primitives begin in `boxes` and `ids`."""
+        """Return (k,) int32, where a node's primitives begin in `boxes` and `ids`."""
         return np.cumsum(self.count, dtype=np.int32) - self.count
 
     def spread(self, values: NDArray[Any]) -> NDArray[Any]:
-        """A value a node, (k,), to a value a primitive, (P,)."""
+        """Expand values per node, (k,), to values per primitive, (P,)."""
         return np.repeat(values, self.count)
 
     def reduce(self, operation: np.ufunc, values: NDArray[Any]) -> NDArray[Any]:
-        """Values of primitives, (..., P), to values of nodes, (..., k)."""
+        """Reduce values per primitive, (..., P), to values per node, (..., k)."""
         result: NDArray[Any] = operation.reduceat(values, self.start, axis=-1)
         return result
 
     def select(self, nodes: BoolArray) -> OpenNodes:
-        """Some of the nodes."""
+        """Return the selected nodes."""
         if nodes.all():
             return self
         kept = np.flatnonzero(self.spread(nodes))
         return OpenNodes(self.boxes.take(kept, axis=1), self.ids.take(kept), self.first[nodes], self.count[nodes])
 
     def batches(self) -> list[OpenNodes]:
-        """The nodes in groups of NODES_AT_ONCE."""
+        """Return the nodes in batches of NODES_AT_ONCE."""
         cuts = np.arange(0, len(self.count), NODES_AT_ONCE)
         edges = np.append(self.start[cuts], len(self.ids))
         return [OpenNodes(self.boxes[:, low:high], self.ids[low:high],
@@ -61,7 +61,7 @@ class OpenNodes:
                 for cut, low, high in zip(cuts, edges[:-1], edges[1:])]
 
     def split(self, right: BoolArray) -> OpenNodes:
-        """The children, left and right in turn: a stable partition of each node's primitives by `right` (P,)."""
+        """Return the children, left and right alternating: a stable partition of each node by `right` (P,)."""
         rights = self.reduce(np.add, right.astype(np.int32))
         lefts = self.count - rights
         rank = np.cumsum(right, dtype=np.int32) - self.spread(np.cumsum(rights, dtype=np.int32) - rights)
@@ -73,15 +73,16 @@ class OpenNodes:
                          np.stack([lefts, rights], axis=1).ravel())
 
 
-#: A rule says which primitives go right, (P,) bool. Where none (or all) of a node's do, the node is not cut.
+#: A split rule returns which primitives go right, (P,) bool. If none (or all) of a node's do, the node is not split.
 Rule = Callable[[OpenNodes], BoolArray]
 
 
 def grow(aabb_min: FloatArray, aabb_max: FloatArray, leaf_size: int, small: int, rule: Rule) -> Tree:
-    """A tree over primitives with boxes (p, 3) float32, finite, cut by `rule`.
+    """Build a binary BVH over primitives with boxes (p, 3) float32, finite, split by `rule`.
 
-    Nodes of up to `small` primitives become leaves unasked. Nodes that the rule does not cut become leaves if they hold
-    up to `leaf_size` primitives; else, and below MAX_FREE_DEPTH, they are cut at the middle of their order.
+    Nodes of up to `small` primitives become leaves without calling the rule. Nodes that it does not split become leaves
+    if they have up to `leaf_size` primitives; others, and those from MAX_FREE_DEPTH on, are split at the median of
+    their order.
     """
     if len(aabb_min) == 0:
         return empty_tree()
@@ -113,7 +114,7 @@ def _nowhere(nodes: OpenNodes) -> BoolArray:
 
 
 def _cut(nodes: OpenNodes, small: int, rule: Rule) -> BoolArray:
-    """The rule's answer for the nodes that hold more than `small` primitives, False for the others' primitives."""
+    """Return the rule's answer for nodes with more than `small` primitives, and False for the primitives of others."""
     large = nodes.count > small
     right = np.zeros(len(nodes.ids), bool)
     if large.any():
@@ -123,7 +124,7 @@ def _cut(nodes: OpenNodes, small: int, rule: Rule) -> BoolArray:
 
 
 def _force(nodes: OpenNodes, right: BoolArray, leaf_size: int) -> tuple[BoolArray, BoolArray]:
-    """Cut at the middle what is too large for a leaf and was not cut: (P,) goes right, (k,) is a leaf."""
+    """Split at the median what is too large for a leaf and was not split: return (P,) goes right, (k,) is a leaf."""
     rights = nodes.reduce(np.add, right.astype(np.int32))
     uncut = (rights == 0) | (rights == nodes.count)
     stuck = uncut & (nodes.count > leaf_size)

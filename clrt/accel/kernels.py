@@ -1,4 +1,4 @@
-"""Which kernel files walk a tree, and what they must be told: the part of a program that belongs to the tree."""
+"""Kernel files and defines for BVH traversal: the part of a program that depends on the layout."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from .build import DEVICE_BUILDERS
 from .builders import BUILDERS
 from .layouts import NO_RAYS, PACK, Layout
 
-#: Files of the tree layouts, and how many triangles their records hold.
+#: Traversal files by layout, and the number of triangles per record.
 TREES = {"bvh8": ("traverse/bvh8.cl", 8), "bvh2": ("traverse/bvh2.cl", 1), "cwbvh": ("traverse/cwbvh.cl", 1),
          "list": ("traverse/list.cl", 1), "packs": ("traverse/packs.cl", PACK)}
-#: Layouts without a tree, whose cost a ray grows with the number of primitives.
+#: Brute-force layouts, whose cost per ray grows linearly with the number of primitives.
 TREELESS = ("packs", "list")
-#: How their rays come to instances.
+#: Traversal files for instances, by layout.
 UPPER_LEVELS = {"bvh8": "traverse/instance.cl", "bvh2": "traverse/slab_instance.cl",
                 "cwbvh": "traverse/slab_instance.cl"}
 #: Builders by name.
 BUILDER_NAMES = [*DEVICE_BUILDERS, *BUILDERS]
 TRIANGLE_TESTS = {name: f"geometry/triangle_{name}.cl"
                   for name in ("watertight", "moller_trumbore", "precomputed", "baldwin_weber")}
-#: Of the layout packs, which has one only.
+#: The only triangle test of the layout packs.
 PACKS_TEST = "geometry/triangle_watertight_packs.cl"
 BOX_TESTS = {"robust": "geometry/box_robust.cl", "plain": "geometry/box_plain.cl"}
 SPHERE_TESTS = {"robust": "geometry/sphere.cl", "textbook": "geometry/sphere_textbook.cl"}
@@ -32,9 +32,9 @@ RECORDS = {"nodes": "Node", "packs": "Triangles", "leaf_triangles": "Triangles",
 
 @dataclass(frozen=True)
 class HitTests:
-    """How rays meet things: names in TRIANGLE_TESTS, BOX_TESTS and SPHERE_TESTS; UsageError for others.
+    """Intersection tests: names in TRIANGLE_TESTS, BOX_TESTS and SPHERE_TESTS. Raises UsageError for others.
 
-    Those that are not watertight or robust are there to compare: they lose hits, or digits, and say where.
+    Tests that are not watertight or robust are for comparison: they lose hits or digits, as their files document.
     """
 
     triangle: str = "watertight"
@@ -47,14 +47,14 @@ class HitTests:
 
 
 def tree_buffers(tree: Layout) -> dict[str, tuple[str, Any]]:
-    """The tree's buffers with their C types."""
+    """Return the BVH's buffers with their C types."""
     return {name: (RECORDS[name], array) for name, array in tree.buffers.items()}
 
 
 def tree_defines(tree: Layout) -> dict[str, int]:
-    """PACK_SIZE, and a STACK_SIZE that the tree's traversal cannot exceed, in steps of 64 so that trees share programs.
+    """Return the defines PACK_SIZE and STACK_SIZE, and COUNT_VISITS if visits are counted (kernels/traverse/visits.cl).
 
-    And COUNT_VISITS, if there is a buffer to count in (kernels/traverse/visits.cl).
+    STACK_SIZE suffices for the traversal; it is rounded up to a multiple of 64 so that BVHs share programs.
     """
     if tree is NO_RAYS:
         return {}
@@ -63,8 +63,7 @@ def tree_defines(tree: Layout) -> dict[str, int]:
 
 
 def tree_features(triangles: bool, spheres: bool, lone: bool = False, rays: bool = True) -> dict[str, bool]:
-    """What the kernels of kernels/traverse ask of the scene; lone: its spheres are not in the tree; rays: whether any
-    is followed."""
+    """Return the feature flags of kernels/traverse. lone: spheres are not in the BVH; rays: whether rays are traced."""
     return {"TRIANGLES": triangles, "LEAF_SPHERES": rays and spheres and not lone,
             "LONE_SPHERES": rays and spheres and lone, "IN_TREE": rays and (triangles or (spheres and not lone)),
             "PRIMITIVES": triangles or spheres}
@@ -72,8 +71,10 @@ def tree_features(triangles: bool, spheres: bool, lone: bool = False, rays: bool
 
 def tree_files(layout: str, tests: HitTests, triangles: bool, spheres: bool, lone: bool = False,
                instances: bool = False) -> dict[str, list[str]]:
-    """What the includes of kernels/traverse stand for, in a scene that has triangles or spheres or neither. layout: one
-    of TREES, or that of NO_RAYS."""
+    """Return the files for the includes of kernels/traverse, for a scene with triangles, spheres or neither.
+
+    layout: one of TREES, or that of NO_RAYS.
+    """
     sphere_test = [SPHERE_TESTS[tests.sphere]] if spheres else []
     if layout == NO_RAYS.name:
         return {"TREE": [], "LONE_SPHERES_FILE": [], "SPHERE_TEST": sphere_test}

@@ -1,17 +1,17 @@
-"""Trees as the device reads them. The dtypes here define the records; the C typedefs are generated from them.
+"""BVH layouts in device memory. The dtypes here define the records; the C typedefs are generated from them.
 
 Records are rows of three floats and a four-byte scalar, or of eight lanes, without OpenCL vector types, so that host
-and device agree on every offset. Triangles have the primitives 0 … m − 1, spheres m … m + s − 1. Triangles without
-area stay in; they are never hit. A scene without triangles, or without spheres, has no buffer for them.
+and device agree on every offset. Triangles are the primitives 0 … m − 1, spheres m … m + s − 1. Degenerate triangles
+(without area) are kept but never hit. A scene without triangles, or without spheres, has no buffer for them.
 
-- list: no tree; leaf_triangles and leaf_spheres in the order of the scene.
-- packs: no tree; packs (of PACK triangles) group by group, and leaf_spheres in the order of the scene.
-- bvh2: nodes (BVH2_NODE), leaf_triangles and leaf_spheres in the order of the tree.
-- bvh8: nodes (BVH8_NODE), packs (one a triangle leaf), leaf_spheres in the order of the tree.
-- cwbvh: nodes (cwbvh.CWBVH_NODE), leaf_triangles and leaf_spheres in the order of the tree.
+- list: no BVH; leaf_triangles and leaf_spheres in scene order.
+- packs: no BVH; packs (of PACK triangles) group by group, and leaf_spheres in scene order.
+- bvh2: nodes (BVH2_NODE), leaf_triangles and leaf_spheres in BVH order.
+- bvh8: nodes (BVH8_NODE), packs (one per triangle leaf), leaf_spheres in BVH order.
+- cwbvh: nodes (cwbvh.CWBVH_NODE), leaf_triangles and leaf_spheres in BVH order.
 
-A scene without any primitive has, in a tree layout, a root that no ray gets past: its children's boxes are inverted.
-See Wide for what that asks of the slab test.
+A BVH layout of a scene without primitives has a root that no ray gets past: its children's boxes are inverted. See Wide
+for what that requires of the slab test.
 """
 
 from __future__ import annotations
@@ -36,42 +36,43 @@ Records = NDArray[np.void]
 
 #: Children of a wide node, and triangles of its packs.
 LANES = 8
-#: Triangles of a pack where there is no tree.
+#: Triangles per pack without a BVH.
 PACK = 16
 
 #: `count`: 0 in an interior node, n in a leaf of n triangles, −n in a leaf of n spheres. `left_first`: the leaf's first
-#: record, or the left child: always even, so that two siblings share 64 bytes (node 1, beside the root, is unused).
+#: record, or the left child: always even, so that two siblings share 64 bytes (node 1, next to the root, is unused).
 BVH2_NODE = np.dtype([("aabb_min", "f4", 3), ("left_first", "i4"), ("aabb_max", "f4", 3), ("count", "i4")])
-#: `child` as in Wide, but the `first` of a triangle leaf is its pack.
+#: `child` as in Wide, but the `first` of a triangle leaf is the index of its pack.
 BVH8_NODE = np.dtype([("lo", "f4", (3, LANES)), ("hi", "f4", (3, LANES)), ("child", "i4", LANES), ("pad", "i4", LANES)])
 LEAF_TRIANGLE = np.dtype([("p0", "f4", 3), ("primitive", "i4"), ("p1", "f4", 3), ("pad1", "i4"),
                           ("p2", "f4", 3), ("pad2", "i4")])
-#: A triangle's box is larger than it by this part of its longest side: its test moves corners by a few roundings of how
-#: far they are from the ray's origin, and a sliver's are far from where it is hit. Also in kernels/build/primitives.cl.
+#: Padding of a triangle's box, as a fraction of its longest side: the test moves corners by a few roundings of their
+#: distance from the ray's origin, and a sliver's corners may be far from the hit point. Also in
+#: kernels/build/primitives.cl.
 TRIANGLE_PAD = 2.0**-21
 #: Unused lanes have NaN vertices and primitive −1.
 TRIANGLE_PACK = np.dtype([("p0", "f4", (3, LANES)), ("p1", "f4", (3, LANES)), ("p2", "f4", (3, LANES)),
                           ("primitive", "i4", LANES)])
-#: lo, hi: the box of its triangles. Of the whole list: its greatest coordinate, by amount, and how many packs it has.
+#: lo, hi: the box of its triangles. extent, count: of all packs, the largest absolute coordinate and their number.
 LONE_PACK = np.dtype([("p0", "f4", (3, PACK)), ("p1", "f4", (3, PACK)), ("p2", "f4", (3, PACK)),
                       ("primitive", "i4", PACK), ("lo", "f4", 3), ("hi", "f4", 3), ("extent", "f4"), ("count", "i4"),
                       ("pad", "f4", PACK - 8)])
 LEAF_SPHERE = np.dtype([("center", "f4", 3), ("radius", "f4"), ("primitive", "i4"), ("pad", "i4", 3)])
 
-#: Primitives of a leaf whose primitives are intersected one by one; Nadolny 2026, 5.4.4 for the midpoint.
+#: Maximum primitives per leaf if they are intersected one by one; Nadolny 2026, 5.4.4 for the midpoint.
 LEAF_SIZES = {"sah": 4, "midpoint": 2}
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """A scene's primitives and the tree over them, ready to be copied to a device or already there.
+    """A scene's primitives and the BVH over them, ready to be copied to a device or already there.
 
-    buffers: by name, records in an array of numpy's or, from a builder on the device, in a DeviceArray.
-    stack: entries that a traversal's stack needs (see Tree.stack_bound), 0 without a tree. builder: its name.
-    depth and sah_cost are those of the tree that is traversed; build_seconds includes the packing. work: sah_cost, or
-    what finds it, for trees that lie on a device.
-    level_sizes: how many nodes each level has, from the root, if they stand level by level in `nodes`; else ().
-    peak_bytes: the most that a builder on the device had there at a time, 0 for one in numpy.
+    buffers: records by name, in a numpy array or, from a builder on the device, in a DeviceArray.
+    stack: stack entries that a traversal needs (see Tree.stack_bound), 0 without a BVH. builder: its name.
+    depth and sah_cost are those of the traversed BVH; build_seconds includes packing. work: sah_cost, or a function
+    that computes it, for BVHs in device memory.
+    level_sizes: number of nodes per level, from the root, if `nodes` is in level order; else ().
+    peak_bytes: peak memory of a builder on the device, 0 for one in numpy.
     """
 
     name: str
@@ -87,25 +88,25 @@ class Layout:
 
     @cached_property
     def sah_cost(self) -> float:
-        """Expected work of a ray that meets the root's box, see Tree.sah_cost."""
+        """Return the expected cost of a ray that hits the root's box, see Tree.sah_cost."""
         return self.work() if callable(self.work) else self.work
 
     @property
     def bytes(self) -> int:
-        """Size of all buffers."""
+        """Return the size of all buffers in bytes."""
         return sum(records.nbytes for records in self.buffers.values())
 
 
-#: What is packed where no ray is followed.
+#: Placeholder if no rays are traced.
 NO_RAYS = Layout("none", {}, stack=0, nodes=0, depth=0, work=0.0)
 
 
 def pack(layout: str, builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
-    """Build a tree and pack it.
+    """Build a BVH and pack it.
 
-    layout: a name in LAYOUTS; builder: a name in BUILDERS (which a list does not use). triangles: (m, 3, 3) float32
+    layout: a name in LAYOUTS; builder: a name in BUILDERS (unused by list and packs). triangles: (m, 3, 3) float32
     corners; spheres: (s, 4) float32 centre and radius; all finite. Raises UsageError for an unknown name, and
-    SceneError for more primitives than the layout can count.
+    SceneError for more primitives than the layout supports.
     """
     check_choice("layout", layout, LAYOUTS)
     check_choice("builder", builder, BUILDERS)
@@ -157,7 +158,8 @@ def _bvh8(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
 
 
 def _cwbvh(builder: str, triangles: FloatArray, spheres: FloatArray) -> Layout:
-    # A leaf at the price of a node, whatever it holds: a third fewer nodes than at one a triangle, and no slower.
+    # A leaf costs as much as a node, regardless of its size: a third fewer nodes than at a cost of 1 per triangle, and
+    # as fast.
     tree = compress(_tree(builder, triangles, spheres, MAX_LEAF, MAX_LEAF))
     buffers = _filled(leaf_triangles=_leaf_triangles(triangles, tree.order),
                       leaf_spheres=leaf_spheres(spheres, tree.sphere_order, len(triangles)))
@@ -170,14 +172,14 @@ LAYOUTS: dict[str, Callable[[str, FloatArray, FloatArray], Layout]] = {
 
 
 def _tree(builder: str, triangles: FloatArray, spheres: FloatArray, leaf_size: int, lanes: int) -> Tree:
-    """One tree over both kinds; triangles are intersected `lanes` at a time, spheres one by one."""
+    """Build one BVH over both kinds; triangles are intersected `lanes` at a time, spheres one by one."""
     build = BUILDERS[builder]
     return join(build(*triangle_boxes(triangles), leaf_size, lanes),
                 build(*sphere_boxes(spheres), min(LEAF_SIZES[builder], leaf_size), 1))
 
 
 def triangle_boxes(triangles: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """aabb_min, aabb_max (m, 3) float32 around triangles (m, 3, 3) as their test sees them: see TRIANGLE_PAD."""
+    """Return aabb_min, aabb_max (m, 3) float32 of triangles (m, 3, 3), padded for their test: see TRIANGLE_PAD."""
     p0, p1, p2 = triangles.transpose(1, 0, 2)
     low, high = np.minimum(np.minimum(p0, p1), p2), np.maximum(np.maximum(p0, p1), p2)
     pad = TRIANGLE_PAD * (high - low).max(axis=1, keepdims=True, initial=0).astype(np.float64)
@@ -185,7 +187,7 @@ def triangle_boxes(triangles: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def sphere_boxes(spheres: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """aabb_min, aabb_max (s, 3) float32, finite, that contain the spheres (s, 4): rounded outward."""
+    """Return aabb_min, aabb_max (s, 3) float32, finite, that contain the spheres (s, 4): rounded outward."""
     center, radius = spheres[:, :3].astype(np.float64), spheres[:, 3:].astype(np.float64)
     far = np.finfo(np.float32).max
     inside = np.nextafter(far, np.float32(0))
@@ -200,7 +202,7 @@ def _level_sizes(tree: Tree | Wide) -> tuple[int, ...]:
 
 
 def bvh2_nodes(tree: Tree) -> Records:
-    """Nodes of the layout bvh2."""
+    """Return the nodes of the layout bvh2."""
     links = np.where(tree.leaf, tree.left_first, tree.left_first + (tree.left_first > 0))
     nodes = np.zeros(1 + len(tree.count), BVH2_NODE)
     for name, values in (("aabb_min", tree.aabb_min), ("aabb_max", tree.aabb_max), ("left_first", links),
@@ -211,7 +213,7 @@ def bvh2_nodes(tree: Tree) -> Records:
 
 
 def wide_nodes(wide: Wide, child: IntArray) -> Records:
-    """Nodes of the layout bvh8 with the boxes of `wide` and references `child` (k, 8)."""
+    """Return the nodes of the layout bvh8 with the boxes of `wide` and references `child` (k, 8)."""
     nodes = np.zeros(len(child), BVH8_NODE)
     nodes["lo"], nodes["hi"] = wide.aabb_min.transpose(0, 2, 1), wide.aabb_max.transpose(0, 2, 1)
     nodes["child"] = child
@@ -231,7 +233,7 @@ def _leaf_triangles(triangles: FloatArray, order: IntArray) -> Records:
 
 
 def leaf_spheres(spheres: FloatArray, order: IntArray, first_primitive: int) -> Records:
-    """LEAF_SPHERE records of spheres (s, 4) float32 in this order; their primitives begin at `first_primitive`."""
+    """Return LEAF_SPHERE records of spheres (s, 4) float32 in this order, numbered from `first_primitive` on."""
     records = np.zeros(len(order), LEAF_SPHERE)
     records["center"], records["radius"] = spheres[order, :3], spheres[order, 3]
     records["primitive"] = first_primitive + order
@@ -240,7 +242,7 @@ def leaf_spheres(spheres: FloatArray, order: IntArray, first_primitive: int) -> 
 
 def _filled_packs(dtype: np.dtype[np.void], triangles: FloatArray, order: IntArray, first: IntArray,
                   count: IntArray) -> Records:
-    """Triangles order[first:first + count] of each leaf as a pack."""
+    """Pack the triangles order[first:first + count] of each leaf."""
     lane = np.arange(dtype["primitive"].shape[0], dtype=np.int32)
     live = lane < count[:, None]
     primitive = np.where(live, order[np.where(live, first[:, None] + lane, 0)], -1)

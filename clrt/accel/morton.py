@@ -1,4 +1,4 @@
-"""Primitives brought into the order of a space-filling curve on the device (kernels/build/morton.cl, sort.cl)."""
+"""Sort primitives along a space-filling curve on the device (kernels/build/morton.cl, sort.cl)."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from ..device.blocks import Blocks
 from .tree import FloatArray, Triangles
 
 CODE_BITS, DIGIT_BITS = 63, 8
-#: Cells along the longest extent of the centres, less one.
+#: Number of cells along the longest extent of the centres, minus one.
 CELLS = (1 << CODE_BITS // 3) - 1
-#: Floats of a primitive.
+#: Floats per primitive.
 SHAPE = 9
 
 
 @dataclass(frozen=True, eq=False)
 class Primitives:
-    """Triangles and spheres on the device, neighbours close together.
+    """Triangles and spheres on the device in Morton order.
 
-    shapes: (count, 9) float32, corners, or centre and radius. ids: (count,) uint32, their numbers in the scene, whose
+    shapes: (count, 9) float32, corners, or centre and radius. ids: (count,) uint32, their numbers in the scene, where
     triangles come first.
     """
 
@@ -33,7 +33,7 @@ class Primitives:
 
     @property
     def arguments(self) -> Sequence[cl.Buffer | int]:
-        """What stands for PRIMITIVE_PARAMETERS."""
+        """Return the kernel arguments for PRIMITIVE_PARAMETERS."""
         return self.shapes, self.ids, self.triangle_count
 
 
@@ -41,7 +41,7 @@ Scene = tuple[cl.Buffer, cl.Buffer, int]  # triangles, spheres, and how many tri
 
 
 def sort_primitives(work: Blocks, triangles: Triangles, spheres: FloatArray) -> Primitives:
-    """Triangles and spheres (s, 4), float32, along a Morton curve through the centres of their boxes."""
+    """Sort triangles and spheres (s, 4), float32, along a Morton curve through the centres of their boxes."""
     count = len(triangles) + len(spheres)
     scene = work.lend(np.asarray(triangles)), work.lend(spheres), len(triangles)
     try:
@@ -55,7 +55,7 @@ def sort_primitives(work: Blocks, triangles: Triangles, spheres: FloatArray) -> 
 
 
 def _morton_order(work: Blocks, scene: Scene, count: int) -> cl.Buffer:
-    """(count,) uint32, numbers of the primitives."""
+    """Return the primitives' numbers in Morton order, (count,) uint32."""
     low, extent = _centre_bounds(work, scene, count)
     scale = min(CELLS / extent, float(np.finfo(np.float32).max)) if extent > 0 else 0.0
     codes, ids = work.empty(np.uint64, count), work.empty(np.uint32, count)
@@ -66,7 +66,7 @@ def _morton_order(work: Blocks, scene: Scene, count: int) -> cl.Buffer:
 
 
 def radix_sort(work: Blocks, codes: cl.Buffer, values: cl.Buffer, count: int) -> tuple[cl.Buffer, cl.Buffer]:
-    """Codes, uint64 below 2^CODE_BITS, in order, with their values, uint32; stable. Frees the arrays that it takes."""
+    """Sort codes, uint64 below 2^CODE_BITS, with their values, uint32; stable. Frees the given arrays."""
     blocks = work.number(count)
     digits = work.empty(np.uint32, blocks << DIGIT_BITS)
     other_codes, other_values = work.empty(np.uint64, count), work.empty(np.uint32, count)
@@ -80,7 +80,7 @@ def radix_sort(work: Blocks, codes: cl.Buffer, values: cl.Buffer, count: int) ->
 
 
 def _centre_bounds(work: Blocks, scene: Scene, count: int) -> tuple[FloatArray, float]:
-    """Twice the lowest centre (3,) float32, and twice the largest extent of the centres."""
+    """Return twice the minimum of the centres (3,) float32, and twice their largest extent."""
     blocks = work.number(count)
     partial = work.empty(np.float32, 6 * blocks)
     work.run("centre_bounds", count, *scene, partial)

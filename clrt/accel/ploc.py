@@ -1,4 +1,4 @@
-"""Binary trees made on the device, by parallel locally-ordered clustering (kernels/build/ploc.cl)."""
+"""Binary BVH construction on the device by parallel locally-ordered clustering, PLOC (kernels/build/ploc.cl)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..device.records import record
 from .morton import Primitives
 
 BINARY_NODE = record(lo="3f4", left="i4", hi="3f4", right="i4")
-#: How far clusters look for partners, as in ploc.cl.
+#: Search radius for nearest clusters, as in ploc.cl.
 RADIUS = 8
-#: One work-group does the rounds of so FEW clusters. A round that joins fewer than one in SLOW is followed by one that
-#: halves them, as in ploc.cl.
+#: Up to FEW clusters, one work-group runs the remaining rounds. A round that merges fewer than one in SLOW clusters is
+#: followed by one that halves them, as in ploc.cl.
 FEW, SLOW = 2048, 16
 
 
@@ -24,7 +24,7 @@ FEW, SLOW = 2048, 16
 class BinaryTree:
     """Nodes of BINARY_NODE, one fewer than primitives, the root last; a child >= 0 is a node, ~p < 0 is primitive p.
 
-    rounds: how many nodes each round made, one after another: their children are from the rounds before.
+    rounds: how many nodes each round made, in order: their children are from earlier rounds.
     """
 
     nodes: cl.Buffer
@@ -32,12 +32,12 @@ class BinaryTree:
 
     @property
     def count(self) -> int:
-        """How many nodes there are."""
+        """Return the number of nodes."""
         return sum(self.rounds)
 
 
 def cluster(work: Blocks, primitives: Primitives) -> BinaryTree:
-    """The tree over at least two primitives."""
+    """Build the binary BVH over at least two primitives."""
     clusters = primitives.count
     now, later = _columns(work, clusters), None
     nearest, nodes = work.empty(np.int8, clusters), work.empty(BINARY_NODE, clusters - 1)
@@ -57,7 +57,7 @@ def cluster(work: Blocks, primitives: Primitives) -> BinaryTree:
         rounds.append(joined)
         clusters, now, later = stay, later, now
     later = later or _columns(work, clusters)
-    # Not even every second round joins fewer than one in SLOW.
+    # In at most every second round are fewer than one in SLOW clusters merged.
     most = 4 + int(math.log(FEW) / -math.log(1 - 1 / SLOW))
     made = work.empty(np.uint32, 1 + most)
     work.run_together("last_rounds", clusters, int(forced), nearest, *now, *later, nodes, sum(rounds), made)
@@ -67,6 +67,6 @@ def cluster(work: Blocks, primitives: Primitives) -> BinaryTree:
 
 
 def _columns(work: Blocks, count: int) -> tuple[cl.Buffer, int]:
-    """Room for the columns of `count` clusters, and how far apart its rows are."""
+    """Allocate the columns of `count` clusters; return them with the pitch of their rows."""
     pitch = count + 2 * RADIUS
     return work.empty(np.float32, 7 * pitch), pitch

@@ -1,4 +1,4 @@
-"""Trees whose vertices move: new boxes from the leaves up, in a tree that stays as it is (kernels/build/refit.cl)."""
+"""Refit a BVH to moved vertices: boxes are recomputed bottom-up, and its topology stays (kernels/build/refit.cl)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .wide import EMPTY
 
 
 class Recipe(NamedTuple):
-    """How a layout is refitted. file: refits a level; node, leaf: its records; leaves: the buffer of leaves.
+    """How a layout is refitted. file: the kernel for a level; node, leaf: its records; leaves: the buffer of leaves.
 
     gap: unused nodes between the root and the level below it.
     """
@@ -34,7 +34,7 @@ RECIPES = {"bvh8": Recipe("build/refit_bvh8.cl", BVH8_NODE, TRIANGLE_PACK, "pack
 
 
 def can_refit(tree: Layout) -> bool:
-    """Whether there is a way: a layout of RECIPES, its nodes level by level, and corners in its leaves, no spheres."""
+    """Return whether the BVH can be refitted: a layout in RECIPES, in level order, leaves with corners, no spheres."""
     if tree.name not in RECIPES or not tree.level_sizes or "leaf_spheres" in tree.buffers:
         return False
     recipe = RECIPES[tree.name]
@@ -42,7 +42,7 @@ def can_refit(tree: Layout) -> bool:
 
 
 class Refitter:
-    """Refits one tree, whose buffers are on the device, over faces (m, 3) int32 and n vertices."""
+    """Refitter of one BVH, whose buffers are on the device, over faces (m, 3) int32 and n vertices."""
 
     def __init__(self, device: Device, tree: Layout, faces: IntArray, vertices: int) -> None:
         self._device, self._recipe = device, RECIPES[tree.name]
@@ -52,7 +52,7 @@ class Refitter:
         self._tree = [tree.buffers[name].buffer for name in ("nodes", self._recipe.leaves)]
 
     def refit(self, vertices: FloatArray) -> None:
-        """Writes new boxes and corners into the tree's buffers. vertices: (n, 3), finite, in the tree's unit."""
+        """Write new boxes and corners into the BVH's buffers. vertices: (n, 3), finite, in the BVH's unit."""
         self._vertices.write(self._device, vertices.reshape(-1))
         end = sum(self._levels)
         for level in reversed(range(len(self._levels))):
@@ -63,7 +63,7 @@ class Refitter:
 
 
 def program_source(layout: str) -> str:
-    """The program that refits trees of a layout."""
+    """Return the program that refits BVHs of a layout."""
     recipe = RECIPES[layout]
     preamble = [defines({"EMPTY": EMPTY, "TRIANGLES": 1, "SPHERES": 0}),
                 typedefs({"Node": recipe.node, "Triangles": recipe.leaf})]

@@ -1,4 +1,4 @@
-"""Better binary trees on the device: subtrees are put in where they belong (kernels/build/reinsert.cl, levels.cl)."""
+"""Optimise a binary BVH on the device by parallel reinsertion of subtrees (kernels/build/reinsert.cl, levels.cl)."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from .morton import Primitives
 from .ploc import BINARY_NODE, BinaryTree
 
 MOVE = record(moved="i4", target="i4", pivot="i4", gain="f4")
-#: Of so many nodes from the root down the children are tried at other places: one of ten.
+#: Reinsertion is tried for the children of one in TOPMOST nodes, from the root down.
 TOPMOST = 10
-#: How often moves that others kept from being made compete again.
+#: How often moves that lost to conflicting moves compete again.
 ROUNDS = 3
 STEPS = 5
-#: Trees that are less deep may become so deep.
+#: Shallower BVHs may grow to this depth.
 DEEP = 64
 
 
 @dataclass(frozen=True, eq=False)
 class Leveled:
-    """A tree in the order of its levels, root last, with the parents of all nodes and then all primitives.
+    """A BVH in level order, root last, with the parents of all nodes and then of all primitives.
 
     parents: (nodes + primitives,) uint32. levels: (nodes,) uint32, depth | height << 16.
     """
@@ -35,9 +35,9 @@ class Leveled:
 
 
 def reinsert(work: Blocks, primitives: Primitives, tree: BinaryTree, passes: int) -> BinaryTree:
-    """The tree after some passes, in each of which subtrees are moved to where the sum of areas falls. Frees `tree`.
+    """Return the BVH after some passes of moving subtrees to reduce the sum of surface areas. Frees `tree`.
 
-    A pass never raises the sum. Leaves come to lie at most 1.5 times as deep as they did, or as DEEP.
+    A pass never increases the sum. Leaves become at most 1.5 times as deep as they were, or DEEP.
     """
     leveled = _level(work, primitives, tree)
     deepest = max(DEEP, len(leveled.tree.rounds))
@@ -50,7 +50,7 @@ def reinsert(work: Blocks, primitives: Primitives, tree: BinaryTree, passes: int
 
 
 def _level(work: Blocks, primitives: Primitives, tree: BinaryTree) -> Leveled:
-    """A tree whose boxes and whose order may be wrong, but whose root is its last node; it is freed."""
+    """Sort a BVH into level order and recompute its boxes; frees `tree`, whose root must be its last node."""
     root, listed = tree.count - 1, work.empty(np.uint32, tree.count)
     nodes, levels = work.empty(BINARY_NODE, tree.count), work.empty(np.uint32, tree.count)
     parents = work.empty(np.uint32, tree.count + primitives.count)
@@ -73,7 +73,7 @@ def _level(work: Blocks, primitives: Primitives, tree: BinaryTree) -> Leveled:
 
 
 def _move(work: Blocks, primitives: Primitives, leveled: Leveled, deepest: int) -> None:
-    """Finds moves and makes those that win over others; the boxes are then wrong."""
+    """Find moves and apply those that win over conflicting ones; the boxes are then out of date."""
     tree = leveled.tree
     places, count = tree.count + primitives.count, 2 * -(-tree.count // TOPMOST)
     arguments = tree.nodes, leveled.parents, leveled.levels, tree.count - 1

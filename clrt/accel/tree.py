@@ -15,7 +15,7 @@ BoolArray = NDArray[np.bool_]
 
 
 class Triangles(Protocol):
-    """(m, 3, 3) float32 corners: an array, or what makes one when numpy asks, so that nobody has to keep it."""
+    """(m, 3, 3) float32 corners: an array, or an object that creates one on conversion, to save memory."""
 
     def __len__(self) -> int: ...
 
@@ -26,12 +26,12 @@ class Triangles(Protocol):
 class Tree:
     """A binary BVH in flat arrays (Nadolny 2026, 5.4.4). Node 0 is the root; children come after their parent.
 
-    A tree over p primitives has at most 2p − 1 nodes. The tree over nothing is one interior node that is its own child
-    and whose box is inverted (min +inf, max −inf), so that no ray enters it.
+    A BVH over p primitives has at most 2p − 1 nodes. The empty BVH is one interior node that is its own child and whose
+    box is inverted (min +inf, max −inf), so that no ray enters it.
 
     aabb_min, aabb_max: (n, 3) float32. count: (n,) int32, primitives of a leaf, 0 for an interior node.
     left_first: (n,) int32, the left child (the right one is next to it), or the leaf's first entry in its order.
-    spheres: (n,) bool, the leaf's entries are in `sphere_order` and not in `order`.
+    spheres: (n,) bool, whether the leaf's entries are in `sphere_order` instead of `order`.
     order, sphere_order: (p,) and (s,) int32, permutations of the triangles and of the spheres.
     """
 
@@ -45,16 +45,16 @@ class Tree:
 
     @property
     def empty(self) -> bool:
-        """Whether there are no primitives."""
+        """Return whether there are no primitives."""
         return self.order.size + self.sphere_order.size == 0
 
     @property
     def leaf(self) -> BoolArray:
-        """(n,) bool."""
+        """Return which nodes are leaves, (n,) bool."""
         return self.count > 0
 
     def levels(self) -> Iterator[IntArray]:
-        """Node indices, level by level from the root."""
+        """Yield node indices, level by level from the root."""
         nodes = np.zeros(1, np.int32)
         while nodes.size:
             yield nodes
@@ -63,52 +63,52 @@ class Tree:
 
     @property
     def depth(self) -> int:
-        """Edges from the root to the deepest leaf."""
+        """Return the number of edges from the root to the deepest leaf."""
         return sum(1 for _ in self.levels()) - 1
 
     @property
     def stack_bound(self) -> int:
-        """The most entries on the stack of a traversal that pushes both children of a node and then pops the next one.
+        """Return the maximum stack size of a traversal that pushes both children of a node and then pops the next one.
 
-        One fewer if it keeps the next one in a register. Exact: a node at depth d is popped with at most d entries
-        left, a sibling a level, and the deepest interior node, at `depth` − 1, then pushes two.
+        One fewer if it keeps the next one in a register. The bound is tight: a node at depth d is popped with at most d
+        entries left, one sibling per level, and the deepest interior node, at `depth` − 1, then pushes two.
         """
         return self.depth + 1
 
     def sah_cost(self, pack: int = 1) -> float:
-        """Expected work of a ray that meets the root's box (Nadolny 2026, 2.7): 1 a node and 1 an intersection.
+        """Return the expected cost of a ray that hits the root's box (Nadolny 2026, 2.7): 1 per node, 1 per test.
 
-        `pack` triangles of a leaf are intersected at the price of one; spheres are not packed.
+        `pack` triangles of a leaf are intersected at the cost of one; spheres are not packed.
         """
         return expected_work(half_area(self.aabb_min, self.aabb_max),
                              np.where(self.leaf, intersections(self.count, self.spheres, pack), not self.empty))
 
 
 def intersections(count: IntArray, spheres: BoolArray, pack: int) -> IntArray:
-    """Intersection tests that leaves cost, `pack` triangles or one sphere a test."""
+    """Return the number of intersection tests per leaf, with `pack` triangles or one sphere per test."""
     return -(-count // np.where(spheres, np.int32(1), np.int32(pack)))
 
 
 def half_area(aabb_min: FloatArray, aabb_max: FloatArray) -> NDArray[np.float64]:
-    """Half the surface of boxes, (..., 3) float32 to (...); 0 for inverted ones. No float32 box overflows float64."""
+    """Return half the surface area of boxes, (..., 3) float32 to (...); 0 if inverted. float64, so none overflows."""
     x, y, z = np.moveaxis(np.maximum(aabb_max.astype(np.float64) - aabb_min, 0), -1, 0)
     area: NDArray[np.float64] = x * y + y * z + z * x
     return area
 
 
 def expected_work(area: NDArray[np.float64], work: NDArray[Any]) -> float:
-    """Sum of work (n,) weighted by area (n,) over the first one's; unweighted where that is 0."""
+    """Return the sum of work (n,) weighted by area (n,) relative to the first one's; unweighted if that is 0."""
     return float(np.sum(area / area[0] * work) if area[0] > 0 else np.sum(work))
 
 
 def empty_tree() -> Tree:
-    """The tree over nothing."""
+    """Return the BVH without primitives."""
     nothing, zero, inverted = np.empty(0, np.int32), np.zeros(1, np.int32), np.full((1, 3), np.inf, np.float32)
     return Tree(inverted, -inverted, zero, zero, np.zeros(1, bool), nothing, nothing)
 
 
 def join(triangles: Tree, spheres: Tree) -> Tree:
-    """One tree over triangles and spheres: a new root above the two, so that every leaf holds one kind only.
+    """Join the BVHs of triangles and spheres under a new root, so that every leaf has one kind only.
 
     Both come from a builder, which fills `order`; the second one's primitives are spheres.
     """

@@ -1,7 +1,7 @@
-"""Triangles in leaves as some tests want them stored, made of the corners that every builder writes.
+"""Leaf triangles in the precomputed forms of some intersection tests, from the corners that every builder writes.
 
-The records stand beside those in `layouts`. They are computed in float64 and rounded once. A triangle without an area,
-or an unused lane of a pack, becomes one that no ray meets.
+They replace the records of `layouts`. They are computed in float64 and rounded once. A triangle without area, or an
+unused lane of a pack, becomes one that no ray hits.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from ..device.open import Device
 from .layouts import LANES, Layout, Records
 
 Doubles = NDArray[np.float64]
-#: Records at a time.
+#: Records converted at a time.
 CHUNK = 1 << 16
 
 PRECOMPUTED_TRIANGLE = np.dtype([("p0", "f4", 3), ("primitive", "i4"), ("e1", "f4", 3), ("pad1", "i4"),
                                  ("e2", "f4", 3), ("pad2", "i4"), ("n", "f4", 3), ("pad3", "i4")])
 PRECOMPUTED_PACK = np.dtype([("p0", "f4", (3, LANES)), ("e1", "f4", (3, LANES)), ("e2", "f4", (3, LANES)),
                              ("n", "f4", (3, LANES)), ("primitive", "i4", LANES)])
-#: All twelve numbers of the map, though one column is always (0, 0, 1): which one differs between the triangles of a
-#: pack, where nine numbers would ask for more selections than they save products.
+#: All twelve entries of the transform, though one column is always (0, 0, 1): it differs between the triangles of a
+#: pack, for which nine entries would need more selections than they save products.
 BALDWIN_WEBER_TRIANGLE = np.dtype([("u", "f4", 4), ("v", "f4", 4), ("w", "f4", 4), ("primitive", "i4"),
                                    ("pad", "i4", 3)])
 BALDWIN_WEBER_PACK = np.dtype([("u", "f4", (4, LANES)), ("v", "f4", (4, LANES)), ("w", "f4", (4, LANES)),
@@ -35,15 +35,16 @@ BALDWIN_WEBER_PACK = np.dtype([("u", "f4", (4, LANES)), ("v", "f4", (4, LANES)),
 
 
 def _precomputed(p0: Doubles, p1: Doubles, p2: Doubles) -> dict[str, Doubles]:
-    """Suchiński 2022, eq. 3.7: the edges and their product."""
+    """Return the edges and their cross product: Suchiński 2022, eq. 3.7."""
     e1, e2 = p1 - p0, p2 - p0
     return {"p0": p0, "e1": e1, "e2": e2, "n": _cross(e1, e2)}
 
 
 def _baldwin_weber(p0: Doubles, p1: Doubles, p2: Doubles) -> dict[str, Doubles]:
-    """Baldwin and Weber 2016: rows of the map that takes p0 to the origin, e1 to u, e2 to v, and `free` to w.
+    """Return the rows of Baldwin and Weber's transform (2016): p0 to the origin, e1 to u, e2 to v, and `free` to w.
 
-    free: the axis on which the normal is largest. The rows of the inverse of (e1, e2, free), and the shift by −p0.
+    free: the axis on which the normal is largest. The rows are those of the inverse of (e1, e2, free), with a shift by
+    −p0.
     """
     e1, e2 = p1 - p0, p2 - p0
     n = _cross(e1, e2)
@@ -54,9 +55,9 @@ def _baldwin_weber(p0: Doubles, p1: Doubles, p2: Doubles) -> dict[str, Doubles]:
 
 
 class Form(NamedTuple):
-    """How a test wants its triangles. leaf, pack: the records. fields: their contents but for `primitive`.
+    """How a test stores its triangles. leaf, pack: the records. fields: computes their contents except for `primitive`.
 
-    fields takes p0, p1, p2 (n, 3) or, of packs, (n, 3, 8), and returns arrays (n, k) or (n, k, 8).
+    fields takes p0, p1, p2 (n, 3) or, for packs, (n, 3, 8), and returns arrays (n, k) or (n, k, 8).
     """
 
     leaf: np.dtype[np.void]
@@ -64,13 +65,13 @@ class Form(NamedTuple):
     fields: Callable[[Doubles, Doubles, Doubles], dict[str, Doubles]]
 
 
-#: By the name of the test; the others take corners.
+#: Forms by test; the other tests use corners.
 FORMS = {"precomputed": Form(PRECOMPUTED_TRIANGLE, PRECOMPUTED_PACK, _precomputed),
          "baldwin_weber": Form(BALDWIN_WEBER_TRIANGLE, BALDWIN_WEBER_PACK, _baldwin_weber)}
 
 
 def in_form(tree: Layout, triangle: str, device: Device | None) -> Layout:
-    """The tree with its triangles, corners so far, in the form of the test `triangle`; device: the buffers', if any."""
+    """Convert the BVH's triangles from corners to the form of the test `triangle`; device: the buffers', if any."""
     if triangle not in FORMS:
         return tree
     start, form = time.perf_counter(), FORMS[triangle]

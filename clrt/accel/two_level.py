@@ -1,6 +1,7 @@
-"""Trees of two levels: one a mesh, and above them one over instances, meshes that stand in the world by a transform.
+"""Two-level BVHs: one BVH per mesh (lower level), and one over instances (upper level), meshes placed by transforms.
 
-A ray is taken into the mesh's frame and walked through its tree there: ten thousand instances cost the memory of one.
+A ray is transformed to the mesh's object space and traverses its BVH there: ten thousand instances take the memory of
+one.
 """
 
 from __future__ import annotations
@@ -25,21 +26,22 @@ from .upper_level import FORMS, upper_level
 
 Doubles = NDArray[np.float64]
 
-#: to_object: rows of the transform from the world to the mesh's frame. root: the mesh's, in the array of all nodes.
-#: index: the host's of the instance.
+#: to_object: rows of the world-to-object transform. root: the mesh's root in the array of all nodes. index: of the
+#: instance on the host.
 INSTANCE = record(to_object="(3,4)f4", root="i4", index="i4", pad="2i4")
-#: Rounding of a coordinate's way to the object's frame and back: three products, their sum, the matrix itself.
+#: Relative rounding error of transforming a coordinate to object space and back: three products, their sum, the matrix
+#: itself.
 TRANSFORM_ROUNDING = 8 * 2.0**-24
 
 
 class TwoLevels:
-    """Trees of meshes on a device, and above them the tree over instances, which can be made anew.
+    """BVHs of meshes on a device, and above them the BVH over instances, which can be rebuilt.
 
-    meshes: triangles (m, 3, 3) each, all of sizes near 1. mesh: (k,) int32 indices of `meshes`, one an instance.
-    triangle: the test that the leaves are for. spheres: (s, 4), which stand in the last mesh's frame and are found with
-    it, their primitives after its own. Without a device the trees stay in numpy.
-    The upper level comes first in the array of nodes, in room for the largest one of so many instances.
-    Raises UsageError for a layout that has no upper level.
+    meshes: triangles (m, 3, 3) each, all of sizes near 1. mesh: (k,) int32 indices of `meshes`, one per instance.
+    triangle: the test that the leaves are for. spheres: (s, 4), in the last mesh's object space and part of its BVH,
+    with primitive numbers after its own. Without a device the BVHs stay in numpy.
+    The upper level comes first in the array of nodes, with room for the largest BVH over this many instances.
+    Raises UsageError for a layout that does not support an upper level.
     """
 
     def __init__(self, device: Device | None, layout: str, builder: str | None, meshes: Sequence[FloatArray],
@@ -62,15 +64,15 @@ class TwoLevels:
         self._seconds = time.perf_counter() - start
 
     def on(self, device: Device | None, buffers: dict[str, DeviceArray | NDArray[Any]]) -> TwoLevels:
-        """The same, with its buffers there."""
+        """Return a copy whose buffers are on `device`."""
         other = copy(self)
         other._device, other._buffers = device, buffers
         return other
 
     def place(self, to_world: Doubles) -> Layout:
-        """The tree with the instances where transforms to the world (k, 3, 4), none singular, put them.
+        """Return the BVH with the instances placed by object-to-world transforms (k, 3, 4), none singular.
 
-        Its buffers are those of the tree before, rewritten. build_seconds: of the lower level and this upper one.
+        Its buffers are those of the previous BVH, overwritten. build_seconds: of the lower level and this upper one.
         """
         start = time.perf_counter()
         upper, order = upper_level(self._form, *world_boxes(self._boxes[self._mesh], to_world))
@@ -79,13 +81,13 @@ class TwoLevels:
         instances["root"] = self._roots[self._mesh[order]]
         put(self._device, self._buffers["nodes"], upper.buffers["nodes"])
         put(self._device, self._buffers["instances"], instances)
-        # On the stack: what waits in the upper level, LEAVE, and what waits in the lower one.
+        # The stack holds the upper level's entries, LEAVE, and the lower level's entries.
         return replace(upper, buffers=self._buffers, stack=upper.stack + 1 + self._stack,
                        nodes=upper.nodes + self._nodes, depth=upper.depth + self._depth, builder=self._builder,
                        build_seconds=self._seconds + time.perf_counter() - start)
 
     def _joined(self, trees: Sequence[Layout]) -> tuple[dict[str, DeviceArray | NDArray[Any]], NDArray[np.int64]]:
-        """The buffers, with the trees' records one tree after another, and where their roots are, (m,)."""
+        """Return the buffers with the BVHs' records concatenated, and the indices of their roots, (m,)."""
         device, form = self._device, self._form
         first_node = form.room(len(self._mesh)) + _starts([len(tree.buffers["nodes"]) for tree in trees])
         first_leaf = _starts([len(tree.buffers.get(form.leaves, ())) for tree in trees])
@@ -104,7 +106,7 @@ class TwoLevels:
 
 
 def world_boxes(boxes: Doubles, to_world: Doubles) -> tuple[FloatArray, FloatArray]:
-    """aabb_min, aabb_max (k, 3) float32 around transformed boxes (k, 2, 3), and around what rounding makes of them."""
+    """Return aabb_min, aabb_max (k, 3) float32 of transformed boxes (k, 2, 3), padded for the transforms' rounding."""
     corners = np.stack([boxes[:, [x, y, z], [0, 1, 2]] for x in (0, 1) for y in (0, 1) for z in (0, 1)], axis=1)
     world = np.einsum("kij,kcj->kci", to_world[..., :3], corners) + to_world[:, None, :, 3]
     to_object = inverse(to_world)
@@ -116,17 +118,17 @@ def world_boxes(boxes: Doubles, to_world: Doubles) -> tuple[FloatArray, FloatArr
 
 
 def inverse(transforms: Doubles) -> Doubles:
-    """(k, 3, 4) inverses of affine transforms; LinAlgError where one is singular."""
+    """Return the inverses (k, 3, 4) of affine transforms. Raises LinAlgError if one is singular."""
     linear = np.linalg.inv(transforms[..., :3])
     return np.concatenate([linear, -linear @ transforms[..., 3:]], axis=-1)
 
 
 def _box(triangles: FloatArray, spheres: FloatArray) -> FloatArray:
-    """The box of a mesh and spheres (2, 3); of neither a point, whose tree no ray gets into."""
+    """Return the box of a mesh and spheres (2, 3); without either it is a point, whose BVH no ray enters."""
     points = np.concatenate([triangles.reshape(-1, 3), *sphere_boxes(spheres)])
     return np.stack([points.min(axis=0), points.max(axis=0)]) if len(points) else np.zeros((2, 3), np.float32)
 
 
 def _starts(sizes: Sequence[int]) -> NDArray[np.int64]:
-    """Where each of some ranges starts if they lie one after another, and where the last one ends."""
+    """Return the start of each of some consecutive ranges, and the end of the last."""
     return np.cumsum([0, *sizes], dtype=np.int64)

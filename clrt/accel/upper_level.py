@@ -1,4 +1,4 @@
-"""The upper level of two: a tree over boxes whose leaves are instances, in each layout that has one."""
+"""The upper level of a two-level BVH: a BVH over boxes with instances as leaves, for each layout that supports one."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from .wide import EMPTY, collapse, leaf_fields
 
 
 class Form(NamedTuple):
-    """What two levels ask of a layout.
+    """Requirements of two-level BVHs on a layout.
 
-    node: its record. leaves: the buffer of leaves. room: the most nodes of a tree over so many instances.
-    pack: the tree whose leaves hold an instance each, and which instance a leaf's number stands for, (k,).
-    shift: adds to all references to nodes and to leaf records of triangles, in place; references to spheres count from
-    the first one, but in cwbvh from the first triangle, and so are to be shifted with the last tree's triangles.
+    node: its record. leaves: the buffer of leaves. room: the maximum number of nodes of a BVH over this many instances.
+    pack: packs a BVH with one instance per leaf; also returns the instance for each leaf number, (k,).
+    shift: adds offsets to all references to nodes and to leaf records of triangles, in place. References to spheres
+    count from the first sphere and stay, but in cwbvh from the first triangle, and so move with the last mesh's
+    triangles.
     """
 
     node: np.dtype[np.void]
@@ -32,7 +33,7 @@ class Form(NamedTuple):
 
 
 def upper_level(form: Form, aabb_min: FloatArray, aabb_max: FloatArray) -> tuple[Layout, IntArray]:
-    """The tree over k instances' boxes (k, 3), with the buffer `nodes` alone, and its order as in Form.pack."""
+    """Return the BVH over k instances' boxes (k, 3), with only the buffer `nodes`, and its order as in Form.pack."""
     tree = BUILDERS["sah"](aabb_min, aabb_max, 1, 1)
     leaves = tree.left_first.copy()
     leaves[tree.leaf] = tree.order[leaves[tree.leaf]]
@@ -53,7 +54,7 @@ def _bvh8(tree: Tree) -> tuple[Layout, IntArray]:
 
 def _cwbvh(tree: Tree) -> tuple[Layout, IntArray]:
     packed = compress(tree)
-    # One more on the stack: while a node's instances are visited, all nodes below it wait.
+    # One more stack entry: while a node's instances are visited, all of its child nodes are on the stack.
     layout = Layout("cwbvh", {"nodes": packed.nodes}, packed.stack + 1, len(packed.nodes), packed.wide.depth,
                     packed.wide.sah_cost())
     return layout, packed.order
@@ -84,7 +85,7 @@ def _binary_room(instances: int) -> int:
     return max(2, 2 * instances)  # with the unused node 1; even, so that siblings below stay side by side
 
 
-#: By layout.
+#: Forms by layout.
 FORMS = {"bvh2": Form(BVH2_NODE, "leaf_triangles", _binary_room, _bvh2, _shift_bvh2),
          "bvh8": Form(BVH8_NODE, "packs", _wide_room, _bvh8, _shift_bvh8),
          "cwbvh": Form(CWBVH_NODE, "leaf_triangles", _wide_room, _cwbvh, _shift_cwbvh)}

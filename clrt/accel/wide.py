@@ -1,4 +1,4 @@
-"""Wide trees: each node holds the boxes of up to eight children, to be met by a ray together."""
+"""Wide BVHs: each node has the boxes of up to eight children, which a ray tests together."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import SceneError
 from .tree import BoolArray, FloatArray, IntArray, Tree, expected_work, half_area, intersections
 
-#: The child of an unused slot; used slots come first.
+#: Child reference of an unused slot; used slots come first.
 EMPTY = 0x7FFFFFFF
 #: A leaf reference has 27 bits for the first primitive, 1 for its kind, 3 for the count.
 MAX_PRIMITIVES = 1 << 27
@@ -22,11 +22,11 @@ MAX_LEAF = 8
 class Wide:
     """A wide BVH of k nodes in breadth-first order, the root first.
 
-    aabb_min, aabb_max: (k, width, 3) float32, the children's boxes; inverted (min +inf, max −inf) in unused slots.
-    Such a box is never hit if near and far planes are chosen by the signs of the ray's direction; the min and max of
-    the distances to both would take it for all of space.
+    aabb_min, aabb_max: (k, width, 3) float32, the children's boxes; inverted (min +inf, max −inf) in unused slots. Such
+    a box is never hit if near and far planes are selected by the signs of the ray's direction; with the min and max of
+    the distances to both planes it would be all of space.
     child: (k, width) int32: a node's index, ~(first << 4 | sphere << 3 | count − 1) for a leaf, EMPTY if unused.
-    order, sphere_order: what the `first` of a leaf counts in, as in the binary tree.
+    order, sphere_order: the orders that a leaf's `first` indexes, as in the binary BVH.
     """
 
     aabb_min: FloatArray
@@ -37,12 +37,12 @@ class Wide:
 
     @property
     def interior(self) -> BoolArray:
-        """(k, width) bool, slots that hold a node."""
+        """Return which slots hold a node, (k, width) bool."""
         used: BoolArray = (self.child >= 0) & (self.child != EMPTY)
         return used
 
     def levels(self) -> Iterator[IntArray]:
-        """Node indices, level by level from the root."""
+        """Yield node indices, level by level from the root."""
         nodes = np.zeros(1, np.int32)
         while nodes.size:
             yield nodes
@@ -50,15 +50,15 @@ class Wide:
 
     @property
     def depth(self) -> int:
-        """Edges from the root to the deepest leaf; leaves are below a node, never the root."""
+        """Return the number of edges from the root to the deepest leaf; leaves are always below a node."""
         return sum(1 for _ in self.levels()) if self.order.size + self.sphere_order.size else 0
 
     @property
     def stack_bound(self) -> int:
-        """The most entries on the stack of a traversal that pushes all children of a node and then pops the next one.
+        """Return the maximum stack size of a traversal that pushes all children of a node and then pops the next one.
 
-        One fewer if it keeps the next one in a register. Exact: a node is popped with at most the sum of (children − 1)
-        over its ancestors left, and there is an order in which it is; then it pushes its own children.
+        One fewer if it keeps the next one in a register. The bound is tight: a node is popped with at most the sum of
+        (children − 1) over its ancestors left, which some order of children reaches; then it pushes its own children.
         """
         children = np.count_nonzero(self.child != EMPTY, axis=1)
         bound, left = 1, np.zeros(len(self.child), np.intp)
@@ -70,7 +70,7 @@ class Wide:
         return bound
 
     def sah_cost(self, pack: int = 1) -> float:
-        """As Tree.sah_cost: a wide node costs 1, like an intersection of `pack` triangles or of one sphere."""
+        """Return the cost as Tree.sah_cost: 1 per wide node, and 1 per test of `pack` triangles or of one sphere."""
         nodes = half_area(self.aabb_min.min(axis=1), self.aabb_max.max(axis=1))
         leaf = self.child < 0
         _, sphere, count = leaf_fields(self.child[leaf])
@@ -81,22 +81,22 @@ class Wide:
 
 
 def leaf_reference(first: IntArray, sphere: BoolArray, count: IntArray) -> IntArray:
-    """What stands in `child` for a leaf."""
+    """Return the `child` entries of leaves."""
     return ~(first << 4 | sphere.astype(np.int32) << 3 | count - 1)
 
 
 def leaf_fields(reference: IntArray) -> tuple[IntArray, BoolArray, IntArray]:
-    """first, sphere, count of leaf references."""
+    """Return first, sphere, count of leaf references."""
     bits = ~reference
     return bits >> 4, (bits >> 3 & 1).astype(bool), (bits & 7) + 1
 
 
 def collapse(tree: Tree, width: int = 8, pack: int = 1) -> Wide:
-    """The wide tree of least expected work that can be cut from the binary one, whose leaves stay as they are.
+    """Collapse a binary BVH to the wide one of least expected cost; its leaves stay as they are.
 
     Dynamic programming over the surface area heuristic (Ylitie, Karras, Laine 2017, "Efficient Incoherent Ray Traversal
-    on GPUs Through Compressed Wide BVHs", 3.1): 4 to 6 % less on scans than if the largest child is opened first.
-    Leaves hold at most MAX_LEAF primitives. Raises SceneError for more than MAX_PRIMITIVES triangles or spheres.
+    on GPUs Through Compressed Wide BVHs", 3.1): 4 to 6 % less on scans than opening the largest child first. Leaves
+    have at most MAX_LEAF primitives. Raises SceneError for more than MAX_PRIMITIVES triangles or spheres.
     """
     largest = max(tree.order.size, tree.sphere_order.size)
     if largest > MAX_PRIMITIVES:
@@ -106,7 +106,7 @@ def collapse(tree: Tree, width: int = 8, pack: int = 1) -> Wide:
     if tree.empty:
         return _wide(tree, np.full((1, width), -1, np.int32))
     opened, share = _plan(tree, width, pack)
-    interior = np.append(~tree.leaf, False)  # slots without a node hold -1, which finds the extra last entry
+    interior = np.append(~tree.leaf, False)  # slots without a node hold -1, which indexes the extra last entry
     slots, tops = [], np.zeros(1, np.int32)
     while tops.size:
         slots.append(_open(tree, tops, opened, share, width))
@@ -115,13 +115,13 @@ def collapse(tree: Tree, width: int = 8, pack: int = 1) -> Wide:
 
 
 def _plan(tree: Tree, width: int, pack: int) -> tuple[BoolArray, NDArray[np.int8]]:
-    """How to stand for each node's subtree with at most b roots, b = 0 … width.
+    """Plan how to represent each node's subtree by at most b roots, b = 0 … width, at the least cost.
 
-    opened: (n + 1, width + 1) bool, whether it pays to put the two children's roots in the node's place.
-    share: (n + 1, width + 1) int8, how many of the b roots are then the left child's.
+    opened: (n + 1, width + 1) bool, whether to replace the node by the roots of its two children.
+    share: (n + 1, width + 1) int8, how many of the b roots the left child then gets.
 
-    Least cost with b roots: of a leaf its own; of a node opened, the best shares of b between its children; of a node
-    kept, which is one root, its area and what it costs opened with `width` roots.
+    Least cost with b roots: for a leaf its own; for an opened node, the best split of b between its children; for a
+    node that is kept, as one root, its area plus its cost opened with `width` roots.
     """
     area = half_area(tree.aabb_min, tree.aabb_max)
     cost = np.repeat((area * intersections(tree.count, tree.spheres, pack))[:, None], width + 1, axis=1)
@@ -142,7 +142,7 @@ def _plan(tree: Tree, width: int, pack: int) -> tuple[BoolArray, NDArray[np.int8
 
 
 def _open(tree: Tree, tops: IntArray, opened: BoolArray, share: NDArray[np.int8], width: int) -> IntArray:
-    """The binary nodes, (k, width), that become the children of the wide nodes in place of `tops` (k,)."""
+    """Return the binary nodes, (k, width), that become the children of the wide nodes for `tops` (k,)."""
     slots, roots = np.full((len(tops), width), -1, np.int32), np.zeros((len(tops), width), np.intp)
     slots[:, 0], roots[:, 0] = tops, width
     for used in range(1, width):
@@ -156,7 +156,7 @@ def _open(tree: Tree, tops: IntArray, opened: BoolArray, share: NDArray[np.int8]
 
 
 def _wide(tree: Tree, slots: IntArray) -> Wide:
-    """Boxes and references for slots (k, width) of binary nodes, whose rows are in breadth-first order."""
+    """Return boxes and references for slots (k, width) of binary nodes, whose rows are in breadth-first order."""
     nowhere = np.full((1, 3), np.inf, np.float32)
     leaf = np.append(tree.leaf, False)[slots]
     interior = (slots >= 0) & ~leaf

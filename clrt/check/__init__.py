@@ -1,1 +1,1 @@
-"""What a device answers, against answers that are known: does its driver compile and run the kernels right?"""
+"""Device checks against known results: whether the driver compiles and runs the kernels correctly."""

@@ -1,4 +1,4 @@
-"""Floats are added, multiplied and rounded as IEEE 754 says, and divided as well as OpenCL says."""
+"""Check float arithmetic: sums, products and rounding by IEEE 754, division within OpenCL's limits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .floats import EXACT, LANES, LIMITS, NORMAL, float_rows, operands
 
 
 def check_arithmetic(device: Device, findings: Findings) -> None:
-    """Sums, products and fma to the bit, division and roots within limits; facts where a driver may choose."""
+    """Check sums, products and fma to the bit, division and roots within limits; record implementation choices."""
     for lanes in LANES:
         _check_exact(device, lanes, findings)
         _check_limits(device, lanes, findings)
@@ -37,13 +37,13 @@ def _check_limits(device: Device, lanes: int, findings: Findings) -> None:
     rows = {name: row.view(np.float32) for name, row in float_rows(device, lanes, a, b, c).items()}
     for name, (limit, exact) in LIMITS.items():
         findings.at_most(limit, ulps(rows[name], exact(x, y, t)), name, "ulp", a, b, c)
-    # x + (y − x)·t: the difference and the product round numbers up to 2 m, the sum one up to m.
+    # With m = max(x, |y|), x + (y − x)·t rounds the difference and the product, up to 2 m, and the sum, up to m.
     roundings = np.abs(rows["mix"] - (x + (y - x) * t)) / (np.maximum(x, np.abs(y)) * 2.0**-24)
     findings.at_most(5.0, roundings, "mix", "roundings", a, b, c)
 
 
 def _check_denormals(device: Device, lanes: int, findings: Findings) -> None:
-    """Numbers below the normal ones may be taken for zero, coming in or going out."""
+    """Check that denormals are kept, or flushed to zero as inputs or results."""
     a = np.float32(2.0**-126) * np.array([1, 1.5, 0.75, 0.5, 2.0**-20, 1.25], np.float32)
     b = np.roll(a, 1)
     rows = float_rows(device, lanes, a, b, a)

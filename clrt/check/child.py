@@ -1,7 +1,7 @@
-"""`python -m clrt.check.child ID`: checks one device, and writes a JSON object a line about each part of the check.
+"""`python -m clrt.check.child ID`: check one device, and print one JSON object per line for each part of the check.
 
-{"begins": NAME} comes before a part, {"failures": […], "figures": {…}} after it. It is a process of its own because a
-broken driver can crash, hang or end it; see run.py. What drivers print goes to standard error.
+{"begins": NAME} precedes a part, {"failures": […], "figures": {…}} follows it. This is a separate process because a
+broken driver can crash or hang it; see run.py. Output of drivers goes to standard error.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .findings import Findings
 
 
 def main() -> None:
-    """Checks the device that the first argument names."""
+    """Check the device that the first argument names."""
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as results:
         os.dup2(2, 1)
         _tell(results, begins="opening the device")
@@ -29,13 +29,13 @@ def main() -> None:
             findings = Findings()
             try:
                 part(device, findings)
-            except Exception as error:  # whatever a driver makes of a kernel that works elsewhere is a finding
+            except Exception as error:  # any error of a kernel that works elsewhere is a finding
                 findings.failures.append(_summary(error))
             _tell(results, **asdict(findings))
 
 
 def _summary(error: Exception) -> str:
-    """Its kind and first line and, from a compiler's log, the first error."""
+    """Return the error's type and first line and, from a compiler's log, the first error."""
     first, *rest = str(error).strip().splitlines() or [""]
     wrong = next((f" {line.strip()}" for line in rest if "error:" in line), "")
     return f"{type(error).__name__}: {first}{wrong}"

@@ -1,4 +1,4 @@
-"""NaN, infinities and zeros of both signs: compared, chosen from, and in arithmetic."""
+"""Check comparisons, selection and arithmetic of NaN, infinities and signed zeros."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ SPECIAL = np.array([0.0, -0.0, 1.0, -1.0, 2.5, -3.75, np.inf, -np.inf, np.nan], 
 
 
 def check_comparisons(device: Device, findings: Findings) -> None:
-    """A NaN compares false, and minimum and maximum then take their second operand; masks are 0 or 1, in vectors −1.
+    """Check that NaN compares false, so that minimum and maximum return their second operand; check masks.
 
-    And what the box tests make of axes that a ray does not run along: 1/0 = inf, 0·inf = NaN.
+    Masks are 0 or 1, and −1 in vectors. Also checks the arithmetic of box tests for rays parallel to an axis: 1/0 =
+    inf, 0·inf = NaN.
     """
     a, b, c = (grid.ravel() for grid in np.meshgrid(SPECIAL, SPECIAL, SPECIAL))
     for lanes in LANES:

@@ -1,4 +1,4 @@
-"""How much a device is asked: of a slow one, as simulators are, less, so that its check ends in seconds, too."""
+"""Scale the work of a check down for slow devices such as simulators, so that it ends in seconds there, too."""
 
 from __future__ import annotations
 
@@ -9,27 +9,28 @@ import numpy as np
 from ..device.open import Device
 from .probe import Probe
 
-#: A small work, and the seconds in which a device has to do it to be asked everything. A CPU takes a tenth of that.
+#: A small workload, and the seconds within which a device must do it to get the full check. A CPU takes a tenth of
+#: that.
 ITEMS, SAMPLES, SECONDS = 64, 128, 0.005
-#: How often it is tried, as other programs may be in the way, and seconds after which that is enough.
+#: Number of attempts, as other programs may interfere, and seconds after which no more are made.
 TRIES, ENOUGH = 5, 0.5
 _efforts: dict[str, float] = {}
 
 
 def effort(device: Device) -> float:
-    """The part of the full work that suits the device, at most 1, as for ordinary ones. Measured once a process."""
+    """Return the fraction of the full work that suits the device, 1 for ordinary ones. Measured once per process."""
     if device.info.id not in _efforts:
         _efforts[device.info.id] = min(1.0, SECONDS / _seconds(device))
     return _efforts[device.info.id]
 
 
 def share(device: Device, full: int, least: int) -> int:
-    """As much of `full` as suits the device, but at least so much."""
+    """Return the share of `full` that suits the device, but at least `least`."""
     return max(least, int(full * effort(device)))
 
 
 def _seconds(device: Device) -> float:
-    """The least that the small work took, once its kernel was compiled."""
+    """Return the minimum time of the small workload, without compiling its kernel."""
     probe, samples = Probe(device, "samples", device.lanes), np.ones((SAMPLES, ITEMS), np.float32)
     out = [(np.float32, 4 * ITEMS), (np.uint32, 2 * ITEMS)]
     probe.run("sums", ITEMS // device.lanes, samples, 1, out=out)

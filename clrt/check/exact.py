@@ -1,4 +1,4 @@
-"""Exact answers: sums and products of floats as fractions, and the float32 that is nearest to one."""
+"""Exact reference results: sums and products of floats as fractions, and the nearest float32 of a fraction."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ Floats = NDArray[np.float32]
 
 
 def nearest_float32(exact: Fraction) -> np.float32:
-    """The float32 nearest to a number in the range of normal ones, of two the even one (IEEE 754-2019, 4.3.1)."""
-    near = np.float32(float(exact))  # rounded twice, hence perhaps to a neighbour of the nearest
+    """Return the float32 nearest to a number in the normal range, on ties the even one (IEEE 754-2019, 4.3.1)."""
+    near = np.float32(float(exact))  # rounded twice, so it may be a neighbour of the nearest
     candidates = np.nextafter(near, np.float32(-np.inf)), near, np.nextafter(near, np.float32(np.inf))
     return min(candidates, key=lambda f: (abs(Fraction(float(f)) - exact), int(f.view(np.uint32)) & 1))
 
 
 def fused(a: Floats, b: Floats, c: Floats) -> Floats:
-    """a·b + c, (n,) each, rounded once."""
+    """Return a·b + c, (n,) each, rounded once."""
     triples = zip(a.tolist(), b.tolist(), c.tolist())
     return np.array([nearest_float32(Fraction(x) * Fraction(y) + Fraction(z)) for x, y, z in triples], np.float32)
 
 
 def ulps(got: Floats, exact: ArrayLike) -> NDArray[np.float64]:
-    """How far `got` is from `exact`, float64, in units of the distance of floats there."""
+    """Return the error of `got` against `exact`, float64, in units in the last place."""
     truth = np.asarray(exact, np.float64)
     return np.asarray(np.abs(got.astype(np.float64) - truth) / np.spacing(np.abs(truth).astype(np.float32)), np.float64)

@@ -1,4 +1,4 @@
-"""The operations of kernels/check/floats.cl: what they answer, and what they are asked."""
+"""The operations of kernels/check/floats.cl: reference results and operands."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from ..device.open import Device
 from .exact import Floats, fused
 from .probe import Probe
 
-#: Numbers one by one, as GPUs have them, and in vectors of eight, and how these types' names end. All devices use both.
+#: SIMD widths and the suffixes of their types: scalars, as on GPUs, and vectors of eight. All devices are checked with
+#: both.
 LANES = {1: "", 8: "8"}
 COUNT = 2048
 
-#: What operations answer for a, b, c where only one answer is right.
+#: Operations on a, b, c with only one correct result.
 EXACT: dict[str, Callable[[Floats, Floats, Floats], NDArray[Any]]] = {
     "sum": lambda a, b, c: a + b,
     "difference": lambda a, b, c: a - b,
@@ -46,7 +47,7 @@ COMPARISONS: dict[str, Callable[[Floats, Floats], NDArray[np.bool_]]] = {
     "unequal": lambda a, b: a != b,
     "not_less": lambda a, b: ~(a < b),
 }
-#: Operations of a >= 0, b and 0 <= c < 1 that may be off by some units in the last place: how many (OpenCL 1.2, 7.4).
+#: Operations on a >= 0, b and 0 <= c < 1 with an error limit in units in the last place (OpenCL 1.2, 7.4).
 LIMITS: dict[str, tuple[float, Callable[..., NDArray[Any]]]] = {
     "quotient": (2.5, lambda a, b, c: a / b),
     "reciprocal": (2.5, lambda a, b, c: 1 / a),
@@ -59,14 +60,14 @@ ROWS = (*EXACT, *NORMAL, *COMPARISONS, *LIMITS, "contraction", "mix", "fmin", "f
 
 
 def float_rows(device: Device, lanes: int, a: Floats, b: Floats, c: Floats) -> dict[str, NDArray[np.uint32]]:
-    """What the device makes of (n,) operands, as bits, by operation."""
+    """Return the device's results for (n,) operands, as bits, by operation."""
     padded = np.resize(np.stack([a, b, c], axis=1), (-(-len(a) // 8) * 8, 3))
     rows = Probe(device, "floats", lanes, ROWS).rows("floats", lanes, padded.T)
     return {name: row[:len(a)] for name, row in rows.items()}
 
 
 def operands() -> tuple[Floats, Floats, Floats]:
-    """a, b, c, (COUNT,) each, whose sums and products round up, down and from halfway, and a·b + c nearly vanishes.
+    """Return a, b, c, (COUNT,) each, whose sums and products round up, down and from halfway; a·b + c nearly vanishes.
 
     No result leaves the range of normal floats.
     """
@@ -74,7 +75,7 @@ def operands() -> tuple[Floats, Floats, Floats]:
     digits, exponents = rng.integers(1 << 23, 1 << 24, (3, COUNT)), rng.integers(-20, 20, (3, COUNT))
     exponents[1] = np.where(i % 2, exponents[1], exponents[0] + rng.integers(-24, 25, COUNT))
     a, b, c = (rng.choice([-1, 1], (3, COUNT)) * digits * 2.0 ** (exponents - 23)).astype(np.float32)
-    b = np.where(i % 8 == 0, np.spacing(a) / 2, b)                               # a + b lies halfway between two floats
+    b = np.where(i % 8 == 0, np.spacing(a) / 2, b)                               # a + b is halfway between two floats
     odd = (1 + (digits[0] % 4096 | 1) / 4096).astype(np.float32)
-    a, b = np.where(i % 8 == 1, odd, a), np.where(i % 8 == 1, odd, b)            # a·b does
+    a, b = np.where(i % 8 == 1, odd, a), np.where(i % 8 == 1, odd, b)            # a·b is
     return a, b, np.where(i % 3 == 0, -(a * b), c)

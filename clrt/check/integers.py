@@ -1,4 +1,4 @@
-"""Whole numbers of 8, 32 and 64 bits: they wrap around, are multiplied, shifted, counted and converted; long loops."""
+"""Check integers of 8, 32 and 64 bits: wrap-around, products, shifts, bit counts and conversions; and long loops."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from .floats import LANES
 from .probe import Probe
 
 COUNT = 2048
-#: Fewer turns of a work-item's loops are too few to follow a path of eight edges.
+#: Minimum number of loop iterations per work-item, needed to trace a path of depth eight.
 LEAST_TURNS = 1 << 14
 Operation = Callable[[int, int], int]
 
 
 def signed(a: int) -> int:
-    """The number whose two's complement of 32 bits is a."""
+    """Return the number whose 32-bit two's complement is a."""
     return a - (a >> 31 << 32)
 
 
 def float_bits(a: int | float) -> int:
-    """The float nearest to a, as its bits."""
+    """Return the bits of the float nearest to a."""
     return int(nearest_float32(Fraction(a)).view(np.uint32))
 
 
 def octets(a: int) -> list[int]:
-    """The four bytes of a, the lowest first."""
+    """Return the four bytes of a, the lowest first."""
     return list(a.to_bytes(4, "little"))
 
 
-#: The rows of kernels/check/integers.cl for a, and b > 0, in Python's numbers, which have no end: modulo 2^32.
+#: Rows of kernels/check/integers.cl for a, and b > 0, in Python's unbounded integers, to be taken modulo 2^32.
 INTEGERS: dict[str, Operation] = {
     "sum": lambda a, b: a + b,
     "difference": lambda a, b: a - b,
@@ -72,7 +72,7 @@ WORDS: dict[str, Operation] = {
 
 
 def check_integers(device: Device, findings: Findings) -> None:
-    """Every row, for random numbers and those at the ends of the range; and a long loop."""
+    """Check every row for random numbers and those at the ends of the range; check a long loop."""
     rng = np.random.default_rng(2)
     ends = np.array([0, 1, 2, 31, 32, 255, 256, (1 << 24) - 1, (1 << 24) + 1, (1 << 31) - 1, 1 << 31, (1 << 32) - 1])
     pairs = np.stack(np.meshgrid(ends, ends)).reshape(2, -1)
@@ -90,7 +90,10 @@ def check_integers(device: Device, findings: Findings) -> None:
 
 
 def _check_loops(device: Device, findings: Findings) -> None:
-    """Drivers that join work-items may end their loops early: then launches are cut (device/loops.py)."""
+    """Check for drivers that limit loop iterations, as some that vectorise across work-items do.
+
+    On those, launches are split (device/loops.py).
+    """
     turns = measured_turns(device)
     if turns is None:
         return

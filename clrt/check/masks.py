@@ -1,4 +1,4 @@
-"""Masks of eight lanes: their bits, and what trees of eight children are walked by (kernels/mask.cl)."""
+"""Check masks of eight lanes: their bits, and the operations for BVHs with eight children (kernels/mask.cl)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ COUNT = 512
 
 
 def check_masks(device: Device, findings: Findings) -> None:
-    """Every pattern of lanes, twice, with numbers whose order is known."""
+    """Check every pattern of lanes, twice, with numbers in a known order."""
     rng = np.random.default_rng(3)
     mask = (np.arange(COUNT)[:, None] >> np.arange(8) & 1).astype(bool)
     b = rng.permuted(np.tile(np.arange(1, 9), (COUNT, 1)), axis=1).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Vectors in memory at any address, numbers that work-items share, groups that scan together."""
+"""Check unaligned vector loads and stores, atomics, and parallel prefix sums."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from .findings import Findings
 from .probe import Probe
 
 COUNT, PLACES = 4096, 7
-#: So many that groups scan parts of it (device/blocks.py), and no multiple of anything.
+#: Large enough for several work-groups to scan parts of it (device/blocks.py), and not a round number.
 SCANNED = 30011
 
 
 def check_memory(device: Device, findings: Findings) -> None:
-    """Copies arrive as they were; atomics lose nothing; sums before each number are those of all before it."""
+    """Check that copies are exact, that atomics lose no update, and that prefix sums are correct."""
     rng, probe = np.random.default_rng(4), Probe(device, "memory")
     floats = rng.random(17 * COUNT, np.float32)
     moved, = probe.run("move", COUNT, floats, out=[(np.float32, floats.size)])

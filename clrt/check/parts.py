@@ -1,4 +1,4 @@
-"""The parts of a check, in order: what an earlier one finds wrong explains what a later one does."""
+"""The parts of a check, ordered so that failures of earlier ones explain those of later ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small pictures whose pixels are known. They take several launches, most of them of several samples a pixel."""
+"""Check small images with known pixels. They take several launches, most of them with several samples per pixel."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from .effort import effort, share
 from .findings import Findings
 
 SIZE = 16
-#: Edges of paths in the room, enough for some to be ended by chance.
+#: Path depth in the room, enough for Russian roulette to end some paths.
 DEPTH = 6
-#: A mean further than this many of its standard errors from the truth is wrong: by chance one in a million is.
+#: A mean further than this many standard errors from the expected value fails; by chance one in a million does.
 SIGMAS = 5.0
 
 
 def check_furnace(device: Device, findings: Findings) -> None:
-    """Under a white sky a plane, which sees nothing of itself, has its own colour, and the sky is white: exactly.
+    """Furnace test: under a white sky, a plane that does not see itself has exactly its colour, and the sky is white.
 
-    Left diffuse and right a mirror, above white and below coloured, in the middle half of the picture.
+    In the middle half of the image: diffuse on the left, mirror on the right, white above and coloured below.
     """
     truth, meshes, quarter = np.ones((SIZE, SIZE, 3), np.float32), list[Mesh](), SIZE // 4
     for row, colors in enumerate([((1.0, 1.0, 1.0), (1.0, 1.0, 1.0)), ((0.5, 0.25, 0.75), (0.75, 0.5, 0.25))]):
@@ -39,7 +39,7 @@ def check_furnace(device: Device, findings: Findings) -> None:
 
 
 def check_lamp(device: Device, findings: Findings) -> None:
-    """A floor, a wall and a lamp: black behind the wall, else color/π · I · cos θ/d² of some point of the pixel."""
+    """Check a floor, a wall and a point light: black behind the wall, else color/π · I · cos θ/d² within the pixel."""
     color, intensity, (x, height, z) = (0.8, 0.5, 0.2), (60.0, 40.0, 20.0), (0.75, 3.0, 0.5)
     material = Diffuse(color=color)
     floor = _quad((-9.0, 0.0, 9.0), (18.0, 0.0, 0.0), (0.0, 0.0, -18.0), material)
@@ -63,15 +63,15 @@ def check_lamp(device: Device, findings: Findings) -> None:
 
 
 def check_ball(device: Device, findings: Findings) -> None:
-    """A ball that shines, in the sun: e + color/π · E · cos θ of some point that is seen, without any noise.
+    """Check an emissive sphere in the sun: e + color/π · E · cos θ for some visible point, without any noise.
 
-    So it must be known at each of its points that the ball itself, from which lights are chosen, too, brings nothing
-    there: a difference that rounding leaves on either side of 0, on each device in its way.
+    So the sphere, which is also an emitter to be sampled, must be known to contribute nothing at each of its own
+    points, although rounding leaves the difference that decides it on either side of 0, depending on the device.
     """
     color, shine, sun, radius = (0.8, 0.5, 0.2), (0.1, 0.2, 0.3), (3.0, 2.0, 1.0), 0.7
     center, towards, distance = np.array([0.3, -0.2, 0.1]), np.array([0.36, 0.48, 0.8]), 7.0
     x, y, z = (center + distance * towards).tolist()
-    corner = np.arcsin(0.3 * radius / distance)    # of the picture, from the middle of the view
+    corner = np.arcsin(0.3 * radius / distance)    # angle of the image's corner from the view direction
     film = _film(device, findings, Scene(
         spheres=[Sphere(center=(0.3, -0.2, 0.1), radius=radius, material=Diffuse(color=color, emission=shine))],
         lights=[DirectionalLight(direction=(-0.36, -0.48, -0.8), irradiance=sun)],
@@ -84,10 +84,10 @@ def check_ball(device: Device, findings: Findings) -> None:
 
 
 def check_room(device: Device, findings: Findings) -> None:
-    """In a closed room where all shines with e and reflects the share a, d edges bring e·(1 + a + … + a^(d − 1)).
+    """Check a closed room whose surfaces all emit e and reflect with albedo a: depth d gives e·(1 + a + … + a^(d − 1)).
 
-    Walls, a diffuse and a mirror ball: light sampled from triangles and spheres, found by reflection, weighed, and
-    paths that end by chance must all add up to that.
+    With walls, a diffuse and a mirror sphere: light sampling of triangles and spheres, BSDF sampling, MIS weights, and
+    Russian roulette must all add up to that.
     """
     share, shine = np.array([0.8, 0.5, 0.2]), np.array([1.0, 2.0, 0.5])
     diffuse, mirror = (kind(color=(0.8, 0.5, 0.2), emission=(1.0, 2.0, 0.5)) for kind in (Diffuse, Mirror))
@@ -108,13 +108,13 @@ def check_room(device: Device, findings: Findings) -> None:
 
 
 def _quad(corner: ArrayLike, side: ArrayLike, other: ArrayLike, material: Material) -> Mesh:
-    """A parallelogram, seen from its front where `side` turns to `other` counter-clockwise."""
+    """Return a parallelogram, seen from its front if `side` turns to `other` counter-clockwise."""
     a, b, c = (np.asarray(vector, np.float32) for vector in (corner, side, other))
     return Mesh(np.stack([a, a + b, a + b + c, a + c]), np.array([[0, 1, 2], [0, 2, 3]], np.int32), material)
 
 
 def _film(device: Device, findings: Findings, scene: Scene, spp: int, max_depth: int = 8, size: int = SIZE) -> Film:
-    """The scene's film of size² pixels after `spp` samples each, fewer if it is slow; a failure where some are lost."""
+    """Return the film of size² pixels with `spp` samples each, fewer on a slow device; lost samples are a failure."""
     spp = share(device, spp, 2)
     renderer = Renderer(scene, device=device.info.id, size=(size, size), max_depth=max_depth)
     *_, state = renderer.passes(spp=spp)

@@ -1,4 +1,4 @@
-"""Runs the kernels of kernels/check over arrays."""
+"""Run the kernels of kernels/check over arrays."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ FILES = ("floats", "integers", "words", "masks", "memory", "samples")
 
 
 def source(file: str, lanes: int, rows: Iterable[str] = ()) -> str:
-    """The program of one of FILES, whose kernels number their rows of results in the order of `rows`."""
+    """Return the program of one of FILES, whose kernels number their rows of results in the order of `rows`."""
     values = {"LANES": lanes} | {f"ROW_{row}": number for number, row in enumerate(rows)}
     return compose("\n".join([defines(values), typedefs({"Pixel": PIXEL})]), f"check/{file}.cl",
                    {"SAMPLER": ["sampler/independent.cl"]})
 
 
 class Probe:
-    """One of FILES on a device."""
+    """The program of one of FILES on a device."""
 
     def __init__(self, device: Device, file: str, lanes: int = 1, rows: Sequence[str] = ()) -> None:
         self.work = Blocks(device, source(file, lanes, rows))
@@ -33,9 +33,9 @@ class Probe:
 
     def run(self, kernel: str, count: int, *arguments: NDArray[Any] | int,
             out: Sequence[tuple[DTypeLike, int]]) -> list[NDArray[Any]]:
-        """What `kernel` over `count` items makes of arrays of zeros, their dtypes and sizes in `out`.
+        """Run `kernel` over `count` items; return its output arrays, zero before, with the dtypes and sizes in `out`.
 
-        Its parameters are count and block, those of `arguments`, and the arrays.
+        The kernel's parameters are count and block, then `arguments`, then the output arrays.
         """
         given = [self.work.upload(argument) if isinstance(argument, np.ndarray) else argument for argument in arguments]
         made = [self.work.zeros(dtype, size) for dtype, size in out]
@@ -43,7 +43,7 @@ class Probe:
         return [self.work.download(array, dtype, size) for array, (dtype, size) in zip(made, out)]
 
     def rows(self, kernel: str, lanes: int, inputs: NDArray[Any]) -> dict[str, NDArray[np.uint32]]:
-        """The (n,) results of `kernel` by the names of their rows, as bits; inputs: (k, n), n a multiple of `lanes`."""
+        """Return the (n,) results of `kernel` by row name, as bits; inputs: (k, n), n a multiple of `lanes`."""
         n = inputs.shape[1]
         out, = self.run(kernel, n // lanes, inputs, out=[(np.uint32, len(self._rows) * n)])
         return dict(zip(self._rows, out.reshape(-1, n)))

@@ -1,4 +1,4 @@
-"""Rays through trees: what they hit first, and whether they hit anything before some distance."""
+"""Check ray queries: closest hits, and whether anything is hit before some distance."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .findings import Findings
 from .star import SQUARES, Doubles, Rays, Star, make_star, rays_from_elsewhere, rays_from_inside
 
 ELSEWHERE = 300
-#: Squares along an edge of the surface, and rays from inside, that a slow device gets at least.
+#: Minimum squares along an edge of the surface, and minimum rays from inside, on a slow device.
 FEW_SQUARES, FEW_RAYS = 4, 64
-#: A hit's point follows from some 30 operations on coordinates, each of which may round.
+#: Error limit: a hit point results from some 30 operations on coordinates, each of which may round.
 ROUNDINGS = 30.0
 
 
 def check_rays(device: Device, findings: Findings) -> None:
-    """Through the tree that the device uses, in the surface's order and in none: the ways differ (tree_query.py)."""
+    """Check the device's own layout with coherent and shuffled rays, which take different paths (tree_query.py)."""
     star = _star(device)
     query, inside = _query(device, star), _rays(device, star)
     for rays in (inside, _shuffled(inside), rays_from_elsewhere(star, share(device, ELSEWHERE, FEW_RAYS))):
@@ -29,13 +29,13 @@ def check_rays(device: Device, findings: Findings) -> None:
 
 
 def check_binary_tree(device: Device, findings: Findings) -> None:
-    """Through the plain binary tree."""
+    """Check the plain binary BVH."""
     star = _star(device)
     _check_hits(_query(device, star, layout="bvh2"), star, _shuffled(_rays(device, star)), findings)
 
 
 def check_tree_builder(device: Device, findings: Findings) -> None:
-    """Through a tree that the device built: the hits are those of a tree of numpy's, to the bit."""
+    """Check a BVH built on the device: its hits must equal those of one built in numpy, to the bit."""
     star = _star(device)
     rays = _shuffled(_rays(device, star))
     built = _check_hits(_query(device, star, builder="ploc"), star, rays, findings)
@@ -44,12 +44,12 @@ def check_tree_builder(device: Device, findings: Findings) -> None:
 
 
 def _star(device: Device) -> Star:
-    """A surface with as many triangles as suit the device."""
+    """Return a surface with as many triangles as suit the device."""
     return make_star(2 * max(FEW_SQUARES // 2, round(SQUARES // 2 * effort(device) ** 0.5)))
 
 
 def _rays(device: Device, star: Star) -> Rays:
-    """From inside: through each triangle to all its parts, or as many of these as suit the device, evenly spread."""
+    """Return rays from inside through all parts of each triangle, or an evenly spaced subset for a slow device."""
     rays = rays_from_inside(star)
     n = len(rays.t)
     return rays.take(np.linspace(0, n - 1, share(device, n, FEW_RAYS)).astype(np.int64))
@@ -64,7 +64,7 @@ def _query(device: Device, star: Star, **options: Any) -> RayQuery:
 
 
 def _check_hits(query: RayQuery, star: Star, rays: Rays, findings: Findings) -> NDArray[Any]:
-    """Whether, what and where each ray hits, and what it meets if it ends before or behind that; returns the hits."""
+    """Check whether, what and where each ray hits, also with rays that end before or behind it; return the hits."""
     hits = query.closest_hit(rays.origins, rays.directions)
     meets = np.isfinite(rays.t)
     shown = ("from", rays.origins), ("along", rays.directions), ("gave", hits)
@@ -83,7 +83,7 @@ def _check_hits(query: RayQuery, star: Star, rays: Rays, findings: Findings) -> 
 
 
 def _errors(star: Star, rays: Rays, hits: NDArray[Any]) -> Doubles:
-    """(n,): how far the point at t and that at (u, v) are from where the ray hits, in roundings of the coordinates."""
+    """Return the distances of the points at t and at (u, v) from the exact hit, (n,), in coordinate roundings."""
     both = np.isfinite(rays.t) & (hits["primitive"] >= 0)
     t, t_exact = np.where(both, hits["t"], 0.0)[:, None], np.where(both, rays.t, 0.0)[:, None]
     u, v = hits["u"].astype(np.float64), hits["v"].astype(np.float64)

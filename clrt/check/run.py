@@ -1,4 +1,4 @@
-"""Checks a device in a process of its own: a driver that crashes or hangs is then a failed check and nothing more."""
+"""Check a device in a child process, so that a driver that crashes or hangs only fails the check."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from ..device.verdicts import Verdict
 from ..errors import DeviceError
 from ..threads import BEAT, beside
 
-#: Seconds that any device has enough of, as long as it answers: one that ran out of fewer has not failed.
+#: Time limit in seconds that suffices for any device that responds: exceeding a lower one is not a failure.
 LIMIT = 300.0
 
 
 def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] = lambda part: None) -> Verdict:
-    """Checks the device for at most `limit` seconds; `on_part` hears the name of each part as it begins.
+    """Check the device for at most `limit` seconds; `on_part` is called with the name of each part as it begins.
 
-    DeviceError where nothing was wrong until a limit below LIMIT was over.
+    Raises DeviceError if there was no failure before a limit below LIMIT expired.
     """
     clock, kernels = AwakeClock(), kernel_digest()
     part, failures, figures = "starting", list[str](), dict[str, float | str]()
@@ -53,7 +53,7 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
 
 
 def _told(child: subprocess.Popen[str], clock: AwakeClock, limit: float) -> Iterator[dict[str, Any]]:
-    """What the child tells until it ends; raises Empty at the limit. Nothing here waits for a process that hangs."""
+    """Yield the child's results until it ends. Raises Empty at the limit, and never waits for a process that hangs."""
     lines: SimpleQueue[str] = SimpleQueue()
 
     assert child.stdout is not None

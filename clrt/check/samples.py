@@ -1,4 +1,4 @@
-"""Random numbers, and the sums that samples are added to."""
+"""Check random numbers, and the compensated sums of samples."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SAMPLES = 128
 
 
 def check_random_numbers(device: Device, findings: Findings) -> None:
-    """The device's numbers are those of the same hash in numpy, and lie in [0, 1)."""
+    """Check that the device's numbers equal those of the same hash in numpy, and lie in [0, 1)."""
     rng, probe = np.random.default_rng(5), Probe(device, "samples", device.lanes)
     index = rng.integers(0, 1 << 32, (2, COUNT), np.uint32)
     for seed, dimension in ((0, 0), (7, 3), (0xffffffff, 1000)):
@@ -29,7 +29,7 @@ def check_random_numbers(device: Device, findings: Findings) -> None:
 
 
 def pcg4d(*words: Words | np.uint32) -> tuple[Words, Words]:
-    """The second and third word of pcg4d (Jarzynski and Olano 2020, listing 4) after its four words' first step."""
+    """Return the second and third word of pcg4d (Jarzynski and Olano 2020, listing 4), including its LCG step."""
     with np.errstate(over="ignore"):
         x, y, z, w = (np.uint32(1664525) * v + np.uint32(1013904223) for v in words)
         x, y, z, w = (x + y * w, y, z, w)
@@ -43,10 +43,10 @@ def pcg4d(*words: Words | np.uint32) -> tuple[Words, Words]:
 
 
 def check_sums(device: Device, findings: Findings) -> None:
-    """Sums of samples, and of their squares, without any error; what is no number is left out and counted.
+    """Check that sums of samples, and of their squares, are exact, and that non-finite samples are dropped and counted.
 
-    Samples are k or k·2^12 with k < 2^8, so the sum of 128 of them, and what it lacks as a second float, are whole
-    numbers of 24 bits times a power of two: who adds them as floats, or reorders the additions, loses some.
+    Samples are k or k·2^12 with k < 2^8, so the sum of 128 of them, and its compensation as a second float, are
+    integers of 24 bits times a power of two: plain float sums, or reordered additions, lose some.
     """
     rng, count = np.random.default_rng(6), share(device, COUNT // 16, 1) * 16
     samples = rng.integers(0, 256, (SAMPLES, count)) << 12 * rng.integers(0, 2, (SAMPLES, count))
@@ -59,7 +59,7 @@ def check_sums(device: Device, findings: Findings) -> None:
     findings.same(counts, counted, "samples kept, and samples dropped")
     pairs = sums.reshape(2, 2, count).astype(np.float64)
     for name, (total, error), values in zip(("sum", "sum of squares"), pairs, (samples, samples**2)):
-        truth = np.where(kept, values, 0).sum(axis=0)                 # below 2^48: of whole numbers, hence exact
-        findings.same(total + error, truth.astype(np.float64), name)   # in float64 this sum is exact, too
+        truth = np.where(kept, values, 0).sum(axis=0)                 # integers below 2^48, so exact
+        findings.same(total + error, truth.astype(np.float64), name)   # exact in float64, too
         findings.expect(np.abs(error) <= np.spacing(total.astype(np.float32)) / 2, f"error kept with the {name}",
                         ("of", total), ("is", error))

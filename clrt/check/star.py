@@ -1,8 +1,8 @@
-"""A closed surface of whole-numbered corners around the origin, and rays whose hits are known exactly.
+"""A closed surface with integer vertices around the origin, and rays whose hits are known exactly.
 
-The surface is the grid on a cube's sides with each point moved out by a whole factor. Whatever the factors, a ray from
-the origin meets the triangle, edge or corner in whose direction it runs, and nothing else: a direction that is the sum
-of a triangle's corners with whole weights of sum W meets it at t = 1/W.
+The surface is the grid on a cube's sides with each point scaled by an integer factor. For any factors, a ray from the
+origin hits the triangle, edge or vertex in its direction, and nothing else: a direction that is the sum of a triangle's
+vertices with integer weights of sum W hits it at t = 1/W.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from numpy.typing import NDArray
 Integers = NDArray[np.int64]
 Doubles = NDArray[np.float64]
 
-#: Squares along an edge of the cube, a multiple of 2, and what its points are multiplied by.
+#: Squares along an edge of the cube, a multiple of 2, and the range of the factors.
 SQUARES, FACTORS = 16, (16, 21)
-#: Of a triangle's corners the sums in whose directions rays run, and what they meet there (see Rays).
+#: Weights of a triangle's vertices that give ray directions, and what these rays hit (see Rays).
 WEIGHTS = np.array([(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (2, 3, 4)])
 MET = np.array([(0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 1, 1), (1, 2, 2), (2, 0, 0), (0, 1, 2)])
-#: So far, in barycentric coordinates, t and the cosine, rays from elsewhere keep from all that is hard to tell.
+#: Minimum distance, in barycentric coordinates, t and the cosine, of rays from elsewhere to ambiguous cases.
 CLEAR = 0.01
 
 
 class Star(NamedTuple):
-    """vertices: (n, 3); faces: (m, 3), counter-clockwise seen from outside."""
+    """The closed surface. vertices: (n, 3); faces: (m, 3), counter-clockwise seen from outside."""
 
     vertices: Integers
     faces: Integers
 
 
 class Rays(NamedTuple):
-    """origins, directions: (n, 3) whole numbers, in float32 exact, and zeros of both signs.
+    """Rays with exact hits. origins, directions: (n, 3) integers, exact in float32, and zeros of both signs.
 
-    t: (n,) where they hit first, inf where they miss. corners: (n, 3), the vertices whose triangle they hit; one that
-    stands there twice is the end of the edge, one three times the corner, that they hit; −1 where they miss.
+    t: (n,), the first hit, inf for a miss. corners: (n, 3), the vertices of the triangle that is hit; a vertex listed
+    twice is an end of the edge that is hit, three times the vertex that is hit; −1 for a miss.
     """
 
     origins: Doubles
@@ -44,12 +44,12 @@ class Rays(NamedTuple):
     corners: Integers
 
     def take(self, order: Integers | slice) -> Rays:
-        """Some of the rays, or all in another order."""
+        """Return some of the rays, or all in another order."""
         return Rays(self.origins[order], self.directions[order], self.t[order], self.corners[order])
 
 
 def make_star(squares: int = SQUARES) -> Star:
-    """The surface, with the same factors every time: 12 triangles for each of an edge's squares times as many."""
+    """Return the surface, with the same factors every time: 12 · squares² triangles."""
     half = squares // 2
     grid = np.stack(np.meshgrid(*[np.arange(-half, half + 1)] * 3, indexing="ij"), axis=-1)
     outside = np.abs(grid).max(axis=-1) == half
@@ -66,7 +66,7 @@ def make_star(squares: int = SQUARES) -> Star:
 
 
 def rays_from_inside(star: Star) -> Rays:
-    """From the origin through every triangle: to its corners, to the middles of its edges, and inside; one by one."""
+    """Return rays from the origin through each triangle: to its vertices, its edges' middles, and its interior."""
     n = len(star.faces) * len(WEIGHTS)
     directions = np.einsum("wk,fkx->fwx", WEIGHTS, star.vertices[star.faces]).reshape(n, 3)
     zeros = 0.0 * np.random.default_rng(8).choice([1, -1], (n, 3))
@@ -75,7 +75,7 @@ def rays_from_inside(star: Star) -> Rays:
 
 
 def rays_from_elsewhere(star: Star, count: int) -> Rays:
-    """Up to `count` rays between whole points in and around the surface: against all triangles, in whole numbers."""
+    """Return up to `count` rays between integer points in and around the surface, tested exactly with all triangles."""
     rng, size = np.random.default_rng(9), int(np.abs(star.vertices).max())
     origins, targets = rng.integers(-2 * size, 2 * size, (2, count, 3))
     origins[::2] //= 16
@@ -91,9 +91,9 @@ def rays_from_elsewhere(star: Star, count: int) -> Rays:
 
 
 def meet_planes(star: Star, origins: Integers, directions: Integers) -> tuple[Doubles, Doubles, Doubles]:
-    """(n, m) each: t where rays meet the triangles' planes, the least barycentric coordinate there, and the cosine.
+    """Return (n, m) each: t at the triangles' planes, the least barycentric coordinate there, and the cosine.
 
-    All are quotients of whole numbers below 2^53, which are exact.
+    All are quotients of integers below 2^53, which are exact.
     """
     p0, p1, p2 = star.vertices[star.faces].transpose(1, 0, 2)
     normals = np.cross(p1 - p0, p2 - p0)
@@ -102,7 +102,7 @@ def meet_planes(star: Star, origins: Integers, directions: Integers) -> tuple[Do
         t = (np.sum(normals * p0, axis=1) - origins @ normals.T) / facing
         moments = np.cross(origins, directions)
         least = np.full(t.shape, np.inf)
-        for a, b in ((p0, p1), (p1, p2), (p2, p0)):       # by the volume that the ray spans with the opposite edge
+        for a, b in ((p0, p1), (p1, p2), (p2, p0)):       # from the volume that the ray spans with the opposite edge
             volume = directions @ np.cross(a, b).T + moments @ (b - a).T
             least = np.minimum(least, volume / facing)
     lengths = np.linalg.norm(directions, axis=1)[:, None] * np.linalg.norm(normals, axis=1)

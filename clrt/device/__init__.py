@@ -1,3 +1,3 @@
-"""Where it runs: devices, programs, bounded launches. The only room, with accel and render, that imports pyopencl."""
+"""OpenCL devices, programs and bounded launches. Only this package, accel and render import pyopencl."""
 
-from . import environment as environment  # before anything here imports pyopencl
+from . import environment as environment  # must come before the first import of pyopencl

@@ -1,4 +1,4 @@
-"""Arrays that live on a device, beside those of numpy. What they ask of it may raise DeviceError, or NoRoomError."""
+"""Arrays in device memory, next to numpy's. Functions that call the device may raise DeviceError or NoRoomError."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class DeviceArray:
 
     @property
     def nbytes(self) -> int:
-        """Size of the elements."""
+        """Return the size of the elements in bytes."""
         return self.size * self.dtype.itemsize
 
     def __len__(self) -> int:
@@ -32,7 +32,7 @@ class DeviceArray:
 
     @driver_errors()
     def read(self, device: Device) -> NDArray[Any]:
-        """A copy of the elements, (size,)."""
+        """Return a copy of the elements, (size,)."""
         values = np.empty(self.size, self.dtype)
         if self.size:
             cl.enqueue_copy(device.queue, values, self.buffer)
@@ -40,7 +40,7 @@ class DeviceArray:
 
     @driver_errors()
     def write(self, device: Device, values: NDArray[Any] | DeviceArray, first: int = 0) -> None:
-        """Puts `values`, of the same dtype, over the elements from `first` on."""
+        """Overwrite the elements from index `first` on with `values`, which have the same dtype."""
         offset = first * self.dtype.itemsize
         if not len(values):
             return
@@ -52,14 +52,14 @@ class DeviceArray:
 
 @driver_errors()
 def empty_array(device: Device, dtype: DTypeLike, size: int) -> DeviceArray:
-    """A new array whose elements are not defined."""
+    """Allocate an array with undefined contents."""
     kind = np.dtype(dtype)
     return DeviceArray(cl.Buffer(device.context, cl.mem_flags.READ_WRITE, max(1, size) * kind.itemsize), kind, size)
 
 
 @driver_errors()
 def on_device(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
-    """The buffer of a device array, or a new one with a copy of a numpy array."""
+    """Return the buffer of a device array, or a new buffer with a copy of a numpy array."""
     if isinstance(array, DeviceArray):
         return array.buffer
     return cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=array)
@@ -67,25 +67,28 @@ def on_device(device: Device, array: NDArray[Any] | DeviceArray) -> cl.Buffer:
 
 @driver_errors()
 def lent(device: Device, array: NDArray[Any] | DeviceArray, writable: bool = False) -> cl.Buffer:
-    """A buffer to read from, or to write to as well: on a CPU the numpy array itself (see lending.py), which must not
-    change then; elsewhere `on_device`."""
+    """Return a buffer to read from, or also to write to if `writable`.
+
+    On a CPU it wraps the numpy array itself without a copy (see lending.py), which must then not change; elsewhere it
+    is that of `on_device`.
+    """
     if isinstance(array, DeviceArray) or device.info.type != "cpu" or not array.flags.c_contiguous:
         return on_device(device, array)
     return lend(device, array, cl.mem_flags.READ_WRITE if writable else cl.mem_flags.READ_ONLY)
 
 
 def resident(device: Device, array: NDArray[Any] | DeviceArray) -> DeviceArray:
-    """The device array itself, or a new one with a copy of a numpy array."""
+    """Return the device array itself, or copy a numpy array into a new one."""
     return array if isinstance(array, DeviceArray) else DeviceArray(on_device(device, array), array.dtype, len(array))
 
 
 def on_host(device: Device, array: NDArray[Any] | DeviceArray) -> NDArray[Any]:
-    """A copy of a device array, or the numpy array itself."""
+    """Return a copy of a device array, or the numpy array itself."""
     return array.read(device) if isinstance(array, DeviceArray) else array
 
 
 def same_content(one: NDArray[Any] | DeviceArray | None, other: NDArray[Any] | DeviceArray | None) -> bool:
-    """Whether two arrays are the same one, or hold the same bytes, as far as that is known without asking a device."""
+    """Return whether two arrays are the same object or, if in numpy, hold the same bytes. No device is read."""
     if not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
         return one is other
     if one is other or (one.dtype, one.shape) != (other.dtype, other.shape):
@@ -95,13 +98,13 @@ def same_content(one: NDArray[Any] | DeviceArray | None, other: NDArray[Any] | D
 
 
 def room_for(device: Device | None, dtype: DTypeLike, size: int) -> DeviceArray | NDArray[Any]:
-    """Elements to be written: on the device, or in numpy without one."""
+    """Allocate `size` elements to be written: on the device, or in numpy (zeros) without one."""
     return empty_array(device, dtype, size) if device else np.zeros(size, dtype)
 
 
 def put(device: Device | None, array: DeviceArray | NDArray[Any], values: DeviceArray | NDArray[Any],
         first: int = 0) -> None:
-    """Puts `values` over the elements of `array` from `first` on, as `DeviceArray.write` does."""
+    """Overwrite the elements of `array` from index `first` on with `values`, as `DeviceArray.write` does."""
     if isinstance(array, DeviceArray):
         assert device is not None
         array.write(device, values, first)

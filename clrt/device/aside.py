@@ -1,8 +1,8 @@
-"""PoCL's front end in a process of its own: what it takes of memory, it gives back only when a process ends, or all of
-its contexts do.
+"""Compile process: PoCL's front end run in a process of its own, which limits peak memory.
 
-Those are 90 MB and more, which would stay beside a large model for as long as that is rendered. What the other process
-makes is put where PoCL keeps its programs, so this one finds it there and has kernels to compile, but no source.
+PoCL frees the memory of its front end (90 MB and more) only when a process, or all of its contexts, end; otherwise it
+would stay allocated for as long as a large model is rendered. The compile process puts its result into PoCL's cache,
+where this process finds it: kernels remain to be compiled, but no source.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from .child import end_child, start_child
 from .heap import give_back
 from .open import open_device
 
-#: From so many bytes on data count as large.
+#: Data of at least this many bytes count as large.
 LARGE = 1 << 25
 
 
 def compile_aside(device_id: str, source: str, options: list[str], seconds: float) -> None:
-    """Takes so long at most. Whatever goes wrong there will go wrong here, too, where it is told."""
-    give_back()     # what packing the data left, as both processes are there for a while
+    """Compile `source` in the compile process, within `seconds`. Errors are ignored: compiling here reports them."""
+    give_back()     # packing's freed memory: both processes run at the same time for a while
     with suppress(OSError), tempfile.TemporaryFile() as given:
         given.write(json.dumps([source, options]).encode())
         given.seek(0)
         child = start_child(__name__, device_id, subprocess.DEVNULL, subprocess.DEVNULL, given=given)
         end = partial(end_child, child)
-        atexit.register(end)    # this process may end meanwhile
+        atexit.register(end)    # this process may exit in the meantime
         try:
             with suppress(subprocess.TimeoutExpired):
                 child.wait(seconds)
@@ -44,7 +44,10 @@ def compile_aside(device_id: str, source: str, options: list[str], seconds: floa
 
 
 def quietly_built(program: cl.Program, options: list[str]) -> cl.Program:
-    """The program, built. pyopencl warns of whatever a compiler says, and Intel's always says something."""
+    """Build and return the program.
+
+    pyopencl warns of any compiler output, and Intel's compiler always writes some, so its warnings are ignored.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", cl.CompilerWarning)
         program.build(options=options, cache_dir=False)  # type: ignore[arg-type]  # False: pyopencl's own cache off
@@ -52,7 +55,7 @@ def quietly_built(program: cl.Program, options: list[str]) -> cl.Program:
 
 
 def main() -> None:
-    """Compiles what is on standard input for the device whose id is the first argument."""
+    """Compile the source and options on standard input for the device whose id is the first argument."""
     device = open_device(sys.argv[1])
     source, options = json.load(sys.stdin)
     quietly_built(cl.Program(device.context, source), options)

@@ -1,4 +1,4 @@
-"""Compilers work in the background: signals come through meanwhile, and one that hangs is given up."""
+"""Run compilers in a background thread, so that signals are handled meanwhile and a hung compiler can be abandoned."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from ..errors import KernelError
 from ..threads import Event, beside
 
 T = TypeVar("T")
-#: Seconds after which a compiler is slow, and after which it is taken for one that hangs.
+#: Seconds after which a compiler counts as slow, and after which it counts as hung.
 SLOW, LIMIT = 15.0, 600.0
 _log = logging.getLogger(__name__)
-#: Whether the process ends without that Python is taken apart, as that of the command line does (clrt.__main__).
+#: Whether the process exits without Python's shutdown, as the command line's does (clrt.__main__).
 ends_at_once = False
 
 
 def in_background(where: str, work: Callable[[], T]) -> T:
-    """What `work` returns or raises, which is done in a thread; KernelError where it takes longer than LIMIT.
+    """Return or raise what `work` does, run in a thread. Raises KernelError if it takes longer than LIMIT.
 
-    where: whose compiler it is, for messages. What it holds on to is lost where it hangs, but the process can go on.
+    where: the device whose compiler runs, for messages. If it hangs, its thread and resources leak, but the process can
+    go on.
     """
     done = Event()
 

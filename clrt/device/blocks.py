@@ -1,4 +1,4 @@
-"""Data-parallel steps: kernels that work through `count` items, a block of consecutive ones in each work-item."""
+"""Data-parallel primitives: kernels over `count` items, with a block of consecutive items per work-item."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from .open import Device
 from .pages import advise_huge_pages
 from .program import build, make_kernel
 
-#: Work-items a compute unit, and the fewest items that one of them gets.
+#: Work-items per compute unit, and the minimum number of items per work-item.
 WORK_ITEMS = {"cpu": 16, "gpu": 512}
 SMALLEST_BLOCK = {"cpu": 256, "gpu": 16}
-#: Turns that the loops of a kernel may take for one item.
+#: Upper bound on a kernel's loop iterations per item.
 ITEM_TURNS = 1024
-#: Items that a launch takes on each compute unit, at most. On a CPU, where PoCL compiles a kernel once more for those
-#: that do not begin at 0, as many as take a tenth of a second.
+#: Maximum number of items per launch and compute unit. On a CPU, where PoCL compiles a kernel again for launches with
+#: an offset other than 0, as many as take a tenth of a second.
 LAUNCH_ITEMS = {"cpu": 1 << 20, "gpu": 1 << 17}
-#: Work-items that scan together where that pays, as in build/scan.cl, and what they get at least.
+#: Work-items that scan cooperatively where that pays, as in build/scan.cl, and the number of elements per work-group.
 SCAN_ITEMS, SCAN_PART = 256, 8192
 
 
 class Blocks:
     """The kernels of one program and the arrays that they share, all on one in-order queue.
 
-    Kernels that `run` runs take `uint count, uint block` first; the program holds build/scan.cl. `peak_bytes` is the
-    most memory that its arrays took at a time; data_bytes: about what they will take. Launches are short, so waiting
-    for them need not let signals through. All may raise DeviceError.
+    Kernels launched by `run` take `uint count, uint block` first; the program includes build/scan.cl. `peak_bytes` is
+    the peak memory of its arrays; data_bytes: their approximate total size. Launches are short, so waiting for them
+    need not handle signals. All methods may raise DeviceError.
     """
 
     def __init__(self, device: Device, source: str, data_bytes: int = 0) -> None:
@@ -46,48 +46,48 @@ class Blocks:
 
     @driver_errors()
     def empty(self, dtype: DTypeLike, count: int) -> cl.Buffer:
-        """An array of `count` elements, at least one, whose contents are not defined."""
+        """Allocate an array of `count` elements, at least one, with undefined contents."""
         array = cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, max(1, count) * np.dtype(dtype).itemsize)
         if self.device.info.type == "cpu":
             advise_huge_pages(self.device.queue, array)
         return self._counted(array)
 
     def zeros(self, dtype: DTypeLike, count: int) -> cl.Buffer:
-        """An array of zeros, copied from the host.
+        """Allocate an array of zeros, copied from the host.
 
-        PoCL fills a buffer forty times slower than it copies one, and Oclgrind takes what was filled for uninitialised.
+        PoCL fills a buffer forty times slower than it copies one, and Oclgrind reports filled memory as uninitialised.
         """
         return self.upload(np.zeros(count, dtype))
 
     @driver_errors()
     def upload(self, values: NDArray[Any]) -> cl.Buffer:
-        """A copy of `values`."""
+        """Return a copy of `values` on the device."""
         array = self.empty(values.dtype, values.size)
         if values.size:
             cl.enqueue_copy(self.device.queue, array, np.ascontiguousarray(values))
         return array
 
     def lend(self, values: NDArray[Any]) -> cl.Buffer:
-        """What kernels may read `values` from until `finish`: on a CPU the array itself, elsewhere a copy."""
+        """Return a buffer to read `values` from until `finish`: on a CPU the array itself, elsewhere a copy."""
         if not values.size:
             return self.upload(values)
         return self._counted(lent(self.device, np.ascontiguousarray(values)))
 
     @driver_errors()
     def finish(self) -> None:
-        """Waits for all that was asked for."""
+        """Wait for all enqueued commands."""
         self.device.queue.finish()
 
     @driver_errors()
     def download(self, array: cl.Buffer, dtype: DTypeLike, count: int, first: int = 0) -> NDArray[Any]:
-        """`count` elements of an array, once all that was asked for is done."""
+        """Return `count` elements of an array after all enqueued commands have completed."""
         values = np.empty(count, dtype)
         if count:
             cl.enqueue_copy(self.device.queue, values, array, src_offset=first * values.itemsize)
         return values
 
     def free(self, *arrays: cl.Buffer) -> None:
-        """Gives arrays back, after the launches that use them."""
+        """Release arrays after the launches that use them."""
         for array in arrays:
             self._bytes -= array.size
             array.release()
@@ -97,19 +97,21 @@ class Blocks:
         return "cpu" if self.device.info.type == "cpu" else "gpu"
 
     def block(self, count: int) -> int:
-        """How many items each work-item gets."""
+        """Return the number of items per work-item."""
         units = self.device.info.compute_units
         block = max(SMALLEST_BLOCK[self._kind], -(-count // (WORK_ITEMS[self._kind] * units)))
         turns = loop_turns(self.device)
         return block if turns is None else max(1, min(block, turns // ITEM_TURNS))
 
     def number(self, count: int) -> int:
-        """How many blocks there are."""
+        """Return the number of blocks."""
         return -(-count // self.block(count))
 
     def run(self, name: str, count: int, *arguments: Any) -> None:
-        """Runs kernel `name` over `count` items, of which a launch takes so many that it is short. Python's ints are
-        passed as uint, floats as float. A kernel may ask for its global id alone."""
+        """Run kernel `name` over `count` items, in launches that are each short.
+
+        Python ints are passed as uint, floats as float. The only index that kernels may use is their global id.
+        """
         block, local = self.block(count), self.device.local_size
         values = np.uint32(count), np.uint32(block), *map(_scalar, arguments)
         groups = -(-self.number(count) // local)
@@ -118,7 +120,10 @@ class Blocks:
             self._launch(name, min(most, groups - first), local, values, first)
 
     def run_together(self, name: str, *arguments: Any) -> None:
-        """Runs kernel `name` in one work-group, where that pays of SCAN_ITEMS items, or as many as have registers."""
+        """Run kernel `name` in a single work-group.
+
+        It has SCAN_ITEMS work-items, or one if larger groups do not pay, limited by the kernel's register use.
+        """
         values = tuple(map(_scalar, arguments))
         with driver_errors():
             most = self._kernel(name, values).get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE,
@@ -126,9 +131,9 @@ class Blocks:
         self._launch(name, 1, min(self._group, most), values)
 
     def scan(self, values: cl.Buffer, count: int, arrays: int = 1) -> None:
-        """Turns each of `arrays` arrays of `count` numbers, one after another in `values`, into what stood before it.
+        """Compute exclusive prefix sums, in place, of `arrays` consecutive arrays of `count` numbers in `values`.
 
-        The sums of all are in `totals` then.
+        The sum of each array is then in `totals`.
         """
         parts = 1 if self.device.local_size == 1 else -(-count // SCAN_PART)
         if parts == 1:
@@ -140,7 +145,7 @@ class Blocks:
         self.free(sums)
 
     def sums(self, arrays: int = 1) -> list[int]:
-        """What the last scan's `totals` are."""
+        """Return the `totals` of the last scan."""
         return [int(total) for total in self.download(self._totals, np.uint32, arrays)]
 
     def _scan(self, values: cl.Buffer, count: int, arrays: int, parts: int, totals: cl.Buffer) -> None:
@@ -157,16 +162,16 @@ class Blocks:
         cl.enqueue_nd_range_kernel(self.device.queue, kernel, (groups * local,), (local,), (first * local,))
 
     def _kernel(self, name: str, values: Sequence[Any]) -> cl.Kernel:
-        """Made at its first launch, for values of these types."""
+        """Return the kernel, created at its first launch for arguments of these types."""
         if name not in self._kernels:
             self._kernels[name] = make_kernel(self.device, self.program, name)
-            # Without types pyopencl finds out what each value is at every launch, by exceptions.
+            # Without declared types pyopencl tries each argument's type at every launch, by exceptions.
             self._kernels[name].set_arg_types([None if isinstance(v, cl.Buffer) else v.dtype for v in values])
         return self._kernels[name]
 
     @property
     def totals(self) -> cl.Buffer:
-        """The sums of the last scan."""
+        """Return the buffer with the sums of the last scan."""
         return self._totals
 
     def _counted(self, array: cl.Buffer) -> cl.Buffer:

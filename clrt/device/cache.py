@@ -1,7 +1,7 @@
-"""Files kept between runs: program binaries, what is known of devices and drivers, reference pictures, the last logs.
+"""Files cached between runs: program binaries, facts about devices and drivers, reference images, the last logs.
 
-Whatever is wrong with the folder (absent, read-only, damaged), a file is not there, and what it held is made anew.
-Files are put in place by a rename, so readers never see half of one; a binary follows its SHA-256.
+If the folder is missing, read-only or damaged, files are treated as absent and their contents are made again. Files are
+put in place by a rename, so readers never see a partial one; a binary is preceded by its SHA-256.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from contextlib import suppress
 from datetime import datetime, timezone
 from pathlib import Path
 
-#: The names of scenes' reference pictures (study/reference.py).
+#: File names of scenes' reference images (study/reference.py).
 REFERENCES = "reference-*.npz"
-#: What is kept, and the names of its files.
+#: File name patterns by kind of content.
 KINDS = {"programs": "*.bin", "reference pictures": REFERENCES, "probes of drivers": "*.driver.json",
          "checks of devices": "*.check.json", "speeds of devices": "*.bench.json", "loop limits": "*.loops.json",
          "logs": "last-*.log", "unfinished files": "unfinished-*"}
 
 
 def cache_folder() -> Path:
-    """Where files are kept: $CLRT_CACHE_DIR, or the user's cache folder."""
+    """Return the cache folder: $CLRT_CACHE_DIR, or the user's."""
     if folder := os.environ.get("CLRT_CACHE_DIR"):
         return Path(folder)
     from platformdirs import user_cache_dir
@@ -31,7 +31,7 @@ def cache_folder() -> Path:
 
 
 def can_keep() -> bool:
-    """Whether files can be written there."""
+    """Return whether files can be written to the cache folder."""
     with suppress(OSError, RuntimeError):
         cache_folder().mkdir(parents=True, exist_ok=True)
         return os.access(cache_folder(), os.W_OK)
@@ -39,7 +39,7 @@ def can_keep() -> bool:
 
 
 def read_file(name: str) -> bytes | None:
-    """What is kept under `name`, or None."""
+    """Return the contents of the file `name`, or None."""
     try:
         return (cache_folder() / name).read_bytes()
     except (OSError, RuntimeError):
@@ -47,7 +47,7 @@ def read_file(name: str) -> bytes | None:
 
 
 def write_file(name: str, content: bytes, mode: int = 0o600) -> bool:
-    """Keeps `content` under `name`; False where that is not possible."""
+    """Store `content` as the file `name`; return False if that is not possible."""
     try:
         folder = (cache_folder() / name).parent
         folder.mkdir(parents=True, exist_ok=True)
@@ -67,31 +67,31 @@ def write_file(name: str, content: bytes, mode: int = 0o600) -> bool:
 
 
 def read_binary(key: str) -> bytes | None:
-    """The binary stored under `key`, or None."""
+    """Return the binary stored under `key`, or None."""
     stored = read_file(f"{key}.bin") or b""
     digest, binary = stored[:32], stored[32:]
     return binary if hashlib.sha256(binary).digest() == digest else None
 
 
 def write_binary(key: str, binary: bytes) -> None:
-    """Stores `binary` under `key` if that is possible."""
+    """Store `binary` under `key` if possible."""
     write_file(f"{key}.bin", hashlib.sha256(binary).digest() + binary)
 
 
 def keep_log(kind: str, text: str) -> None:
-    """Keeps the last log of its kind, "build" or "error", if that is possible, for `clrt doctor`."""
+    """Store the last log of its kind ("build" or "error") for `clrt doctor`, if possible."""
     when = datetime.now(timezone.utc).isoformat(timespec="seconds")
     write_file(f"last-{kind}.log", f"{when}\n{text}\n".encode(errors="replace"))
 
 
 def kept_logs() -> dict[str, str]:
-    """The logs that are kept, by their kind."""
+    """Return the stored logs by kind."""
     logs = {kind: read_file(f"last-{kind}.log") for kind in ("build", "error")}
     return {kind: log.decode(errors="replace") for kind, log in logs.items() if log}
 
 
 def sizes() -> dict[str, tuple[int, int]]:
-    """How many files of each of KINDS there are, and their bytes."""
+    """Return the number of files and their total bytes for each of KINDS."""
     found = {}
     for kind, pattern in KINDS.items():
         bytes_each = []
@@ -102,12 +102,12 @@ def sizes() -> dict[str, tuple[int, int]]:
 
 
 def clear(pattern: str = "*.bin") -> int:
-    """Deletes every stored binary, or what else `pattern` names; returns how many files there were."""
+    """Delete the files that match `pattern`, by default all binaries; return how many were deleted."""
     deleted = 0
     for file in cache_folder().glob(pattern):
         try:
             file.unlink(missing_ok=True)
             deleted += 1
         except OSError:
-            continue  # a folder in its place, or not ours to delete
+            continue  # it is a folder, or may not be deleted
     return deleted

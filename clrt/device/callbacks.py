@@ -1,4 +1,4 @@
-"""Functions that are called as commands complete, by threads of the driver's."""
+"""Functions called when commands complete, from threads of the driver."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import pyopencl as cl
 
 from ..threads import Event
 
-#: Those that are still to come; and whether no more should.
+#: Pending callbacks, and whether Python is shutting down.
 _expected: set[object] = set()
 _python_ends = Event()
 
 
 def when_complete(event: cl.Event, function: Callable[[], object]) -> None:
-    """Has `function` called once the event is complete, or at once where that was before; never while Python ends."""
+    """Have `function` called once the event is complete, or at once if it already is; never while Python shuts down."""
     token = object()
 
     def called(_: int) -> None:
@@ -32,7 +32,10 @@ def when_complete(event: cl.Event, function: Callable[[], object]) -> None:
 
 @atexit.register
 def _await_them() -> None:
-    """One that came while Python ends would abort the process; threads that still wait then do without."""
+    """Wait up to 1 s for pending callbacks: one that runs during Python's shutdown would abort the process.
+
+    Threads that still wait for one must then poll.
+    """
     _python_ends.set()
     start = time.perf_counter()
     while _expected and time.perf_counter() < start + 1:

@@ -1,4 +1,4 @@
-"""Processes of our own for what a driver may crash or hang in; the process that starts one goes on."""
+"""Child processes that isolate crashes and hangs of drivers from the process that starts them."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from typing import IO
 
 def start_child(module: str, argument: str, output: IO[bytes] | int, errors: IO[bytes] | int,
                 given: IO[bytes] | int = subprocess.DEVNULL, **variables: str) -> subprocess.Popen[str]:
-    """`python -m module argument`, which finds the same modules as this process wherever it is started; given: its
-    standard input; `variables` are added to its environment."""
+    """Start `python -m module argument` with this process's module search path, wherever it is started.
+
+    given: its standard input. `variables` are added to its environment.
+    """
     path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
     environment = {**os.environ, "PYTHONPATH": path, **variables}
     return subprocess.Popen([sys.executable, "-P", "-m", module, argument], stdin=given, stdout=output, stderr=errors,
@@ -22,15 +24,17 @@ def start_child(module: str, argument: str, output: IO[bytes] | int, errors: IO[
 
 
 def end_child(child: subprocess.Popen[str]) -> None:
-    """Kills it, and does not wait for one that hangs in the kernel."""
+    """Kill the child and wait at most 1 s: it may hang in the kernel."""
     child.kill()
     with suppress(subprocess.TimeoutExpired):
         child.wait(1.0)
 
 
 def activity(child: subprocess.Popen[str]) -> tuple[float, bool]:
-    """The processor time that it took so far, and whether it wants more, or waits for a disk; (0, False) where that is
-    not known (it has ended, or this is not Linux)."""
+    """Return the CPU time of the child so far in seconds, and whether it is runnable or waits for a disk.
+
+    Returns (0, False) if that is not known (it has ended, or this is not Linux).
+    """
     try:
         status = Path(f"/proc/{child.pid}/stat").read_text(encoding="utf-8", errors="replace")
         fields = status.rpartition(")")[2].split()
@@ -40,14 +44,14 @@ def activity(child: subprocess.Popen[str]) -> tuple[float, bool]:
 
 
 def told_end(code: int) -> str:
-    """How a process ended that should have returned 0."""
+    """Describe how a process ended that should have returned 0."""
     if code < 0:
         return f"the driver crashed with signal {-code} ({signal.strsignal(-code)})"
     return f"the process ended with code {code}"
 
 
 def last_line(errors: IO[bytes]) -> str:
-    """The last that was written, which says what was wrong if anything does."""
+    """Return the last non-empty line of `errors` for a message, or an empty string."""
     errors.seek(0)
     lines = errors.read().decode(errors="replace").split("\n")
     last = next((line.strip() for line in reversed(lines) if line.strip()), "")

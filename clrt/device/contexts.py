@@ -1,9 +1,10 @@
-"""One context a device, shared by all that is opened on it, and the programs that were built in it.
+"""One shared context per device, and the programs built in it.
 
-Each takes time and memory (with PoCL a compiler of a hundred megabytes), and compilers keep something of every program
-(PoCL 3 a quarter of a megabyte) until it ends. So it is used again, but not once it compiled MOST_COMPILED programs, or
-anything has failed: a device that was lost needs another. All contexts of PoCL that there are at a time share one
-compiler (its pocl_llvm_utils.cc), so what a worn one has kept is freed only if it ends before the next begins.
+Each context takes time and memory (with PoCL a compiler of a hundred megabytes), and compilers retain memory for every
+program (PoCL 3 a quarter of a megabyte) until it ends. So a context is reused, but not after it has compiled
+MOST_COMPILED programs, or after any failure: a lost device needs a new one. All contexts of PoCL that exist at the same
+time share one compiler (its pocl_llvm_utils.cc), so what a worn context has retained is freed only if it ends before
+the next is created.
 """
 
 from __future__ import annotations
@@ -22,8 +23,11 @@ MOST_COMPILED = 40
 
 @dataclass(eq=False)
 class Shared:
-    """A context; programs: those of it that were used last, by their key; ahead: of what another process
-    compiles, whether it is done; compiled: how many programs were compiled in it."""
+    """A context and its programs.
+
+    programs: those used last, by key. ahead: events that are set when another process has compiled a program, by key.
+    compiled: how many programs were compiled in the context.
+    """
 
     context: Context
     programs: dict[str, cl.Program] = field(default_factory=dict)
@@ -32,16 +36,16 @@ class Shared:
 
     @property
     def worn(self) -> bool:
-        """Whether its device should be opened anew."""
+        """Return whether the device should be reopened with a new context."""
         return self.compiled >= MOST_COMPILED
 
 
-#: By device, those that are opened again.
+#: Contexts for reuse, by device.
 _shared: dict[int, Shared] = {}
 
 
 def shared_by(device: cl.Device) -> Shared:
-    """The context to open it with."""
+    """Return the shared context of the device, a new one if there is none or it is worn."""
     if device.int_ptr in _shared and _shared[device.int_ptr].worn:
         del _shared[device.int_ptr]
     if device.int_ptr not in _shared:
@@ -50,12 +54,12 @@ def shared_by(device: cl.Device) -> Shared:
 
 
 def share_no_more() -> None:
-    """Something failed: what is opened from now on has contexts of its own."""
+    """Forget all shared contexts after a failure: devices opened from now on get new ones."""
     _shared.clear()
 
 
 @atexit.register
 def _end_with_the_process() -> None:
-    """PoCL 3 aborts where a context ends in which a program was damaged, and then all work is done."""
+    """Keep contexts alive until the process ends: PoCL 3 aborts when a context ends in which a program was damaged."""
     for shared in _shared.values():
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(shared))

@@ -1,4 +1,4 @@
-"""What is told of a device, and the identity that it keeps."""
+"""Device properties, and the identity of a device."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from .speeds import Speed
 from .verdicts import Verdict
 
 MINIMUM_ALLOCATION = 16 << 20
-#: What a platform's or device's name says where OpenCL is translated to something else, and to what.
+#: Layers that translate OpenCL to another API: part of the platform's or device's name, and the API.
 TRANSLATIONS = {"clvk": "Vulkan", "zink": "Vulkan", "openclon12": "Direct3D 12"}
 
 
 @dataclass(frozen=True)
 class DeviceInfo:
-    """One OpenCL device, or a driver that offers none: `usable` and `why` tell.
+    """One OpenCL device, or a driver without devices (`usable` is then False and `why` the reason).
 
-    id: the same until the platform or driver changes. why: what is to be said of it, and what to do where it cannot be
-    used. check, bench: what its last check found and its speed; None where it was not checked or measured as it is now.
-    hardware: its UUID and place on the PCI bus, where its driver tells them.
+    id: stable until the platform or driver changes. why: a remark, or the reason why it cannot be used and the remedy.
+    check, bench: the result of its last check and its measured speed; None if it was not checked or measured in its
+    present state. hardware: its UUID and PCI address if its driver reports them.
     """
 
     index: int
@@ -48,18 +48,18 @@ class DeviceInfo:
 
     @property
     def failed(self) -> bool:
-        """Whether its check failed."""
+        """Return whether the check of the device failed."""
         return self.check is not None and not self.check.passed
 
     @property
     def translated(self) -> str:
-        """What its platform translates OpenCL to; empty where it does not."""
+        """Return the API that the platform translates OpenCL to, empty if it is native."""
         names = f"{self.platform} {self.name}".lower()
         return next((target for word, target in TRANSLATIONS.items() if word in names), "")
 
 
 def describe(device: cl.Device, index: int = 0) -> DeviceInfo:
-    """The device, as its driver tells; `chosen`, `check` and `bench` are left out."""
+    """Return the properties that the driver reports; `chosen`, `check` and `bench` are left at their defaults."""
     platform, places = device.platform, hardware(device)
     identity = "|".join([platform.name, platform.version, device.vendor, device.name, device.driver_version, *places])
     reason = _unusable(device)
@@ -72,20 +72,20 @@ def describe(device: cl.Device, index: int = 0) -> DeviceInfo:
 
 
 def size_of(device: cl.Device) -> int:
-    """What it may be able to do: compute units times clock, and on a CPU, as not every platform uses them, vectors."""
+    """Estimate throughput: compute units times clock, and on a CPU times SIMD width, as not every platform uses it."""
     vectors = device.native_vector_width_float if _type(device) == "cpu" else 1
     return int(device.max_compute_units * device.max_clock_frequency * vectors)
 
 
 def describe_empty(platform: cl.Platform) -> DeviceInfo:
-    """A platform without devices."""
+    """Describe a platform without devices."""
     return replace(_nothing(platform.name.strip(), platform.version, "it has no device: is its hardware there, may you "
                             "use it (groups video and render), does the driver want a variable to be set? If you do "
                             "not need it, remove it"), platform_version=platform.version.strip())
 
 
 def describe_faulty(driver: Driver, fault: str) -> DeviceInfo:
-    """A driver that was left out."""
+    """Describe a driver that was left out because of `fault`."""
     return replace(_nothing(driver.library, driver.source, f"{fault}. It is left out. Update, reinstall or remove this "
                             f"driver ({driver.source} names it), then run `clrt devices`"), driver=driver.source)
 
@@ -97,7 +97,7 @@ def _nothing(name: str, source: str, why: str) -> DeviceInfo:
 
 
 def with_own_id(info: DeviceInfo, taken: Collection[str]) -> DeviceInfo:
-    """The device with an id that none has yet: twins that nothing else tells apart are told by their order."""
+    """Return the device with an id that is not in `taken`: identical devices are numbered by their order."""
     ids = (info.id if not twin else _digest(f"{info.id}{twin}") for twin in range(len(taken) + 1))
     return replace(info, id=next(each for each in ids if each not in taken))
 
@@ -115,7 +115,7 @@ def _type(device: cl.Device) -> str:
 
 
 def _unusable(device: cl.Device) -> str:
-    """Why the device cannot run clrt; empty where it can."""
+    """Return why the device cannot run clrt, empty if it can."""
     if not device.available:
         return "the driver says that it is not available"
     if not device.compiler_available:

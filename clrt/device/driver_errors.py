@@ -1,4 +1,4 @@
-"""What a driver refuses or fails at, as errors of clrt."""
+"""Convert errors of the OpenCL driver to clrt's exceptions."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from .contexts import share_no_more
 
 @contextmanager
 def driver_errors() -> Iterator[None]:
-    """Around calls of a driver, or before a function that makes some: NoRoomError where the device has not enough
-    memory, and DeviceError for whatever else it says."""
+    """Convert errors of driver calls, as a context manager or decorator.
+
+    Raises NoRoomError if the device runs out of memory, and DeviceError for any other error.
+    """
     try:
         yield
     except cl.MemoryError as error:

@@ -1,10 +1,10 @@
-"""Where the drivers of OpenCL are: the libraries that its loader would load, and some that it would not find.
+"""Find installed OpenCL drivers: the libraries that the ICD loader would load, and some that it would not find.
 
 The loader reads .icd files, each of which names a library, in the folder OCL_ICD_VENDORS (or OPENCL_VENDOR_PATH, or
-/etc/OpenCL/vendors); where that variable names a file, there is this one alone. pip's pyopencl has a loader that reads
-its own folder as well. OCL_ICD_FILENAMES adds libraries. Beyond that, this finds
-- what is installed in Python's environment, where pip leaves .icd files that name no place that exists (Intel's);
-- libraries of drivers without an .icd file, as in containers that got a GPU's driver from their host.
+/etc/OpenCL/vendors); if that variable names a file, only this one is read. pip's pyopencl has a loader that also reads
+its own folder. OCL_ICD_FILENAMES adds libraries. In addition, this module finds
+- drivers installed in Python's environment, where pip leaves .icd files with paths that do not exist (Intel's);
+- driver libraries without an .icd file, as in containers that got a GPU's driver from their host.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 import pyopencl as cl
 
 VENDORS = "/etc/OpenCL/vendors"
-#: Libraries that are looked for whether an .icd file names them or not, unless a variable says where drivers are.
+#: Libraries to look for whether or not an .icd file names them, unless a variable says where drivers are.
 UNLISTED = ("libnvidia-opencl.so.1", "libamdocl64.so", "intel-opencl/libigdrcl.so")
 FOLDERS = (f"/usr/lib/{os.uname().machine}-linux-gnu" if hasattr(os, "uname") else "", "/usr/lib64", "/usr/lib",
            "/usr/local/lib", "/usr/local/nvidia/lib64", "/usr/lib/wsl/lib", "/opt/rocm/lib", "/opt/rocm/opencl/lib")
@@ -27,14 +27,17 @@ FOLDERS = (f"/usr/lib/{os.uname().machine}-linux-gnu" if hasattr(os, "uname") el
 
 @dataclass(frozen=True)
 class Driver:
-    """library: a path, or a name that only the dynamic linker may find; source: the file or variable that names it."""
+    """An OpenCL driver (ICD).
+
+    library: a path, or a name that only the dynamic linker may find; source: the file or variable that names it.
+    """
 
     library: str
     source: str
 
 
 def installed_drivers() -> list[Driver]:
-    """Every driver once, in the order in which the loader would take them."""
+    """Return every driver once, in the order in which the loader would load them."""
     named = os.environ.get("OCL_ICD_VENDORS") or os.environ.get("OPENCL_VENDOR_PATH")
     if named and not os.path.isdir(named):
         drivers = [_driver(named, "OCL_ICD_VENDORS")]
@@ -49,14 +52,14 @@ def installed_drivers() -> list[Driver]:
 
 
 def _listed(folder: Path) -> Iterator[Driver]:
-    """Those that a folder's .icd files name."""
+    """Yield the drivers that a folder's .icd files name."""
     with suppress(OSError):
         names = sorted(name for name in os.listdir(folder) if name.endswith(".icd"))
         yield from (_driver(os.path.join(folder, name), "") for name in names)
 
 
 def _driver(path: str, variable: str) -> Driver:
-    """The driver of an .icd file, or of a library that the variable names."""
+    """Return the driver of an .icd file, or of a library that `variable` names."""
     if not path.endswith(".icd"):
         return Driver(_located(path), variable)
     if os.sep not in path:
@@ -69,9 +72,9 @@ def _driver(path: str, variable: str) -> Driver:
 
 
 def _located(name: str, folder: str = "") -> str:
-    """The path of a library that an .icd file in `folder` names; the name itself where there is no such file.
+    """Return the path of a library that an .icd file in `folder` names, or the name itself if there is no such file.
 
-    That may be a bare name, and what pip or conda installed may have been meant for another place than where it is.
+    The name may lack a folder, and an absolute path may be that of another machine for what pip or conda installed.
     """
     if os.path.exists(name) and os.sep in name:
         return name
@@ -90,7 +93,7 @@ def _unlisted() -> list[Driver]:
 
 
 def _linker_folders() -> list[str]:
-    """Where the dynamic linker looks, and where drivers are known to hide from it."""
+    """Return the folders that the dynamic linker searches, and others where drivers are known to be installed."""
     folders = os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep)
     with suppress(OSError):
         for file in sorted(os.scandir("/etc/ld.so.conf.d"), key=lambda entry: entry.name):

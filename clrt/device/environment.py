@@ -1,7 +1,7 @@
-"""Gives the OpenCL libraries a folder for their caches where the user's own cannot be written.
+"""Redirect the OpenCL libraries' cache folders if the user's own are not writable.
 
-PoCL hides its device, and pyopencl fails, when their cache folders cannot be made: no HOME, a read-only one. They read
-these variables as they load, so this module is imported before pyopencl.
+PoCL offers no device, and pyopencl fails, if their cache folders cannot be created (no HOME, or a read-only one). They
+read these variables when they are loaded, so this module is imported before pyopencl.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ import os
 import tempfile
 from pathlib import Path
 
-#: Where Linux has memory that looks like files, also in containers whose file system is read-only.
+#: Linux's memory-backed file system, writable also in containers whose file system is read-only.
 MEMORY = "/dev/shm"
 
 
 def provide_cache_folders() -> None:
-    """Points XDG_CACHE_HOME and POCL_CACHE_DIR to a temporary folder where what they name cannot be written."""
+    """Set XDG_CACHE_HOME and POCL_CACHE_DIR to a temporary folder where those that they name are not writable."""
     temporary = _temporary()
     home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     programs = os.environ.get("POCL_CACHE_DIR")
@@ -33,7 +33,10 @@ def provide_cache_folders() -> None:
 
 
 def _writable(folder: str) -> bool:
-    """Whether it is there, or can be made, is the user's own, and takes files. Without a home "~" stays as it is."""
+    """Return whether the folder exists or can be created, belongs to the user, and is writable.
+
+    Without a home folder "~" is not expanded, so the path is not absolute.
+    """
     try:
         if not os.path.isabs(folder):
             return False
@@ -45,11 +48,11 @@ def _writable(folder: str) -> bool:
 
 
 def _temporary() -> str:
-    """The folder for temporary files; in memory where there is none."""
+    """Return the folder for temporary files, or one in memory if there is none."""
     try:
         return tempfile.gettempdir()
     except OSError:
-        os.environ["TMPDIR"] = tempfile.tempdir = MEMORY    # for processes that are started, too
+        os.environ["TMPDIR"] = tempfile.tempdir = MEMORY    # for child processes, too
         return MEMORY
 
 

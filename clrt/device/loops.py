@@ -1,9 +1,9 @@
-"""Drivers that end loops early.
+"""Drivers that limit loop iterations.
 
-Mesa's llvmpipe lets each vector of work-items turn its loops 65 535 times, all loops together, nested ones and those
-of all functions; from then on every loop ends after its first turn, without an error. (LP_MAX_TGSI_LOOP_ITERATIONS, a
-guard against shaders without end.) So where there is such a limit, launches are cut to keep below it, and kernels find
-out by themselves whether they did (kernels/loops.cl).
+Mesa's llvmpipe limits each vector of work-items to 65 535 loop iterations in total, counting nested loops and those of
+all functions; after that every loop ends after its first iteration, without an error. (LP_MAX_TGSI_LOOP_ITERATIONS, a
+guard against endless shaders.) With such a limit, launches are split to stay below it, and kernels verify that they did
+(kernels/loops.cl).
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from .open import Device
 from .program import build, compose, make_kernel
 from .verdicts import identity_of
 
-#: How the names of the files end that keep what was found, and turns up to which it is looked for.
+#: Suffix of the files that cache the limits, and the number of iterations up to which a limit is searched for.
 KIND, TURNS = "loops.json", 100_000
 _MULTIPLIER, _INCREMENT = 1664525, 1013904223
 _known: dict[str, int | None] = {}
 
 
 def loop_turns(device: Device) -> int | None:
-    """How many turns all loops of a work-item may take together; None without such a limit.
+    """Return how many loop iterations a work-item may run in total, or None without such a limit.
 
-    Kept in memory and on disk. Drivers that run work-items one by one run their loops as they are, and are not asked.
+    The limit is cached in memory and on disk. Drivers whose work-items run one by one have no limit and are not tested.
     """
     if device.vectors:
         return None
@@ -47,13 +47,13 @@ def loop_turns(device: Device) -> int | None:
 
 
 def turns_source() -> str:
-    """The program that `measured_turns` runs."""
+    """Return the source of the program that `measured_turns` runs."""
     return compose("", "check/turns.cl", {})
 
 
 @driver_errors()
 def measured_turns(device: Device) -> int | None:
-    """How many of TURNS turns a loop takes; None if all, 0 if the loop went wrong in some other way."""
+    """Measure how many of TURNS iterations a loop runs: None if all, 0 if its result is wrong in another way."""
     kernel = make_kernel(device, build(device, turns_source()), "turns")
     number = np.full(1, 7, np.uint32)
     given, made = (cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=number)

@@ -1,4 +1,4 @@
-"""The memory plan: what fits a device, and arrays in parts where its largest buffer is smaller than they are."""
+"""Memory planning: whether a scene fits the device, and arrays split into parts where its largest buffer is smaller."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from ..errors import NoRoomError, UsageError
 if TYPE_CHECKING:
     from .describe import DeviceInfo
 
-#: For developers: the largest buffer that a device is taken to allow, such as 1M.
+#: For developers: an upper bound on a device's largest buffer, such as 1M.
 VARIABLE = "CLRT_MAX_ALLOC"
 UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
-#: Records that a part has in common with the next one, so that those of a leaf are never in two (kernels/arrays.cl).
+#: Records that a part shares with the next one, so that a leaf's records are never in two parts (kernels/arrays.cl).
 OVERLAP = 16
 
 
 def largest_buffer(allowed: int) -> int:
-    """What a device allows, or less by the variable."""
+    """Return the device's limit, or that of VARIABLE if it is lower."""
     asked = os.environ.get(VARIABLE)
     if not asked:
         return allowed
@@ -33,7 +33,10 @@ def largest_buffer(allowed: int) -> int:
 
 
 def part_records(itemsize: int, part_bytes: int) -> int:
-    """How many records of so many bytes a part has of its own; NoRoomError where there is no room for one."""
+    """Return how many records of `itemsize` bytes a part has without its overlap.
+
+    Raises NoRoomError if there is no room for one.
+    """
     records = part_bytes // itemsize - OVERLAP
     if records < 1:
         raise NoRoomError(f"buffers of {part_bytes} bytes are too small for this scene, of whose largest records "
@@ -42,7 +45,7 @@ def part_records(itemsize: int, part_bytes: int) -> int:
 
 
 def needed_parts(arrays: Iterable[Any], info: DeviceInfo) -> int | None:
-    """The largest buffer of a device where one of the arrays is larger, so that all will be in parts; else None."""
+    """Return the device's largest buffer if one of the arrays is larger, so that all are split to parts; else None."""
     sizes = [(array.nbytes, array.dtype.itemsize) for array in arrays]
     if all(size <= info.max_alloc_bytes for size, _ in sizes):
         return None
@@ -51,20 +54,22 @@ def needed_parts(arrays: Iterable[Any], info: DeviceInfo) -> int | None:
 
 
 def parts(array: NDArray[Any], part_bytes: int | None) -> Iterator[NDArray[Any]]:
-    """The parts of an array, none of which is larger than `part_bytes`; without it the array itself."""
+    """Yield the parts of an array, none larger than `part_bytes`; the array itself if that is None."""
     own = max(1, len(array)) if part_bytes is None else part_records(array.itemsize, part_bytes)
     for first in range(0, max(1, len(array)), own):
         yield array[first:first + own + (0 if part_bytes is None else OVERLAP)]
 
 
 def part_count(array: Any, part_bytes: int | None) -> int:
-    """How many parts there are of an array of numpy's or a device's."""
+    """Return the number of parts of a numpy or device array."""
     return 1 if part_bytes is None else max(1, -(-len(array) // part_records(array.dtype.itemsize, part_bytes)))
 
 
 def check_memory(info: DeviceInfo, needs: Mapping[str, int], parameter_bytes: int, most_parameter_bytes: int) -> None:
-    """NoRoomError with the numbers where buffers of so many bytes do not fit, or a kernel cannot take as many as there
-    are parts: its parameters would fill `parameter_bytes`."""
+    """Check that buffers of these sizes fit the device, and that a kernel can take an argument for each part.
+
+    Raises NoRoomError, with the numbers, otherwise. parameter_bytes: size of the kernel's parameters.
+    """
     check_room(info, needs)
     if parameter_bytes > most_parameter_bytes:
         raise NoRoomError(f"{info.name}: its buffers are {size(info.max_alloc_bytes)} at most, and the scene of "
@@ -74,7 +79,7 @@ def check_memory(info: DeviceInfo, needs: Mapping[str, int], parameter_bytes: in
 
 
 def check_room(info: DeviceInfo, needs: Mapping[str, int]) -> None:
-    """NoRoomError with the numbers where buffers of so many bytes, by what is in them, do not fit."""
+    """Raise NoRoomError, with the numbers, if buffers of these sizes, by what they hold, do not fit."""
     total = sum(needs.values())
     if total > info.global_bytes:
         largest = sorted(needs, key=lambda name: -needs[name])[:4]
@@ -85,7 +90,7 @@ def check_room(info: DeviceInfo, needs: Mapping[str, int]) -> None:
 
 
 def check_host(film_bytes: int, width: int, height: int) -> None:
-    """NoRoomError where this machine has no room for a film and what is made of it, which takes as much again."""
+    """Raise NoRoomError if this machine has no room for a film and for the same size again of derived data."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 2 * film_bytes
     if 2 * film_bytes > memory:
         raise NoRoomError(f"a picture of {width}x{height} needs {size(2 * film_bytes)} of memory, and this machine has "
@@ -93,11 +98,11 @@ def check_host(film_bytes: int, width: int, height: int) -> None:
 
 
 def size(count: int) -> str:
-    """Bytes for people."""
+    """Format a number of bytes for display."""
     exponent = min(3, max(0, (int(count).bit_length() - 1) // 10))
     return f"{count / (1 << 10 * exponent):.4g} {('bytes', 'KiB', 'MiB', 'GiB')[exponent]}"
 
 
 def array_bytes(array: Any, part_bytes: int | None) -> int:
-    """What an array takes on the device, what its parts have in common included."""
+    """Return the size of an array on the device, including the overlap of its parts."""
     return int(array.nbytes + (part_count(array, part_bytes) - 1) * OVERLAP * np.dtype(array.dtype).itemsize)

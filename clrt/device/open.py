@@ -1,4 +1,4 @@
-"""A device opened for work: its context, queue and the choices that follow from its kind."""
+"""A device opened for work: its context, queue, and the settings that depend on its kind."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from .discover import choose
 from .fork import check_process
 from .pulse import take_any_time
 
-#: The name of PoCL's platform.
+#: Name of PoCL's platform.
 POCL = "Portable Computing Language"
-#: Launches tell how long they ran.
+#: Queues record launch times.
 TIMED = cl.command_queue_properties.PROFILING_ENABLE
 
 
 @dataclass(frozen=True)
 class Device:
-    """An opened device. In a process that was forked from that which opened it, queue and context are a UsageError."""
+    """An opened device. In a process forked from the one that opened it, `queue` and `context` raise UsageError."""
 
     info: DeviceInfo
     cl: cl.Device
@@ -34,61 +34,61 @@ class Device:
 
     @property
     def queue(self) -> CommandQueue:
-        """Which runs in order."""
+        """Return the in-order command queue of this device."""
         check_process()
         return self._queue
 
     @property
     def context(self) -> Context:
-        """Of its buffers and programs."""
+        """Return the OpenCL context of this device."""
         check_process()
         return self.shared.context
 
     @property
     def vectors(self) -> bool:
-        """Whether the program writes its vectors: on a CPU, unless its driver joins work-items as a GPU does."""
+        """Return whether kernels use explicit vectors: on a CPU, unless its driver vectorises over work-items."""
         return self.info.type == "cpu" and self.cl.native_vector_width_float > 1
 
     @property
     def lanes(self) -> int:
-        """Paths a work-item follows: one on a GPU, whose hardware joins work-items; a vector of them on a CPU."""
+        """Return the SIMD width, in paths per work-item: 1 on a GPU, whose hardware vectorises over work-items."""
         return 8 if self.vectors else 1
 
     @property
     def is_pocl(self) -> bool:
-        """Whether its driver is PoCL, which compiles kernels as they are first launched, and keeps them itself."""
+        """Return whether the driver is PoCL, which compiles kernels at their first launch and caches them itself."""
         return self.info.platform == POCL
 
     @property
     def packs(self) -> bool:
-        """Whether lanes are put side by side by one instruction (kernels/mask.cl), which waves of paths need."""
+        """Return whether one instruction compacts lanes (kernels/mask.cl), which wavefront path tracing needs."""
         return self.vectors and self.is_pocl and platform.machine().lower() in ("x86_64", "amd64")
 
     @property
     def fuses(self) -> bool:
-        """Whether fma is an instruction there. Intel's runtime and Oclgrind have it without saying so."""
+        """Return whether fma is a hardware instruction. Intel's runtime and Oclgrind have it without reporting it."""
         return (self.vectors or self.info.type == "simulator"
                 or bool(self.cl.single_fp_config & cl.device_fp_config.FMA))
 
     @property
     def local_size(self) -> int:
-        """Work-items of a group. On a CPU one: its compiler then has no loop over work-items to write around."""
+        """Return the work-group size. On a CPU it is 1, so that the compiler generates no loop over work-items."""
         return 1 if self.vectors else 64
 
     @property
     def layout(self) -> str:
-        """The tree layout that suits the device: eight boxes at a time where there are vectors, else compressed."""
+        """Return the BVH layout: "bvh8" (eight boxes per SIMD test) with explicit vectors, else "cwbvh"."""
         return "bvh8" if self.vectors else "cwbvh"
 
 
-#: One device or several, by names (see `choose`) or open; None is the best.
+#: One device or several, by name (see `choose`) or open; None is the best.
 Selectors = str | int | Device | Sequence[str | int | Device] | None
 
 
 def open_devices(selectors: Selectors) -> list[Device]:
-    """Opens the devices that are named (see `choose`), at least one; DeviceError where that fails.
+    """Open the devices that `selectors` names (see `choose`); those already open are returned as they are.
 
-    Those that are open already are taken as they are. UsageError where there are no names.
+    Raises DeviceError if a device cannot be opened, and UsageError for an empty list.
     """
     if isinstance(selectors, Sequence) and not selectors:
         raise UsageError(f"device is {selectors!r}; name at least one, or leave it out for the best")
@@ -97,12 +97,12 @@ def open_devices(selectors: Selectors) -> list[Device]:
 
 
 def name_of(devices: Sequence[Device]) -> str:
-    """Their names in one line, each once."""
+    """Return the distinct names of the devices in one line."""
     return " + ".join(dict.fromkeys(device.info.name for device in devices))
 
 
 def open_device(selector: str | int | None = None) -> Device:
-    """Opens the device that `selector` names (see `choose`); DeviceError where that fails."""
+    """Open the device that `selector` names (see `choose`). Raises DeviceError if that fails."""
     info, device = choose(selector)
     if info.platform == POCL:
         pocl.name_processor(device)

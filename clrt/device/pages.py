@@ -1,4 +1,4 @@
-"""Huge memory pages for the buffers of CPU devices, so that who first writes to them meets few page faults."""
+"""Huge memory pages for the buffers of CPU devices, which reduce page faults at the first write."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 import pyopencl as cl
 
 PAGE = mmap.PAGESIZE
-#: Smaller buffers are not worth it: huge pages have 2 MB.
+#: Minimum buffer size: huge pages have 2 MB, and smaller buffers would not benefit.
 WORTH = 1 << 22
 
 
 def advise_huge_pages(queue: cl.CommandQueue, buffer: cl.Buffer) -> None:
-    """Asks Linux to back the memory of a buffer that was just made with huge pages; elsewhere does nothing.
+    """Advise Linux to back a newly created buffer with huge pages; elsewhere do nothing.
 
-    Mapping a buffer of a CPU device gives the address of its memory, none of which is touched. It is only advice.
+    Mapping a buffer of a CPU device gives its address without touching the memory.
     """
     if not hasattr(mmap, "MADV_HUGEPAGE") or buffer.size < WORTH:
         return

@@ -1,7 +1,7 @@
-"""The platforms of all drivers that can be loaded, and what is wrong with the others.
+"""The platforms of all drivers that can be loaded, and the faults of the others.
 
-A driver is probed (probe.py) before this process loads it. What was found is kept on disk for its files as they are:
-that it is fine until one of them or the machine changes, and a fault for an hour.
+A driver is probed (probe.py) before this process loads it. The result is cached on disk for the driver's current files:
+success until one of them or the machine changes, a fault for an hour.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from .loader import load, load_all
 from .windows_drivers import is_loaded, not_loaded, pip_drivers
 
 log = logging.getLogger(__name__)
-#: How the names of the files end that keep what probes found.
+#: Suffix of the files that cache probe results.
 KIND = "driver.json"
-#: Seconds for which a fault is believed.
+#: Seconds for which a cached fault is valid.
 FAULTY = 3600.0
 
 Faults = dict[Driver, str]
@@ -33,7 +33,7 @@ _loaded: tuple[list[cl.Platform], Faults] | None = None
 
 
 def load_platforms(again: bool = False) -> tuple[list[cl.Platform], Faults]:
-    """The platforms, and what is wrong with each driver that was left out. again: drivers with faults are probed anew.
+    """Return the platforms, and the fault of each driver that was left out. again: probe faulty drivers again.
 
     A process loads its drivers once, so later calls return the same.
     """
@@ -52,7 +52,7 @@ def load_platforms(again: bool = False) -> tuple[list[cl.Platform], Faults]:
 
 
 def faults_of(drivers: list[Driver], again: bool = False) -> Faults:
-    """What is wrong with each driver, empty where nothing is; what is not known is probed."""
+    """Return the fault of each driver, empty if there is none; probe those without a cached result."""
     faults = {driver: _kept(driver, again) for driver in drivers}
     unknown = [driver for driver, fault in faults.items() if fault is None]
     if unknown:
@@ -69,7 +69,7 @@ def faults_of(drivers: list[Driver], again: bool = False) -> Faults:
 
 
 def _kept(driver: Driver, again: bool) -> str | None:
-    """What an earlier probe found, or None where that does not count, or no more."""
+    """Return the cached result of a probe, or None if there is none or it has expired."""
     content = cache.read_file(_name(driver))
     try:
         kept = json.loads(content or b"null")
@@ -85,7 +85,7 @@ def _name(driver: Driver) -> str:
 
 
 def _state(driver: Driver) -> list[Any]:
-    """The files of a driver, and the machine that they are on, whose kernel has the other half of some drivers."""
+    """Return what a probe's result depends on: the driver's files, the machine and its kernel (part of some driver)."""
     files = []
     for path in (driver.library, driver.source):
         try:

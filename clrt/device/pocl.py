@@ -1,13 +1,13 @@
-"""Has PoCL 3.0, the one that pip installs, make code for a processor that its library is made for.
+"""Have PoCL 3.0, the version that pip installs, generate code for a processor that its own library was compiled for.
 
-The library is one for AVX2, made for Intel's Haswell, one for AVX-512, and so on; LLVM 14 inlines its functions only
-into code for the same processor, or one that has all that it has. For AMD's Zen 1 to 3 and Intel's Alder Lake fma, fabs
-and vload8 stay calls then, and pictures take twice the time and more. Zen 4 is taken for Zen 3, which has no AVX-512,
-and LLVM aborts at the first fma of the library for that. Later ones it calls "generic", a name that its own front end
-refuses: every program fails with "unknown target CPU 'generic'".
+Its library comes in variants: one for AVX2, compiled for Intel's Haswell, one for AVX-512, and so on. LLVM 14 inlines
+library functions only into code for the same processor, or one with a superset of its features. Otherwise, as for AMD's
+Zen 1 to 3 and Intel's Alder Lake, fma, fabs and vload8 remain calls, and renders take twice the time and more. Zen 4 is
+misdetected as Zen 3, which has no AVX-512, and LLVM aborts at the first fma of the library. Later processors are called
+"generic", a name that its own front end rejects: every program fails with "unknown target CPU 'generic'".
 
-The name is a pointer in PoCL's device structure, beside the target triple; `name_processor` points it at the best
-processor of such a library that this machine can run. It touches nothing unless exactly one such pair is found.
+The name is a pointer in PoCL's device structure, next to the target triple; `name_processor` points it at the best
+processor of such a library that this machine supports. It changes nothing unless exactly one such pair is found.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import pyopencl as cl
 
-#: LLVM name → the /proc/cpuinfo flags of the instructions that its code generator may choose, best first.
+#: LLVM name → the /proc/cpuinfo flags of the instructions that its code generator may use, best first.
 PROCESSORS = {
     "icelake-server": {"avx512f", "avx512dq", "avx512bw", "avx512vl", "avx512cd", "avx512vbmi", "avx512_vbmi2",
                        "avx512_vnni", "avx512_bitalg", "avx512_vpopcntdq", "avx512ifma", "gfni", "fma", "bmi2",
@@ -30,12 +30,12 @@ PROCESSORS = {
     "nehalem": {"sse4_2", "popcnt"},
 }
 SEARCHED_BYTES = 1024
-_names: list[ctypes.Array[ctypes.c_char]] = []  # PoCL keeps the pointer, so the strings must live as long as it
+_names: list[ctypes.Array[ctypes.c_char]] = []  # PoCL keeps the pointers, so the strings must stay alive
 
 
 @cache
 def processor_flags() -> frozenset[str]:
-    """The instructions that this machine has, as Linux names them; empty elsewhere."""
+    """Return the CPU's feature flags as Linux names them; empty on other systems."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
@@ -44,20 +44,20 @@ def processor_flags() -> frozenset[str]:
 
 
 def best_processor(flags: Set[str]) -> str:
-    """The best of PROCESSORS whose needs `flags` meet, else the plain "x86-64"."""
+    """Return the first of PROCESSORS whose requirements `flags` satisfy, else the plain "x86-64"."""
     return next((name for name, needs in PROCESSORS.items() if needs <= flags), "x86-64")
 
 
 def is_misnamed(name: str, flags: Set[str]) -> bool:
-    """Whether LLVM 14 should call a processor with these instructions by another name.
+    """Return whether LLVM 14 should use another name for a processor with these features.
 
-    Those without AVX2 have libraries made for themselves.
+    Processors without AVX2 have library variants of their own.
     """
     return name == "generic" or ("avx2" in flags and name != best_processor(flags))
 
 
 def name_processor(device: cl.Device) -> bool:
-    """Gives the PoCL device the name of its library's processor; True where it had another."""
+    """Set the PoCL device's processor to that of its library; return True if it was another."""
     if "LLVM 14" not in device.platform.version or not Path("/proc/self/mem").exists():
         return False
     flags = processor_flags()
@@ -71,9 +71,9 @@ def name_processor(device: cl.Device) -> bool:
 
 
 def _strings(address: int) -> list[tuple[int, str, str]]:
-    """(offset, string, string of the neighbouring pointer) of every pointer to text in the structure at `address`.
+    """Return (offset, string, neighbouring pointer's string) of every pointer to text in the structure at `address`.
 
-    Reads through /proc/self/mem, where a word that is no pointer gives an error instead of a crash.
+    Reads through /proc/self/mem, where a word that is not a pointer gives an error instead of a crash.
     """
     with open("/proc/self/mem", "rb", buffering=0) as memory:
         memory.seek(address)

@@ -1,5 +1,8 @@
-"""Programs that PoCL keeps. Where one is damaged (a disk that was full, a machine that lost power), PoCL ends the whole
-process, or has a program without kernels, again and again: so these are found, and removed."""
+"""Find and remove damaged programs in PoCL's cache.
+
+If one is damaged (the disk was full, the machine lost power), PoCL aborts the whole process, or returns a program
+without kernels, every time.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,16 @@ from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 
-#: What LLVM's bitcode begins with.
+#: Magic number of LLVM bitcode.
 BITCODE = b"BC\xc0\xde"
 
 
 def kept_programs() -> Path:
-    """The folder; in it are folders of two letters, in those one for each program, and beside them one for each kernel
-    of those that were built of bitcode (see bitcode.py)."""
+    """Return PoCL's cache folder.
+
+    It has folders of two letters, with one folder per program in each, and next to them one folder per kernel of the
+    programs that were built from bitcode (see bitcode.py).
+    """
     if folder := os.environ.get("POCL_CACHE_DIR"):
         return Path(folder)
     cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
@@ -24,9 +30,9 @@ def kept_programs() -> Path:
 
 
 def remove_damaged() -> int:
-    """How many programs were damaged; they are compiled again when they are needed."""
+    """Remove damaged programs, which are then compiled again when needed; return how many there were."""
     removed = 0
-    with suppress(OSError, RuntimeError):   # it may not be ours to read, and there may be no home
+    with suppress(OSError, RuntimeError):   # the folder may be unreadable, or there may be no home
         for program in chain(kept_programs().glob("[A-Z][A-Z]/*"), kept_programs().glob("*_*")):
             if not all(map(_is_whole, program.rglob("*"))):
                 shutil.rmtree(program, ignore_errors=True)
@@ -35,7 +41,7 @@ def remove_damaged() -> int:
 
 
 def _is_whole(file: Path) -> bool:
-    """Whether it looks like what its name says."""
+    """Return whether a file has the format that its name implies."""
     if file.suffix == ".bc":
         with open(file, "rb") as opened:
             return opened.read(len(BITCODE)) == BITCODE
@@ -43,7 +49,7 @@ def _is_whole(file: Path) -> bool:
 
 
 def _is_whole_library(file: Path) -> bool:
-    """Whether an ELF file is as long as the table at its end asks for (System V ABI, ELF-64 header)."""
+    """Return whether an ELF file extends to the end of its section header table (System V ABI, ELF-64 header)."""
     with open(file, "rb") as opened:
         header = opened.read(64)
     if len(header) < 64 or header[:4] != b"\x7fELF":

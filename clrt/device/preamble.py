@@ -1,4 +1,4 @@
-"""The C text that opens a program: records, the scene's buffers as one struct, the types and features in use."""
+"""The generated C text at the start of a program: records, the scene's buffers as one struct, types and features."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Buffers = Mapping[str, tuple[str, Any]]
 
 
 def scene_struct(buffers: Buffers, part_bytes: int | None = None) -> str:
-    """`Scene`, the kernel parameters that fill it (SCENE_PARAMETERS) and its initialiser (SCENE_ARGUMENTS).
+    """Return the struct `Scene`, its kernel parameters (SCENE_PARAMETERS) and its initialiser (SCENE_ARGUMENTS).
 
-    The order of `buffers` is the order of the kernel's arguments; the counts come last. part_bytes: all are in parts of
-    at most so many bytes (kernels/arrays.cl).
+    The order of `buffers` is the order of the kernel's arguments; the counts come last. part_bytes: maximum size of the
+    parts that all buffers are split into (kernels/arrays.cl), None for whole buffers.
     """
     typedefs = {c_type: c_typedef(c_type, array.dtype) for c_type, array in buffers.values()}
     members = [f"global const {c_type} *{name}" for name, (c_type, _) in buffers.items()]
@@ -38,15 +38,15 @@ def scene_struct(buffers: Buffers, part_bytes: int | None = None) -> str:
 
 
 def type_list(macro: str, types: Iterable[tuple[str, int]]) -> str:
-    """An X-macro: `#define MACRO(X) X(name, number) …`."""
+    """Return an X-macro: `#define MACRO(X) X(name, number) …`."""
     return f"#define {macro}(X) {' '.join(f'X({name}, {number})' for name, number in types)}"
 
 
 def defines(values: Mapping[str, int | float]) -> str:
-    """`#define NAME number` for each; a Python float, which must be one of float32, is a float."""
+    """Return `#define NAME number` for each value; a Python float, exact in float32, becomes a float literal."""
     return "\n".join(f"#define {name} {value}{'f' * isinstance(value, float)}" for name, value in values.items())
 
 
 def typedefs(records: Mapping[str, np.dtype[Any]]) -> str:
-    """The typedefs of records that are no scene buffers."""
+    """Return the typedefs of records other than scene buffers."""
     return "\n".join(c_typedef(name, dtype) for name, dtype in records.items())

@@ -1,4 +1,4 @@
-"""The device that is used where none is named: of $CLRT_DEVICE, else of the user's configuration file.
+"""The default device: that of $CLRT_DEVICE, else of the user's configuration file.
 
     device = "gpu"      # what --device takes
 
@@ -15,14 +15,14 @@ from ..errors import UsageError
 
 
 class Preference(NamedTuple):
-    """selector: see `discover.select`; origin: where it stands, for messages."""
+    """The user's default device. selector: see `discover.select`; origin: where it was set, for messages."""
 
     selector: str | int
     origin: str
 
 
 def preferred_device() -> Preference | None:
-    """None where neither names one. UsageError where the file cannot be read or says something else."""
+    """Return the user's default device, or None. Raises UsageError if the file is unreadable or has other contents."""
     if named := os.environ.get("CLRT_DEVICE"):
         return Preference(named, "CLRT_DEVICE")
     path = config_file()
@@ -43,7 +43,7 @@ def preferred_device() -> Preference | None:
 
 
 def config_file() -> Path:
-    """Where the user's configuration is, if there is any."""
+    """Return the path of the user's configuration file, which need not exist."""
     if named := os.environ.get("CLRT_CONFIG"):
         return Path(named)
     from platformdirs import user_config_dir

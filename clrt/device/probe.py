@@ -1,6 +1,7 @@
-"""Asks drivers whether they can be loaded, each in a process of its own, for one may crash or hang whoever loads it.
+"""Probe whether drivers can be loaded, each in a child process, as one may crash or hang the process that loads it.
 
-`python -m clrt.device.probe LIBRARY` is that process. It does all that listing devices does, and writes what is wrong.
+`python -m clrt.device.probe LIBRARY` is that process. It does everything that listing devices does, and prints the
+fault.
 """
 
 from __future__ import annotations
@@ -19,16 +20,16 @@ from .child import activity, end_child, last_line, start_child, told_end
 from .describe import describe, size_of
 from .loader import devices_of, load
 
-#: Seconds that all probes together may take. A slow start of many GPUs is no hang.
+#: Time limit of all probes together in seconds. A slow start of many GPUs is not a hang.
 LIMIT = 7.0
-#: On a busy machine they may take longer: so many times, as long as a probe computes, or waits for a processor or a
-#: disk, in so many seconds at least once.
+#: On a busy machine the limit may be extended up to PATIENCE times, as long as a probe computes, or waits for a
+#: processor or a disk, at least once in IDLE seconds.
 PATIENCE, IDLE = 10.0, 2.0
 
 
 def probe(libraries: Sequence[str], limit: float = LIMIT) -> list[str]:
-    """What is wrong with each driver, empty where nothing is; they are asked all at once."""
-    with tempfile.TemporaryDirectory(prefix="clrt-probes-") as folder:  # for what those that crash leave behind
+    """Return the fault of each driver, empty if there is none. All are probed at the same time."""
+    with tempfile.TemporaryDirectory(prefix="clrt-probes-") as folder:  # for files that crashed probes leave behind
         return _probe(libraries, limit, folder)
 
 
@@ -46,9 +47,9 @@ def _probe(libraries: Sequence[str], limit: float, folder: str) -> list[str]:
 
 
 def _wait(children: Sequence[subprocess.Popen[str]], limit: float) -> None:
-    """Until all have ended, or those that have not do nothing, or have had the time of all for themselves."""
+    """Wait until all children have ended, are idle after the limit, or have used the whole limit as CPU time each."""
     clock = AwakeClock()
-    busy = {child: (0.0, 0.0) for child in children}     # the processor time of each, and when it last did anything
+    busy = {child: (0.0, 0.0) for child in children}     # CPU time of each, and when it was last active
     while busy:
         time.sleep(0.02)
         now = clock.look()
@@ -71,12 +72,12 @@ def _fault(child: subprocess.Popen[str], output: IO[bytes], errors: IO[bytes], l
 
 
 def main() -> None:
-    """Loads the driver that the first argument names. What it prints itself goes to standard error."""
+    """Load the driver that the first argument names and print its fault. Its own output goes to standard error."""
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as result:
         os.dup2(2, 1)
         _no_core_dump()
         result.write(_what_is_wrong(sys.argv[1]))
-    os._exit(0)  # some drivers crash as they are unloaded, when all work is done
+    os._exit(0)  # some drivers crash when they are unloaded
 
 
 def _what_is_wrong(library: str) -> str:

@@ -1,10 +1,9 @@
 """From kernel files to a built program: composition, build, cache.
 
 A program's text is a preamble (records, choices, features) followed by whole kernel files. `#include "file.cl"` is
-resolved here, each file once, and `#include NAME` stands for the files that the scene chose for NAME, possibly none.
-So the text holds what the scene needs and nothing else; `--print-kernel` shows exactly what is compiled, but for what
-ends kernels' names (bitcode.py); and the known troubles with -I (spaces in paths, driver caches that ignore included
-files) cannot arise.
+resolved here, each file once, and `#include NAME` stands for the files that the scene selects for NAME, possibly none.
+So the text has exactly what the scene needs. `--print-kernel` shows what is compiled, except for the suffix of kernel
+names (bitcode.py). The known problems of -I (spaces in paths, driver caches that ignore included files) cannot occur.
 """
 
 from __future__ import annotations
@@ -33,17 +32,20 @@ from .sources import kernel_folder
 
 log = logging.getLogger(__name__)
 OPTIONS = ["-cl-std=CL1.2"]
-#: Oclgrind's LLVM lacks an intrinsic that its clang writes where it optimises, or inlines what says that it must be.
+#: Oclgrind's LLVM lacks an intrinsic that its clang emits when it optimises or inlines an always_inline function.
 SIMULATOR_OPTIONS = ["-cl-opt-disable", "-Dalways_inline="]
 _INCLUDE = re.compile(r'^#include\s+(?:"([^"]+)"|(\w+))\s*$')
-#: Programs that are kept in memory of a context, those used last: each takes some megabytes.
+#: Maximum number of programs kept in memory per context, least recently used first out: each takes some megabytes.
 MOST_KEPT = 32
 
 
 @dataclass(frozen=True)
 class BuiltProgram:
-    """A program ready to run. `cached`: it was not compiled from source; `build_seconds`: what getting it took;
-    `ending`: of its kernels' names (see bitcode.py)."""
+    """A program ready to run.
+
+    `cached`: it was not compiled from source; `build_seconds`: time to build or load it; `ending`: suffix of its
+    kernels' names (see bitcode.py).
+    """
 
     program: cl.Program
     build_seconds: float
@@ -52,9 +54,9 @@ class BuiltProgram:
 
 
 def compose(preamble: str, entry: str, choices: Mapping[str, Sequence[str]], folder: Traversable | None = None) -> str:
-    """The text of a program: `preamble`, then the file `entry` with all that it includes.
+    """Return the text of a program: `preamble`, then the file `entry` with all that it includes.
 
-    choices: for each NAME in `#include NAME` the files to put there. folder: where kernel files lie (clrt.kernels).
+    choices: the files for each NAME in `#include NAME`. folder: the kernel files' folder (default clrt.kernels).
     """
     folder = folder or kernel_folder()
     seen: set[str] = set()
@@ -79,16 +81,16 @@ def compose(preamble: str, entry: str, choices: Mapping[str, Sequence[str]], fol
 
 
 def files_of(source: str) -> list[str]:
-    """The kernel files that a composed text is made of."""
+    """Return the names of the kernel files in a composed text."""
     return re.findall(r'^#line 1 "(.+)"$', source, re.MULTILINE)
 
 
 def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
-    """Builds `source` for the device, or takes it from this process or the cache; KernelError with the log if refused.
+    """Build `source` for the device, or take it from memory or the cache. Raises KernelError with the log on failure.
 
-    PoCL keeps the kernels that it compiled itself; what is kept for it is bitcode, or only that a program was built
-    before. Where the device has no instruction for fma, kernels/fma.cl comes first. data_bytes: about what the program
-    will work on; beside large data PoCL's front end runs in a process of its own.
+    PoCL caches compiled kernels itself; clrt's cache then holds bitcode, or an empty entry to record that a program was
+    built. If the device has no fma instruction, kernels/fma.cl is prepended. data_bytes: approximate size of the
+    program's data; for large data PoCL's front end runs in the compile process (aside.py).
     """
     start = time.perf_counter()
     source = _whole(device, source)
@@ -116,13 +118,13 @@ def build(device: Device, source: str, data_bytes: int = 0) -> BuiltProgram:
 
 
 def is_kept(device: Device, source: str) -> bool:
-    """Whether `build` will not have to compile it."""
+    """Return whether `build` would find the program in memory or the cache."""
     key = program_key(device, _whole(device, source))
     return key in device.shared.programs or read_binary(key) is not None
 
 
 def compile_ahead(device: Device, source: str) -> None:
-    """Has PoCL's front end compile in another process what `build` will soon be asked for, and waits for that."""
+    """Compile in the compile process what `build` will soon need (PoCL only), and wait for it."""
     if is_kept(device, source) or not can_keep() or os.environ.get("POCL_KERNEL_CACHE") == "0":
         return
     whole = _whole(device, source)
@@ -135,7 +137,7 @@ def compile_ahead(device: Device, source: str) -> None:
 
 
 def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
-    """The kernel `name` of a program; KernelError where the driver fails only now."""
+    """Return the kernel `name` of a program. Raises KernelError if the driver fails only now."""
     try:
         return cl.Kernel(built.program, name + built.ending)
     except cl.Error as error:
@@ -143,32 +145,34 @@ def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
 
 
 def program_key(device: Device, source: str) -> str:
-    """What the cache calls the program. Machines may share one, and not all processors of a name have the same
-    instructions."""
+    """Return the cache key of a program.
+
+    It includes the processor: machines may share a cache, and processors of the same name may differ in features.
+    """
     identity = [source, *OPTIONS, device.info.id, device.info.platform_version, device.info.driver,
                 best_processor(processor_flags())]
     return hashlib.sha256("\n".join(identity).encode()).hexdigest()
 
 
 def _whole(device: Device, source: str) -> str:
-    """With what the device lacks."""
+    """Return the source, preceded by functions that the device lacks."""
     return source if device.fuses else compose("", "fma.cl", {}) + source
 
 
 def _ending(device: Device, key: str) -> str:
-    """Of the names of kernels."""
+    """Return the suffix of kernel names, empty unless programs are built from bitcode."""
     return f"_{key[:32]}" if takes_bitcode(device.info.platform_version) else ""
 
 
 def _built(device: Device, key: str, source: str, ending: str, aside: bool = False) -> cl.Program:
-    """Built of its source; what it may be built of another time is in the cache then."""
+    """Compile the program from source, and cache what it can be built from next time."""
     source = name_kernels(source, ending)
     if aside:
         in_background(_where(device), lambda: compile_aside(device.info.id, source, OPTIONS, LIMIT))
     program, other = _compile(device, source), None
     if device.is_pocl:
         binary = find_bitcode(ending) or b"" if ending else b""
-        other = _from_binary(device, binary)    # now, too, so that its kernels are compiled once
+        other = _from_binary(device, binary)    # use it now, too, so that its kernels are compiled only once
         write_binary(key, binary if other else b"")
     else:
         binaries: list[bytes] = program.get_info(cl.program_info.BINARIES)  # type: ignore[assignment]
@@ -180,7 +184,7 @@ def _from_binary(device: Device, binary: bytes | None) -> cl.Program | None:
     try:
         return quietly_built(cl.Program(device.context, [device.cl], [binary]), []) if binary else None
     except (cl.Error, ValueError):
-        return None  # a driver may refuse an old or damaged binary: compile again
+        return None  # the driver may reject an old or damaged binary: compile again
 
 
 def _compile(device: Device, source: str) -> cl.Program:
@@ -202,12 +206,12 @@ def _compile(device: Device, source: str) -> cl.Program:
 
 
 def _where(device: Device) -> str:
-    """For messages."""
+    """Return the device's name for messages."""
     return f"{device.info.name} ({device.info.platform})"
 
 
 def _build_log(device: Device, program: cl.Program) -> str:
-    """What the compiler said."""
+    """Return the compiler's log."""
     try:
         log = program.get_build_info(device.cl, cl.program_build_info.LOG)  # type: ignore[no-untyped-call]
         return str(log).strip()

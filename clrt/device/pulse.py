@@ -1,8 +1,8 @@
-"""Whether a driver answers: kept in memory that a guard in another process can watch (cli/guard.py).
+"""Hang watchdog: counters of driver calls in memory that a guard in another process can watch (cli/guard.py).
 
-Waiting for a launch ends after the patience that there is (launch.py). But a driver may also hang in a call, and then
-no line of Python runs until it returns: pyopencl lets other threads run only in calls that are meant to wait. So each
-call is counted as it begins and as it ends, and who shares this memory sees an odd count that stands still.
+Waiting for a launch ends after `patience` (launch.py). But a driver may also hang inside a call, and then no Python
+code runs until it returns: pyopencl releases the GIL only in calls that are meant to wait. So each call is counted when
+it begins and when it ends; a process that shares this memory detects a hang by an odd count that does not change.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from contextlib import contextmanager
 
 from ..errors import UsageError
 
-#: How long a launch, or a call, may take before it counts as hung; they should take a tenth of a second. The variable
-#: changes it, and 0 turns it off.
+#: Seconds after which a launch or a call counts as hung; they should take a tenth of a second. The variable overrides
+#: it, and 0 disables the watchdog.
 HANG_SECONDS, VARIABLE = 60.0, "CLRT_HANG_SECONDS"
 
-#: Many drivers compile at the first launch, which may take so many times as long.
+#: Factor on that time for a program's first launch, at which many drivers compile.
 WARM_UP = 10
 
-#: Calls begun and ended; simulators in use; whether any hung; warm-ups. A fork shares it.
+#: Calls begun and ended; simulators in use; whether any hung; warm-ups in progress. Shared with forked processes.
 _counts = memoryview(mmap.mmap(-1, 32)).cast("q")
 CALLS, UNWATCHED, HUNG, WARMING = 0, 1, 2, 3
 
 
 def patience() -> float:
-    """Seconds that a launch or a call may take; infinite where that is not watched."""
+    """Return the seconds that a launch or a call may take; infinite if the watchdog is off."""
     try:
         seconds = float(os.environ.get(VARIABLE) or HANG_SECONDS)
         if not 0 <= seconds < float("inf"):
@@ -39,14 +39,14 @@ def patience() -> float:
 
 
 def call_in_progress() -> int:
-    """A number that is the same as long as the same call goes on; 0 where there is none, or none that is watched."""
+    """Return a number that identifies the call in progress; 0 if there is none, or it is not watched."""
     calls = _counts[CALLS]
     return calls if calls % 2 and not (_counts[UNWATCHED] or _counts[WARMING]) else 0
 
 
 @contextmanager
 def counted_call() -> Iterator[None]:
-    """Around calls of a driver that should take no time; within another one it does nothing."""
+    """Count driver calls that should return at once; nested uses have no effect."""
     outermost = 1 - _counts[CALLS] % 2
     _counts[CALLS] += outermost
     try:
@@ -56,23 +56,23 @@ def counted_call() -> Iterator[None]:
 
 
 def note_hang() -> None:
-    """A device does not answer: its driver may not even let this process end in the usual way."""
+    """Record that a device has hung: its driver may even prevent this process from exiting normally."""
     _counts[HUNG] = 1
 
 
 def has_hung() -> bool:
-    """Whether that was noted."""
+    """Return whether a hang was recorded."""
     return bool(_counts[HUNG])
 
 
 def take_any_time() -> None:
-    """From now on nothing is watched: simulators are slow."""
+    """Disable the watchdog from now on, for slow simulators."""
     _counts[UNWATCHED] += 1
 
 
 @contextmanager
 def warming_up() -> Iterator[None]:
-    """Around the first launch of a program. Its calls are not watched: see background.py."""
+    """Mark the first launch of a program, whose calls are not watched: see background.py."""
     _counts[WARMING] += 1
     try:
         yield

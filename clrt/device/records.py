@@ -1,7 +1,7 @@
-"""Records that host and device share. A numpy dtype is the definition; the C typedef is written from it.
+"""Records shared by host and device. A numpy dtype defines each, and the C typedef is generated from it.
 
-Fields are float32, int32, uint32 or uint8, alone or in arrays, in an order that needs no padding, and a record's size
-is a multiple of 16: then numpy, and every OpenCL compiler, lay it out alike.
+Fields are float32, int32, uint32 or uint8, scalars or arrays, in an order that needs no padding, and a record's size is
+a multiple of 16: then numpy and every OpenCL compiler agree on its layout.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ C_TYPES = {np.dtype("f4"): "float", np.dtype("i4"): "int", np.dtype("u4"): "uint
 
 
 def c_typedef(name: str, dtype: np.dtype[Any]) -> str:
-    """The C declaration of a structured dtype, e.g. `typedef struct { float center[3]; float radius; } Sphere;`."""
+    """Return the C typedef of a structured dtype, e.g. `typedef struct { float center[3]; float radius; } Sphere;`."""
     members = []
     for field in dtype.names or ():
         base, shape = dtype[field].subdtype or (dtype[field], ())
@@ -23,7 +23,7 @@ def c_typedef(name: str, dtype: np.dtype[Any]) -> str:
 
 
 def record(**fields: str) -> np.dtype[Any]:
-    """A record dtype from `name="3f4"` specifications; raises ValueError where its size is not a multiple of 16."""
+    """Return a record dtype from `name="3f4"` specifications. Raises ValueError if its size is not a multiple of 16."""
     dtype = np.dtype([(name, spec) for name, spec in fields.items()])
     if dtype.itemsize % 16:
         raise ValueError(f"record of {dtype.itemsize} bytes: add padding to a multiple of 16")

@@ -1,4 +1,4 @@
-"""Where the kernel files are, and a digest of them all."""
+"""Location of the kernel files, and a digest of them all."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 def kernel_folder() -> Traversable:
-    """The installed package clrt.kernels, or the folder beside clrt in a source tree."""
+    """Return the installed package clrt.kernels, or the folder next to clrt in a source tree."""
     try:
         return files("clrt.kernels")
     except ModuleNotFoundError:
@@ -18,7 +18,7 @@ def kernel_folder() -> Traversable:
 
 
 def kernel_digest() -> str:
-    """SHA-256 of the names and texts of all kernel files, as 64 hexadecimal digits."""
+    """Return the SHA-256 of the names and texts of all kernel files, as 64 hexadecimal digits."""
     digest = hashlib.sha256()
     for name, text in sorted(_kernel_files(kernel_folder(), "")):
         digest.update(f"{name}\0{len(text)}\0".encode() + text)

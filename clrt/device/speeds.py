@@ -1,6 +1,6 @@
-"""How fast devices were when they were measured (study/device_speed.py), kept beside the compiled programs.
+"""Measured speeds of devices (study/device_speed.py), cached with the compiled programs.
 
-A speed counts for one device with one driver, for the kernels and the version of clrt that were measured.
+A speed is valid for one device and driver, and for the kernels and version of clrt that were measured.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from .verdicts import identity_of
 if TYPE_CHECKING:
     from .describe import DeviceInfo
 
-#: How the names of their files end.
+#: Suffix of the files.
 KIND = "bench.json"
 
 
 @dataclass(frozen=True)
 class Speed:
-    """Millions of rays a second, the kernels alone."""
+    """Throughput of the kernels alone, in millions of rays per second."""
 
     mrays_primary: float
     mrays_bounce: float
@@ -31,18 +31,18 @@ class Speed:
 
     @property
     def mrays(self) -> float:
-        """Of as many rays of each kind."""
+        """Return the throughput for equal numbers of rays of each kind."""
         return 3 / (1 / self.mrays_primary + 1 / self.mrays_bounce + 1 / self.mrays_shadow)
 
 
 def keep_speed(info: DeviceInfo, speed: Speed) -> bool:
-    """Stores the speed of a device; False where that is not possible."""
+    """Store the speed of a device; return False if that is not possible."""
     kept = {"measured": identity_of(info), "kernels": kernel_digest(), "bench": asdict(speed)}
     return cache.write_file(f"{info.id}.{KIND}", json.dumps(kept, indent=1).encode())
 
 
 def kept_speed(info: DeviceInfo) -> Speed | None:
-    """The speed of a device as it is now, or None."""
+    """Return the stored speed of a device in its present state, or None."""
     content = cache.read_file(f"{info.id}.{KIND}")
     try:
         kept = json.loads(content or b"null")

@@ -1,7 +1,7 @@
-"""What checks of devices found, kept on disk beside the compiled programs (see clrt.check).
+"""Results of device checks, cached on disk with the compiled programs (see clrt.check).
 
-A verdict counts for one device with one driver, and for the kernels and the version of clrt that were checked. Whatever
-the file holds that is no such verdict, the device has not been checked.
+A verdict is valid for one device and driver, and for the kernels and version of clrt that were checked. If the file is
+malformed, the device counts as not checked.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from .sources import kernel_digest
 if TYPE_CHECKING:
     from .describe import DeviceInfo
 
-#: How the names of their files end.
+#: Suffix of the files.
 KIND = "check.json"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """failures: what was wrong, a sentence each, none where it passed. figures: what was measured, by name.
+    """The result of a device check. failures: one sentence each, empty if it passed. figures: measurements by name.
 
-    when: the time of the check in UTC (ISO 8601); seconds: how long it took. kernels: the digest (sources.py) of those
-    that were checked.
+    when: the time of the check in UTC (ISO 8601); seconds: its duration. kernels: digest of the kernels that were
+    checked (sources.py).
     """
 
     passed: bool
-    failures: list[str] = field(hash=False)     # lists and dicts have no hash; equal verdicts have equal ones without
+    failures: list[str] = field(hash=False)     # lists and dicts are unhashable; equality still implies equal hashes
     when: str
     seconds: float
     kernels: str
@@ -39,13 +39,13 @@ class Verdict:
 
 
 def keep_verdict(info: DeviceInfo, verdict: Verdict) -> bool:
-    """Stores the verdict on a device; False where that is not possible."""
+    """Store the verdict on a device; return False if that is not possible."""
     text = json.dumps({"checked": identity_of(info), "verdict": asdict(verdict)}, indent=1)
     return cache.write_file(f"{info.id}.{KIND}", text.encode())
 
 
 def kept_verdict(info: DeviceInfo) -> Verdict | None:
-    """The verdict on a device as it is now, or None."""
+    """Return the stored verdict on a device in its present state, or None."""
     content = cache.read_file(f"{info.id}.{KIND}")
     if content is None:
         return None
@@ -58,12 +58,12 @@ def kept_verdict(info: DeviceInfo) -> Verdict | None:
 
 
 def forget_verdicts() -> int:
-    """Deletes all that are kept; returns how many there were."""
+    """Delete all stored verdicts; return how many there were."""
     return cache.clear(f"*.{KIND}")
 
 
 def identity_of(info: DeviceInfo) -> dict[str, str]:
-    """All that what is found about a device depends on, but for the kernels."""
+    """Return what results about a device depend on, except for the kernels."""
     try:
         own = version("clrt")
     except PackageNotFoundError:
@@ -73,7 +73,7 @@ def identity_of(info: DeviceInfo) -> dict[str, str]:
 
 
 def _verdict(stored: Mapping[str, Any]) -> Verdict:
-    """A verdict of what JSON brought; raises ValueError, TypeError, LookupError or OverflowError where that is none."""
+    """Return the verdict from parsed JSON; ValueError, TypeError, LookupError or OverflowError if it is malformed."""
     failures, figures = [str(failure) for failure in stored["failures"]], dict(stored["figures"])
     when, seconds, kernels = str(stored["when"]), float(stored["seconds"]), str(stored["kernels"])
     if stored["passed"] is not (not failures) or not all(isinstance(f, (int, float, str)) for f in figures.values()):

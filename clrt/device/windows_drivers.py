@@ -1,6 +1,6 @@
-"""Drivers on Windows that the registry does not list: those that pip leaves in Python's environment.
+"""Windows drivers that the registry does not list: those that pip installs in Python's environment.
 
-OpenCL's loader reads the registry's HKEY_LOCAL_MACHINE, which pip cannot write, and OCL_ICD_FILENAMES, but the latter
+The OpenCL loader reads the registry's HKEY_LOCAL_MACHINE, which pip cannot write, and OCL_ICD_FILENAMES, but the latter
 only in a process without administrator rights (the Khronos loader's icd_windows_envvars.c).
 """
 
@@ -13,24 +13,24 @@ import sys
 
 from .drivers import Driver
 
-#: In a prefix of Python, what intel-opencl-rt installs.
+#: What intel-opencl-rt installs, relative to Python's prefix.
 LIBRARIES = (r"Library\bin\intelocl64.dll",)
 KEY = r"HKLM\SOFTWARE\Khronos\OpenCL\Vendors"
 
 
 def pip_drivers() -> list[Driver]:
-    """Those in Python's prefix and the user's (`pip install --user`); none on other systems than Windows."""
+    """Return drivers in Python's prefix and the user's (`pip install --user`); none on systems other than Windows."""
     return installed_in([sys.prefix, site.getuserbase()]) if sys.platform == "win32" else []
 
 
 def installed_in(prefixes: list[str]) -> list[Driver]:
-    """The drivers in these folders, each once."""
+    """Return the distinct drivers in these folders."""
     paths = (os.path.join(prefix, *library.split("\\")) for prefix in prefixes for library in LIBRARIES)
     return [Driver(path, "pip") for path in dict.fromkeys(paths) if os.path.exists(path)]
 
 
 def is_loaded(driver: Driver) -> bool:
-    """Whether this process has loaded its library."""
+    """Return whether this process has loaded the driver's library."""
     if sys.platform == "win32":
         handle = ctypes.WinDLL("kernel32").GetModuleHandleW
         handle.argtypes, handle.restype = [ctypes.c_wchar_p], ctypes.c_void_p
@@ -40,6 +40,6 @@ def is_loaded(driver: Driver) -> bool:
 
 
 def not_loaded(driver: Driver) -> str:
-    """Why a driver is not loaded, and what to do."""
+    """Return why a driver is not loaded, and the remedy."""
     return ("OpenCL's loader did not load it: in a process with administrator rights it loads only what the registry "
             f'lists. Run clrt without them, or list it once: reg add {KEY} /v "{driver.library}" /t REG_DWORD /d 0')

@@ -1,1 +1,1 @@
-"""Many machines, one picture: renders on the workers of a Dask cluster (docs/farm.md)."""
+"""Distributed rendering: images rendered by the workers of a Dask cluster (docs/farm.md)."""

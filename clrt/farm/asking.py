@@ -1,4 +1,4 @@
-"""Asks one worker of a cluster for something, and another one where that is gone meanwhile."""
+"""Request a result from one worker of a cluster, and from another one if that worker is lost meanwhile."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ if TYPE_CHECKING:
 
 
 def ask(dispatch: Dispatch, function: Callable[..., Any], *arguments: Any) -> Any:
-    """What the function returns on a worker that is ready, or raises there. One that has forgotten the scene is met
-    again; tasks go on being heard. DeviceError where no worker is left."""
+    """Return what the function returns, or raise what it raises, on a worker that is ready.
+
+    A worker that has forgotten the scene is introduced again; results of tasks are still processed. Raises DeviceError
+    if no worker is left.
+    """
     while True:
         member = dispatch.wait_for()[0]
         answer = dispatch.cluster.ask(member.address, f"clrt-ask-{uuid4().hex}", function, *arguments)
@@ -30,7 +33,7 @@ def ask(dispatch: Dispatch, function: Callable[..., Any], *arguments: Any) -> An
 
 
 def _is_there(dispatch: Dispatch, member: Member, answer: Future[Any]) -> bool:
-    """Waits for an answer; False where its worker, or the scheduler, is gone before."""
+    """Wait for an answer; return False if its worker, or the scheduler, is lost first."""
     while not answer.done():
         if not dispatch.cluster.alive or dispatch.members.get(member.address) is not member:
             return False

@@ -1,4 +1,4 @@
-"""Whole pictures, or bands of large ones, on a worker."""
+"""Render whole images, or bands of large ones, on a worker."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from ..rendering.tiles import TILE, tiles_of
 from .orders import PictureOrder
 
 
-#: The renderer of the last order: frames and bands of one scene need its tree and program once.
+#: The renderer of the last order: frames and bands of one scene share its BVH and program.
 _kept: dict[str, Renderer] = {}
 
 
 class BandRenderer(Renderer):
-    """Some rows of the tiles of a picture, as if they were all of it: the size in pixels is the session's."""
+    """Renderer of some tile rows of an image, as if they were all of it: the size in pixels is the session's."""
 
     _team: Team | None = None
     _band = (0, 1)
 
     def show(self, band: tuple[int, int]) -> None:
-        """Begins with rows first … end − 1."""
+        """Start with tile rows first … end − 1."""
         self._band = band
         self.session = self._make_picture()
         self._begin()
@@ -46,15 +46,17 @@ class BandRenderer(Renderer):
 
 
 def render(key: str, order: PictureOrder) -> dict[str, Any]:
-    """The picture's pixels, report, and so on, as the fields of `Image`. key: of all in the order but camera and band.
-    Raises ClrtErrors."""
+    """Return the image's pixels, report, and so on, as the fields of `Image`.
+
+    key: identifies all of the order except camera and band. Raises ClrtErrors.
+    """
     denoiser = Denoiser() if order.denoise else None
     renderer = _renderer(key, order)
     guides = renderer.session.guides() if denoiser else {}
     state = None
     for state in renderer.passes(spp=order.spp, time=order.time, error=order.error):
         pass
-    assert state is not None    # there is at least one
+    assert state is not None    # there is at least one pass
     image = Image(state.pixels, render_report(renderer, state), aovs=renderer.aovs(state))
     if denoiser is not None:
         image = denoised(image, denoiser, guides)
@@ -62,7 +64,7 @@ def render(key: str, order: PictureOrder) -> dict[str, Any]:
 
 
 def _renderer(key: str, order: PictureOrder) -> Renderer:
-    """One that begins with the order's picture."""
+    """Return a renderer that starts with the order's image."""
     if key not in _kept:
         _kept.clear()
         planned = planned_spp(order.scene.render, order.spp, order.time, order.error)

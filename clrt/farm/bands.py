@@ -1,8 +1,7 @@
-"""A picture too large for the client's memory: bands of it are rendered by a worker each, and kept in a file until all
-are there.
+"""Images too large for the client's memory: each band is rendered by one worker, and stored in a file until all exist.
 
-What the client holds is the band that just came. The file has the picture's rows, 12 bytes a pixel, each at its place;
-a manifest beside it says which are there, and a render that was cut off goes on with the others.
+The client holds only the band that it just received. The file has the image's rows, 12 bytes per pixel, each at its
+offset; a manifest next to it lists the finished bands, so that an interrupted render can be resumed.
 """
 
 from __future__ import annotations
@@ -30,21 +29,21 @@ from .manifest import Manifest
 from .orders import PictureOrder
 from .whole_pictures import WholePictures
 
-#: Pixels from which on a picture is rendered in bands: all below fit the client, film and estimates (some 350 bytes a
-#: pixel) included.
+#: Pixels from which on an image is rendered in bands: smaller ones fit the client, including film and estimates (some
+#: 350 bytes per pixel).
 HUGE = 1 << 23
-#: Pixels of a band, about. A worker has its film, which takes as much a pixel there.
+#: Approximate pixels per band. A worker has the band's film, with as many bytes per pixel.
 BAND_PIXELS = 1 << 20
 BYTES = 12
-#: Of a band's report, what says nothing of the picture.
+#: Fields of a band's report that do not apply to the image.
 OF_ONE = {"seconds", "samples_per_second", "rays_per_second", "stop_reason", "tile_noise", "clamped_part", "brightest"}
-#: Of an order, what is a fact by itself, and what differs from band to band.
+#: Fields of an order that are separate facts, or differ from band to band.
 COMMON = {"scene", "options", "camera", "band"}
 
 
 @dataclass
 class Banded:
-    """A picture in bands. order: of the whole picture; path: of the manifest, beside which the rows are kept."""
+    """An image in bands. order: for the whole image; path: of the manifest, next to which the rows are stored."""
 
     order: PictureOrder
     path: Path
@@ -53,17 +52,19 @@ class Banded:
 
     @property
     def size(self) -> tuple[int, int]:
-        """(width, height)."""
+        """Return (width, height)."""
         return self.order.settled.render.size
 
     @property
     def rows_path(self) -> Path:
-        """Where the rows are."""
+        """Return the path of the file with the rows."""
         return Path(f"{self.path}.rows")
 
     def render(self, cluster: Cluster, resume: bool = False) -> Iterator[tuple[int, int]]:
-        """Has all bands rendered that are not there yet; yields how many there are, and of how many, at least every
-        tenth of a second. Raises ClrtErrors."""
+        """Render all missing bands; yield the number of finished bands and of all, at least every tenth of a second.
+
+        Raises ClrtErrors.
+        """
         validate(self.order.settled)
         bands = self._bands()
         manifest = Manifest(self.path, self._facts(), resume)
@@ -87,17 +88,17 @@ class Banded:
             manifest.close()
 
     def save(self, path: Path, view: str, exposure: float, metadata: dict[str, str]) -> Path:
-        """Writes the picture, once all bands are there. OutputError."""
+        """Write the image once all bands are there. Raises OutputError."""
         write_rows(path, self.size, self._pieces(), metadata=metadata, view=view, exposure=exposure)
         return path
 
     def forget(self) -> None:
-        """Removes what was kept."""
+        """Remove the stored rows and the manifest."""
         self.rows_path.unlink(missing_ok=True)
         self.path.unlink(missing_ok=True)
 
     def summary(self) -> dict[str, Any]:
-        """What all bands' reports say together: samples, rays, and noise; time is the workers', added."""
+        """Combine the reports of all bands: samples, rays and noise; time is the sum of the workers'."""
         reports = list(self.reports.values())
         added = {name: sum(report[name] for report in reports)
                  for name in ("samples", "rays", "nonfinite_samples", "seconds")}
@@ -115,7 +116,7 @@ class Banded:
                 "noise": float(np.sqrt(sum(squares) / pixels)) if len(squares) == len(reports) else None}
 
     def _warnings(self, reports: list[dict[str, Any]]) -> list[str]:
-        """Those about the whole picture; of the scene each band has its own."""
+        """Return warnings about the whole image; each band's report already has those about the scene."""
         settings = self.order.settled.render
         dropped, samples = (sum(report[name] for report in reports) for name in ("nonfinite_samples", "samples"))
         return [*nonfinite_warnings(dropped, samples), *bias_warnings(settings, None),
@@ -123,14 +124,14 @@ class Banded:
                                 max(report["brightest"] for report in reports), DARK)]
 
     def _bands(self) -> dict[str, tuple[int, int]]:
-        """Rows of tiles of each band, by its name; all begin where a block of an .exr does."""
+        """Return the tile rows of each band by name; all begin at a block of an .exr file."""
         rows, each = tiles_of(self.size)[0], BLOCK_ROWS // TILE
         step = each * max(1, self.band_pixels // (self.size[0] * BLOCK_ROWS))
         return {f"rows {first * TILE} to {min((first + step) * TILE, self.size[1])}": (first, min(rows, first + step))
                 for first in range(0, rows, step)}
 
     def _facts(self) -> dict[str, str]:
-        """Of which render the bands are: with where it stops, for each stops by itself."""
+        """Return the facts that identify the render, including its stopping criteria, as each band stops by itself."""
         order = self.order
         others = {"band_pixels": self.band_pixels, **beyond(order.options, order.scene.render),
                   **{each.name: getattr(order, each.name) for each in fields(order) if each.name not in COMMON}}
@@ -138,7 +139,7 @@ class Banded:
                 **{name: str(value) for name, value in others.items() if name != "device"}}
 
     def _span(self, band: tuple[int, int]) -> tuple[int, int]:
-        """Where a band begins in the file, and its bytes."""
+        """Return a band's offset in the file, and its size in bytes."""
         width, height = self.size
         first, end = band[0] * TILE, min(band[1] * TILE, height)
         return first * width * BYTES, (end - first) * width * BYTES
@@ -159,7 +160,7 @@ class Banded:
         self.reports[name] = report
 
     def _is_there(self, file: FileIO, band: tuple[int, int], about: dict[str, Any]) -> bool:
-        """Whether the file has what the manifest says."""
+        """Return whether the file has the rows that the manifest lists."""
         at, count = self._span(band)
         file.seek(at)
         return hashlib.sha256(file.read(count) or b"").hexdigest() == about.get("sha256")

@@ -1,4 +1,4 @@
-"""The cluster that renders: a Dask scheduler somewhere, or workers on this machine alone. All that knows Dask."""
+"""The cluster that renders: a remote Dask scheduler, or workers on this machine only. All code that depends on Dask."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from .scheduler import check_scheduler
 if TYPE_CHECKING:
     from distributed import Client, Future, LocalCluster
 
-#: Seconds in which a scheduler must answer.
+#: Seconds within which a scheduler must answer.
 ANSWER = 10.0
 #: Messages that a connection keeps for debugging.
 LOG_LENGTH = 8
-#: Results that are fetched at a time, and so at most in memory.
+#: Maximum number of results fetched at a time, and so in memory.
 MOST_RESULTS = 16
-#: Of workers' processes, what Dask's nannies say when one ends.
+#: Log messages of Dask's nannies when a worker process ends.
 LAST_WORDS = ("was killed by", "exited with")
 Result = concurrent.futures.Future[Any]
 _log = logging.getLogger(__name__)
 
 
 class Cluster:
-    """A connection to a scheduler. Functions are sent to workers by address; how they ended is heard by `hear`."""
+    """A connection to a scheduler. `send` calls functions on workers by address; `hear` returns their results."""
 
     def __init__(self, address: str, local: LocalCluster | None = None) -> None:
         keep_less()
@@ -46,7 +46,7 @@ class Cluster:
         self._client = self._connect()
 
     def _begin(self) -> None:
-        """Nothing was sent yet."""
+        """Reset to the state in which nothing was sent."""
         self._heard: SimpleQueue[tuple[str, Result | None]] = SimpleQueue()
         self._sent: dict[str, Future[Any]] = {}
         self._waiting: deque[str] = deque()
@@ -68,12 +68,12 @@ class Cluster:
 
     @property
     def alive(self) -> bool:
-        """Whether the scheduler is connected."""
+        """Return whether the scheduler is connected."""
         return self._client.status == "running"
 
     def reconnect(self) -> bool:
-        """Whether a scheduler answers there again. What was sent to the one before is lost."""
-        with suppress(Exception):   # there is nothing to be said to a connection that is broken
+        """Return whether a scheduler answers at the address again. What was sent to the previous one is lost."""
+        with suppress(Exception):   # the connection is already broken
             self._client.close(timeout=1)
         try:
             self._client = self._connect()
@@ -84,10 +84,10 @@ class Cluster:
         return True
 
     def workers(self) -> dict[str, str]:
-        """The names of those that are there, by address; as it was known last where there is no answer.
+        """Return the names of the connected workers by address; the last known ones if the scheduler does not answer.
 
-        The scheduler is asked itself: `Client.scheduler_info` may be overwritten by one without workers, which the
-        client fetches every two seconds.
+        The scheduler is queried directly: `Client.scheduler_info` may be overwritten by a reply without workers, which
+        the client fetches every two seconds.
         """
         client = self._client
         with suppress(OSError):
@@ -97,8 +97,10 @@ class Cluster:
         return self._there
 
     def put(self, arrays: dict[str, NDArray[Any]]) -> list[Future[Any]]:
-        """Arrays that workers will take, each sent once: a task whose result they are, which Dask hands from worker
-        to worker, and repeats where it was lost."""
+        """Return futures of arrays for workers, each sent once.
+
+        Each is the result of a task, so Dask copies it from worker to worker, and recomputes it if it is lost.
+        """
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Sending large graph")
             for digest in arrays.keys() - self._held.keys():
@@ -106,29 +108,33 @@ class Cluster:
         return [self._held[digest] for digest in arrays]
 
     def keep_only(self, digests: set[str]) -> None:
-        """Lets workers forget all other arrays."""
+        """Let workers release all other arrays."""
         for digest in self._held.keys() - digests:
             del self._held[digest]
 
     def send(self, worker: str, key: str, function: Callable[..., Any], *arguments: Any) -> None:
-        """Has one worker call a function; futures among the arguments are what they stand for. How it ended is heard by
-        its key, once the result is here."""
+        """Have one worker call a function; futures among the arguments are replaced by their results.
+
+        `hear` returns the outcome under `key` once the result has arrived.
+        """
         heard = self._heard
         self._sent[key] = self._submit(worker, key, function, *arguments)
         self._sent[key].add_done_callback(lambda future: heard.put((key, None)))
 
     def forget(self, key: str) -> None:
-        """What was sent under the key is not waited for any more."""
+        """Stop waiting for what was sent under the key."""
         self._sent.pop(key, None)
         self._coming.discard(key)
 
     def is_late(self, key: str) -> None:
-        """Others do what was sent under the key: if it is on its way, it keeps nothing else from coming."""
+        """Let a late result no longer count as being fetched, so that it holds back no others: its task is repeated."""
         self._coming.discard(key)
 
     def hear(self, seconds: float) -> list[tuple[str, Result]]:
-        """Keys and results of what ended since; waits for the first of them. There are never more than MOST_RESULTS
-        here, however many workers there are."""
+        """Return keys and results of what has ended since; wait at most `seconds` for the first of them.
+
+        There are never more than MOST_RESULTS in memory, regardless of the number of workers.
+        """
         ended: list[tuple[str, Result]] = []
         with suppress(Empty):
             self._take_in(*self._heard.get(timeout=seconds), ended)
@@ -139,7 +145,7 @@ class Cluster:
         return ended
 
     def _take_in(self, key: str, result: Result | None, ended: list[tuple[str, Result]]) -> None:
-        """Something is done there, or its result is here."""
+        """Process a notification: a task has ended there, or its result has arrived."""
         if result is None:
             self._waiting.append(key)
             return
@@ -156,7 +162,7 @@ class Cluster:
         coming.add_done_callback(lambda result: heard.put((key, result)))
 
     def ask(self, worker: str, key: str, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """What will be the function's answer there (`remote.Answer`), unless the worker ends before."""
+        """Return a future of the function's answer (`remote.Answer`) on that worker; it fails if the worker ends."""
         return self._submit(worker, key, function, *arguments)
 
     def _submit(self, worker: str, key: str, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
@@ -165,16 +171,16 @@ class Cluster:
             return self._client.submit(function, *arguments, key=key, workers=[worker], pure=False)
 
     def last_words(self) -> str:
-        """What is known of how worker processes ended lately."""
+        """Return what the logs say about worker processes that ended recently."""
         try:
             logs = self._client.get_worker_logs(n=50, nanny=True)
-        except Exception:    # a help for people, which may fail in any way
+        except Exception:    # only a hint for the user, which may fail in any way
             return ""
         lines = [line for entries in logs.values() for _, line in entries if any(word in line for word in LAST_WORDS)]
         return f" ({lines[0].strip().splitlines()[-1]})" if lines else ""
 
     def close(self) -> None:
-        """Leaves the scheduler, and ends what was started for this cluster."""
+        """Disconnect from the scheduler, and end the local cluster if there is one."""
         with suppress(Exception):
             self._client.close(timeout=5)
         if self._local is not None:
@@ -189,11 +195,13 @@ class Cluster:
 
 
 async def _fetched(client: Client, future: Future[Any]) -> Any:
-    """The result of what is done, by itself: `Client.gather` joins requests, and then one worker that hangs keeps the
-    results of all others back."""
+    """Return the result of a finished task, fetched separately.
+
+    `Client.gather` batches requests, so one worker that hangs would hold back the results of all others.
+    """
     if future.status != "finished":
-        return await client.gather(future, asynchronous=True)    # raises what is wrong
-    assert client.scheduler is not None    # as long as it is connected
+        return await client.gather(future, asynchronous=True)    # raises the task's error
+    assert client.scheduler is not None    # while it is connected
     found = await client.scheduler.gather(keys=[future.key])
     if found["status"] != "OK":
         raise ConnectionError("its worker has not got it any more")
@@ -201,7 +209,7 @@ async def _fetched(client: Client, future: Future[Any]) -> Any:
 
 
 def connect(address: str) -> Cluster:
-    """A cluster by its scheduler's address, tcp://… or tls://…, with the certificates of Dask's own settings."""
+    """Connect to the scheduler at tcp://… or tls://…, with the certificates from Dask's settings."""
     _check_dask()
     if "://" not in address or not address.partition("://")[2]:
         raise UsageError(f"--scheduler {address}: is no address; write tcp://HOST:PORT or tls://HOST:PORT, as the "
@@ -210,8 +218,10 @@ def connect(address: str) -> Cluster:
 
 
 def local_cluster(count: int) -> Cluster:
-    """So many workers on this machine, each with its share of the processors, which nothing else can speak to: their
-    ports are of the loopback interface, and their certificates live in memory."""
+    """Start this many workers on this machine, each with its share of the CPUs, isolated from other programs.
+
+    They listen only on the loopback interface, and their certificates exist only in memory.
+    """
     _check_dask()
     if count < 1:
         raise UsageError(f"--local-cluster {count}: there must be a worker")
@@ -233,7 +243,7 @@ def _check_dask() -> None:
         import distributed  # noqa: F401
     except ImportError:
         raise UsageError("a farm needs Dask: pip install distributed cryptography") from None
-    # Else each connection keeps its last thousand messages, with all that was in them.
+    # By default each connection keeps its last thousand messages with their contents.
     dask.config.set({"distributed.admin.low-level-log-length": LOG_LENGTH})
-    for name in ("distributed", "distributed.client"):    # Dask gives the latter a level of its own
+    for name in ("distributed", "distributed.client"):    # Dask sets a level for the latter
         logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -1,8 +1,8 @@
-"""Gives tasks to the workers of a cluster until none is left, whoever comes, goes, fails or sleeps meanwhile.
+"""Dispatch tasks to the workers of a cluster until none is left, while workers may come, go, fail or sleep.
 
-Each worker has the next task at hand before it has ended one. What a dead worker was at is given to another, as is,
-once nothing else is left, what a slow one should have ended long ago: the result that comes first counts, and no other.
-A task that ends several workers, or fails on several, is given up, and with it the render.
+Each worker has its next task queued before it has ended one. Tasks of a dead worker are given to others, and so are,
+once nothing else is left, overdue tasks of a slow one: the first result counts, and no other. A task that kills several
+workers, or fails on several, is given up, and with it the render.
 """
 
 from __future__ import annotations
@@ -19,21 +19,22 @@ from ..errors import ClrtError, DeviceError, HungError, SceneError
 from .cluster import Cluster, Result
 from .members import BadResult, Member, Run, Source, Task
 
-#: Seconds between two looks at who is there, and so many times what one takes; and the wait for results.
+#: Minimum seconds between two queries of the workers, also as a multiple of a query's duration; and the wait for
+#: results.
 LOOK, LOOK_COST, TICK = 0.5, 50, 0.1
-#: A task is given up after so many deaths of workers, or failures.
+#: A task is given up after this many deaths of workers, or failures.
 MOST_DEATHS, MOST_FAILURES = 4, 3
-#: A run is overdue after so many times what it should take, and so many seconds.
+#: A run is overdue after SLOW times its expected time plus SLACK seconds.
 SLOW, SLACK = 2.0, 0.5
-#: Seconds without any worker that is ready before that is told, and before it is given up; and without a scheduler.
+#: Seconds without a ready worker before a warning, and before giving up; and without a scheduler.
 LONELY, HOPELESS, GONE = 20.0, 600.0, 120.0
-#: What was lost on its way, with its worker or the scheduler.
+#: Errors that mean a result was lost with its worker or the scheduler.
 LOST = (CancelledError, TimeoutError, ConnectionError)
 _log = logging.getLogger(__name__)
 
 
 class Dispatch:
-    """The workers of a cluster, and what they are at for one source. DeviceError where none is left that may."""
+    """The workers of a cluster, and their tasks from one source. Raises DeviceError if no usable worker is left."""
 
     def __init__(self, cluster: Cluster, source: Source) -> None:
         self.cluster, self._source = cluster, source
@@ -45,11 +46,11 @@ class Dispatch:
         self._meeting: dict[str, Member] = {}
         self._next_look = self._alone_since = 0.0
         self._told_alone = False
-        #: Tasks that were sent.
+        #: Number of tasks sent.
         self.sent = 0
 
     def run(self) -> Iterator[None]:
-        """Until the source has nothing left, and then workers have at hand what follows; yields at least every TICK."""
+        """Run until the source has nothing left, keeping further tasks queued on workers; yield at least every TICK."""
         self._hand_out()
         while self._source.left():
             if not self.cluster.alive:
@@ -59,7 +60,7 @@ class Dispatch:
             yield
 
     def drain(self, tasks: list[Task], seconds: float) -> list[Task]:
-        """Waits for these, for so long at most; those that were not done by then, which it forgets."""
+        """Wait for these tasks, at most `seconds`; cancel and return those that were not done by then."""
         end = time.perf_counter() + seconds
         while any(task.runs for task in tasks) and self.cluster.alive and time.perf_counter() < end:
             for key, result in self.cluster.hear(TICK):
@@ -69,7 +70,7 @@ class Dispatch:
         return late
 
     def forget(self, tasks: list[Task]) -> None:
-        """Their results count for nothing."""
+        """Ignore the results of these tasks."""
         for task in tasks:
             task.runs.clear()
             self.tasks.remove(task)
@@ -77,7 +78,7 @@ class Dispatch:
                 self._again.remove(task)
 
     def wait_for(self, count: int = 1) -> list[Member]:
-        """The workers that are ready, once there are so many."""
+        """Wait until `count` workers are ready, and return all that are."""
         while True:
             if len(ready := self.ready()) >= count:
                 return ready
@@ -87,21 +88,21 @@ class Dispatch:
             self.meet()
 
     def meet(self) -> None:
-        """Meets those that are new, and hears what there is to be heard."""
+        """Introduce new workers, and process results."""
         self._look()
         for key, result in self.cluster.hear(TICK):
             self._hear(key, result)
 
     def everyone(self) -> list[Member]:
-        """Its workers, also those that are gone."""
+        """Return all workers, including those that were lost."""
         return [*self.members.values(), *self.former]
 
     def ready(self) -> list[Member]:
-        """Those that may be given work, with least first."""
+        """Return the workers that can be given tasks, least loaded first."""
         return sorted((member for member in self.members.values() if member.ready), key=lambda each: each.load)
 
     def _look(self) -> None:
-        """Meets new workers, and gives what those that are gone were at to others."""
+        """Introduce new workers, and reassign the tasks of those that were lost."""
         now = time.perf_counter()
         if now < self._next_look:
             return
@@ -118,7 +119,7 @@ class Dispatch:
         self._check_alone(now)
 
     def _check_alone(self, now: float) -> None:
-        """Warns where there is nobody to work, and gives up where that will not change."""
+        """Warn if there is no ready worker, and give up if that is permanent."""
         hopes = [member for member in self.members.values() if not member.refused]
         if any(member.facts for member in hopes):
             self._alone_since = 0.0
@@ -135,7 +136,7 @@ class Dispatch:
                          "workers, none of which is ready" if hopes else "no worker")
 
     def _part_with(self, member: Member) -> None:
-        """It is gone: what it had begun may be why."""
+        """Remove a lost worker; the task that it was running may be the cause."""
         member.gone = True
         self.former.append(member)
         self._meeting = {key: other for key, other in self._meeting.items() if other is not member}
@@ -155,7 +156,7 @@ class Dispatch:
             _log.warning("%s is gone; others do again what it was at", member.name)
 
     def _hand_out(self) -> None:
-        """Gives each worker what it should have at hand, in turns; and then those without any what is overdue."""
+        """Queue tasks on the workers round-robin; then give overdue tasks to those without any."""
         ready = self.ready()
         for member in (each for load in range(self._source.ahead(len(ready))) for each in ready if each.load == load):
             task = self._again.popleft() if self._again else self._source.next(member)
@@ -171,7 +172,7 @@ class Dispatch:
             self._begin(run.task, member)
 
     def _overdue(self) -> list[Run]:
-        """What should have been done long ago, and no other worker is at; the oldest first."""
+        """Return the overdue runs of tasks that no other worker runs, the oldest first."""
         rates = [member.rate for member in self.everyone() if member.rate]
         if not rates:
             return []
@@ -192,12 +193,12 @@ class Dispatch:
         self._runs[key] = run
 
     def _repeat(self, task: Task) -> None:
-        """Has it done again, unless another worker is at it."""
+        """Queue the task again, unless another worker runs it."""
         if not task.runs and task in self.tasks and task not in self._again:
             self._again.append(task)
 
     def _hear(self, key: str, result: Result) -> None:
-        """Takes in how something ended."""
+        """Process the outcome of an introduction or a run."""
         if key in self._meeting:
             self._met(self._meeting.pop(key), result)
         elif key in self._runs:
@@ -208,10 +209,10 @@ class Dispatch:
             member.facts = result.result().result()
             self._source.meet(member)
         except LOST:
-            self.members.pop(member.address, None)    # to be met again, if it is still there
+            self.members.pop(member.address, None)    # to be introduced again if it is still there
         except SceneError:
             raise
-        except Exception as error:   # whatever it is, it is the worker's
+        except Exception as error:   # any error is the worker's
             self._refuse(member, error)
 
     def _refuse(self, member: Member, error: Exception) -> None:
@@ -227,7 +228,7 @@ class Dispatch:
         member.work -= task.work
         member.silent = False
         if run not in task.runs:
-            return     # another worker was faster, or nobody asks any more
+            return     # another worker was faster, or the task was cancelled
         task.runs.remove(run)
         try:
             found, seconds = result.result().result()
@@ -246,7 +247,7 @@ class Dispatch:
             self.tasks.remove(task)
 
     def _failed(self, task: Task, member: Member, error: Exception) -> None:
-        """A worker that fails is left out, and its task given to others, if it may not be what fails."""
+        """Exclude a worker that failed, and give its task to others, as the worker may be the cause."""
         if isinstance(error, LookupError):
             self.meet_again(member)
         else:
@@ -257,12 +258,15 @@ class Dispatch:
         self._repeat(task)
 
     def meet_again(self, member: Member) -> None:
-        """It has a new process behind its address, or forgot the scene: all that it has at hand will tell so."""
+        """Introduce a worker again that has a new process at its address, or has forgotten the scene.
+
+        All its queued tasks will fail in the same way.
+        """
         if self.members.get(member.address) is member:
             self.former.append(self.members.pop(member.address))
 
     def _find_scheduler(self) -> Iterator[None]:
-        """Waits until the scheduler answers again: what is done is here, and what was in flight is done again."""
+        """Wait until the scheduler answers again. Results so far are kept, and tasks in flight are repeated."""
         _log.warning("%s does not answer any more; waiting for it for up to %g s", self.cluster.address, GONE)
         self.former += self.members.values()
         self.members, self._runs, self._meeting = {}, {}, {}

@@ -1,7 +1,7 @@
-"""What of many pictures is done: a file that grows by a line each, so that a render that was cut off goes on.
+"""Manifest of finished images: a file with a line appended per image, so that an interrupted render can be resumed.
 
-The first line says of which render it is, each other one names a picture and the SHA-256 of what was kept of it. A line
-that is not whole, the last one of a process that was killed, counts for nothing.
+The first line identifies the render, each other one names an image and the SHA-256 of what was stored of it. An
+incomplete line, the last one of a process that was killed, is ignored.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ VERSION = "clrt manifest 1"
 
 
 class Manifest:
-    """The pictures that are done, by name, with what is to be known of each. facts: of the render, see
-    `identity.facts_of`. CheckpointError where the file is of another one, or something else; OutputError where it
-    cannot be written."""
+    """The finished images by name, with data on each. facts: of the render, see `identity.facts_of`.
+
+    Raises CheckpointError if the file is of another render or no manifest, and OutputError if it cannot be written.
+    """
 
     def __init__(self, path: Path, facts: dict[str, str], resume: bool) -> None:
         self.path = path
@@ -39,12 +40,12 @@ class Manifest:
             raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
 
     def add(self, name: str, about: dict[str, Any]) -> None:
-        """Notes that a picture is done; on disk when it returns."""
+        """Record that an image is done; on disk when this returns."""
         self._write({"name": name, "about": about})
         self.done[name] = about
 
     def close(self) -> None:
-        """Ends writing."""
+        """Close the file."""
         self._file.close()
 
     def _write(self, entry: dict[str, Any]) -> None:
@@ -56,7 +57,7 @@ class Manifest:
             raise OutputError(f"{self.path}: cannot be written ({error.strerror})") from error
 
     def _read(self, facts: dict[str, str]) -> int:
-        """Takes in what is whole, and tells how many bytes that is."""
+        """Read the complete lines, and return their size in bytes."""
         content = self.path.read_bytes()
         lines = content[:content.rfind(b"\n") + 1].splitlines(keepends=True)
         try:

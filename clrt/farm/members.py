@@ -1,4 +1,4 @@
-"""The workers as the client knows them, what they are at, and what came of it."""
+"""The workers as the client knows them, their tasks and the source of tasks."""
 
 from __future__ import annotations
 
@@ -6,21 +6,22 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-#: What of the latest speed goes into what is expected of the next.
+#: Weight of the latest measured speed in the expected one.
 NEWS = 0.5
 
 
 class BadResult(Exception):
-    """A worker gave something that cannot be right."""
+    """An implausible result of a worker."""
 
 
 @dataclass(eq=False)
 class Member:
-    """A worker. facts: what it said of itself; None until it is ready. refused: why it gets nothing any more; silent:
-    whether others had to do its work again, and it has not been heard of since.
+    """A worker of the cluster, with its state and speed.
 
-    rate: units of work a second, 0 as long as that is not known; load, work: tasks that it has at hand, and their work;
-    done: the work that it did.
+    facts: its answer to the introduction, None until it is ready. refused: why it is excluded; silent: whether another
+    worker had to repeat its task and it has not answered since.
+    rate: units of work per second, 0 if unknown; load, work: number of queued tasks, and their work; done: the work
+    that it did.
     """
 
     address: str
@@ -36,11 +37,11 @@ class Member:
 
     @property
     def ready(self) -> bool:
-        """Whether it may be given work."""
+        """Return whether it can be given tasks."""
         return self.facts is not None and not (self.refused or self.silent or self.gone)
 
     def ran(self, work: float, seconds: float) -> None:
-        """Takes into account how long some work took."""
+        """Update the rate from the time that some work took."""
         rate = work / max(seconds, 1e-6)
         self.rate = rate if not self.rate else (1 - NEWS) * self.rate + NEWS * rate
         self.done += round(work)
@@ -48,9 +49,11 @@ class Member:
 
 @dataclass(eq=False)
 class Task:
-    """Something to be done by one worker. what: as its source knows it; name: as messages call it; work: in the
-    source's units; arguments: made as it is sent; deaths: how many workers ended while they were at it; failures: how
-    often it failed otherwise."""
+    """A task for one worker.
+
+    what: the source's own data; name: for messages; work: in the source's units; arguments: created when it is sent;
+    deaths: how many workers ended while they ran it; failures: how often it failed otherwise.
+    """
 
     what: Any
     name: str
@@ -64,7 +67,7 @@ class Task:
 
 @dataclass(eq=False)
 class Run:
-    """A task on a worker. key: that it was sent under; ahead: the work that it then had at hand, this one included."""
+    """A task on a worker. key: that it was sent under; ahead: the worker's queued work then, including this task."""
 
     key: str
     task: Task
@@ -77,19 +80,19 @@ class Source(Protocol):
     """Where tasks come from, and where their results go."""
 
     def left(self) -> bool:
-        """Whether there is, or may still be, something to hand out."""
+        """Return whether there are, or may still be, tasks to dispatch."""
 
     def ahead(self, members: int) -> int:
-        """How many tasks each of so many workers should have at hand."""
+        """Return how many tasks each of `members` workers should have queued."""
 
     def introduction(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """What a worker must do first, whose result becomes its `facts`."""
+        """Return the first call for a worker, whose result becomes its `facts`."""
 
     def meet(self, member: Member) -> None:
-        """Hears of one that is ready; BadResult where it must not be used."""
+        """Accept a worker that is ready. Raises BadResult if it must not be used."""
 
     def next(self, member: Member) -> Task | None:
-        """Something for this worker, or None for now."""
+        """Return a task for this worker, or None for now."""
 
     def accept(self, task: Task, result: Any, member: Member) -> None:
-        """Takes a result; BadResult where that cannot be right."""
+        """Accept a result. Raises BadResult if it is implausible."""

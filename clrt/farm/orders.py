@@ -1,4 +1,4 @@
-"""What workers are sent to do, with the scene that it is of. Nothing but data: see parcels.py."""
+"""Work orders sent to workers, with their scene. Plain data only: see parcels.py."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from ..scene.model import Camera, Scene
 
 @dataclass(frozen=True)
 class Order:
-    """A scene to prepare for shares of its picture. asked, lanes: see `choices_on`; planned_spp: see
-    `session.block_bits`; devices: a worker's devices that are meant; none for its best one; simulated: samples a second
-    of a worker that only sleeps (simulated.py)."""
+    """A scene to prepare for rendering shares of its image.
+
+    asked, lanes: see `choices_on`; planned_spp: see `session.block_bits`; devices: selectors of a worker's devices,
+    none for its best one; simulated: samples per second of a worker that only sleeps (simulated.py).
+    """
 
     scene: Scene
     asked: Choices
@@ -26,8 +28,11 @@ class Order:
 
 @dataclass(frozen=True)
 class PictureOrder:
-    """A whole picture. camera: instead of the scene's; options: of `Renderer`; spp, time, error: of its
-    `passes`; denoise: whether to; band: rows first … end − 1 of its tiles alone."""
+    """A whole image.
+
+    camera: replaces the scene's; options: of `Renderer`; spp, time, error: of its `passes`; denoise: whether to
+    denoise; band: only tile rows first … end − 1.
+    """
 
     scene: Scene
     options: dict[str, Any] = field(default_factory=dict)
@@ -40,11 +45,11 @@ class PictureOrder:
 
     @property
     def settled(self) -> Scene:
-        """The scene with those options that are settings of it."""
+        """Return the scene with those options applied that are render settings."""
         return replace(self.scene, camera=self.camera or self.scene.camera,
                        render=settings_of(self.scene.render, self.options))
 
     @property
     def choices(self) -> Choices:
-        """What the options choose about the program."""
+        """Return the program choices among the options."""
         return choices_of(self.options)

@@ -1,8 +1,8 @@
-"""What is sent to workers: a small text of what there is, and the large arrays by what is in them.
+"""Serialisation for workers: a small pickle, and the large arrays by content hash.
 
-An array is known by the SHA-256 of its type, shape and bytes. So those that several frames share, or several meshes,
-travel once. Whoever unpacks a parcel gets scenes made of these arrays and opens no file; what the text may name are the
-classes of clrt's scenes and numpy's numbers.
+An array is identified by the SHA-256 of its type, shape and bytes, so arrays that several frames or meshes share are
+sent once. Unpacking creates scenes from these arrays and opens no file; the pickle may name only the classes of clrt's
+scenes and numpy's numbers.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from ..errors import SceneError
 
-#: Bytes from which on an array travels by itself.
+#: Size in bytes from which on an array is sent separately.
 LARGE = 1 << 14
-#: In the place of where a file lies on the client, which means nothing elsewhere: it arrives as None.
+#: Placeholder for the client's file paths, which have no meaning elsewhere: they arrive as None.
 HERE = "a file"
-#: What a text may name: the dataclasses of some modules, and single names.
+#: Classes that a pickle may name: the dataclasses of these modules, and single names.
 ROOMS = ("clrt.scene.", "clrt.accel.kernels", "clrt.rendering.choices", "clrt.farm.orders")
 NAMES = {("numpy", "ndarray"), ("numpy", "dtype"), ("collections", "OrderedDict"), ("builtins", "complex"),
          *((f"numpy.{core}", name) for core in ("core.multiarray", "_core.multiarray")
@@ -37,19 +37,19 @@ Arrays = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Parcel:
-    """The text, and the arrays that it speaks of, by their digests."""
+    """The pickle, and the arrays that it refers to by digest."""
 
     text: bytes
     arrays: Arrays
 
     @cached_property
     def key(self) -> str:
-        """SHA-256 of all that is in it."""
+        """Return the SHA-256 that identifies the contents."""
         return hashlib.sha256(self.text).hexdigest()
 
 
 def pack(value: object) -> Parcel:
-    """A parcel of scenes, settings and plain values."""
+    """Pack scenes, settings and plain values."""
     arrays: Arrays = {}
     digests: dict[int, str] = {}
     written = io.BytesIO()
@@ -60,15 +60,17 @@ def pack(value: object) -> Parcel:
 
 
 def unpack(text: bytes, arrays: Mapping[str, NDArray[Any]]) -> Any:
-    """What was packed. SceneError where the text names anything that no scene is made of, or arrays that are not
-    there."""
+    """Return what was packed.
+
+    Raises SceneError if the pickle names anything that is not part of a scene, or arrays that are missing.
+    """
     unpickler = _Unpickler(io.BytesIO(text))
     unpickler.arrays = arrays
     return unpickler.load()
 
 
 def digest_of(array: NDArray[Any]) -> str:
-    """What an array is known by."""
+    """Return the digest that identifies an array."""
     digest = hashlib.sha256(f"{array.dtype.str}{array.shape}".encode())
     digest.update(np.ascontiguousarray(array).reshape(-1).view(np.uint8).data)
     return digest.hexdigest()

@@ -1,10 +1,10 @@
-"""A picture rendered by the workers of a cluster. The film lies here, on the client.
+"""An image rendered by the workers of a cluster. The film is on the client.
 
-A task is some tiles, their pixels as they are, and which samples to add: what a device of a crew gets
-(rendering/team.py), only larger. A tile is in one task at a time, and the pixels that come back replace the film's. So
-each pixel's samples are added one after another in their own order: nothing depends on who did what, or when, the sums
-are those of one machine to the last bit, and what is rendered twice counts once. Tiles that have all samples of a pass
-get those of the next while the others catch up (ahead.py).
+A task has some tiles, their current pixels, and the samples to add: the same as a device of a crew gets
+(rendering/team.py), only larger. A tile is in one task at a time, and the returned pixels replace the film's. So each
+pixel's samples are added one after another in a fixed order: the result does not depend on which worker did what, or
+when, the sums are bit-identical to those of one machine, and repeated tasks count once. Tiles that have all samples of
+a pass get those of the next while the others catch up (ahead.py).
 """
 
 from __future__ import annotations
@@ -37,27 +37,27 @@ from .parcels import pack
 from .proofs import Proofs
 from .remote import draw, identity, prepare, render_share
 
-#: Seconds that a task should take, of few workers; of many as much more as keeps the client and the scheduler at so
-#: many tasks a second.
+#: Target seconds per task with few workers; with many, more, so that client and scheduler handle at most
+#: TASKS_A_SECOND.
 TASK_SECONDS, TASKS_A_SECOND = 1.0, 32
-#: Samples of the first task of a worker whose speed is not known.
+#: Samples in the first task of a worker with unknown speed.
 FIRST_SAMPLES = 1 << 17
-#: The smallest task is such a part of a full one. Tiles of one at most: what is sent with a task should be below 10 MB.
+#: The smallest task as a fraction of a full one (1/SMALLEST), and the maximum number of tiles per task, to keep what is
+#: sent below 10 MB.
 SMALLEST, MOST_TILES = 8, 2048
-#: Tasks that a worker has at hand, and more, up to so many, where the client is away for longer; and of a pass, for
-#: each.
+#: Tasks queued per worker, and the maximum if the client is away for longer; and tasks per worker and pass.
 AHEAD, MOST_AHEAD, PASS_TASKS = 2, 8, 36
-#: A pass takes so many times as long as the client is away between two, to estimate the picture's error.
+#: Minimum ratio of a pass's duration to the time that the client takes between two, to estimate the image's error.
 GAP_COST = 10
-#: How long the end of a render waits for what is in flight, in times of a task.
+#: Maximum wait at the end of a render for tasks in flight, in multiples of a task's duration.
 DRAIN = 2.5
-#: A worker that drops a larger part of its samples is not believed.
+#: The result of a worker that drops a larger fraction of its samples is rejected.
 MOST_DROPPED = 0.5
 _log = logging.getLogger(__name__)
 
 
 class FarmPicture(Accumulation):
-    """Samples of the order's scene. pixel: the film's record."""
+    """Samples of the order's scene, accumulated by a cluster. pixel: the film's record."""
 
     def __init__(self, cluster: Cluster, order: Order, pixel: np.dtype[Any]) -> None:
         super().__init__(order.scene.render.size)
@@ -69,18 +69,18 @@ class FarmPicture(Accumulation):
         self._proofs, self._drops = Proofs(), False
         self._doubted: dict[Task, tuple[Member, NDArray[Any]]] = {}
         self._ended = self._gap = 0.0
-        #: Of pixels and tiles' numbers, to workers and back.
+        #: Bytes of pixels and tile numbers sent to workers and back.
         self.moved_bytes = 0
         self.dispatch = Dispatch(cluster, self)
 
     def machine(self, devices: Sequence[Device]) -> dict[str, Any]:
-        """What a report says of the workers; of what they built, what one of them did."""
+        """Return the report's data on the workers; for data on builds, that of one of them."""
         reports = [each.facts["report"] for each in self.dispatch.everyone() if each.facts]
         return {**reports[0], "platform": self.told("platform"), "driver": self.told("driver"),
                 "moved_bytes": self.moved_bytes, "devices": self.shares()}
 
     def told(self, what: str) -> str:
-        """What all workers said of themselves, each thing once."""
+        """Return the distinct values of a field in the workers' answers."""
         return " + ".join(dict.fromkeys(str(each.facts[what]) for each in self.dispatch.everyone() if each.facts))
 
     def guides(self) -> dict[str, NDArray[np.float32]]:
@@ -92,29 +92,29 @@ class FarmPicture(Accumulation):
         return {**self._drawn(tuple(names))}
 
     def _drawn(self, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
-        """Pictures of what is seen first, by one worker (see `remote.draw`)."""
+        """Return AOVs of the first hits, from one worker (see `remote.draw`)."""
         pictures: dict[str, NDArray[Any]] = ask(self.dispatch, draw, self._parcel.key, names)
         return pictures
 
     def introduction(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Workers get the scene, and compile it."""
+        """Return the call that sends the scene to a worker and compiles it there."""
         key, text, arrays = self._parcel.key, self._parcel.text, self._parcel.arrays
         return prepare, (identity(), key, text, list(arrays), *self.dispatch.cluster.put(arrays))
 
     def meet(self, member: Member) -> None:
-        """Compares its proof with the others'."""
+        """Compare the worker's proof with the others'."""
         self._proofs.compare(member)
 
     def left(self) -> bool:
-        """Whether anything of the pass is in hand or in flight."""
+        """Return whether any part of the pass is waiting or in flight."""
         return self._busy
 
     def ahead(self, members: int) -> int:
-        """One that it is at, the next, and as many as keep it busy while the client is away."""
+        """Return the tasks to queue per worker: the current, the next, and more to cover the client's absence."""
         return min(MOST_AHEAD, AHEAD + round(self._gap / self._task_seconds))
 
     def next(self, member: Member) -> Task | None:
-        """As much as fills its time, and less near the end, so that all end together."""
+        """Return a task that takes the target time, or less near the end, so that all workers end at the same time."""
         rates = [each.rate for each in self.dispatch.members.values() if each.ready]
         known = [rate for rate in rates if rate]
         size = (member.rate or sum(known) / max(1, len(known))) * self._task_seconds or FIRST_SAMPLES
@@ -135,7 +135,7 @@ class FarmPicture(Accumulation):
                     lambda: (self._parcel.key, tiles, part.samples, part.more, pixels))
 
     def accept(self, task: Task, result: NDArray[Any], member: Member) -> None:
-        """Takes the pixels into the film, if they can be right."""
+        """Store the pixels in the film if they are plausible."""
         work, part, tiles = task.what
         dropped = check_pixels(result, self._ahead.film[tiles], self._inside[tiles], part.more)
         if dropped > MOST_DROPPED * task.work and not self._drops:
@@ -144,7 +144,7 @@ class FarmPicture(Accumulation):
         self.moved_bytes += result.nbytes
 
     def _doubt(self, task: Task, result: NDArray[Any], member: Member) -> None:
-        """BadResult for one who drops most samples, unless another one did the same: then it is the scene's way."""
+        """Raise BadResult for a worker that drops most samples, unless another got the same result for the task."""
         other, found = self._doubted.pop(task, (None, None))
         if other is None or found is None or found.tobytes() != result.tobytes():
             self._doubted[task] = member, result
@@ -152,7 +152,7 @@ class FarmPicture(Accumulation):
         self._drops, other.refused = True, ""
 
     def advance(self, room: Callable[[int], int]) -> Iterator[None]:
-        """See `Accumulation.advance`; the pass may have begun, and the next one may begin before it ends."""
+        """See `Accumulation.advance`. The pass may have begun already, and the next one may begin before it ends."""
         self.mend()
         done = self.samples_done
         if not self._busy:
@@ -173,7 +173,7 @@ class FarmPicture(Accumulation):
         yield from super().double(tiles)
 
     def _forget_ahead(self) -> None:
-        """What was begun ahead is not what follows."""
+        """Discard the pass that was begun ahead."""
         self.dispatch.forget([task for task in self.dispatch.tasks if task not in self._at_pass])
         self._ahead.forget()
 
@@ -186,7 +186,7 @@ class FarmPicture(Accumulation):
 
     @property
     def _at_pass(self) -> list[Task]:
-        """The tasks that are of the pass in work."""
+        """Return the tasks of the current pass."""
         return [task for task in self.dispatch.tasks if task.what[0] is self.work]
 
     @property
@@ -201,70 +201,70 @@ class FarmPicture(Accumulation):
         self._ahead.film.fill(0)
 
     def wait(self) -> None:
-        """Waits for what is in flight of the pass, but not for slow workers: what they are at is in hand again."""
+        """Wait for tasks of the pass in flight, but not for slow workers: their work is put back."""
         with self._tearing():
             for task in self.dispatch.drain(self._at_pass, DRAIN * self._task_seconds):
                 self.work.give_back(task.what[1])
             self._settle()
 
     def work_left(self) -> Work:
-        """The work of the pass with what is in flight in hand."""
+        """Return the remaining work of the pass, including tasks in flight."""
         kept = Work(self.work.samples, self.work.then, self.work.tiles, self.work.parts)
         for task in self._at_pass:
             kept.give_back(task.what[1])
         return kept
 
     def pass_limit(self) -> int:
-        """As many samples a pixel as keep all busy for some tasks, and for much longer than the client is away."""
+        """Return the samples per pixel that keep all busy for some tasks, and much longer than the client is away."""
         rates = sum(each.rate for each in self.dispatch.ready())
         seconds = max(PASS_TASKS * self._task_seconds, GAP_COST * self._gap)
         return max(1, int(rates * seconds / (self.size[0] * self.size[1])))
 
     def film(self) -> Film:
-        """The film so far, without what is in flight, or of what follows the pass."""
+        """Return the film so far, without tasks in flight, or samples of the next pass."""
         return Film(row_by_row(self._ahead.shown(), self.size))
 
     def restore(self, film: Film, work: Work) -> None:
-        """Goes on from a film of this size and the work that it was rendered by."""
+        """Resume from a film of this size and the work that produced it."""
         self.work, self._ahead = work, Ahead(tile_by_tile(film.pixels))
 
     def shares(self) -> list[dict[str, Any]]:
-        """What each worker did, and how fast it is."""
+        """Return each worker's samples and speed."""
         return [{"worker": each.name, "device": (each.facts or {}).get("name"), "samples": each.done,
                  "samples_per_second": each.rate, "lost": each.gone or bool(each.refused)}
                 for each in self.dispatch.everyone() if each.facts]
 
     @property
     def scene(self) -> SceneOnDevice:
-        """There is none here."""
+        """Raise ClrtError: the scene is not on the client."""
         raise ClrtError("the scene of a farm is on its workers alone")
 
     @property
     def device_bytes(self) -> int:
-        """Memory of all buffers, on the worker that has most."""
+        """Return the size of all buffers on the worker that uses most."""
         return max((each.facts["report"]["peak_device_bytes"] for each in self.dispatch.everyone() if each.facts),
                    default=0)
 
     @property
     def longest_launch(self) -> float:
-        """That is for each worker to know."""
+        """Return 0: only workers measure it."""
         return 0.0
 
 
 def _inside(size: tuple[int, int]) -> NDArray[np.bool_]:
-    """(tiles, TILE_PIXELS): which of the tiles' pixels are in the picture."""
+    """Return which of the tiles' pixels are in the image, (tiles, TILE_PIXELS)."""
     width, height = size
     return np.asarray(tile_by_tile(np.ones((height, width), bool)))
 
 
 def evenly(most: int, work: Work) -> int:
-    """About as many samples of a tile's pixels, so that tasks of the fewest tiles leave no small rest of a pass."""
+    """Round `most` samples of a tile's pixels, so that tasks of FEWEST_TILES tiles leave no small rest of a pass."""
     each, samples = max(1, most // FEWEST_TILES), int((work.then - work.samples).max())
     return most if samples <= each else FEWEST_TILES * -(-samples // round(samples / each))
 
 
 def check_pixels(found: NDArray[Any], before: NDArray[Any], inside: NDArray[np.bool_], more: int) -> int:
-    """BadResult unless these can be the pixels with so many more samples; how many of them were dropped."""
+    """Raise BadResult unless these can be the pixels with `more` more samples; return how many were dropped."""
     if not isinstance(found, np.ndarray) or found.shape != before.shape or found.dtype != before.dtype:
         raise BadResult("it returned something that is no pixels")
     if not all(np.isfinite(found[name]).all() for name in ("sum", "sum_error", "square", "square_error")):

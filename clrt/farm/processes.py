@@ -1,4 +1,4 @@
-"""A scheduler and workers as processes of their own, as a farm has them: to be measured, killed and stopped."""
+"""A local scheduler and workers in separate processes, to be measured, killed and stopped."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .cluster import LOG_LENGTH
 
 
 class Processes:
-    """They listen on the loopback interface alone. folder: for their files and logs."""
+    """A scheduler and workers that listen only on the loopback interface. folder: for their files and logs."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -25,13 +25,12 @@ class Processes:
         self.workers: list[subprocess.Popen[bytes]] = []
 
     def start_scheduler(self) -> subprocess.Popen[bytes]:
-        """One at the address; another may have been there."""
+        """Start a scheduler at the address, where an earlier one may have been."""
         port = self.address.rpartition(":")[2]
         return self._start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
 
     def add_workers(self, count: int = 1, preload: Path | None = None, **variables: str) -> None:
-        """So many more, which nothing starts again. preload: a module that each loads; variables: of its
-        environment."""
+        """Start `count` more workers, which are not restarted. preload: a module to load; variables: environment."""
         loaded = [] if preload is None else ["--preload", str(preload)]
         for _ in range(count):
             self.workers.append(self._start("distributed.cli.dask_worker", self.address, "--nthreads", "1",
@@ -39,11 +38,11 @@ class Processes:
                                             "60", *loaded, **variables))
 
     def add_simulated(self, count: int) -> None:
-        """A process with so many workers that only sleep (simulated.py)."""
+        """Start a process with `count` simulated workers (simulated.py)."""
         self.workers.append(self._start("clrt.farm.simulated", self.address, str(count)))
 
     def kill(self, process: subprocess.Popen[bytes]) -> None:
-        """At once, as a machine that goes down would."""
+        """Kill a process at once, as if its machine went down."""
         process.kill()
         process.wait()
         if process in self.workers:
@@ -60,7 +59,7 @@ class Processes:
                                 start_new_session=True)
 
     def __enter__(self) -> Processes:
-        """Once the scheduler listens, which takes long on a busy machine."""
+        """Wait until the scheduler listens, which takes long on a busy machine."""
         host, _, port = self.address.rpartition("/")[2].partition(":")
         while self.scheduler.poll() is None:
             with suppress(OSError), socket.create_connection((host, int(port)), 1):

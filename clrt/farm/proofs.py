@@ -1,4 +1,4 @@
-"""Whether workers render alike: each renders a few tiles of the scene, before it gets any work."""
+"""Worker check: before it gets any work, each worker renders a few tiles, which must agree with those of the others."""
 
 from __future__ import annotations
 
@@ -10,23 +10,26 @@ from numpy.typing import NDArray
 
 from .members import BadResult, Member
 
-#: Devices that round differently may differ that much in a value, in such a part of all pixels.
+#: Relative difference of values allowed between devices that round differently, and the fraction of pixels that may
+#: exceed it.
 TOLERANCE, MOST_DIFFERING = 1e-2, 0.05
-#: What tells devices that must render the same bits.
+#: Devices for which these facts are equal must render identical bits.
 KIND = ("name", "platform", "platform_version", "driver")
 _log = logging.getLogger(__name__)
 
 
 class Proofs:
-    """The first worker's proof, and that of each kind of device."""
+    """The first worker's proof, and one for each kind of device."""
 
     def __init__(self) -> None:
         self._first: tuple[Member, NDArray[Any]] | None = None
         self._kinds: dict[tuple[str, ...], tuple[Member, NDArray[Any]]] = {}
 
     def compare(self, member: Member) -> None:
-        """BadResult where a worker's proof is not what others of its kind, or any others, showed. Warns where it is of
-        a kind that rounds otherwise: then it depends on who renders what."""
+        """Raise BadResult if a worker's proof differs from that of its kind, or too much from that of the first worker.
+
+        Warns if its kind rounds differently: then the image's last bits depend on which worker renders what.
+        """
         facts: dict[str, Any] = member.facts or {}
         proof, kind = facts["proof"], tuple(str(facts[name]) for name in KIND)
         if not all(np.isfinite(proof[name]).all() for name in ("sum", "square")):
@@ -50,6 +53,6 @@ class Proofs:
 
 
 def _differing(found: NDArray[Any], expected: NDArray[Any]) -> float:
-    """The part of all pixels that differ by more than rounding."""
+    """Return the fraction of pixels that differ by more than rounding."""
     a, b = found["sum"].astype(np.float64), expected["sum"].astype(np.float64)
     return float(np.mean((np.abs(a - b) > TOLERANCE * (np.abs(a) + np.abs(b)) + 1e-6).any(axis=-1)))

@@ -1,7 +1,7 @@
-"""What workers do. Imported by schedulers, too, so nothing heavy is before it is used.
+"""Functions that run on workers. Schedulers import this module, too, so heavy imports are local to functions.
 
-A worker keeps the scenes that it was prepared for, compiled, with their trees, on its devices. These do one thing at a
-time, whatever Dask gives it.
+A worker caches the scenes that it was prepared for, compiled, with their BVHs, on its devices. The devices do one thing
+at a time, regardless of how many tasks Dask starts.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from .simulated import Simulation
 
 P = ParamSpec("P")
-#: Scenes that a worker keeps; the one that was used longest ago goes first.
+#: Scenes that a worker caches; the least recently used is evicted.
 MOST_KEPT = 2
 _renderers: dict[str, ShareRenderer | Simulation] = {}
 _starting, _table = Lock(), Lock()
 
 
 def identity() -> dict[str, str]:
-    """What must be the same on the client and on all workers: the version, and the kernels' digest."""
+    """Return what must be equal on the client and all workers: the version, and the kernels' digest."""
     from importlib.metadata import version
 
     from ..device.sources import kernel_digest
@@ -42,15 +42,17 @@ def identity() -> dict[str, str]:
 
 
 class Answer(NamedTuple):
-    """What a function returned, or what it raised: an error's class, of clrt.errors or builtins, and its text. Errors
-    travel as text, since not everything in them can be sent."""
+    """A function's result or error, as the class (of clrt.errors or builtins) and its text.
+
+    Errors are sent as text, since not everything in them can be serialised.
+    """
 
     value: Any
     error: str = ""
     text: str = ""
 
     def result(self) -> Any:
-        """The value, or raises the error."""
+        """Return the value, or raise the error."""
         if not self.error:
             return self.value
         kind = getattr(errors, self.error, None)
@@ -60,25 +62,25 @@ class Answer(NamedTuple):
 
 
 def answering(function: Callable[P, Any]) -> Callable[P, Answer]:
-    """The function with an Answer."""
+    """Wrap a function to return an Answer."""
     @wraps(function)
     def answer(*arguments: P.args, **named: P.kwargs) -> Answer:
         try:
             return Answer(function(*arguments, **named))
-        except Exception as error:  # whatever it is, it is the client that must know
+        except Exception as error:  # every error is reported to the client
             return Answer(None, type(error).__name__, str(error))
 
     return answer
 
 
 def as_it_is(value: Any) -> Any:
-    """A task whose result is sent with it."""
+    """Return the value: a task that holds an array."""
     return value
 
 
 @answering
 def introduce(client: dict[str, str], devices: tuple[str | int, ...]) -> dict[str, Any]:
-    """What a worker is: its devices' names, platforms and drivers. DeviceError where it cannot render."""
+    """Return the worker's device names, platforms and drivers. Raises DeviceError if it cannot render."""
     _check_identity(client)
     with _starting:
         return about(opened(devices))
@@ -86,8 +88,11 @@ def introduce(client: dict[str, str], devices: tuple[str | int, ...]) -> dict[st
 
 @answering
 def prepare(client: dict[str, str], key: str, text: bytes, digests: list[str], *arrays: NDArray[Any]) -> dict[str, Any]:
-    """Compiles what was sent (see `ShareRenderer`) and keeps it under `key`. What a worker is, the machine's part of
-    the report, and its proof (`ShareRenderer.proof`). DeviceError, KernelError, SceneError."""
+    """Compile an order (see `ShareRenderer`) and cache it under `key`.
+
+    Returns data on the worker, its part of the report, and its proof (`ShareRenderer.proof`). Raises DeviceError,
+    KernelError and SceneError.
+    """
     _check_identity(client)
     with _starting:
         if (renderer := _found(key)) is None:
@@ -101,23 +106,27 @@ def prepare(client: dict[str, str], key: str, text: bytes, digests: list[str], *
 @answering
 def render_share(key: str, tiles: NDArray[Any], first: int, more: int,
                  pixels: NDArray[Any] | None) -> tuple[NDArray[Any], float]:
-    """The pixels (tiles, TILE_PIXELS) of these tiles with samples first … first + more − 1 added, and the seconds that
-    took; pixels: as they were before, None without samples. DeviceError where no device can go on."""
+    """Return the pixels (tiles, TILE_PIXELS) with samples first … first + more − 1 added, and the seconds taken.
+
+    pixels: their values before, None without samples. Raises DeviceError if no device can go on.
+    """
     start = time.perf_counter()
     return _renderer(key).share(tiles, first, more, pixels), time.perf_counter() - start
 
 
 @answering
 def draw(key: str, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
-    """Pictures of what is seen first: AOVs by their names, or, without, what guides a denoiser."""
+    """Return AOVs of the first hits by name, or the denoiser's guides if `names` is None."""
     return _renderer(key).drawn(names)
 
 
 @answering
 def render_whole(client: dict[str, str], key: str, text: bytes, part: bytes, digests: list[str],
                  *arrays: NDArray[Any]) -> tuple[dict[str, Any], float]:
-    """A whole picture, or a band of one, with what was asked for beside it, and the seconds that took (see
-    `band_renderer.render`). text: the order, known by its key; part: its camera and its band."""
+    """Return a whole image, or a band of one, with its AOVs, and the seconds taken (see `band_renderer.render`).
+
+    text: the order, identified by its key; part: its camera and band.
+    """
     _check_identity(client)
     from .band_renderer import render
 
@@ -130,14 +139,14 @@ def render_whole(client: dict[str, str], key: str, text: bytes, part: bytes, dig
 
 @cache
 def opened(selectors: tuple[str | int, ...]) -> list[Device]:
-    """The devices of this worker that are meant, opened once."""
+    """Return this worker's selected devices, opened once."""
     from ..device.open import open_devices
 
     return open_devices(selectors or None)
 
 
 def about(devices: list[Device]) -> dict[str, Any]:
-    """Devices' names, platforms and drivers, each once."""
+    """Return the devices' distinct names, platforms and drivers."""
     return {name: " + ".join(dict.fromkeys(getattr(device.info, name) for device in devices))
             for name in ("name", "platform", "platform_version", "driver")}
 
@@ -153,7 +162,7 @@ def _made(order: Order) -> ShareRenderer | Simulation:
 
 
 def _check_identity(client: dict[str, str]) -> None:
-    """DeviceError where clrt is another one than the client's: pictures could differ, or records not fit."""
+    """Raise DeviceError if clrt differs from the client's: images could differ, or records be incompatible."""
     own = identity()
     if own != client:
         told = [f"clrt {each['version']} with the kernels {each['kernels']}" for each in (own, client)]
@@ -161,7 +170,7 @@ def _check_identity(client: dict[str, str]) -> None:
 
 
 def _found(key: str) -> ShareRenderer | Simulation | None:
-    """What is kept under the key, which is then the last to go. Some threads may ask at a time."""
+    """Return the cached renderer, now the last to be evicted, or None. Thread-safe."""
     with _table:
         if key in _renderers:
             _renderers[key] = _renderers.pop(key)

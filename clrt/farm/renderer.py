@@ -1,4 +1,4 @@
-"""A renderer whose devices are those of a cluster's workers; the machine that it runs on needs none."""
+"""A renderer on the devices of a cluster's workers; the client needs none."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from .cluster import Cluster
 from .orders import Order
 from .picture import FarmPicture
 
-#: What a checkpoint calls those that rendered, before they are known.
+#: Device name in a checkpoint before the workers are known.
 FARM = "a farm"
 
 
 class FarmRenderer(Renderer):
-    """A scene on a cluster. What is said of `Renderer` holds; `device` is of each worker's devices.
+    """Renderer of a scene on a cluster. It is used like `Renderer`; `device` selects among each worker's devices.
 
-    simulated: samples a second of workers that only sleep, to measure all the rest (simulated.py).
+    simulated: samples per second of workers that only sleep, to measure the overhead (simulated.py).
     """
 
     session: FarmPicture
@@ -39,7 +39,7 @@ class FarmRenderer(Renderer):
 
     def passes(self, *, spp: int | None = None, time: float | None = None, error: float | None = None,
                reference: NDArray[np.float32] | None = None) -> Iterator[State]:
-        """See `Renderer.passes`. Where the cluster fails what is done is kept in the checkpoint."""
+        """See `Renderer.passes`. If the cluster fails, the samples so far are kept in the checkpoint."""
         try:
             yield from super().passes(spp=spp, time=time, error=error, reference=reference)
         except DeviceError:
@@ -67,11 +67,11 @@ class FarmRenderer(Renderer):
         return picture
 
     def _turn_to(self, camera: Camera) -> None:
-        """Makes all anew. Of many pictures each is better rendered by one worker (whole_pictures.py)."""
+        """Start a new image. Many images are better rendered by one worker each (whole_pictures.py)."""
         self.scene = replace(self.scene, camera=camera)
         self.session = self._make_picture()
 
     @property
     def name(self) -> str:
-        """Of all devices that render."""
+        """Return the names of all devices that render."""
         return (self.session.told("name") if hasattr(self, "session") else "") or FARM

@@ -1,4 +1,4 @@
-"""Asks whether a Dask scheduler answers at an address, before Dask's client connects, which may wait there forever."""
+"""Check that a Dask scheduler answers at an address before Dask's client connects, which may wait there forever."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from ..threads import Event, beside
 
 
 def check_scheduler(address: str, seconds: float) -> None:
-    """Raise OSError, ValueError or TypeError unless a scheduler at the address says within so many seconds what it is.
+    """Raise OSError, ValueError or TypeError unless a scheduler at the address identifies itself within `seconds`.
 
-    A thread asks: one that looks a host's name up cannot be interrupted, and is left behind.
+    This runs in a thread, as host name resolution cannot be interrupted; such a thread is abandoned.
     """
     ended, outcome = Event(), list[BaseException | None]()
 
@@ -31,7 +31,7 @@ def check_scheduler(address: str, seconds: float) -> None:
         raise OSError(f"no answer within {seconds:g} s") from error
     if isinstance(error, OSError | ValueError | TypeError):
         raise error
-    if error is not None:    # what another protocol's bytes mean to Dask's is accidental
+    if error is not None:    # Dask may raise any error on another protocol's bytes
         raise OSError("its answer is not a scheduler's") from error
 
 

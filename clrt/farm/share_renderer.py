@@ -1,4 +1,4 @@
-"""A scene on a worker, ready to take shares of its picture."""
+"""A scene on a worker, ready to render shares of its image."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from ..rendering.work import Part, Work
 from .orders import Order
 from .remote import about, opened
 
-#: Devices do one thing at a time.
+#: The devices do one thing at a time.
 _at_work = Lock()
-#: Tiles of a proof.
+#: Number of tiles in a proof.
 PROOF_TILES = 16
 
 
 class ShareRenderer:
-    """The order's scene, compiled for this worker's devices. DeviceError, KernelError, NoRoomError."""
+    """The order's scene, compiled for this worker's devices. Raises DeviceError, KernelError and NoRoomError."""
 
     def __init__(self, order: Order) -> None:
         self.scene, self.selectors = order.scene, order.devices
@@ -33,7 +33,7 @@ class ShareRenderer:
         compiled = Compiler(devices).compile(order.scene,
                                              [choices_on(each, order.asked, order.lanes) for each in devices])
         self._team = make_team(devices, compiled, settings.size, depth_of(settings), settings.seed, order.planned_spp)
-        self._picture = Crew(self._team, settings.size)    # whose film takes no memory as long as nothing is in it
+        self._picture = Crew(self._team, settings.size)    # its film uses no memory while it is empty
         self._pixel = compiled[0].choices.pixel
 
     def share(self, tiles: NDArray[np.uint32], first: int, more: int, pixels: NDArray[Any] | None) -> NDArray[Any]:
@@ -48,7 +48,7 @@ class ShareRenderer:
         return film
 
     def proof(self) -> NDArray[Any]:
-        """A few tiles from all over the picture with one sample: what others can compare theirs with."""
+        """Render one sample of a few tiles from all over the image, to compare with other workers'."""
         tiles = scattered(self._picture.tile_samples.size).astype(np.uint32)
         return self.share(np.sort(tiles[::max(1, len(tiles) // PROOF_TILES)][:PROOF_TILES]), 0, 1, None)
 
@@ -60,9 +60,9 @@ class ShareRenderer:
             return {**self._picture.first_hits(self.scene, names)}
 
     def introduction(self) -> dict[str, Any]:
-        """What the worker is."""
+        """Return data on the worker's devices."""
         return about(opened(self.selectors))
 
     def report(self) -> dict[str, Any]:
-        """The machine's part of a report."""
+        """Return the worker's part of a report."""
         return self._picture.machine(opened(self.selectors))

@@ -1,9 +1,9 @@
-"""Workers without a device, each with a fixed speed: what a farm costs beside the work itself, measured on one machine.
+"""Simulated workers without a device, each with a fixed speed, to measure a farm's overhead on one machine.
 
     python -m clrt.farm.simulated SCHEDULER COUNT
 
-runs so many workers in one process until it is ended. They sleep as long as a device would work, and what they send and
-get are pixels as large as real ones.
+runs COUNT workers in one process until it is ended. They sleep as long as a device would work, and send and receive
+pixels of real size.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PROOF_TILES = 16
 
 
 class Simulation:
-    """In the place of a `ShareRenderer`."""
+    """Replacement of a `ShareRenderer`."""
 
     selectors = None
 
@@ -32,7 +32,7 @@ class Simulation:
         self._speed, self._pixel = order.simulated, order.asked.pixel
 
     def share(self, tiles: NDArray[np.uint32], first: int, more: int, pixels: NDArray[Any] | None) -> NDArray[Any]:
-        """The pixels with so many more samples, all black, after as long as those take."""
+        """Return the pixels with `more` more samples, all black, after the time that those would take."""
         start = time.perf_counter()
         film = np.zeros((len(tiles), TILE_PIXELS), self._pixel) if pixels is None else np.array(pixels)
         film["count"] += more
@@ -40,19 +40,19 @@ class Simulation:
         return film
 
     def drawn(self, names: tuple[str, ...] | None) -> dict[str, NDArray[Any]]:
-        """Nothing is seen."""
+        """Return no AOVs."""
         return {}
 
     def proof(self) -> NDArray[Any]:
-        """Pixels that all agree on."""
+        """Return the same pixels on all workers."""
         return np.zeros((PROOF_TILES, TILE_PIXELS), self._pixel)
 
     def introduction(self) -> dict[str, Any]:
-        """What it is."""
+        """Return data on the simulated device."""
         return {name: "simulated" for name in ("name", "platform", "platform_version", "driver")}
 
     def report(self) -> dict[str, Any]:
-        """Nothing was built."""
+        """Return a report without a build."""
         return {"bvh": {}, "kernel": {"features": ["LIGHTS"]}, "peak_device_bytes": 0}
 
 
@@ -60,7 +60,8 @@ async def _run(address: str, count: int) -> None:
     import dask
     from distributed import Worker
 
-    # Each looks at its own stack a hundred times a second, and at its machine twice: too much for many in one process.
+    # By default each profiles its stack a hundred times per second, and polls its machine twice: too much for many in
+    # one process.
     dask.config.set({"distributed.worker.profile.enabled": False, "distributed.admin.system-monitor.interval": "60s"})
     workers = [Worker(address, nthreads=1, memory_limit=0, host="127.0.0.1", dashboard=False) for _ in range(count)]
     await asyncio.gather(*workers)

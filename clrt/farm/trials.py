@@ -1,4 +1,4 @@
-"""What a farm does and costs, measured on one machine: `clrt bench farm`."""
+"""Measurements of a farm's results and costs on one machine: `clrt bench farm`."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from .processes import Processes
 from .renderer import FarmRenderer
 from .whole_pictures import WholePictures
 
-#: Samples a second of a worker that only sleeps: what two cores make of the Cornell box.
+#: Samples per second of a simulated worker: as many as two cores render of the Cornell box.
 SPEED = 4e6
-#: Workers that only sleep, in one process.
+#: Simulated workers per process.
 IN_PROCESS = 16
 Row = dict[str, Any]
 
 
 @contextmanager
 def farm(workers: int = 0, simulated: int = 0) -> Iterator[Processes]:
-    """A scheduler and workers as processes of their own."""
+    """Run a scheduler and workers in separate processes."""
     with tempfile.TemporaryDirectory() as folder, Processes(Path(folder)) as processes:
         processes.add_workers(workers)
         for first in range(0, simulated, IN_PROCESS):
@@ -44,7 +44,7 @@ def farm(workers: int = 0, simulated: int = 0) -> Iterator[Processes]:
 
 
 def equality(scenes: list[Scene], spp: int) -> Iterator[Row]:
-    """Each scene by one process, by two of --local-cluster, and by four of a scheduler: are the films the same?"""
+    """Compare the films of each scene by one process, by two of --local-cluster, and by four of a scheduler."""
     with local_cluster(2) as two, farm(4) as processes, connect(processes.address) as four:
         for scene in scenes:
             alone = Renderer(scene, spp=spp)
@@ -60,7 +60,7 @@ def equality(scenes: list[Scene], spp: int) -> Iterator[Row]:
 
 
 def animation(scene: Scene, count: int, spp: int) -> Iterator[Row]:
-    """Frames of a turntable by one process, two of --local-cluster, and four of a scheduler: are they the same?"""
+    """Compare the frames of a turntable by one process, by two of --local-cluster, and by four of a scheduler."""
     shots = {f"frame {number}": PictureOrder(shot, spp=spp) for number, shot in frames(turntable(scene, count))}
     renderer = Renderer(scene, spp=spp)
     alone = {}
@@ -79,7 +79,7 @@ def animation(scene: Scene, count: int, spp: int) -> Iterator[Row]:
 
 
 def kills(scene: Scene, spp: int, every: float) -> Iterator[Row]:
-    """Four workers, one of which is killed every so many seconds and replaced, and the same in peace."""
+    """Compare renders on four workers undisturbed, and with one killed and replaced every `every` seconds."""
     alone = _run(Renderer(scene, spp=spp), spp)
     with farm(4) as processes, connect(processes.address) as cluster:
         for killing in (False, True):
@@ -106,9 +106,8 @@ def kills(scene: Scene, spp: int, every: float) -> Iterator[Row]:
 
 
 def overhead(scene: Scene, workers: int, seconds: float) -> Row:
-    """Workers that only sleep, at a fixed speed: how far they are from so many times one, what is moved, and what
-    client and scheduler need for it."""
-    import psutil    # comes with Dask
+    """Measure simulated workers: parallel efficiency, data moved, and CPU time of client and scheduler."""
+    import psutil    # a dependency of Dask
 
     width, height = scene.render.size
     spp = int(workers * SPEED * seconds / (width * height))
@@ -127,7 +126,7 @@ def overhead(scene: Scene, workers: int, seconds: float) -> Row:
 
 
 def huge(scene: Scene, size: tuple[int, int], spp: int, workers: int, path: Path) -> Row:
-    """A picture in bands of the normals, which cost little, and what the client took for it at most."""
+    """Render a large image of normals, which are cheap, in bands, and measure the client's peak memory."""
     with tempfile.TemporaryDirectory(dir=".") as folder, farm(workers) as processes, \
             connect(processes.address) as cluster:
         banded = Banded(PictureOrder(scene, {"size": size, "integrator": "normals"}, spp=spp),
@@ -143,15 +142,15 @@ def huge(scene: Scene, size: tuple[int, int], spp: int, workers: int, path: Path
 
 
 def sized(scene: Scene, size: tuple[int, int]) -> Scene:
-    """The scene with a picture of this size."""
+    """Return the scene with images of this size."""
     settings: RenderSettings = replace(scene.render, size=size)
     return replace(scene, render=settings)
 
 
 def same_film(one: State, other: State) -> bool:
-    """Whether two films are the same to the last bit."""
+    """Return whether two films are bit-identical."""
     return one.film.pixels.tobytes() == other.film.pixels.tobytes()
 
 
 def _run(renderer: Renderer, spp: int) -> State:
-    return deque(renderer.passes(spp=spp), maxlen=1).pop()    # one state in memory, not all
+    return deque(renderer.passes(spp=spp), maxlen=1).pop()    # keeps only the last state in memory

@@ -1,7 +1,7 @@
-"""Many pictures, each rendered by one worker from its first sample to its last: frames, and bands of a large picture.
+"""Many images, each rendered by one worker from its first sample to its last: frames, and bands of a large image.
 
-What a worker gives is what one machine would. No more than what is being rendered is ever here, however many workers
-there are: a picture is handed on as it comes.
+The results are those of one machine. Images are handed on as they arrive, so the client's memory does not grow with the
+number of workers.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from .orders import PictureOrder
 from .parcels import Parcel, pack
 from .remote import identity, introduce, render_whole
 
-#: With so many pictures left for each worker it has the next one at hand before it has ended one.
+#: With more images than this left per worker, each worker has the next one queued.
 PLENTY = 3
 
 
 class WholePictures:
-    """Pictures by name. order: what a worker is to render for a name; a result is `band_renderer.render`'s."""
+    """Images by name. order: returns a worker's order for a name; the results are those of `band_renderer.render`."""
 
     def __init__(self, cluster: Cluster, names: Sequence[str], order: Callable[[str], PictureOrder],
                  devices: tuple[str | int, ...] = ()) -> None:
@@ -34,8 +34,10 @@ class WholePictures:
         self.dispatch = Dispatch(cluster, self)
 
     def results(self) -> Iterator[tuple[str, dict[str, Any]] | None]:
-        """Names and results as they come; None from time to time between them. DeviceError where a picture was given
-        up, or no worker is left."""
+        """Yield names and results as they arrive, and None from time to time between them.
+
+        Raises DeviceError if an image was given up, or no worker is left.
+        """
         for _ in self.dispatch.run():
             results, self._results = self._results, []
             yield None
@@ -43,22 +45,22 @@ class WholePictures:
         yield from self._results
 
     def introduction(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
-        """Workers tell who they are."""
+        """Return the call by which a worker reports its devices."""
         return introduce, (identity(), self._devices)
 
     def meet(self, member: Member) -> None:
-        """Whoever passed the introduction may work."""
+        """Accept every worker that passed the introduction."""
 
     def left(self) -> bool:
-        """Whether there are names left, or in work."""
+        """Return whether there are names left, or in progress."""
         return bool(self._names or self.dispatch.tasks)
 
     def ahead(self, members: int) -> int:
-        """One, and the next where there are plenty."""
+        """Return 2 while there are plenty of images left, else 1."""
         return 2 if len(self._names) > PLENTY * members else 1
 
     def next(self, member: Member) -> Task | None:
-        """The next picture."""
+        """Return a task for the next image."""
         if not self._names:
             return None
         name = self._names.pop()
@@ -69,13 +71,13 @@ class WholePictures:
             identity(), parcel.key, parcel.text, part, list(parcel.arrays), *cluster.put(parcel.arrays)))
 
     def _packed(self, order: PictureOrder) -> Parcel:
-        """A parcel of what most pictures have in common, packed once for all of them."""
+        """Pack what most orders have in common, once for all of them."""
         if self._common is None or self._common[0] != order:
             self._common = order, pack(order)
         return self._common[1]
 
     def accept(self, task: Task, result: dict[str, Any], member: Member) -> None:
-        """Keeps it until it is handed on; BadResult unless it is a picture."""
+        """Store the result until it is handed on. Raises BadResult unless its pixels are finite."""
         if not np.isfinite(result["pixels"]).all():
             raise BadResult("it returned pixels that are no finite numbers")
         self._results.append((task.what[0], result))
