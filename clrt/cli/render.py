@@ -172,6 +172,11 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
                     _render_frames(renderer, sequence, goal, denoiser, progress)
             except (DeviceError, OutputError) as failure:
                 raise type(failure)(f"{failure}{advice()}") from failure
+        if renderer.stop_reason == "interrupted":
+            logging.getLogger(__name__).warning("%s: interrupted; %s", content.name, (
+                "with --resume the same command renders the frames that are missing" if sequence else
+                f"--resume goes on from {checkpoint}" if checkpoint else
+                "a render that has a --checkpoint can go on with --resume"))
     if interruptible.asked:
         sys.exit(130)
 
