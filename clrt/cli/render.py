@@ -85,8 +85,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             view: str, exposure: float, progress_kind: str | None, force: bool, print_kernel: bool,
             quiet: bool, frames: str | None, turntable: int | None, fps: float | None, scheduler: str | None,
             local_cluster: int | None, **others: Any) -> None:
-    """Render SCENE, a .toml scene, a bare model, or - for a .toml scene on standard input, until the first of --spp,
-    --time and --error is reached."""
+    """Render SCENE, a .toml scene, a Mitsuba scene (.xml), a bare model, or - for a .toml scene on standard input,
+    until the first of --spp, --time and --error is reached."""
     def advice() -> str:
         kept = checkpoint is not None and checkpoint.exists()
         return f"; {checkpoint} holds what was rendered before, and --resume goes on from it" if kept else ""

@@ -55,14 +55,26 @@ def plot_convergence(path: Path, results: Sequence[Mapping[str, Any]], devices: 
         for axis, (key, label) in zip(column, (("seconds", "seconds"), ("spp", "samples a pixel"))):
             _draw_convergence(axis, result, names, key)
             axis.set(xscale="log", yscale="log", xlabel=label)
+            _label_short_range(axis)
             axis.grid(linewidth=0.4, alpha=0.4)
         column[0].set_title(f"{result['scene']}, {'x'.join(map(str, result['size']))}", fontsize="medium")
     for row in axes:
         row[0].set_ylabel("error (√relMSE)")
     marks = {label: mark for axis in axes.flat for mark, label in zip(*axis.get_legend_handles_labels())}
-    figure.legend(marks.values(), marks.keys(), loc="outside lower center", ncols=2 + len(results), frameon=False,
+    figure.legend(marks.values(), marks.keys(), loc="outside lower center", ncols=1 + len(results), frameon=False,
                   fontsize="small", title="\n".join(devices), title_fontsize="x-small")
     return write_figure(path, figure)
+
+
+def _label_short_range(axis: Axes) -> None:
+    """Over few decades matplotlib labels the steps between as 2×10⁰, 3×10⁰ …, one over the other in a narrow axis."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    low, high = axis.get_xlim()
+    if high < 30 * low:
+        axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.xaxis.set_major_formatter("{x:g}")
+        axis.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _draw_convergence(axis: Axes, result: Mapping[str, Any], names: Sequence[str], key: str) -> None:
