@@ -7,7 +7,7 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..output.plots import MARKERS, write_figure
+from ..output.plots import MARKERS, label_short_range, write_figure
 from .families import FIGURES
 
 if TYPE_CHECKING:
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Zero errors are drawn here, below all that was counted.
 ZERO = 1e-3
+#: Over more of its range a narrow axis has room for the labels of whole decades alone.
+SHORT = 30
 #: Okabe and Ito's, which most colour-blind eyes tell apart.
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#f0e442")
 
@@ -55,7 +57,9 @@ def plot_convergence(path: Path, results: Sequence[Mapping[str, Any]], devices: 
         for axis, (key, label) in zip(column, (("seconds", "seconds"), ("spp", "samples a pixel"))):
             _draw_convergence(axis, result, names, key)
             axis.set(xscale="log", yscale="log", xlabel=label)
-            _label_short_range(axis)
+            low, high = axis.get_xlim()
+            if high < SHORT * low:
+                label_short_range(axis.xaxis)
             axis.grid(linewidth=0.4, alpha=0.4)
         column[0].set_title(f"{result['scene']}, {'x'.join(map(str, result['size']))}", fontsize="medium")
     for row in axes:
@@ -64,17 +68,6 @@ def plot_convergence(path: Path, results: Sequence[Mapping[str, Any]], devices: 
     figure.legend(marks.values(), marks.keys(), loc="outside lower center", ncols=1 + len(results), frameon=False,
                   fontsize="small", title="\n".join(devices), title_fontsize="x-small")
     return write_figure(path, figure)
-
-
-def _label_short_range(axis: Axes) -> None:
-    """Over few decades matplotlib labels the steps between as 2×10⁰, 3×10⁰ …, one over the other in a narrow axis."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    low, high = axis.get_xlim()
-    if high < 30 * low:
-        axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axis.xaxis.set_major_formatter("{x:g}")
-        axis.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _draw_convergence(axis: Axes, result: Mapping[str, Any], names: Sequence[str], key: str) -> None:
