@@ -60,10 +60,9 @@ class Mesh:
     """Triangles of one material.
 
     vertices: (n, 3) float32; faces: (m, 3) int32, counter-clockwise seen from the front; both become that from lists
-    and arrays of other numbers. normals: (n, 3) float32,
-    interpolated over each face, or None for flat shading. uv, uv1: (n, 2) float32, the two sets of texture coordinates
-    (scene.textures). colors: (n, 3) or (n, 4) float32, linear, from 0 to 1, which multiply the material's color, and
-    the fourth its opacity, if that is not 1.
+    and arrays of other numbers. normals: (n, 3) float32, interpolated over each face, or None for flat shading.
+    uv, uv1: (n, 2) float32, the two sets of texture coordinates (scene.textures). colors: (n, 3) or (n, 4) float32,
+    linear, from 0 to 1, which multiply the material's color, and the fourth its opacity, if that is not 1.
     tangents: (n, 4) float32, for normal maps, w the sign of the bitangent as in glTF; computed where they are missing.
     material_name: what a model file calls the material.
     """
