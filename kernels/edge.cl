@@ -90,7 +90,7 @@ static inline real3 emitted_light(const Scene *scene, const Path *path, const Su
 static inline real3 escaped_light(const Scene *scene, const Path *path, ireal escaped) {
 #if ENVIRONMENT
     if (!ANY(escaped)) return splat(ZERO);
-    real3 wi = choose(escaped, path->wi, vector(ZERO, ONE, ZERO));   // NaN in inactive lanes would be an invalid texel index
+    real3 wi = choose(escaped, path->wi, vector(ZERO, ONE, ZERO));   // NaN in inactive lanes gives no valid texel
     real3 light = environment_light(scene, path->p, path->n, wi, path->pdf, path->specular);
     return choose(escaped, at_eye(path, light), splat(ZERO));
 #else

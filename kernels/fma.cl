@@ -1,7 +1,7 @@
-// a·b + c, rounded once, of plain operations: for devices that have no instruction for it, where a driver's own function
-// takes 40 ms to compile wherever it stands, and ten times as long to run (measured with Mesa 22.3). The bits are the same
-// but where the product is below 2^-100, as its error may be no float then. (Dekker 1971; Boldo and Melquiond 2008,
-// "Emulation of a FMA and Correctly Rounded Sums: Proved Algorithms Using Rounding to Odd".)
+// Software a·b + c, rounded once, for devices without an fma instruction, where the driver's own function takes 40 ms
+// to compile per use and ten times as long to run (measured with Mesa 22.3). The result is bit-exact unless the product
+// is below 2^-100, since its error may then not be representable. (Dekker 1971; Boldo and Melquiond 2008, "Emulation of
+// a FMA and Correctly Rounded Sums: Proved Algorithms Using Rounding to Odd".)
 #define FUSED(type, uints, as_uints, as_type) \
     /* The float nearest to a + b, and what it lacks. */ \
     static inline type __attribute__((overloadable)) sum_of(type a, type b, type *lacks) { \

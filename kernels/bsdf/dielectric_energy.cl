@@ -15,7 +15,7 @@ typedef struct { real first, second; } Pair;
 
 static inline ireal table_index(real place, int last) {
     ireal index = TO_INT(place);
-    return index > 0 ? (index < last ? index : (ireal)(last)) : (ireal)(0);    // the value in an inactive lane is arbitrary
+    return index > 0 ? (index < last ? index : (ireal)(last)) : (ireal)(0);    // arbitrary in inactive lanes
 }
 
 // Interpolate linearly in a side's table at `place`, in pairs from its beginning.

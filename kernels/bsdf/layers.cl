@@ -1,7 +1,7 @@
 // Layers on a metallic_roughness surface, and transmission through it, following glTF's extensions:
 //   CLEARCOAT  a clear coat on top, F0 = 0.04: factor `clearcoat`, GGX with its own roughness
 //   SHEEN      fibres over the rest: sheen_color·D(h)·V (sheen.cl)
-//   THROUGH    the fraction `transmission` of the body is a thin sheet, which transmits through microfacets without refraction:
+//   THROUGH    the fraction `transmission` of the body is a thin sheet: microfacet transmission without refraction,
 //              color·(1 − F(wo·h))·G·D/(4·cos wo·cos wi), wi mirrored to wo's side, F of the dielectric part
 //
 // COAT_NORMALS: wo and wi are in the frame of the unbent normal. The coat and the base each reflect in a frame around

@@ -4,7 +4,7 @@
 //   COUPLING_ALBEDO       (1 − E(wi))(1 − E(wo))/(1 − mean E), E the directional albedo of the dielectric's gloss
 //                         (ggx_albedo.cl): reciprocal, and white stays white (Kelemen and Szirmay-Kalos 2001)
 //   COUPLING_FRESNEL      (1 − F(cos wi))(1 − F(cos wo)): reciprocal, never more than 1 with the gloss
-//   COUPLING_HALF_VECTOR  1 − F(wi·h), as in the sources and glTF, which creates energy: at roughness 0.1 a white plastic
+//   COUPLING_HALF_VECTOR  1 − F(wi·h), as in the sources and glTF, which creates energy: at roughness 0.1 white plastic
 //                         reflects 1.7 times the incident light at grazing angles
 //
 // D is GGX, and the microfacet lobe samples normals visible from wo (ggx.cl); lobes are chosen by their albedos at wo.
