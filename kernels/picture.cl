@@ -2,8 +2,8 @@
 //
 // The file in picture/ provides
 //
-//   picture_value(scene, launch, direction, t, &surface) the value of a surface at t along the ray, not yet turned to any
-//                                                        side
+//   picture_value(scene, launch, direction, t, &surface) the value of a surface at t along the ray, before
+//                                                        turn_towards
 #include "camera.cl"
 #include "surface.cl"
 #include PICTURE

@@ -1,7 +1,7 @@
 // The interface of a sampler; each sampler's file provides
 //
 //   Sampler, with a member `dimension`                      the dimension of the next pair, from 0
-//   sampler_at(pixel, sample, seed, block_bits)             the sampler of sample `sample` of a pixel; pixel: a unique number
+//   sampler_at(pixel, sample, seed, block_bits)             the sampler of one sample of a pixel, with a unique number
 //   next_bits(&sampler)                                     the next pair, 32 bits each
 //
 // Samples come in blocks of 2^block_bits, each of which covers the unit square evenly; 32: a single block.

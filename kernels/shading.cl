@@ -3,7 +3,7 @@
 //   shading_eval(shading, surface, wi)           bsdf_eval: value and pdf, 0 if wi is on the wrong geometric side:
 //                                                reflected light belongs above the surface, transmitted light below
 //   shading_sample(shading, surface, u, lobe)    bsdf_sample, with wi in the world frame; pdf 0 if sampling failed
-//   absorption_along(shading, surface, wi, here) absorption coefficient along wi, per unit of length; on wo's side `here`
+//   absorption_along(shading, surface, wi, here) absorption coefficient along wi, per unit of length; wo's is `here`
 //
 // wi: unit, world frame. HORIZON: light that lobes around a bent or interpolated normal scatter to the wrong side is
 // not lost (horizon.cl).

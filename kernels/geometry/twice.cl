@@ -1,8 +1,8 @@
-// Numbers of twice the digits of a float, hi + lo, for what a float's rounding would decide wrongly (Dekker 1971, "A
-// Floating-Point Technique for Extending the Available Precision"; Joldes et al. 2017, "Tight and Rigorous Error Bounds
-// for Basic Building Blocks of Double-Word Arithmetic"). Sums and products are right to a few units of 2^-46.
+// Double-word arithmetic, hi + lo, where float rounding would decide wrongly (Dekker 1971, "A Floating-Point Technique
+// for Extending the Available Precision"; Joldes et al. 2017, "Tight and Rigorous Error Bounds for Basic Building
+// Blocks of Double-Word Arithmetic"). Sums and products are accurate to a few units of 2^-46.
 //
-// They are macros over the type: float for one thing, wide for several at once.
+// Macros over the type: float for single values, wide for several at once.
 
 #define TWICE_OF(type, Twice, name) \
     typedef struct { type hi, lo; } Twice; \
