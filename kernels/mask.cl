@@ -18,7 +18,7 @@ static inline uint mask_bits(int8 mask) {
     ulong bytes = as_ulong(convert_char8(mask));
     return (uint)(((bytes & 0x8040201008040201UL) * 0x0101010101010101UL) >> 56);
 }
-// By bytes: Oclgrind reports the upper half of sixteen lanes as uninitialised.
+// Via bytes: Oclgrind reports the upper half of sixteen lanes as uninitialised.
 static inline uint mask_bits16(int16 mask) {
     ulong2 bits = ((as_ulong2(convert_char16(mask)) & 0x8040201008040201UL) * 0x0101010101010101UL) >> 56;
     return (uint)(bits.x | bits.y << 8);

@@ -36,7 +36,7 @@
         Twice a = name##_dot(d, d), r2 = name##_product(r, r); \
         type discriminant = name##_value(name##_sum(name##_product(a, r2), name##_negative(name##_dot(n, n)))); \
         type b = name##_value(name##_dot(f, d)), c = name##_value(name##_sum(name##_dot(f, f), name##_negative(r2))); \
-        type q = -b - copysign(sqrt(discriminant), b);   /* a NaN where the ray misses */ \
+        type q = -b - copysign(sqrt(discriminant), b);   /* NaN on a miss */ \
         type t0 = c / q, t1 = q / name##_value(a); \
         *near = t0 < t1 ? t0 : t1; \
         *far = t0 < t1 ? t1 : t0; \

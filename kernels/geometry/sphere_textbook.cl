@@ -13,7 +13,7 @@
         type a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]; \
         type b = 2.0f * (fx * d[0] + fy * d[1] + fz * d[2]); \
         type c = fx * fx + fy * fy + fz * fz - radius * radius; \
-        type root = sqrt(b * b - 4.0f * a * c);   /* a NaN where the ray misses */ \
+        type root = sqrt(b * b - 4.0f * a * c);   /* NaN on a miss */ \
         *near = (-b - root) / (2.0f * a); \
         *far = (-b + root) / (2.0f * a); \
     }

@@ -13,7 +13,7 @@
     static inline Twice name##_sum(Twice a, Twice b) { \
         type s = a.hi + b.hi, z = s - a.hi; \
         type e = ((a.hi - (s - z)) + (b.hi - z)) + (a.lo + b.lo), hi = s + e; \
-        return (Twice){hi, e - (hi - s)}; /* where the his cancel, what is left must move up */ \
+        return (Twice){hi, e - (hi - s)}; /* renormalise, for cancellation of the high words */ \
     } \
     static inline Twice name##_product(Twice a, Twice b) { \
         type p = a.hi * b.hi; \

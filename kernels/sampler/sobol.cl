@@ -4,7 +4,7 @@
 // 1/n, and any 2^k consecutive samples starting at a multiple of 2^k are a (0, k, 2)-net.
 //
 // The pixels of a square take blocks of 2^block_bits points of one sequence along the Z curve, so that neighbouring
-// pixels are stratified together and their errors cancel when eyes and filters average them (Ahmed and Wonka 2020).
+// pixels are stratified together and their errors cancel when the eye or a filter averages them (Ahmed and Wonka 2020).
 // Each square, and each later block, has its own sequence: the errors of pixels that share a sequence are correlated,
 // and if all pixels did, changes of the image would not reveal its error (clrt/rendering/noise.py). With block_bits =
 // 32, for an unknown number of samples, each pixel has its own sequence.
