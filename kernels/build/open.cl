@@ -72,7 +72,7 @@ static inline Needs needs_of(const Content *contents) {
 
 // Open the nodes below `count` wide ones. slots: [CHILDREN] per node, of binary nodes and EMPTY. places: starts with
 // the index of the first wide child of each node. waiting: entries on the traversal stack when it reaches a node; with
-// GROUPS, the sibling nodes of a node are one entry. All three are written for the `below` children, with three times
+// GROUPS, the child nodes of one node are one entry. All three are written for the `below` children, with three times
 // as many places: how many wide nodes, records of triangles and of spheres each needs. most[0]: the maximum number of
 // entries on the stack.
 kernel void open_level(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *nodes,
