@@ -9,7 +9,8 @@
     │   └── HungError    it does not answer any more                  exit code 4
     ├── KernelError   the device's compiler refused the program       exit code 5
     └── OutputError   a picture or report could not be written        exit code 6
-        └── KeptBesideError  it is beside the file to be replaced     exit code 6
+        ├── KeptBesideError  it is beside the file to be replaced     exit code 6
+        └── ReaderGoneError  nobody reads the pipe any more           exit code 6, or 130 where that came by Ctrl-C
 
 Everything public raises only these for users' mistakes; any other exception is a defect of clrt.
 """
@@ -75,6 +76,10 @@ class OutputError(ClrtError):
 
 class KeptBesideError(OutputError):
     """A result cannot replace a file, and is beside it under another name."""
+
+
+class ReaderGoneError(OutputError):
+    """A result cannot be written to a pipe, as whoever read it has gone."""
 
 
 def check_choice(name: str, value: object, known: Iterable[object]) -> None:
