@@ -5,28 +5,26 @@ from __future__ import annotations
 import atexit
 import time
 from collections.abc import Callable
+from weakref import ref
 
 import pyopencl as cl
 
-from ..threads import Event
+from ..threads import LAST_WAIT, Event
 
-#: Those that are still to come; and whether no more should.
-_expected: set[object] = set()
+#: Those that are still to come or under way; and whether no more should.
+_expected: set[ref[Callable[[int], None]]] = set()
 _python_ends = Event()
 
 
 def when_complete(event: cl.Event, function: Callable[[], object]) -> None:
     """Has `function` called once the event is complete, or at once where that was before; never while Python ends."""
-    token = object()
-
     def called(_: int) -> None:
         function()
-        _expected.discard(token)
 
-    _expected.add(token)
-    if _python_ends.is_set():
-        _expected.clear()
-    else:
+    # The driver's thread lets go of `called` as the last thing for which it holds Python's lock; a line of Python that
+    # noted its end could be followed by the end of Python.
+    _expected.add(ref(called, _expected.discard))
+    if not _python_ends.is_set():
         event.set_callback(cl.command_execution_status.COMPLETE, called)
 
 
@@ -34,6 +32,6 @@ def when_complete(event: cl.Event, function: Callable[[], object]) -> None:
 def _await_them() -> None:
     """One that came while Python ends would abort the process; threads that still wait then do without."""
     _python_ends.set()
-    start = time.perf_counter()
-    while _expected and time.perf_counter() < start + 1:
+    end = time.monotonic() + LAST_WAIT
+    while _expected and time.monotonic() < end:
         time.sleep(1e-3)
