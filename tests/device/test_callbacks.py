@@ -14,7 +14,7 @@ from clrt.device.open import Device
 
 def test_one_that_is_under_way_is_expected(device: Device) -> None:
     """To its last line: a process that ends before that would be aborted."""
-    called = []
+    called = list[None]()
 
     def function() -> None:
         called.append(None)
