@@ -30,8 +30,11 @@ def when_complete(event: cl.Event, function: Callable[[], object]) -> None:
 
 @atexit.register
 def _await_them() -> None:
-    """One that came while Python ends would abort the process; threads that still wait then do without."""
+    """One that came while Python ends would abort the process: so all are waited for as long as any still come.
+    Threads that wait for one that does not come do without."""
     _python_ends.set()
-    end = time.monotonic() + LAST_WAIT
+    left, end = len(_expected), time.monotonic() + LAST_WAIT
     while _expected and time.monotonic() < end:
+        if len(_expected) < left:
+            left, end = len(_expected), time.monotonic() + LAST_WAIT
         time.sleep(1e-3)
