@@ -1,7 +1,7 @@
 """Gives the OpenCL libraries a folder for their caches where the user's own cannot be written.
 
-PoCL hides its device, and pyopencl fails, when their cache folders cannot be made: no HOME, a read-only one. They read
-these variables as they load, so this module is imported before pyopencl.
+PoCL hides its device, and pyopencl fails, when their cache folders cannot be made: no HOME, a read-only or full one. They
+read these variables as they load, so this module is imported before pyopencl.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from pathlib import Path
 
 #: Where Linux has memory that looks like files, also in containers whose file system is read-only.
 MEMORY = "/dev/shm"
+#: Bytes for which a folder must have room: less than the programs of a render.
+ROOM = 1 << 18
 
 
 def provide_cache_folders() -> None:
@@ -25,7 +27,8 @@ def provide_cache_folders() -> None:
         return
     folder = os.path.join(temporary, f"clrt-cache-{os.getuid() if hasattr(os, 'getuid') else 0}")
     if not _writable(folder):
-        folder = tempfile.mkdtemp(prefix="clrt-cache-")
+        has_room = _writable(temporary) or not _writable(MEMORY)
+        folder = tempfile.mkdtemp(prefix="clrt-cache-", dir=temporary if has_room else MEMORY)
     if home_is_closed:
         os.environ["XDG_CACHE_HOME"] = folder
     if programs_are_closed:
@@ -38,7 +41,9 @@ def _writable(folder: str) -> bool:
         if not os.path.isabs(folder):
             return False
         Path(folder).mkdir(mode=0o700, parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
+        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+            if file.write(bytes(ROOM)) < ROOM:
+                return False
             return not hasattr(os, "getuid") or os.stat(folder).st_uid == os.getuid()
     except (OSError, RuntimeError):
         return False
