@@ -1,7 +1,7 @@
 """Gives the OpenCL libraries a folder for their caches where the user's own cannot be written.
 
-PoCL hides its device, and pyopencl fails, when their cache folders cannot be made: no HOME, a read-only or full one. They
-read these variables as they load, so this module is imported before pyopencl.
+PoCL hides its device, and pyopencl fails, when their cache folders cannot be made or have no room: no HOME, a read-only
+or full one. They read these variables as they load, so this module is imported before pyopencl.
 """
 
 from __future__ import annotations
