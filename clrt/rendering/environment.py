@@ -16,8 +16,8 @@ from .steps import steps
 Doubles = NDArray[np.float64]
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 #: An environment map is sampled as a light if the third central moment of its luminance over all directions, in cubes
-#: of the mean, is more than this. The moment is large for small bright parts, even if they hold little of the light, and
-#: small for gradients and half-bright maps, which do not gain from it. For the default sky it is 0.04.
+#: of the mean, is more than this. The moment is large for small bright parts, even if they hold little of the light,
+#: and small for gradients and half-bright maps, which do not gain from it. For the default sky it is 0.04.
 UNEVEN = 0.15
 #: Maximum directional fraction of the irradiance estimate, so that no surface is considered dark.
 MOST_DIRECTED = 0.9
