@@ -85,8 +85,8 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             view: str, exposure: float, progress_kind: str | None, force: bool, print_kernel: bool,
             quiet: bool, frames: str | None, turntable: int | None, fps: float | None, scheduler: str | None,
             local_cluster: int | None, **others: Any) -> None:
-    """Render SCENE, a .toml scene, a bare model, or - for a .toml scene on standard input, until the first of --spp,
-    --time and --error is reached."""
+    """Render SCENE, a .toml scene, a Mitsuba scene (.xml), a bare model, or - for a .toml scene on standard input,
+    until the first of --spp, --time and --error is reached."""
     def advice() -> str:
         kept = checkpoint is not None and checkpoint.exists()
         return f"; {checkpoint} holds what was rendered before, and --resume goes on from it" if kept else ""
@@ -172,6 +172,11 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
                     _render_frames(renderer, sequence, goal, denoiser, progress)
             except (DeviceError, OutputError) as failure:
                 raise type(failure)(f"{failure}{advice()}") from failure
+        if renderer.stop_reason == "interrupted":
+            logging.getLogger(__name__).warning("%s: interrupted; %s", content.name, (
+                "with --resume the same command renders the frames that are missing" if sequence else
+                f"--resume goes on from {checkpoint}" if checkpoint else
+                "a render that has a --checkpoint can go on with --resume"))
     if interruptible.asked:
         sys.exit(130)
 
