@@ -13,43 +13,45 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from . import trimesh as trimesh
+    from . import trimesh
     from .api import animate as animate, load as load, render as render
-    from .device.discover import devices as devices
+    from .device.discovery.discover import devices as devices
     from .errors import (CheckpointError as CheckpointError, ClrtError as ClrtError, DeviceError as DeviceError,
                          KernelError as KernelError, OutputError as OutputError, SceneError as SceneError,
                          UsageError as UsageError)
-    from .instances import InstancedRayQuery as InstancedRayQuery
-    from .output.compare import compare as compare
     from .output.image import Image as Image
-    from .query import RayQuery as RayQuery
+    from .output.image_error import compare as compare
+    from .queries.instanced import InstancedRayQuery as InstancedRayQuery
+    from .queries.mesh import RayQuery as RayQuery
     from .rendering.renderer import Renderer as Renderer, State as State
     from .scene.animation import (Animation as Animation, Keyframe as Keyframe, frames as frames,
                                   turntable as turntable)
     from .scene.lights import (DirectionalLight as DirectionalLight, PointLight as PointLight,
                                SpotLight as SpotLight)
-    from .scene.materials import (BlinnPhong as BlinnPhong, Conductor as Conductor, Dielectric as Dielectric,
-                                  Diffuse as Diffuse, MetallicRoughness as MetallicRoughness, Mirror as Mirror,
-                                  Phong as Phong)
+    from .scene.materials.material_types import (BlinnPhong as BlinnPhong, Conductor as Conductor,
+                                                 Dielectric as Dielectric, Diffuse as Diffuse,
+                                                 MetallicRoughness as MetallicRoughness, Mirror as Mirror,
+                                                 Phong as Phong)
+    from .scene.materials.textures import Picture as Picture, Texture as Texture
     from .scene.model import (Camera as Camera, Environment as Environment, Instance as Instance, Mesh as Mesh,
                               RenderSettings as RenderSettings, Scene as Scene, Sphere as Sphere)
-    from .scene.textures import Picture as Picture, Texture as Texture
     __version__: str
 
 _HOME = {
     "api": ("animate", "load", "render"),
-    "device.discover": ("devices",),
+    "device.discovery.discover": ("devices",),
     "errors": ("CheckpointError", "ClrtError", "DeviceError", "KernelError", "OutputError", "SceneError", "UsageError"),
-    "instances": ("InstancedRayQuery",),
-    "output.compare": ("compare",),
+    "queries.instanced": ("InstancedRayQuery",),
+    "output.image_error": ("compare",),
     "output.image": ("Image",),
-    "query": ("RayQuery",),
+    "queries.mesh": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
     "scene.animation": ("Animation", "Keyframe", "frames", "turntable"),
     "scene.lights": ("DirectionalLight", "PointLight", "SpotLight"),
-    "scene.materials": ("BlinnPhong", "Conductor", "Dielectric", "Diffuse", "MetallicRoughness", "Mirror", "Phong"),
+    "scene.materials.material_types": ("BlinnPhong", "Conductor", "Dielectric", "Diffuse", "MetallicRoughness", "Mirror",
+                                       "Phong"),
     "scene.model": ("Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
-    "scene.textures": ("Picture", "Texture"),
+    "scene.materials.textures": ("Picture", "Texture"),
 }
 _MODULES = ("trimesh",)
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}

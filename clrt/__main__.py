@@ -12,9 +12,9 @@ def main() -> None:
     atexit.register(_end, code)     # registered before all others, so called after them
     try:
         from .cli import main as run
-        from .device import background
+        from .device.programs import background_compile
 
-        background.ends_at_once = True
+        background_compile.ends_at_once = True
         run()
     except KeyboardInterrupt:
         sys.exit(130)

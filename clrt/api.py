@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .float_errors import with_default_errors
-from .output.data import check_denoisable
+from .formats.load_scene import load as _load
+from .output.data_images import check_denoisable
 from .output.denoise import Denoiser, denoised
 from .output.image import Image
+from .rendering.render_report import render_report
 from .rendering.renderer import Renderer
-from .rendering.report import render_report
-from .rendering.stops import planned_spp
+from .rendering.stop_conditions import planned_spp
 from .scene.animation import frames as _frames
-from .scene.file import load as _load
 from .scene.model import Scene
 
 

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import UsageError
 from .float_errors import with_default_errors
-from .query import RayQuery
-from .scene.numbers import real_array
-from .scene.ray_arrays import ray_arrays
+from .queries.mesh import RayQuery
+from .scene.geometry.ray_arrays import ray_arrays
+from .scene.validation.number_arrays import real_array
 
 __all__ = ["RayMeshIntersector"]
 

@@ -5,7 +5,7 @@
 //
 //   ray_through(launch, sx, sy, &sampler)     the camera ray; cameras without random numbers leave `sampler` alone
 //
-// Each file documents the meaning of launch->right, up and forward; clrt/rendering/camera.py computes them.
+// Each file documents the meaning of launch->right, up and forward; clrt/rendering/compile/camera_kernel.py computes them.
 #include "sampler.cl"
 #include "vector.cl"
 #include FILTER

@@ -5,7 +5,7 @@
 // that is neither, as Open Image Denoise recommends, with its albedo tinted by the specular colors. The sky, suns
 // included, stores its radiance, clamped to 1, as albedo, and no normal. World frame.
 //
-// To add one: add a field to the record GUIDE (clrt/rendering/records.py) and to Seen, and compute it below.
+// To add one: add a field to the record GUIDE (clrt/rendering/compile/records.py) and to Seen, and compute it below.
 #include "camera.cl"
 #include "film.cl"
 #include "light.cl"

@@ -1,5 +1,5 @@
 // Detection of drivers that end loops early: Mesa's llvmpipe limits the loops of a work-item to 65535 iterations in
-// total; after that each loop silently ends after its first iteration (clrt/device/loops.py). LOOP_LIMIT: the driver is
+// total; after that each loop silently ends after its first iteration (clrt/device/launches/driver_loop_limits.py). LOOP_LIMIT: the driver is
 // one of these.
 #if LOOP_LIMIT
 // Whether that has happened to this work-item, which invalidates its results. `two` is 2, but must be unknown to the

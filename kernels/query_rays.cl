@@ -1,7 +1,7 @@
 // Rays of a query as received from the host, LANES at a time, and their results. World frame; t is in multiples of
 // the direction's length.
 //
-// `unit` is the power of two by which the lengths in the BVH were scaled (clrt/scene/scaling.py). Directions are
+// `unit` is the power of two by which the lengths in the BVH were scaled (clrt/scene/geometry/scaling.py). Directions are
 // scaled to a length near 1 by a power of two as well, so that neither affects precision: t in the host's units is
 // t·to_t.
 #include "loops.cl"

@@ -1,4 +1,4 @@
-// Textures: texels of 8 bits per channel in one buffer, a record for each use of an image (clrt/scene/textures.py).
+// Textures: texels of 8 bits per channel in one buffer, a record for each use of an image (clrt/scene/materials/textures.py).
 //
 // Coordinates as in glTF: (0, 0) is the upper left corner of the image. Colours are decoded from sRGB by a table before
 // they are filtered; numbers are linear.

@@ -59,7 +59,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """A test that asks for `device` runs on every usable device; a simulator of one would take hours."""
     if "device" in metafunc.fixturenames:
-        from clrt.device.discover import find_devices
+        from clrt.device.discovery.discover import find_devices
 
         found = [info for info, _ in find_devices() if info.usable and info.type != "simulator"]
         metafunc.parametrize("device", [info.index for info in found], indirect=True, scope="session",

@@ -147,8 +147,8 @@ def _places(value: Any) -> Iterator[tuple[Any, Any]]:
 def outcome(file: Path, render: bool) -> str:
     """What loading a file came to: picture, error, or traceback and what it says."""
     from clrt.errors import SceneError
-    from clrt.scene.file import load
-    from clrt.scene.pictures import read_picture, read_texels
+    from clrt.formats.images.image_reader import read_picture, read_texels
+    from clrt.formats.load_scene import load
 
     try:
         if file.suffix in PICTURES:

@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
-from clrt.device import blocks, contexts, program
+from clrt.device import contexts
+from clrt.device.launches import data_parallel
 from clrt.device.open import Device, open_device
-from clrt.rendering import on_device
-from clrt.scene import instancing
+from clrt.device.programs import program
+from clrt.rendering.accumulation import scene_on_device
+from clrt.scene.geometry import instancing
 
 from .small_work import work
 
@@ -74,8 +76,8 @@ def main(form: str, path: str) -> None:
     instancing.FEW_TRIANGLES = 0   # instances of small meshes, too
     contexts.MOST_COMPILED = program.MOST_KEPT = sys.maxsize    # see compiled_files
     alone = {"in_background": at_once}
-    for owner, values in ((Device, DEVICES[form]), (blocks, SHARES), (cl, workarounds), (program, alone),
-                          (on_device, alone)):
+    for owner, values in ((Device, DEVICES[form]), (data_parallel, SHARES), (cl, workarounds), (program, alone),
+                          (scene_on_device, alone)):
         for name, value in values.items():
             setattr(owner, name, value)
     answers = {f"{way}/{name}": array for way, found in work(open_device("oclgrind")) for name, array in found.items()}

@@ -12,7 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from clrt.scene.meshes import SUFFIXES
+from clrt.formats.models import SUFFIXES
 
 #: Seconds that one file may take.
 LIMIT = 120

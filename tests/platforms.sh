@@ -26,7 +26,7 @@ install() {
 # The version of the platform that OCL_ICD_VENDORS names, and its devices; nothing if it has none.
 describe() {
     "$python" - <<-'END'
-	from clrt.device.discover import find_devices
+	from clrt.device.discovery.discover import find_devices
 	found = [info for info, _ in find_devices() if info.usable]
 	if found:
 	    version = found[0].platform_version.removeprefix("OpenCL ").split("  ")[0]

@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clrt.formats.images.image_reader import read_picture
 from clrt.scene.lights import PointLight
-from clrt.scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
-from clrt.scene.pictures import read_picture
 
 Record = dict[str, Any]
 
@@ -50,7 +50,7 @@ def load_reference(json_path: Path) -> tuple[Scene, NDArray[np.float32]]:
 
 
 def _meshes(folder: Path, shape: Record, materials: dict[str, Record]) -> list[Mesh]:
-    from clrt.scene.meshes import read_mesh
+    from clrt.formats.models import read_mesh
 
     material = _material(shape, materials)
     return [replace(mesh, material=material) for mesh in read_mesh(folder / shape["file"], "file")]

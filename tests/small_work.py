@@ -12,20 +12,20 @@ from numpy.typing import NDArray
 import clrt
 from clrt.accel.build import build_tree
 from clrt.accel.device_builder import SHAPES
-from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, UPPER_LEVELS, HitTests
+from clrt.accel.traversal_kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, UPPER_LEVELS, HitTests
+from clrt.bench.numerics.kernel_probe import choices
 from clrt.debug.trace import trace_pixel
 from clrt.device.open import Device
-from clrt.output.layers import layered
+from clrt.output.aov_files import layered
+from clrt.queries.base import TRAVERSALS
+from clrt.rendering.accumulation.denoiser_guides import render_guides
+from clrt.rendering.accumulation.first_hits import first_hits
+from clrt.rendering.accumulation.single_device import Session
 from clrt.rendering.aovs import AOVS, film_aovs
-from clrt.rendering.choices import OFFSETS
-from clrt.rendering.compile import compile_scene
-from clrt.rendering.film import Film
-from clrt.rendering.first_hits import first_hits
-from clrt.rendering.guides import render_guides
-from clrt.rendering.session import Session
+from clrt.rendering.compile.choices import OFFSETS
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.rendering.film.film import Film
 from clrt.scene.model import Environment, Mesh, RenderSettings, Scene, Sphere
-from clrt.study.probe import choices
-from clrt.tree_query import TRAVERSALS
 
 from .accel.cases import soup, spheres
 from .rendering.lamps import lamps

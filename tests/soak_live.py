@@ -30,9 +30,9 @@ import clrt
 from clrt.live.live import Live
 from clrt.scene.editing import materials_of, with_material
 from clrt.scene.lights import PointLight
-from clrt.scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.materials.presets import Preset
 from clrt.scene.model import Integrator, Scene, Sphere
-from clrt.scene.presets import Preset
 
 GROWTH = 1.05
 SIZE = (192, 144)

@@ -16,7 +16,7 @@ import pytest
 import clrt
 from clrt.device.open import Device
 from clrt.errors import DeviceError
-from clrt.rendering.identity import scene_hash
+from clrt.rendering.checkpoint.identity import scene_hash
 
 from .covering import covering
 

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
-from clrt.accel.kernels import TRIANGLE_TESTS
 from clrt.accel.layouts import pack
+from clrt.accel.traversal_kernels import TRIANGLE_TESTS
 from clrt.accel.triangle_forms import FORMS, in_form
 from clrt.device.open import Device
 

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.device.open import Device
-from clrt.device.sources import kernel_folder
+from clrt.device.programs.kernel_files import kernel_folder
 
 from . import small_work
 from .oclgrind_program import DEVICES

@@ -13,8 +13,8 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
-from clrt import tree_query
 from clrt.device.open import Device
+from clrt.queries import base
 
 Doubles = NDArray[np.float64]
 RNG = np.random.default_rng(5)
@@ -94,7 +94,7 @@ def test_coherent_rays_meet_the_same_by_all_traversals(device: Device) -> None:
     origins = np.concatenate([np.tile([0.1, 0.2, 3.0], (len(x), 1)), np.stack([x, y, np.full(len(x), 2.0)], axis=1)])
     rays = origins, np.concatenate([fan, parallel]), RNG.uniform(1, 4, len(origins))
     queries = [clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout="bvh8", traversal=traversal)
-               for traversal in (*tree_query.TRAVERSALS, None)]
+               for traversal in (*base.TRAVERSALS, None)]
     first, *others = [each.closest_hit(*rays) for each in queries]
     assert (first["primitive"] >= 0).mean() > 0.3
     for hits in others:
@@ -125,7 +125,7 @@ def test_chunks_and_order_do_not_matter(soup: clrt.RayQuery, monkeypatch: pytest
     whole = soup.closest_hit(ORIGINS, DIRECTIONS)
     order = RNG.permutation(len(ORIGINS))
     np.testing.assert_array_equal(soup.closest_hit(ORIGINS[order], DIRECTIONS[order]), whole[order])
-    monkeypatch.setattr(tree_query, "CHUNK", 257)
+    monkeypatch.setattr(base, "CHUNK", 257)
     np.testing.assert_array_equal(soup.closest_hit(ORIGINS, DIRECTIONS), whole)
 
 

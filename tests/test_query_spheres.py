@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import clrt
-from clrt.accel.kernels import SPHERE_TESTS
+from clrt.accel.traversal_kernels import SPHERE_TESTS
 from clrt.device.open import Device
 
-from .covering import others
 from .accel.cases import soup, spheres
+from .covering import others
 from .rendering.rays import hit_spheres, hit_triangles
 
 WAYS = [("bvh8", "single"), ("bvh8", "packet"), ("bvh8", "pool"), ("bvh2", None), ("cwbvh", None), ("packs", None),

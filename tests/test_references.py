@@ -11,8 +11,8 @@ import pytest
 
 from clrt.output.images import write_image
 from clrt.scene.lights import PointLight
-from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
-from tests.references import load_reference
+from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror
+from .references import load_reference
 
 RECORD: dict[str, Any] = {
     "name": "mix",

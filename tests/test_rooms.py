@@ -15,12 +15,12 @@ KERNELS = sorted((HOUSE / "kernels").rglob("*.cl"))
 LONGEST = 300
 
 #: In order: a room imports only from itself and those before it. `clrt` itself is the public names alone.
-ROOMS = ["errors", "threads", "awake", "float_errors", "file_mode", "file_names", "scene", "device", "accel",
-         "tree_query", "query", "instances", "trimesh", "rendering", "check", "output", "study", "debug", "api", "live",
+ROOMS = ["errors", "threads", "awake", "float_errors", "file_mode", "file_names", "scene", "formats",
+         "device", "accel", "queries", "trimesh", "rendering", "check", "output", "bench", "debug", "api", "live",
          "window", "farm", "clrt", "cli", "__main__"]
-KNOW_OPENCL = {"device", "accel", "tree_query", "rendering"}
+KNOW_OPENCL = {"device", "accel", "queries", "rendering"}
 #: Beyond the order: trees know nothing of scenes, and pictures are written without any device.
-NEVER = {"accel": {"scene"}, "output": {"device", "accel", "tree_query", "query", "instances", "trimesh", "rendering"}}
+NEVER = {"accel": {"scene"}, "output": {"device", "accel", "queries", "trimesh", "rendering"}}
 
 
 def room(module: str) -> str:
@@ -84,8 +84,8 @@ def test_scenes_load_without_opencl(tmp_path: Path) -> None:
 import sys
 sys.modules["pyopencl"] = None
 import clrt, numpy
-from clrt.scene.file import load
-from clrt.scene.validate import validate
+from clrt.formats.load_scene import load
+from clrt.scene.validation.validate import validate
 from pathlib import Path
 folder = Path({str(tmp_path)!r})
 for file in ("scene.toml", "model.obj"):

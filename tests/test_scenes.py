@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.significance import mean_test, sidak
+from clrt.formats.images.image_reader import read_picture
+from clrt.formats.load_scene import load
+from clrt.formats.toml.instance_table import InstanceTable
+from clrt.formats.toml.mesh_table import MeshTable
 from clrt.scene.animation import Animation, Keyframe
-from clrt.scene.file import load
-from clrt.scene.instance_reader import InstanceTable
 from clrt.scene.lights import LIGHTS
-from clrt.scene.material import SHARED
-from clrt.scene.materials import MATERIALS, Material, MetallicRoughness
-from clrt.scene.mesh_table import MeshTable
+from clrt.scene.materials.material import SHARED
+from clrt.scene.materials.material_types import MATERIALS, Material, MetallicRoughness
+from clrt.scene.materials.presets import CONDUCTORS, F0_PRESETS
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
-from clrt.scene.pictures import read_picture
-from clrt.scene.presets import CONDUCTORS, F0_PRESETS
-from clrt.study.significance import mean_test, sidak
 from .covering import others
 from .rendering.ggx import albedo
 

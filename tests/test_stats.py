@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare, kstest, norm, t
 
-from clrt.study.significance import FAMILY, chi2_test, corrected, family_row, mean_test, rejected, sidak, t_test
+from clrt.bench.significance import FAMILY, chi2_test, corrected, family_row, mean_test, rejected, sidak, t_test
 
 CELLS = np.array([0.3, 0.2, 0.2, 0.1, 0.1, 0.06, 0.04])
 

@@ -17,7 +17,7 @@ import clrt
 from clrt.live.live import Live
 from clrt.live.snapshot import Snapshot
 from clrt.scene.editing import materials_of, with_material
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Scene
 
 #: Between two of the walker's steps, and two looks of the waiting thread.

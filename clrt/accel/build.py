@@ -6,13 +6,13 @@ import time
 
 import numpy as np
 
-from ..device.arrays import DeviceArray
+from ..device.launches.device_arrays import DeviceArray
 from ..device.open import Device
 from ..errors import UsageError, check_choice
 from . import device_builder
 from .builders import BUILDERS
+from .bvh import FloatArray, Triangles
 from .layouts import LAYOUTS, LEAF_SPHERE, PACK, Layout, pack
-from .tree import FloatArray, Triangles
 from .triangle_forms import in_form
 
 #: Builders that run on the device, with the number of reinsertion passes that follow.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .grow import OpenNodes, grow
-from .tree import BoolArray, FloatArray, Tree
+from .bvh import BoolArray, FloatArray, Tree
+from .top_down import OpenNodes, grow
 
 Doubles = NDArray[np.float64]
 Integers = NDArray[np.int64]

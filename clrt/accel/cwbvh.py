@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .tree import BoolArray, FloatArray, IntArray, Tree
+from .bvh import BoolArray, FloatArray, IntArray, Tree
 from .wide import EMPTY, Wide, collapse, leaf_fields
 
 Bytes = NDArray[np.uint8]

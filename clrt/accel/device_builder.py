@@ -11,18 +11,18 @@ from typing import NamedTuple
 import numpy as np
 import pyopencl as cl
 
-from ..device.blocks import Blocks
+from ..device.launches.data_parallel import Blocks
 from ..device.open import Device
-from ..device.preamble import defines, typedefs
-from ..device.program import compose
-from ..device.records import record
+from ..device.programs.preamble import defines, typedefs
+from ..device.programs.program import compose
+from ..device.programs.struct_types import record
 from ..errors import NoRoomError, SceneError
+from .bvh import FloatArray, Triangles, half_area
 from .cwbvh import CWBVH_NODE, MAX_LEAF, SLOTS
 from .layouts import BVH2_NODE, BVH8_NODE, LANES, LEAF_SIZES, LEAF_SPHERE, LEAF_TRIANGLE, TRIANGLE_PACK
 from .morton import SHAPE, Primitives, sort_primitives
 from .ploc import BINARY_NODE, SLOW, BinaryTree, cluster
 from .reinsertion import MOVE, reinsert
-from .tree import FloatArray, Triangles, half_area
 from .wide import EMPTY, MAX_PRIMITIVES
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .tree import FloatArray, IntArray
+from .bvh import FloatArray, IntArray
 
 Doubles = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

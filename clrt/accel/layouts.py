@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 
 from ..errors import check_choice
 from .builders import BUILDERS
+from .bvh import FloatArray, IntArray, Tree, join
 from .cwbvh import MAX_LEAF, compress
 from .grouping import packs_of
-from .tree import FloatArray, IntArray, Tree, join
 from .wide import Wide, collapse, leaf_fields, leaf_reference
 
 Records = NDArray[np.void]

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pyopencl as cl
 
-from ..device.blocks import Blocks
-from .tree import FloatArray, Triangles
+from ..device.launches.data_parallel import Blocks
+from .bvh import FloatArray, Triangles
 
 CODE_BITS, DIGIT_BITS = 63, 8
 #: Number of cells along the longest extent of the centres, minus one.

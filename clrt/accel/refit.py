@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..device.arrays import empty_array, on_device
-from ..device.blocks import Blocks
+from ..device.launches.data_parallel import Blocks
+from ..device.launches.device_arrays import empty_array, on_device
 from ..device.open import Device
-from ..device.preamble import defines, typedefs
-from ..device.program import compose
+from ..device.programs.preamble import defines, typedefs
+from ..device.programs.program import compose
+from .bvh import FloatArray, IntArray
 from .layouts import BVH2_NODE, BVH8_NODE, LEAF_TRIANGLE, TRIANGLE_PACK, Layout
-from .tree import FloatArray, IntArray
 from .wide import EMPTY
 
 

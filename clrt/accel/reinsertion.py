@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pyopencl as cl
 
-from ..device.blocks import Blocks
-from ..device.records import record
+from ..device.launches.data_parallel import Blocks
+from ..device.programs.struct_types import record
 from .morton import Primitives
 from .ploc import BINARY_NODE, BinaryTree
 

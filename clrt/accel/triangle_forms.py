@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.arrays import on_host
+from ..device.launches.device_arrays import on_host
 from ..device.open import Device
 from .layouts import LANES, Layout, Records
 

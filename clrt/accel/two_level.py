@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.arrays import DeviceArray, on_host, put, room_for
+from ..device.launches.device_arrays import DeviceArray, on_host, put, room_for
 from ..device.open import Device
-from ..device.records import record
+from ..device.programs.struct_types import record
 from ..errors import UsageError, check_choice
 from .build import build_tree
+from .bvh import FloatArray, IntArray
 from .layouts import LAYOUTS, Layout, sphere_boxes
-from .tree import FloatArray, IntArray
 from .upper_level import FORMS, upper_level
 
 Doubles = NDArray[np.float64]

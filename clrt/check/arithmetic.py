@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..device.open import Device
-from .exact import Floats, fused, ulps
+from .exact_floats import Floats, fused, ulps
 from .findings import Findings
 from .floats import EXACT, LANES, LIMITS, NORMAL, float_rows, operands
 

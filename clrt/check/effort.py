@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from ..device.open import Device
-from .probe import Probe
+from .kernel_calls import Probe
 
 #: A small workload, and the seconds within which a device must do it to get the full check. A CPU takes a tenth of
 #: that.

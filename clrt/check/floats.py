@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..device.open import Device
-from .exact import Floats, fused
-from .probe import Probe
+from .exact_floats import Floats, fused
+from .kernel_calls import Probe
 
 #: SIMD widths and the suffixes of their types: scalars, as on GPUs, and vectors of eight. All devices are checked with
 #: both.

@@ -8,12 +8,12 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.loops import TURNS, measured_turns
+from ..device.launches.driver_loop_limits import TURNS, measured_turns
 from ..device.open import Device
-from .exact import nearest_float32
+from .exact_floats import nearest_float32
 from .findings import Findings
 from .floats import LANES
-from .probe import Probe
+from .kernel_calls import Probe
 
 COUNT = 2048
 #: Minimum number of loop iterations per work-item, needed to trace a path of depth eight.
@@ -92,7 +92,7 @@ def check_integers(device: Device, findings: Findings) -> None:
 def _check_loops(device: Device, findings: Findings) -> None:
     """Check for drivers that limit loop iterations, as some that vectorise across work-items do.
 
-    On those, launches are split (device/loops.py).
+    On those, launches are split (device/launches/driver_loop_limits.py).
     """
     turns = measured_turns(device)
     if turns is None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..device.open import Device
 from .findings import Findings
-from .probe import Probe
+from .kernel_calls import Probe
 
 COUNT = 512
 

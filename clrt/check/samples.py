@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..device.open import Device
 from .effort import share
 from .findings import Findings
-from .probe import Probe
+from .kernel_calls import Probe
 
 Words = NDArray[np.uint32]
 COUNT = 1024

@@ -86,14 +86,14 @@ def _run(arguments: list[str] | None) -> str | int | None:
 
 def _keep(error: str) -> None:
     """Store the error for `clrt doctor`."""
-    from ..device.cache import keep_log
+    from ..device.programs.cache_files import keep_log
 
     keep_log("error", error)
 
 
 def _leave(code: str | int | None) -> NoReturn:
     """Exit; immediately if a device has hung, as its driver might block the regular exit forever."""
-    pulse = sys.modules.get("clrt.device.pulse")
+    pulse = sys.modules.get("clrt.device.launches.hang_watchdog")
     if pulse is not None and pulse.has_hung() and isinstance(code, int):
         sys.stdout.flush()
         sys.stderr.flush()

@@ -28,8 +28,8 @@ def agree_command(scenes: tuple[Path, ...], size: tuple[int, int] | None, depth:
     Each block of 16 x 16 pixels is compared by the spread of its means over the seeds. Exit code 1 where one differs
     by more than chance, or the mean of a picture by more than 0.5 %.
     """
-    from ..scene.file import load
-    from ..study.agreement import agreement
+    from ..bench.renderers.agreement import agreement
+    from ..formats.load_scene import load
 
     results = []
     for number, path in enumerate(scenes):

@@ -27,9 +27,9 @@ def blender_command(scenes: tuple[str, ...], materials: tuple[str, ...], spp: in
     are mean radiances of the floor, Suzanne, the ball and the cube in clrt over those in Cycles, with their standard
     errors.
     """
+    from ..bench.renderers.blender import judge
+    from ..bench.renderers.blender_scenes import COLORS
     from ..output.image import save_side_by_side
-    from ..study.blender import judge
-    from ..study.blender_scenes import COLORS
 
     rows = []
     found = judge(scenes, materials, spp, seeds, device)

@@ -24,9 +24,9 @@ def build_command(mesh: Path | None, device: str | None, quick: bool, json_file:
     a second by size, with the line a + b·log2(triangles) that fits the time of a ray; then what a new process takes
     from arrays to first answers.
     """
-    from ..study.build import measure_build
-    from ..study.rays import load_triangles
-    from ..study.workloads import bumpy_ball
+    from ..bench.rays.build_speed import measure_build
+    from ..bench.rays.ray_speed import load_triangles
+    from ..bench.rays.workloads import bumpy_ball
 
     figures: dict[str, Any] = {"mesh": mesh, "sizes": []}
     lines = {"size": _builder_lines, "rays": _ray_lines, "fresh": _fresh_lines}

@@ -12,7 +12,7 @@ import click
 from .bench_files import figures_options, write_figures
 
 if TYPE_CHECKING:
-    from ..study.combinations import Verdict
+    from ..bench.combinations.combinations import Verdict
 
 PROPERTIES = ("additivity", "strategies", "choice", "integrators", "brightness", "similarity", "partition",
               "bystanders")
@@ -46,8 +46,8 @@ def combinations_command(names: tuple[str, ...], scenes: int | None, first: int,
     instances (partition), and further objects that are not seen (bystanders). The exit code is 1 if a scene violates a
     property significantly.
     """
+    from ..bench.combinations.combinations import keep_scenes, verdicts
     from ..device.open import open_device
-    from ..study.combinations import keep_scenes, verdicts
 
     count = scenes or (4 if quick else 500)
     opened, chosen = open_device(device), names or PROPERTIES

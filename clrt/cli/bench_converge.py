@@ -14,8 +14,8 @@ from .bench_files import figures_options, write_figures
 from .options import Size
 
 if TYPE_CHECKING:
+    from ..bench.convergence.converge import Effort
     from ..scene.model import Integrator
-    from ..study.converge import Effort
 
 #: The configurations of contestants.py, where the names start with "clrt, ".
 NAMES = ["clrt", "stratified", "independent", "lanes 1", "bvh2", "adaptive", "lanes 8", "lanes 16", "paths in lanes",
@@ -50,12 +50,12 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
     Pictures of 1, 2, 4 ... samples a pixel by all contestants in turns, with several seeds. Also whether the error that
     clrt estimates is the true one, and whether a contestant is biased (ask for many seeds of one number of samples).
     """
-    from ..device.discover import choose
-    from ..scene.file import load
-    from ..study.calibration import calibrations
-    from ..study.contestants import CHOICES, MORE_CHOICES
-    from ..study.converge import measure_convergence
-    from ..study.plots import plot_convergence
+    from ..bench.convergence.calibration import calibrations
+    from ..bench.convergence.contestants import CHOICES, MORE_CHOICES
+    from ..bench.convergence.converge import measure_convergence
+    from ..bench.numerics.plots import plot_convergence
+    from ..device.discovery.discover import choose
+    from ..formats.load_scene import load
     from .converge_tables import calibration_lines, scene_lines
 
     devices = [choose(selector)[0] for selector in selectors or (None,)]
@@ -84,7 +84,7 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
 
 def _effort(quick: bool, seconds: float | None, spp: tuple[int, ...], seeds: int | None,
             reference_spp: int | None) -> Effort:
-    from ..study.converge import QUICK, Effort
+    from ..bench.convergence.converge import QUICK, Effort
 
     usual = QUICK if quick else Effort()
     return Effort(seconds=seconds or (inf if spp else usual.seconds), seeds=seeds or usual.seeds, steps=usual.steps,

@@ -33,8 +33,8 @@ def farm_command(trials: tuple[str, ...], scenes: tuple[Path, ...], spp: int | N
     """Trials of a farm on this machine: is its picture that of one process to the last bit, also where workers are
     killed; how far are 64 workers from 64 times one; and what memory does a client take for a picture of 16k x 16k."""
     from ..farm import trials as trial
+    from ..formats.load_scene import load
     from ..output.images import check_writable
-    from ..scene.file import load
     from ..scene.model import Scene
 
     if "huge" in (trials or TRIALS):

@@ -50,8 +50,8 @@ def write_figures(path: Path | None, figures: Mapping[str, Any]) -> None:
 
 
 def _check(given: Mapping[str, Any], force: bool) -> None:
-    from ..output.files import check_target, check_unprotected, make_folder
-    from ..output.plots import check_plot
+    from ..output.atomic_files import check_target, check_unprotected, make_folder
+    from ..output.error_plots import check_plot
 
     taken = {os.path.realpath(path): "read" for name, value in given.items() if name not in {*FILES, *FOLDERS}
              for path in _paths(value)}

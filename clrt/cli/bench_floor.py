@@ -25,9 +25,9 @@ def floor_command(chosen: tuple[str, ...], spp: int, seeds: int, device: str | N
     by the view alone. Then clrt, Mitsuba's roughplastic and principled (pip install mitsuba), and Cycles' Principled
     BSDF (pip install bpy). 1 is what a white Lambertian floor reflects.
     """
+    from ..bench.renderers.plastic_floor import judges, lights, measure_floor
+    from ..bench.renderers.plastic_floor_model import MODELS
     from ..errors import UsageError
-    from ..study.floor import judges, lights, measure_floor
-    from ..study.floor_model import MODELS
 
     if unknown := [name for name in chosen if name not in lights()]:
         raise UsageError(f"--light {unknown[0]}: is none of {', '.join(lights())}")

@@ -21,8 +21,8 @@ def hits_command(device: str | None, quick: bool, json_file: Path | None) -> Non
     A million rays a mesh: random ones, and ones aimed at vertices, at edges and along the axes. Then how many of the
     answers are wrong by float64.
     """
-    from ..device.discover import choose, devices
-    from ..study.hits import measure_hits
+    from ..bench.rays.hit_agreement import measure_hits
+    from ..device.discovery.discover import choose, devices
 
     only = None if device is None else choose(device)[0].index
     found, results = [each for each in devices() if each["usable"] and only in (None, each["index"])], []

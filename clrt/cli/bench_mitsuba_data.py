@@ -27,8 +27,8 @@ def mitsuba_data_command(folder: Path, scenes: tuple[str, ...], samples: int, pi
 
     Scenes that clrt cannot express are listed with what is missing. Exit code 1 where one fails.
     """
+    from ..bench.renderers.mitsuba_data import cases, judge
     from ..errors import UsageError
-    from ..study.mitsuba_data import cases, judge
 
     chosen = [case for case in cases(folder) if not scenes or any(text in case.name for text in scenes)]
     if not chosen:

@@ -25,10 +25,10 @@ def numerics_command(device: str | None, quick: bool, json_file: Path | None, pl
     rays or pixels, or of t in units in the last place (ulp). Then the hard cases by the defaults: how many answers are
     wrong, where 0 is asked of all but M1.
     """
-    from ..device.discover import devices
-    from ..study.families import measure_families
-    from ..study.numerics import chosen_devices, measure_device, measure_together
-    from ..study.plots import plot_families
+    from ..bench.numerics.families import measure_families
+    from ..bench.numerics.numerics import chosen_devices, measure_device, measure_together
+    from ..bench.numerics.plots import plot_families
+    from ..device.discovery.discover import devices
 
     chosen, known = chosen_devices(device), devices()
     results: list[dict[str, Any]] = []
@@ -50,7 +50,7 @@ def numerics_command(device: str | None, quick: bool, json_file: Path | None, pl
 
 
 def _family(name: str, tests: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    from ..study.families import FIGURES
+    from ..bench.numerics.families import FIGURES
 
     figures = FIGURES[name]
     lines = [f"  {name:18}{'M/s':>9}{'times as fast':>18}" + "".join(f"{title:>17}" for title in figures.values())]

@@ -23,9 +23,9 @@ def peers_command(mesh: Path | None, device: str | None, quick: bool, json_file:
     Embree, inside pip's embreex, is called from C on all processors: singly or in packets of 8, in fast and in robust
     mode, without and with its flag for coherent rays. Python libraries are measured by whole calls.
     """
-    from ..study.peers import measure_peers, versions
-    from ..study.rays import load_triangles
-    from ..study.workloads import bumpy_ball
+    from ..bench.rays.library_speed import measure_peers, versions
+    from ..bench.rays.ray_speed import load_triangles
+    from ..bench.rays.workloads import bumpy_ball
 
     results = []
     for result in measure_peers(*(load_triangles(mesh) if mesh else bumpy_ball()), quick=quick, device=device):

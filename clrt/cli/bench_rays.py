@@ -30,9 +30,9 @@ def rays_command(mesh: Path | None, rays: Path | None, quick: bool, json_file: P
     With --rays, those of the file: for their closest hits and for any hit. Without, from a camera, on from their hits
     and to two lights, by every tree layout in turns.
     """
-    from ..study.layouts import measure_layouts
-    from ..study.rays import load_rays, load_triangles, measure_rays
-    from ..study.workloads import bumpy_ball
+    from ..bench.rays.layout_speed import measure_layouts
+    from ..bench.rays.ray_speed import load_rays, load_triangles, measure_rays
+    from ..bench.rays.workloads import bumpy_ball
 
     if rays is not None and mesh is None:
         raise click.UsageError("--rays needs the mesh that they are for: add --mesh FILE")

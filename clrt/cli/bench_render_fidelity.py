@@ -31,10 +31,10 @@ def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: in
     A scenario is inside if clrt is no further from the others than one of them is, by FLIP, and its means are within
     5 % of theirs, of the whole and by material. Those whose files are missing are listed.
     """
+    from ..bench.renderers.fidelity_suite import scenarios
+    from ..bench.renderers.render_fidelity import judge
     from ..errors import UsageError
     from ..output.image import save_side_by_side
-    from ..study.fidelity_suite import scenarios
-    from ..study.render_fidelity import judge
 
     chosen = [each for each in scenarios(folder) if not scenarios_ or any(text in each.name for text in scenarios_)]
     if not chosen:

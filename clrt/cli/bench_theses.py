@@ -27,8 +27,8 @@ def theses_command(device: str | None, quick: bool, json_file: Path | None, plot
     The scenes are like those of the theses (docs/theses.md), whose own figures stand beside, from other machines: what
     can be compared is the ratios.
     """
-    from ..study.plots import plot_theses
-    from ..study.theses import QUICK, Effort, Models, measure_theses
+    from ..bench.numerics.plots import plot_theses
+    from ..bench.theses.experiments import QUICK, Effort, Models, measure_theses
 
     results = []
     for result in measure_theses(QUICK if quick else Effort(), Models(**models), device=device,

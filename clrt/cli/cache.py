@@ -12,13 +12,13 @@ def command(clear: bool) -> None:
 
     All of it is made again when it is needed. Drivers keep programs in caches of their own.
     """
-    from ..device import cache
+    from ..device.programs import cache_files
 
-    sizes = cache.sizes()
-    click.echo(cache.cache_folder())
+    sizes = cache_files.sizes()
+    click.echo(cache_files.cache_folder())
     for kind, (count, size) in sizes.items():
         if count:
-            deleted = f", {cache.clear(cache.KINDS[kind])} deleted" if clear else ""
+            deleted = f", {cache_files.clear(cache_files.KINDS[kind])} deleted" if clear else ""
             click.echo(f"  {kind:20} {count:6} {size:14_} bytes{deleted}")
     if not any(count for count, _ in sizes.values()):
         click.echo("  empty")

@@ -13,7 +13,7 @@ import click
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 def command(image: Path, reference: Path, as_json: bool) -> None:
     """Compare IMAGE with REFERENCE: relMSE, RMSE, ratio of the means, FLIP, largest difference, non-finite values."""
-    from ..output.compare import compare_files
+    from ..output.image_error import compare_files
     from ..output.json_text import json_text
 
     result = compare_files(image, reference)

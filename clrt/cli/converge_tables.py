@@ -14,7 +14,7 @@ LEGEND = ["  relMSE: mean over seeds, less the reference's own; ratio: of relMSE
 
 def scene_lines(result: Mapping[str, Any], on_cpu: bool) -> list[str]:
     """Return the lines for a result of `measure_convergence`; on_cpu: include processor time."""
-    from ..study.converge import AGREES
+    from ..bench.convergence.converge import AGREES
 
     (width, height), reference, rows = result["size"], result["reference"], result["contestants"]
     lines = [f"{result['scene']}: {width}x{height}, {result['max_depth']} path edges; reference of {reference['spp']} "
@@ -51,7 +51,7 @@ def _noise_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
 def calibration_lines(told: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Return the lines for the result of `calibrations`."""
-    from ..study.calibration import RIGHT
+    from ..bench.convergence.calibration import RIGHT
 
     lines = [f"  {name:28}{row['pictures']:9}{row['within']:9.1%}{row['median']:9.2f}{row['worst']:9.2f}"
              for name, row in told.items()]

@@ -16,10 +16,10 @@ from ..errors import UsageError
 @click.option("--force", is_flag=True, help="Replace files that are there, also read-only ones.")
 def command(model: Path, scene: Path, camera: str | None, force: bool) -> None:
     """Write SCENE.toml, which shows MODEL as `clrt render MODEL` does: camera, sky, lights and materials to change."""
-    from ..output.files import check_target
+    from ..formats.load_scene import load
+    from ..formats.toml.writer import started
+    from ..output.atomic_files import check_target
     from ..output.scenes import save_scene
-    from ..scene.file import load
-    from ..scene.writing import started
 
     if scene.suffix.lower() != ".toml":
         raise UsageError(f"{scene}: a scene file ends in .toml; write {scene.with_suffix('.toml')}")

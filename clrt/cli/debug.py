@@ -13,7 +13,7 @@ from .guard import guarded
 from .options import Pixel, picture_options, tracing_options
 
 if TYPE_CHECKING:
-    from ..rendering.choices import Choices
+    from ..rendering.compile.choices import Choices
 
 #: Options with the name of the scene setting that they replace.
 SETTINGS = ("size", "spp", "seed", "integrator", "sampler", "back_face_culling", "clamp_direct", "clamp_indirect")
@@ -43,8 +43,8 @@ def command(scene: Path, pixel: tuple[int, int], samples: int, device: str | Non
     from ..debug.trace import trace_pixel
     from ..debug.vertices import vertices
     from ..device.open import open_device
+    from ..formats.load_scene import load
     from ..output.json_text import json_text
-    from ..scene.file import load
 
     content = load(scene, camera)
     chosen = {"max_depth": depth, "filter": pixel_filter, **{name: given.pop(name) for name in SETTINGS}}
@@ -67,7 +67,7 @@ def command(scene: Path, pixel: tuple[int, int], samples: int, device: str | Non
 
 
 def _choices(triangle: str, box: str, sphere: str, **others: Any) -> Choices:
-    from ..accel.kernels import HitTests
-    from ..rendering.choices import Choices
+    from ..accel.traversal_kernels import HitTests
+    from ..rendering.compile.choices import Choices
 
     return Choices(tests=HitTests(triangle, box, sphere), **others)

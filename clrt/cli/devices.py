@@ -13,8 +13,8 @@ from .logs import verbose_option
 from .options import Finite
 
 if TYPE_CHECKING:
-    from ..device.describe import DeviceInfo
-    from ..device.verdicts import Verdict
+    from ..device.discovery.check_results import Verdict
+    from ..device.discovery.device_info import DeviceInfo
 
 
 @click.command()
@@ -32,9 +32,9 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     if they are named. A device that fails its check is used only if it is named, until its driver or clrt changes or
     it passes.
     """
-    from ..device.discover import as_dict, find_devices, select
-    from ..device.install_advice import no_device
-    from ..device.preference import preferred_device
+    from ..device.discovery.discover import as_dict, find_devices, select
+    from ..device.discovery.install_advice import no_device
+    from ..device.discovery.user_preference import preferred_device
     from ..output.json_text import json_text
 
     preference = preferred_device()
@@ -64,8 +64,8 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
 
 def _measured(info: DeviceInfo, limit: float) -> str:
     """Measure a device's speed and store it; return an error message, or ""."""
-    from ..device.speeds import keep_speed
-    from ..study.device_speed import measure_device
+    from ..bench.rays.device_speed import measure_device
+    from ..device.discovery.measured_speeds import keep_speed
 
     click.echo(f"{info.name}: measuring", err=True)
     try:
@@ -77,8 +77,8 @@ def _measured(info: DeviceInfo, limit: float) -> str:
 
 def _checked(info: DeviceInfo, limit: float, verdicts: dict[str, Verdict]) -> str:
     """Check a device, report progress, and store the verdict, also in `verdicts`; return an error message, or ""."""
-    from ..check.run import check_device
-    from ..device.verdicts import keep_verdict
+    from ..check.run_check import check_device
+    from ..device.discovery.check_results import keep_verdict
 
     try:
         verdict = check_device(info, limit, lambda part: click.echo(f"{info.name}: {part}", err=True))

@@ -27,11 +27,11 @@ def command(as_json: bool, output: Path | None, force: bool) -> None:
     """
     if output is not None and output.suffix.lower() not in FORMS:
         raise UsageError(f"{output}: a report is a {', '.join(FORMS)} file; name one of these")
-    from ..device.diagnosis import diagnosis
+    from ..device.discovery.diagnosis import diagnosis
     from ..output.json_text import json_text
 
     if output is not None:
-        from ..output.files import check_target, check_unprotected
+        from ..output.atomic_files import check_target, check_unprotected
 
         check_target(output)
         check_unprotected(output, force)
@@ -69,7 +69,7 @@ def _lines(value: Any, indent: str = "") -> Iterator[str]:
 
 
 def _write(path: Path, texts: dict[str, str]) -> None:
-    from ..output.files import replacing
+    from ..output.atomic_files import replacing
 
     with replacing(path) as temporary:
         if path.suffix.lower() == ".zip":

@@ -59,14 +59,14 @@ def make_renderer(cluster: Cluster | None, scene: Scene, **options: Any) -> Rend
         from ..rendering.renderer import Renderer
 
         return Renderer(scene, **options)
-    from ..farm.renderer import FarmRenderer
+    from ..farm.farm_renderer import FarmRenderer
 
     return FarmRenderer(scene, cluster, **options)
 
 
 def is_huge(size: tuple[int, int]) -> bool:
     """Return whether an image is rendered in bands, as it would not fit into the client's memory."""
-    from ..farm.bands import HUGE
+    from ..farm.banded_picture import HUGE
 
     return size[0] * size[1] > HUGE
 
@@ -74,7 +74,7 @@ def is_huge(size: tuple[int, int]) -> bool:
 def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: Goal, results: Outputs,
                 progress: Progress) -> bool:
     """Render in bands, each to the goal, and write the results; return False if interrupted."""
-    from ..farm.bands import Banded
+    from ..farm.banded_picture import Banded
     from ..farm.orders import PictureOrder
 
     for name, value in {"--time": goal.seconds, "--aov": options["aovs"] or None, "--plot": results.plot,

@@ -17,7 +17,7 @@ from ..errors import OutputError, UsageError
 from .outputs import Outputs
 
 if TYPE_CHECKING:
-    from ..rendering.choices import Choices
+    from ..rendering.compile.choices import Choices
     from ..scene.model import Camera, Scene
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -65,7 +65,7 @@ class Sequence:
     def scene(self, scene: Scene, size: tuple[int, int] | None, turntable: int | None, fps: float | None) -> Scene:
         """Return the scene as in its first frame. Checks before rendering that frames exist and outputs are
         writable."""
-        from ..output.files import check_unprotected
+        from ..output.atomic_files import check_unprotected
         from ..output.video import check_video
         from ..scene.animation import Animation, frames, turntable as turned
 
@@ -100,9 +100,9 @@ class Sequence:
 
     def left(self, scene: Scene, choices: Choices, goal: object) -> Iterator[tuple[Outputs, Camera]]:
         """Yield outputs and camera of each remaining frame. Finished images contain a hash of all they depend on."""
-        from ..output.files import make_folder
+        from ..output.atomic_files import make_folder
         from ..output.images import metadata_of
-        from ..rendering.identity import facts_of
+        from ..rendering.checkpoint.identity import facts_of
 
         facts = {**facts_of(scene, choices), "camera": ""}
         asked = self.outputs

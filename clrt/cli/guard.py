@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable
 from math import isinf
 
-from ..device.pulse import VARIABLE, call_in_progress, patience
+from ..device.launches.hang_watchdog import VARIABLE, call_in_progress, patience
 from .interrupt import end_by_signals
 
 #: By name, as Windows has few of them and imports this module, too.
@@ -87,7 +87,7 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
         return os.WEXITSTATUS(status)
     name = signal.Signals(os.WTERMSIG(status)).name
     if name in CRASHES:
-        from ..device.pocl_cache import kept_programs, remove_damaged
+        from ..device.pocl.kernel_cache import kept_programs, remove_damaged
 
         damaged = remove_damaged()
         cause = (f"since PoCL keeps programs in {kept_programs()}, of which {damaged} were damaged: they are removed, "

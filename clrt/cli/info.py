@@ -34,13 +34,13 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
         return
     if scene is None:
         raise click.UsageError("Missing argument 'SCENE'; write a scene file or a model, or --materials")
+    from ..formats.load_scene import load
     from ..output.json_text import json_text
+    from ..rendering.accumulation.first_hits import first_hit_program
     from ..rendering.aovs import chosen_aovs, seen_first
-    from ..rendering.choices import choices_on
-    from ..rendering.compile import compile_scene
-    from ..rendering.first_hits import first_hit_program
-    from ..rendering.options import choices_of
-    from ..scene.file import load
+    from ..rendering.compile.choices import choices_on
+    from ..rendering.compile.compile_scene import compile_scene
+    from ..rendering.renderer_options import choices_of
 
     names = chosen_aovs(",".join(aovs)) if aovs else ()
     content = load(scene)
@@ -86,7 +86,7 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
 
 def _device(selector: str | None) -> Device | None:
     """Return the device that would render; None if there is none and none was requested."""
-    from ..device.discover import find_devices
+    from ..device.discovery.discover import find_devices
     from ..device.open import open_device
 
     if selector is None and not any(info.chosen for info, _ in find_devices()):

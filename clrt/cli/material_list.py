@@ -8,13 +8,13 @@ from dataclasses import fields
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from ..scene.fields import show
-from ..scene.limits import Ge, Gt, Le, Lt
-from ..scene.material import SHARED
-from ..scene.materials import MATERIALS, Material
-from ..scene.presets import F0_PRESETS
-from ..scene.presets import CONDUCTORS
-from ..scene.textures import Texture
+from ..scene.materials.material import SHARED
+from ..scene.materials.material_types import MATERIALS, Material
+from ..scene.materials.presets import F0_PRESETS
+from ..scene.materials.presets import CONDUCTORS
+from ..scene.materials.textures import Texture
+from ..scene.validation.field_types import show
+from ..scene.validation.limits import Ge, Gt, Le, Lt
 
 #: Descriptions of limits.
 LIMITS = {Ge: "at least", Gt: "above", Le: "at most", Lt: "below"}

@@ -17,7 +17,7 @@ from .fallback import kept_elsewhere
 from .pipes import STDOUT, Pipe
 
 if TYPE_CHECKING:
-    from ..farm.bands import Banded
+    from ..farm.banded_picture import Banded
     from ..output.image import Image
     from ..rendering.renderer import Renderer
 
@@ -60,16 +60,16 @@ class Outputs:
     @property
     def beside(self) -> tuple[Path, ...]:
         """Paths of the AOVs that have files of their own."""
-        from ..output.layers import files_beside
+        from ..output.aov_files import files_beside
 
         return tuple(path for picture in self._kept for path in files_beside(picture, self.aovs).values())
 
     def check(self, checkpoint: Path | None = None) -> None:
         """Check before the render that the results can be written and do not replace any of its inputs."""
-        from ..output.files import check_target
+        from ..output.atomic_files import check_target
+        from ..output.error_plots import check_plot
         from ..output.images import check_writable
-        from ..output.plots import check_plot
-        from ..output.view import check_view
+        from ..output.view_transform import check_view
 
         check_view(self.view, self.exposure)
         if self.aovs and (all(picture.suffix.lower() == ".hdr" for picture in self._kept)
@@ -89,7 +89,7 @@ class Outputs:
 
     def check_unprotected(self, checkpoint: Path | None = None) -> None:
         """Check whether results would replace read-only files."""
-        from ..output.files import check_unprotected
+        from ..output.atomic_files import check_unprotected
 
         older = checkpoint and Path(f"{checkpoint}~")
         for path in (*self._kept, *self.raws, *self.beside, self.report, self.plot, checkpoint, older):
@@ -112,7 +112,7 @@ class Outputs:
 
     def save(self, image: Image, raw: bool = False) -> None:
         """Write the images, or the raw ones."""
-        from ..output.layers import files_beside
+        from ..output.aov_files import files_beside
 
         def save(path: Path, image: Image = image) -> None:
             image.save(path, view=self.view, exposure=self.exposure)
@@ -157,7 +157,7 @@ class Outputs:
 
     def save_measures(self, renderer: Renderer, image: Image) -> None:
         """Write report and plot, and then raise OutputError if anything could not be written."""
-        from ..output.plots import plot_history
+        from ..output.error_plots import plot_history
         from ..output.report import write_report
 
         if self.report is not None:

@@ -96,13 +96,13 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     if click.get_current_context().obj == PROGRAM:
         guarded(advice)
     end_by_signals()
-    from ..output.data import check_denoisable
-    from ..output.writer import load_writer
+    from ..output.data_images import check_denoisable
+    from ..output.image_library import load_writer
 
     load_writer()
-    from ..rendering.stops import check_stops, planned_spp
-    from ..scene.file import STDIN, check_scene, load
-    from ..scene.paths import files_read
+    from ..formats.load_scene import STDIN, check_scene, load
+    from ..formats.referenced_files import files_read
+    from ..rendering.stop_conditions import check_stops, planned_spp
 
     check_scene(scene)
     layers = _chosen_aovs(aovs) if aovs else ()
@@ -235,7 +235,7 @@ def _write(renderer: Renderer, state: State, results: Outputs, denoiser: Denoise
            expected: Any, progress: Progress) -> None:
     from ..output.denoise import denoised
     from ..output.image import Image
-    from ..rendering.report import render_report
+    from ..rendering.render_report import render_report
 
     progress.phase("write")
     image = Image(state.pixels, render_report(renderer, state) | results.header, aovs=renderer.aovs(state))
@@ -256,7 +256,7 @@ def _write(renderer: Renderer, state: State, results: Outputs, denoiser: Denoise
 
 def _read_reference(path: Path, size: tuple[int, int]) -> Any:
     from ..output.images import read_image
-    from ..rendering.state import check_reference
+    from ..rendering.film.state import check_reference
 
     pixels = read_image(path)
     height, width = pixels.shape[:2]

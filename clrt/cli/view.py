@@ -37,12 +37,12 @@ def command(scene: Path, camera: str | None, devices: tuple[str, ...], view: str
     from ..window.needs import check_window
 
     check_window()
-    from ..device.discover import select
+    from ..device.discovery.discover import select
+    from ..formats.load_scene import load
     from ..live.settings import Settings
-    from ..output.view import check_view
-    from ..scene.fields import field_problems
-    from ..scene.file import load
+    from ..output.view_transform import check_view
     from ..scene.model import RenderSettings
+    from ..scene.validation.field_types import field_problems
     from ..window.app import App, Look
 
     check_view(view, exposure)

@@ -7,10 +7,10 @@ from collections import Counter
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rendering.compile import CompiledScene
-from ..rendering.emitters import TYPES, light_type
+from ..rendering.compile.compile_scene import CompiledScene
+from ..rendering.compile.lights.pack_lights import TYPES, light_type
 from ..scene.model import Instance, Mesh, Scene, Sphere
-from ..scene.source import material_of
+from ..scene.provenance import material_of
 
 IntArray = NDArray[np.int64]
 

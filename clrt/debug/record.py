@@ -6,8 +6,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from ..device.preamble import defines, typedefs
-from ..device.records import record
+from ..device.programs.preamble import defines, typedefs
+from ..device.programs.struct_types import record
 
 #: position … direction: in the world frame of the compiled scene. throughput: radiance at the camera over radiance
 #: arriving here. radiance: emission that arrives here; emission: its contribution. emitter: entry of the light table,

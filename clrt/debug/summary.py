@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..rendering.environment import LUMINANCE
+from ..rendering.compile.lights.environment_map import LUMINANCE
 from .names import Names
 from .outcomes import Outcome, outcomes
 from .record import End

@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.arrays import empty_array
-from ..device.launch import wait_for
+from ..device.launches.device_arrays import empty_array
+from ..device.launches.launch import wait_for
 from ..device.open import Device
-from ..device.program import make_kernel
+from ..device.programs.program import make_kernel
 from ..errors import UsageError
-from ..rendering.adaptive import most_planned
-from ..rendering.choices import Choices, choices_on
-from ..rendering.compile import CompiledScene, compile_scene
-from ..rendering.features import WITH_LIGHT
-from ..rendering.loop_limit import check_paths
-from ..rendering.on_device import SceneOnDevice
-from ..rendering.session import depth_of, first_launch, first_launch_samples
+from ..rendering.accumulation.checked_loops import check_paths
+from ..rendering.accumulation.scene_on_device import SceneOnDevice
+from ..rendering.accumulation.single_device import depth_of, first_launch, first_launch_samples
+from ..rendering.compile.choices import Choices, choices_on
+from ..rendering.compile.compile_scene import CompiledScene, compile_scene
+from ..rendering.compile.features import WITH_LIGHT
+from ..rendering.error_estimate.adaptive_sampling import most_planned
 from ..scene.model import RenderSettings, Scene
 from .record import VERTEX, End, vertex_preamble
 

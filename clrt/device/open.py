@@ -10,12 +10,12 @@ import pyopencl as cl
 from pyopencl import CommandQueue, Context
 
 from ..errors import DeviceError, UsageError
-from . import pocl
 from .contexts import Shared, shared_by
-from .describe import DeviceInfo
-from .discover import choose
-from .fork import check_process
-from .pulse import take_any_time
+from .discovery.device_info import DeviceInfo
+from .discovery.discover import choose
+from .launches.fork_safety import check_process
+from .launches.hang_watchdog import take_any_time
+from .pocl import cpu_name
 
 #: Name of PoCL's platform.
 POCL = "Portable Computing Language"
@@ -105,7 +105,7 @@ def open_device(selector: str | int | None = None) -> Device:
     """Open the device that `selector` names (see `choose`). Raises DeviceError if that fails."""
     info, device = choose(selector)
     if info.platform == POCL:
-        pocl.name_processor(device)
+        cpu_name.name_processor(device)
     if info.type == "simulator":
         take_any_time()
     try:

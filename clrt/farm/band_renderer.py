@@ -9,15 +9,15 @@ import numpy as np
 
 from ..output.denoise import Denoiser, denoised
 from ..output.image import Image
-from ..rendering.accumulation import Accumulation
-from ..rendering.crew import Crew, make_team
-from ..rendering.on_device import SceneOnDevice
+from ..rendering.accumulation.accumulation import Accumulation
+from ..rendering.accumulation.device_pool import Team
+from ..rendering.accumulation.multi_device import Crew, make_team
+from ..rendering.accumulation.scene_on_device import SceneOnDevice
+from ..rendering.accumulation.single_device import depth_of
+from ..rendering.film.tiles import TILE, tiles_of
+from ..rendering.render_report import render_report
 from ..rendering.renderer import Renderer
-from ..rendering.report import render_report
-from ..rendering.session import depth_of
-from ..rendering.stops import planned_spp
-from ..rendering.team import Team
-from ..rendering.tiles import TILE, tiles_of
+from ..rendering.stop_conditions import planned_spp
 from .orders import PictureOrder
 
 

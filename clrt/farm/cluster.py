@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from ..device.heap import keep_less
+from ..device.launches.malloc_trim import keep_less
 from ..errors import DeviceError, UsageError
-from .remote import as_it_is
 from .scheduler import check_scheduler
+from .worker_tasks import as_it_is
 
 if TYPE_CHECKING:
     from distributed import Client, Future, LocalCluster

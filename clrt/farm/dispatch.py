@@ -17,7 +17,7 @@ from uuid import uuid4
 from ..awake import watched_clock
 from ..errors import ClrtError, DeviceError, HungError, SceneError
 from .cluster import Cluster, Result
-from .members import BadResult, Member, Run, Source, Task
+from .worker_states import BadResult, Member, Run, Source, Task
 
 #: Minimum seconds between two queries of the workers, also as a multiple of a query's duration; and the wait for
 #: results.

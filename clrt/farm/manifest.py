@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import CheckpointError, OutputError
-from ..rendering.checkpoint_file import check_replaceable
-from ..rendering.identity import differences
+from ..rendering.checkpoint.checkpoint_file import check_replaceable
+from ..rendering.checkpoint.identity import differences
 
 VERSION = "clrt manifest 1"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..rendering.choices import Choices
-from ..rendering.options import choices_of, settings_of
+from ..rendering.compile.choices import Choices
+from ..rendering.renderer_options import choices_of, settings_of
 from ..scene.model import Camera, Scene
 
 

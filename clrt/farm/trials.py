@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
+from ..bench.rays.cold_start import peak_bytes
 from ..rendering.renderer import Renderer, State
 from ..scene.animation import frames, turntable
 from ..scene.model import RenderSettings, Scene
-from ..study.fresh import peak_bytes
-from .bands import Banded
+from .banded_picture import Banded
 from .cluster import connect, local_cluster
+from .farm_renderer import FarmRenderer
+from .local_processes import Processes
 from .orders import PictureOrder
-from .processes import Processes
-from .renderer import FarmRenderer
 from .whole_pictures import WholePictures
 
 #: Samples per second of a simulated worker: as many as two cores render of the Cornell box.

@@ -14,10 +14,10 @@ import numpy as np
 
 from .cluster import Cluster
 from .dispatch import Dispatch
-from .members import BadResult, Member, Task
 from .orders import PictureOrder
-from .parcels import Parcel, pack
-from .remote import identity, introduce, render_whole
+from .serialization import Parcel, pack
+from .worker_states import BadResult, Member, Task
+from .worker_tasks import identity, introduce, render_whole
 
 #: With more images than this left per worker, each worker has the next one queued.
 PLENTY = 3

@@ -17,10 +17,10 @@ import numpy as np
 from ..device.open import name_of
 from ..errors import ClrtError
 from ..output.image import Image
-from ..rendering.features import INTEGRATORS
-from ..rendering.machine import tree_report
+from ..rendering.accumulation.device_report import tree_report
+from ..rendering.compile.features import INTEGRATORS
+from ..rendering.render_report import render_report
 from ..rendering.renderer import Renderer, State
-from ..rendering.report import render_report
 from ..scene.model import Scene
 from ..threads import Condition, beside
 from .history import History

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.heap import give_back
+from ..device.launches.malloc_trim import give_back
 from ..device.open import Device, open_devices
 from ..output.denoise import Denoiser
-from ..rendering.guides import render_guides
+from ..rendering.accumulation.denoiser_guides import render_guides
 from ..rendering.renderer import Renderer, State
 from ..scene.model import Scene
 from .pace import Pace

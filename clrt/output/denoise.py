@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DeviceError, UsageError
-from .compare import mean_ratios, relmse
 from .image import Image
+from .image_error import mean_ratios, relmse
 
 FloatArray = NDArray[np.float32]
 

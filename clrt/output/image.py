@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..float_errors import with_default_errors
-from .data import shown_data
+from .data_images import shown_data
 from .images import write_image
 from .report import header_of
 

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from ..errors import OutputError
 from ..file_names import utf8_path
-from ..scene.pictures import read_picture
-from .files import check_target, replacing
-from .layers import Pictures, drawn, files_beside, layered
-from .view import check_view, to_display
-from .whole import check_whole
+from ..formats.images.image_reader import read_picture
+from .aov_files import Pictures, drawn, files_beside, layered
+from .atomic_files import check_target, replacing
+from .truncation import check_whole
+from .view_transform import check_view, to_display
 
 FloatArray = NDArray[np.float32]
 

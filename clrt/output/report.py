@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..file_names import printable
-from .files import check_target, replacing
+from .atomic_files import check_target, replacing
 from .json_text import json_text
 
 

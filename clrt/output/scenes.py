@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import OutputError
+from ..formats.toml.writer import scene_files
 from ..scene.model import Scene
-from ..scene.writing import scene_files
-from .files import check_target, check_unprotected, replacing
+from .atomic_files import check_target, check_unprotected, replacing
 from .images import write_image, write_texels
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import OutputError, UsageError
-from .files import check_target, replacing
+from .atomic_files import check_target, replacing
 
 #: ffmpeg's options: nearly lossless quality, and sRGB colors with the matrix of Rec. 709.
 CODECS: dict[str, tuple[str, list[str]]] = {

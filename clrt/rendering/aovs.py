@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from ..errors import UsageError
 from ..float_errors import with_default_errors
 from ..scene.model import Scene
-from .accumulation import Accumulation
-from .features import WITH_LIGHT
-from .film import Film
-from .first_hits import MEANS, OF_THE_MIDDLE
+from .accumulation.accumulation import Accumulation
+from .accumulation.first_hits import MEANS, OF_THE_MIDDLE
+from .compile.features import WITH_LIGHT
+from .film.film import Film
 
 #: AOVs from the render's film; the first two make it accumulate direct light separately.
 LIGHT = ("direct", "indirect")

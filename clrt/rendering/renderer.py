@@ -12,33 +12,33 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..device.open import Selectors, name_of, open_devices
 from ..awake import AwakeClock, watched_clock
+from ..device.open import Selectors, name_of, open_devices
 from ..errors import DeviceError
 from ..float_errors import with_default_errors
 from ..scene.model import Camera, RenderSettings, Scene
-from ..scene.validate import check_is_scene, validate
+from ..scene.validation.validate import check_is_scene, validate
 from ..threads import Event
-from .accumulation import Accumulation
-from .adaptive import most_planned
+from .accumulation.accumulation import Accumulation
+from .accumulation.multi_device import make_picture
+from .accumulation.scene_on_device import SceneOnDevice
+from .accumulation.single_device import depth_of
 from .aovs import Aovs
-from .camera import camera_file
-from .checkpoint import check_of_none, open_checkpoints
-from .choices import choices_on
-from .compile import CompiledScene
-from .compiler import Compiler
-from .convergence import Convergence
-from .crew import make_picture
-from .film import Film
-from .kept import Kept
-from .on_device import SceneOnDevice
-from .options import choices_of, settings_of
-from .pace import Pace
-from .picture_warnings import PictureWarnings
-from .session import depth_of
-from .state import State as State, check_reference
-from .stops import Limits, check_stops, checked_percentile
-from .turns import Turns
+from .checkpoint.checkpoints import check_of_none, open_checkpoints
+from .checkpoint.saved_state import Kept
+from .compile.camera_kernel import camera_file
+from .compile.choices import choices_on
+from .compile.compile_scene import CompiledScene
+from .compile.scene_compiler import Compiler
+from .error_estimate.adaptive_sampling import most_planned
+from .error_estimate.convergence import Convergence
+from .film.film import Film
+from .film.state import State as State, check_reference
+from .render_warnings import PictureWarnings
+from .renderer_options import choices_of, settings_of
+from .state_interval import Pace
+from .stop_conditions import Limits, check_stops, checked_percentile
+from .thread_turns import Turns
 
 
 class Renderer:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from ..errors import SceneError, UsageError
-from .curves import Doubles, smooth
-from .fields import field_problems
-from .limits import Gt, Lt
-from .material import tuples_for_lists
-from .textures import NonNegative
+from .materials.material import tuples_for_lists
+from .materials.textures import NonNegative
+from .splines import Doubles, smooth
+from .validation.field_types import field_problems
+from .validation.limits import Gt, Lt
 
 if TYPE_CHECKING:
     from .model import Camera, Scene

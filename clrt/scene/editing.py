@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Container
 from dataclasses import replace
 
-from .instancing import meshes_by_id
-from .materials import Material
+from .geometry.instancing import meshes_by_id
+from .materials.material_types import Material
 from .model import Instance, Mesh, Scene, Sphere
 
 

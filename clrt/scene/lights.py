@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from math import pi, radians, sin
 from typing import Annotated, ClassVar
 
-from .limits import Ge, Gt, Le, Lt
-from .material import Radiance, tuples_for_lists
+from .materials.material import Radiance, tuples_for_lists
+from .validation.limits import Ge, Gt, Le, Lt
 
 Length = Annotated[float, Gt(0)]
 

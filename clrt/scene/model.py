@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from ..errors import ClrtError
 from .animation import Animation
 from .lights import Light
-from .limits import Ge, Gt, Le, Lt
-from .material import Culling, tuples_for_lists
-from .materials import Diffuse, Material
-from .numbers import real_array, whole_array
-from .textures import NonNegative
+from .materials.material import Culling, tuples_for_lists
+from .materials.material_types import Diffuse, Material
+from .materials.textures import NonNegative
+from .validation.limits import Ge, Gt, Le, Lt
+from .validation.number_arrays import real_array, whole_array
 
 if TYPE_CHECKING:
-    from .source import Source
+    from .provenance import Source
 
 Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]

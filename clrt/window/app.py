@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from imgui_bundle import hello_imgui, imgui, immapp
 
-from ..device.discover import find_devices
+from ..device.discovery.discover import find_devices
 from ..live.live import Live
 from ..live.settings import Settings
 from ..scene.model import Scene

@@ -12,21 +12,21 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from ..device.describe import DeviceInfo
+from ..device.discovery.device_info import DeviceInfo
 from ..errors import ClrtError, UsageError
+from ..formats.load_scene import load
 from ..live.live import Live
 from ..live.picks import Thing
 from ..live.settings import Settings
 from ..live.snapshot import Snapshot
-from ..output.files import check_unprotected
+from ..output.atomic_files import check_unprotected
 from ..output.images import write_image
 from ..output.scenes import save_scene
 from ..scene.editing import materials_of, with_material
-from ..scene.file import load
 from ..scene.lights import DirectionalLight
-from ..scene.material import Material
+from ..scene.materials.material import Material
 from ..scene.model import Camera, Instance, Scene, Sphere
-from ..scene.source import Source
+from ..scene.provenance import Source
 from .camera_controls import CameraControls
 from .navigation import around, distance
 from .screenshot import screenshot

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..errors import ClrtError
 from ..live.snapshot import Snapshot
-from ..output.data import shown_data
-from ..output.view import to_display
+from ..output.data_images import shown_data
+from ..output.view_transform import to_display
 from ..threads import Condition, beside
 
 

@@ -1,4 +1,4 @@
-// Shared by the kernels of this folder: a work-item processes its block of the vectors (see device/blocks.py).
+// Shared by the kernels of this folder: a work-item processes its block of the vectors (see device/launches/data_parallel.py).
 #include "lanes.cl"
 
 #define FOR_BLOCK(i) \

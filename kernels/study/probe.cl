@@ -1,4 +1,4 @@
-// Kernels that apply one function each to arrays, LANES elements per work-item (clrt/study/probe.py).
+// Kernels that apply one function each to arrays, LANES elements per work-item (clrt/bench/numerics/kernel_probe.py).
 //
 // Compiled into a scene's program in place of path.cl, so the probed code is that which renders the scene. Arrays are
 // rows of n floats: row r of element i is array[r·n + i]. Integers up to 2^24 and masks (0, 1) are stored as floats.

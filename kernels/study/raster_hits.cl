@@ -1,4 +1,4 @@
-// First hits at one position of each pixel, rasterised and traced (clrt/study/raster.py).
+// First hits at one position of each pixel, rasterised and traced (clrt/bench/rays/raster_speed.py).
 #include "film.cl"
 #include "surface.cl"
 #include "raster/tile.cl"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from clrt.accel.tree import FloatArray
-from clrt.scene.scaling import unit_for
+from clrt.accel.bvh import FloatArray
+from clrt.scene.geometry.scaling import unit_for
 
 
 def soup(count: int, size: float = 0.1, seed: int = 0) -> FloatArray:

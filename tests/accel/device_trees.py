@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.accel.build import build_tree
+from clrt.accel.bvh import FloatArray, Tree, half_area
 from clrt.accel.device_builder import SHAPES, program_source
 from clrt.accel.layouts import Layout, sphere_boxes
 from clrt.accel.morton import sort_primitives
 from clrt.accel.ploc import BINARY_NODE, cluster
 from clrt.accel.reinsertion import reinsert
-from clrt.accel.tree import FloatArray, Tree, half_area
 from clrt.accel.wide import EMPTY, Wide, leaf_fields, leaf_reference
-from clrt.device.arrays import on_host
-from clrt.device.blocks import Blocks
+from clrt.device.launches.data_parallel import Blocks
+from clrt.device.launches.device_arrays import on_host
 from clrt.device.open import Device
 
 from .cases import SCENES, edges

@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from clrt.accel.builders import BUILDERS, midpoint, sah
-from clrt.accel.tree import FloatArray, Tree, half_area, join
+from clrt.accel.bvh import FloatArray, Tree, half_area, join
 
 from .cases import NASTY, grid, soup, spheres
 

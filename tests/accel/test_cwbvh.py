@@ -14,10 +14,10 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from clrt.accel.builders import BUILDERS, sah
+from clrt.accel.bvh import FloatArray
 from clrt.accel.cwbvh import MAX_LEAF, Records, compress, octant_slots, quantise
 from clrt.accel.layouts import Layout, pack, sphere_boxes
-from clrt.accel.tree import FloatArray
-from clrt.scene.scaling import unit_for
+from clrt.scene.geometry.scaling import unit_for
 
 from .cases import NASTY, edges, soup, spheres
 from .test_layouts import SCENES

@@ -12,7 +12,7 @@ from clrt.accel.build import build_tree
 from clrt.accel.device_builder import SHAPES
 from clrt.accel.layouts import LEAF_SPHERE, TRIANGLE_PACK, sphere_boxes
 from clrt.accel.wide import EMPTY, MAX_PRIMITIVES, leaf_fields
-from clrt.device.arrays import on_host
+from clrt.device.launches.device_arrays import on_host
 from clrt.device.open import Device
 from clrt.errors import SceneError
 

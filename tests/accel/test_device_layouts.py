@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import clrt
+from clrt.accel.bvh import half_area
 from clrt.accel.cwbvh import MAX_LEAF, stack_bound
 from clrt.accel.device_builder import SHAPES
 from clrt.accel.layouts import Layout, sphere_boxes
-from clrt.accel.tree import half_area
 from clrt.accel.wide import EMPTY
 from clrt.device.open import Device
 

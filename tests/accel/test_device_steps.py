@@ -10,13 +10,13 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.accel import ploc
+from clrt.accel.bvh import FloatArray, half_area, intersections
 from clrt.accel.device_builder import SHAPES, Shape, program_source
 from clrt.accel.layouts import sphere_boxes
 from clrt.accel.morton import CODE_BITS, radix_sort, sort_primitives
 from clrt.accel.ploc import SLOW
-from clrt.accel.tree import FloatArray, half_area, intersections
 from clrt.accel.wide import leaf_fields
-from clrt.device.blocks import Blocks
+from clrt.device.launches.data_parallel import Blocks
 from clrt.device.open import Device
 
 from .cases import SCENES, edges

@@ -13,11 +13,11 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from clrt.accel.builders import BUILDERS
+from clrt.accel.bvh import FloatArray
 from clrt.accel.cwbvh import CWBVH_NODE
-from clrt.accel.kernels import TREELESS
 from clrt.accel.layouts import (BVH2_NODE, BVH8_NODE, LAYOUTS, LEAF_SPHERE, LEAF_TRIANGLE, LONE_PACK, TRIANGLE_PACK,
                                 Layout, pack, sphere_boxes)
-from clrt.accel.tree import FloatArray
+from clrt.accel.traversal_kernels import TREELESS
 from clrt.accel.wide import EMPTY
 from clrt.errors import UsageError
 

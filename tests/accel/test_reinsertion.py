@@ -9,12 +9,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from clrt.accel.bvh import FloatArray, half_area
 from clrt.accel.device_builder import SHAPES, program_source
 from clrt.accel.morton import sort_primitives
 from clrt.accel.ploc import BINARY_NODE, BinaryTree
 from clrt.accel.reinsertion import DEEP, reinsert
-from clrt.accel.tree import FloatArray, half_area
-from clrt.device.blocks import Blocks
+from clrt.device.launches.data_parallel import Blocks
 from clrt.device.open import Device
 
 from ..covering import others

@@ -9,7 +9,7 @@ import pytest
 
 from clrt.accel.build import LARGE, build_tree
 from clrt.accel.device_builder import LARGEST_ARRAY, SHAPES
-from clrt.device.blocks import Blocks
+from clrt.device.launches.data_parallel import Blocks
 from clrt.device.open import Device
 from clrt.errors import NoRoomError
 
@@ -48,7 +48,7 @@ def test_short_launches_build_the_same_tree(device: Device, monkeypatch: pytest.
     """Cut into launches of few items each."""
     triangles = soup(5_000, 0.1)
     trees = [build_tree(device, "bvh8", "reinsertion", triangles)]
-    monkeypatch.setattr("clrt.device.blocks.LAUNCH_ITEMS", {"cpu": 100, "gpu": 100})
+    monkeypatch.setattr("clrt.device.launches.data_parallel.LAUNCH_ITEMS", {"cpu": 100, "gpu": 100})
     trees.append(build_tree(device, "bvh8", "reinsertion", triangles))
     whole, cut = ({name: array.read(device).tobytes() for name, array in tree.buffers.items()} for tree in trees)
     assert whole == cut

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clrt.accel.builders import BUILDERS, midpoint, sah
-from clrt.accel.tree import IntArray, Tree, empty_tree, half_area, join
+from clrt.accel.bvh import IntArray, Tree, empty_tree, half_area, join
 from clrt.accel.wide import EMPTY, MAX_PRIMITIVES, Wide, collapse, leaf_fields
 from clrt.errors import SceneError
 

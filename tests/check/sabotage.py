@@ -9,7 +9,7 @@ import re
 import shutil
 from pathlib import Path
 
-from clrt.device.sources import kernel_folder
+from clrt.device.programs.kernel_files import kernel_folder
 
 
 def sabotaged(folder: Path, pattern: str, wrong: str, head: str = "") -> Path:

@@ -9,12 +9,12 @@ import pytest
 
 from clrt.check import star
 from clrt.check.arithmetic import check_arithmetic
-from clrt.check.exact import nearest_float32, ulps
+from clrt.check.check_parts import PARTS
+from clrt.check.exact_floats import nearest_float32, ulps
 from clrt.check.findings import Findings
 from clrt.check.floats import operands
-from clrt.check.parts import PARTS
 from clrt.device.open import Device
-from clrt.query import RayQuery
+from clrt.queries.mesh import RayQuery
 
 
 @pytest.mark.parametrize("part", PARTS)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from clrt.check.check_parts import PARTS
 from clrt.check.findings import Findings
-from clrt.check.parts import PARTS
-from clrt.device import program
 from clrt.device.open import Device, open_device
+from clrt.device.programs import program
 
 from ..covering import others
 from .sabotage import sabotaged

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from clrt.bench.combinations import combinations, identities
+from clrt.bench.rays.ray_speed import load_rays
 from clrt.cli import bench_combinations
 from clrt.errors import SceneError
-from clrt.study import combinations, identities
-from clrt.study.rays import load_rays
 
 pytestmark = pytest.mark.study
 

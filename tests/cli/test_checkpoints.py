@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from clrt.output.images import read_image
-from clrt.rendering.checkpoint_file import older, read_checkpoint
-from clrt.rendering.kept import KINDS
+from clrt.rendering.checkpoint.checkpoint_file import older, read_checkpoint
+from clrt.rendering.checkpoint.saved_state import KINDS
 
 from .test_commands import clrt
 

@@ -15,9 +15,9 @@ import pytest
 from click.testing import CliRunner
 
 import clrt
-from clrt.check.run import LIMIT, check_device
+from clrt.check.run_check import LIMIT, check_device
 from clrt.cli import devices
-from clrt.device.discover import find_devices
+from clrt.device.discovery.discover import find_devices
 from clrt.device.open import open_device
 from clrt.errors import DeviceError
 
@@ -110,7 +110,7 @@ def test_a_check_that_runs_out_of_the_default_limit_has_failed(monkeypatch: pyte
     info = open_device().info
     with pytest.raises(DeviceError, match="starting did not finish in 0.01 s; raise --limit"):
         check_device(info, 0.01)
-    monkeypatch.setattr("clrt.check.run.LIMIT", 0.01)
+    monkeypatch.setattr("clrt.check.run_check.LIMIT", 0.01)
     verdict = check_device(info, 0.01)
     assert not verdict.passed and verdict.failures == ["starting: it did not finish in 0.01 s"]
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from clrt.device.diagnosis import diagnosis, without_names
+from clrt.device.discovery.diagnosis import diagnosis, without_names
 
 pytestmark = pytest.mark.processes
 
@@ -84,7 +84,7 @@ def test_what_cannot_be_found_out_is_told(monkeypatch: pytest.MonkeyPatch) -> No
     def fails() -> None:
         raise OSError("no such luck")
 
-    monkeypatch.setattr("clrt.device.diagnosis._devices", fails)
+    monkeypatch.setattr("clrt.device.discovery.diagnosis._devices", fails)
     assert diagnosis()["devices"] == {"error": "OSError: no such luck"}
 
 

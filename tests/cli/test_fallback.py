@@ -69,7 +69,7 @@ def test_what_is_beside_already_is_not_kept_twice(places: list[Path], tmp_path: 
     def refuse(*arguments: object) -> None:
         raise KeptBesideError("it is a-1.png beside it")
 
-    monkeypatch.setattr("clrt.output.files._move", refuse)
+    monkeypatch.setattr("clrt.output.atomic_files._move", refuse)
     with pytest.raises(OutputError, match="a-1.png beside it"):
         asked.save_frame(Image(PIXELS))
     assert not [*places[0].iterdir()]

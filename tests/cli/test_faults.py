@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from clrt.device.pulse import VARIABLE, patience
+from clrt.device.launches.hang_watchdog import VARIABLE, patience
 from clrt.errors import UsageError
 from clrt.output.images import read_image
 

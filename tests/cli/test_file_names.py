@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from clrt.file_names import SHOWN, printable, utf8_path
+from clrt.formats.load_scene import load
+from clrt.formats.models import SUFFIXES
 from clrt.output.images import EXTENSIONS, metadata_of, read_image, write_image
-from clrt.scene.file import load
-from clrt.scene.meshes import SUFFIXES
 
 from .test_commands import SCENE
 

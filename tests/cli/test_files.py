@@ -11,10 +11,10 @@ import pytest
 
 from clrt.errors import CheckpointError, OutputError
 from clrt.farm.manifest import Manifest
-from clrt.output.files import replacing
+from clrt.formats.load_scene import load
+from clrt.output.atomic_files import replacing
 from clrt.output.images import write_image
 from clrt.output.scenes import save_scene
-from clrt.scene.file import load
 
 from .test_checkpoints import SCENE
 from .test_commands import clrt

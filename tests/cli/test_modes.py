@@ -11,8 +11,8 @@ from random import Random
 
 import pytest
 
-from clrt.output.files import replacing
-from clrt.rendering.checkpoint_file import write_checkpoint
+from clrt.output.atomic_files import replacing
+from clrt.rendering.checkpoint.checkpoint_file import write_checkpoint
 
 from ..covering import others
 from .test_checkpoints import SCENE

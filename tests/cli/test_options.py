@@ -11,10 +11,10 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from clrt.accel.kernels import BOX_TESTS, BUILDER_NAMES, SPHERE_TESTS, TREES, TRIANGLE_TESTS
+from clrt.accel.traversal_kernels import BOX_TESTS, BUILDER_NAMES, SPHERE_TESTS, TREES, TRIANGLE_TESTS
 from clrt.cli import bench_rays, commands, debug, info, render
 from clrt.errors import DeviceError
-from clrt.rendering.choices import OFFSETS
+from clrt.rendering.compile.choices import OFFSETS
 
 KNOWN: dict[str, Iterable[str]] = {"triangle": TRIANGLE_TESTS, "box": BOX_TESTS, "sphere": SPHERE_TESTS,
                                    "offset": OFFSETS, "layout": TREES, "builder": BUILDER_NAMES}

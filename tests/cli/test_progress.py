@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from clrt.cli.goal import Goal, Pace, time_left
-from clrt.rendering.film import Film
-from clrt.rendering.records import PIXEL
+from clrt.rendering.compile.records import PIXEL
+from clrt.rendering.film.film import Film
 from clrt.rendering.renderer import State
 
 SCENE = "[render]\nsize = [16, 8]\nspp = 4\n[environment]\ncolor = [1, 1, 1]\n[[sphere]]\n"

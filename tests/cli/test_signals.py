@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from clrt.awake import LONGEST
-from clrt.device.pulse import VARIABLE
+from clrt.device.launches.hang_watchdog import VARIABLE
 from clrt.output.images import read_image
 
 from .test_checkpoints import SCENE, worker_of

@@ -13,13 +13,13 @@ from clrt.debug.summary import summary
 from clrt.debug.trace import PixelPaths, trace_pixel
 from clrt.debug.vertices import Vertex, vertices
 from clrt.device.open import Device
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
-from clrt.scene import instancing
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.geometry import instancing
+from clrt.scene.geometry.transform import transform_mesh
 from clrt.scene.lights import DirectionalLight, PointLight
-from clrt.scene.materials import Diffuse, Mirror
+from clrt.scene.materials.material_types import Diffuse, Mirror
 from clrt.scene.model import Camera, Mesh, RenderSettings, Scene, Sphere
-from clrt.scene.transform import transform_mesh
 
 from ..covering import others
 from ..rendering.pictures import quad

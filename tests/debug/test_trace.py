@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from clrt.debug import trace
 from clrt.debug.record import End
 from clrt.debug.trace import PixelPaths, trace_pixel
-from clrt.device import program
 from clrt.device.open import Device
+from clrt.device.programs import program
 from clrt.errors import DeviceError, UsageError
-from clrt.rendering import loop_limit
-from clrt.rendering.choices import Choices
+from clrt.formats.load_scene import load
+from clrt.rendering.accumulation import checked_loops
+from clrt.rendering.compile.choices import Choices
 from clrt.rendering.renderer import Renderer
-from clrt.scene import instancing
-from clrt.scene.file import load
-from clrt.scene.materials import Diffuse
+from clrt.scene.geometry import instancing
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import RenderSettings, Scene, Sphere
 
 from ..check.sabotage import sabotaged
@@ -147,6 +147,6 @@ def test_paths_that_were_ended_are_missed(device: Device, tmp_path: Path, monkey
     """Drivers that end loops early (test_loop_limit.py)."""
     folder = sabotaged(tmp_path / "kernels", r"!loops_ended\(2 \+ \(launch.width == 0\)\)", "(launch.width == 0)")
     monkeypatch.setattr(program, "kernel_folder", lambda: folder)
-    monkeypatch.setattr(loop_limit, "loop_turns", lambda device: 50_000)
+    monkeypatch.setattr(checked_loops, "loop_turns", lambda device: 50_000)
     with pytest.raises(DeviceError, match="after 50000 turns, and 4 of 4 paths .* need more"):
         trace_pixel(everything(), device, (4, 4))

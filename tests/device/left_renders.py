@@ -14,7 +14,7 @@ import numpy as np
 import pyopencl as cl
 
 import clrt
-from clrt.device import arrays
+from clrt.device.launches import device_arrays
 
 RNG = np.random.default_rng(3)
 ROUNDS, RAYS = 8, 60_000
@@ -73,5 +73,5 @@ def unowned(device: Any, array: Any, access: int) -> cl.Buffer:
 
 if __name__ == "__main__":
     if "unsafe" in sys.argv:    # to see that it dies
-        setattr(arrays, "lend", unowned)
+        setattr(device_arrays, "lend", unowned)
     main(int(sys.argv[1]))

@@ -10,9 +10,9 @@ from pathlib import Path
 import pyopencl
 import pytest
 
-from clrt.device.aside import LARGE, compile_aside
 from clrt.device.open import Device
-from clrt.device.program import OPTIONS, build, make_kernel
+from clrt.device.programs.compile_process import LARGE, compile_aside
+from clrt.device.programs.program import OPTIONS, build, make_kernel
 from clrt.errors import KernelError
 
 from .test_shared_cache import surroundings
@@ -24,8 +24,8 @@ BUILD = """
 import json, sys
 from clrt.accel.device_builder import SHAPES, program_source
 from clrt.device.open import open_device
-from clrt.device.program import build
-from clrt.study.fresh import peak_bytes
+from clrt.device.programs.program import build
+from clrt.bench.rays.cold_start import peak_bytes
 
 built = build(open_device(), program_source(SHAPES["bvh8"], True, False, False), int(sys.argv[1]))
 print(json.dumps([peak_bytes(), built.cached, built.program.num_kernels]))

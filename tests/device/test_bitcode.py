@@ -11,12 +11,12 @@ import numpy as np
 import pyopencl
 import pytest
 
-from clrt.device import program
-from clrt.device.bitcode import find_bitcode, name_kernels, takes_bitcode
 from clrt.device.open import Device
-from clrt.device.pocl import best_processor, processor_flags
-from clrt.device.pocl_cache import BITCODE
-from clrt.device.program import program_key
+from clrt.device.pocl.cpu_name import best_processor, processor_flags
+from clrt.device.pocl.kernel_cache import BITCODE
+from clrt.device.programs import program
+from clrt.device.programs.bitcode import find_bitcode, name_kernels, takes_bitcode
+from clrt.device.programs.program import program_key
 from clrt.output.images import read_image
 
 from .test_shared_cache import RENDER, SCENE, surroundings
@@ -27,7 +27,7 @@ import json
 import numpy as np
 import pyopencl as cl
 from clrt.device.open import open_device
-from clrt.device.program import build, make_kernel
+from clrt.device.programs.program import build, make_kernel
 
 def multiplied(factor):
     built = build(device, "kernel void multiply(global float *x) { x[get_global_id(0)] *= %d; }" % factor)

@@ -9,7 +9,7 @@ from traceback import walk_stack
 import pyopencl as cl
 import pytest
 
-from clrt.device import callbacks
+from clrt.device.launches import event_callbacks
 from clrt.device.open import Device
 from clrt.threads import Event, beside
 
@@ -23,23 +23,23 @@ def test_one_that_is_under_way_is_expected(device: Device) -> None:
         sys.setprofile(lambda *_: time.sleep(0.02))     # another thread gets on wherever one can, until this one ends
 
     event = cl.UserEvent(device.context)
-    callbacks.when_complete(event, function)
-    assert callbacks._expected
+    event_callbacks.when_complete(event, function)
+    assert event_callbacks._expected
     event.set_status(cl.command_execution_status.COMPLETE)
-    while callbacks._expected:
+    while event_callbacks._expected:
         pass
     running = [frame.f_code.co_filename for each in sys._current_frames().values() for frame, _ in walk_stack(each)]
-    assert called and callbacks.__file__ not in running
+    assert called and event_callbacks.__file__ not in running
 
 
 def test_all_that_come_one_by_one_are_waited_for(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """Together they take longer than the wait for one; one that never comes ends it."""
-    monkeypatch.setattr(callbacks, "_expected", set())
-    monkeypatch.setattr(callbacks, "_python_ends", Event())
-    monkeypatch.setattr(callbacks, "LAST_WAIT", 1.0)
+    monkeypatch.setattr(event_callbacks, "_expected", set())
+    monkeypatch.setattr(event_callbacks, "_python_ends", Event())
+    monkeypatch.setattr(event_callbacks, "LAST_WAIT", 1.0)
     events = [cl.UserEvent(device.context) for _ in range(6)]
     for event in events:
-        callbacks.when_complete(event, lambda: None)
+        event_callbacks.when_complete(event, lambda: None)
 
     def complete() -> None:
         for event in events[1:]:
@@ -47,7 +47,7 @@ def test_all_that_come_one_by_one_are_waited_for(device: Device, monkeypatch: py
             event.set_status(cl.command_execution_status.COMPLETE)
 
     completed = beside(complete)
-    callbacks._await_them()
+    event_callbacks._await_them()
     completed()
-    assert len(callbacks._expected) == 1
+    assert len(event_callbacks._expected) == 1
     events[0].set_status(cl.command_execution_status.COMPLETE)

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from clrt.device import discover, pocl
-from clrt.device.describe import DeviceInfo
-from clrt.device.discover import choose, devices, find_devices
+from clrt.device.discovery import discover
+from clrt.device.discovery.device_info import DeviceInfo
+from clrt.device.discovery.discover import choose, devices, find_devices
 from clrt.device.open import Device, open_device
+from clrt.device.pocl import cpu_name
 from clrt.errors import ClrtError, DeviceError, UsageError
 
 #: As it is, whatever a test puts in its place.
@@ -165,10 +166,10 @@ SKYLAKE = {"avx512f", "avx512dq", "avx512bw", "avx512vl", "avx512cd", "fma", "bm
 @pytest.mark.parametrize(("flags", "name"), [
     (set(), "x86-64"), ({"sse4_2", "popcnt"}, "nehalem"), ({"avx2", "fma", "bmi1", "bmi2", "f16c"}, "x86-64"),
     ({"avx2", "fma", "bmi1", "bmi2", "f16c", "movbe", "sse4_2", "popcnt"}, "haswell"), (SKYLAKE, "skylake-avx512"),
-    (SKYLAKE - {"avx512bw"}, "haswell"), (set().union(*pocl.PROCESSORS.values()), "icelake-server")])
+    (SKYLAKE - {"avx512bw"}, "haswell"), (set().union(*cpu_name.PROCESSORS.values()), "icelake-server")])
 def test_best_processor(flags: set[str], name: str) -> None:
     """The newest whose instructions are all there: one that is not crashes the process."""
-    assert pocl.best_processor(flags) == name
+    assert cpu_name.best_processor(flags) == name
 
 
 @pytest.mark.parametrize(("name", "flags", "wrong"), [
@@ -176,9 +177,9 @@ def test_best_processor(flags: set[str], name: str) -> None:
     ("skylake-avx512", SKYLAKE, False), ("haswell", SKYLAKE - {"avx512f"}, False), ("sandybridge", {"avx"}, False)])
 def test_names_that_the_library_is_not_made_for(name: str, flags: set[str], wrong: bool) -> None:
     """Zen 4 by Zen 3's name, all later ones, and Zen 3 by its own."""
-    assert pocl.is_misnamed(name, flags) == wrong
+    assert cpu_name.is_misnamed(name, flags) == wrong
 
 
 def test_a_named_processor_stays(device: Device) -> None:
     """Once named, or known from the start, nothing is touched again."""
-    assert not pocl.name_processor(device.cl)
+    assert not cpu_name.name_processor(device.cl)

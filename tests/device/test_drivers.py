@@ -12,9 +12,9 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clrt.device.drivers import Driver, installed_drivers
-from clrt.device.platforms import faults_of
-from clrt.device.probe import probe
+from clrt.device.discovery.driver_probe import probe
+from clrt.device.discovery.drivers import Driver, installed_drivers
+from clrt.device.discovery.platforms import faults_of
 from clrt.output.images import read_image
 
 from .fake_drivers import FAULTS, environment, listed, loads, make_driver, run

@@ -8,7 +8,7 @@ from typing import cast
 import pyopencl as cl
 import pytest
 
-from clrt.device.launch import run_seconds
+from clrt.device.launches.launch import run_seconds
 
 
 @pytest.mark.parametrize(("nanoseconds", "seconds"), [(0, 0.0), (1, 0.0), (70_000_000, 0.07)])

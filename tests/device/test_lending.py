@@ -21,7 +21,7 @@ import pyopencl as cl
 import pytest
 
 import clrt
-from clrt.device import arrays, lending
+from clrt.device.launches import device_arrays, lent_memory as lending
 from clrt.device.open import Device
 
 pytestmark = pytest.mark.processes
@@ -55,8 +55,8 @@ class Gate:
             return lend(device, array, access)
 
         monkeypatch.setattr(cl, "enqueue_nd_range_kernel", launch)
-        monkeypatch.setattr(arrays, "lend", noted)
-        monkeypatch.setattr("clrt.device.launch.LONGEST_LOOK", 1e-3)
+        monkeypatch.setattr(device_arrays, "lend", noted)
+        monkeypatch.setattr("clrt.device.launches.launch.LONGEST_LOOK", 1e-3)
 
     def open(self) -> None:
         """Lets all begin."""

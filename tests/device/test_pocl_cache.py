@@ -9,7 +9,7 @@ import numpy as np
 import pyopencl
 import pytest
 
-from clrt.device.pocl_cache import remove_damaged
+from clrt.device.pocl.kernel_cache import remove_damaged
 from clrt.output.images import read_image
 
 from .test_shared_cache import RENDER, SCENE, surroundings

@@ -1,4 +1,4 @@
-"""Programs from files: what is included, what is built, and that no cache, however broken, is in the way."""
+"""Programs from files: what is included, what is built, and that no cache_files, however broken, is in the way."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ import pytest
 import clrt
 from clrt.accel import refit
 from clrt.accel.device_builder import SHAPES, program_source
-from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS, HitTests
-from clrt.check import probe
+from clrt.accel.traversal_kernels import BOX_TESTS, SPHERE_TESTS, TRIANGLE_TESTS, HitTests
+from clrt.bench.numerics.bsdf_cases import variants
+from clrt.check import kernel_calls
 from clrt.debug.record import vertex_preamble
-from clrt.device import cache
-from clrt.device.loops import turns_source
+from clrt.device.launches.driver_loop_limits import turns_source
 from clrt.device.open import Device
-from clrt.device.program import BuiltProgram, build, compose, files_of, make_kernel
+from clrt.device.programs import cache_files
+from clrt.device.programs.program import BuiltProgram, build, compose, files_of, make_kernel
 from clrt.errors import KernelError
+from clrt.rendering.accumulation.first_hits import first_hit_program
 from clrt.rendering.aovs import AOVS
-from clrt.rendering.choices import OFFSETS, Choices
-from clrt.rendering.compile import compile_scene
-from clrt.rendering.first_hits import first_hit_program
-from clrt.scene import instancing
-from clrt.scene.materials import MATERIALS
+from clrt.rendering.compile.choices import OFFSETS, Choices
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.geometry import instancing
+from clrt.scene.materials.material_types import MATERIALS
 from clrt.scene.model import Environment, Filter, Sampler
-from clrt.study.bsdfs import variants
 
 from ..covering import others
 from ..rendering.lamps import lamps
@@ -109,8 +109,8 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
     for layout in refit.RECIPES:
         used |= set(files_of(refit.program_source(layout)))
     used |= set(files_of(turns_source()))
-    for file in probe.FILES:
-        used |= set(files_of(probe.source(file, device.lanes)))
+    for file in kernel_calls.FILES:
+        used |= set(files_of(kernel_calls.source(file, device.lanes)))
     for entry in ("check/turns.cl", "fma.cl"):
         used |= set(files_of(compose("", entry, {})))
     for shape in SHAPES.values():
@@ -156,7 +156,7 @@ def test_programs_build_without_a_warning(device: Device, entry: str, capfd: pyt
                "debug.cl": compiled.source_of("debug.cl", vertex_preamble())}
     monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path))
     build(device, f"{sources[entry]}\n// its own text, so that no cache has it")
-    log = cache.kept_logs()["build"]
+    log = cache_files.kept_logs()["build"]
     assert "\nbuilt in " in log and not re.findall(r".*\.cl:\d+:\d+: warning.*", log)
     assert "warning" not in capfd.readouterr().err
 
@@ -179,7 +179,7 @@ def test_a_program_is_built_whatever_the_cache_holds(device: Device, state: str,
     content = stored[0].read_bytes()
     device.shared.programs.clear()
     if state == "absent":
-        cache.clear()
+        cache_files.clear()
     elif state == "corrupt":
         stored[0].write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
     elif state == "truncated":
@@ -193,7 +193,7 @@ def test_a_program_is_built_whatever_the_cache_holds(device: Device, state: str,
         stored[0].unlink()
         stored[0].mkdir()
     elif state == "not a binary":
-        cache.write_binary(stored[0].stem, b"of another driver")
+        cache_files.write_binary(stored[0].stem, b"of another driver")
     built = build(device, source)
     assert built.cached == (state == "stored")
     if state == "not a binary":
@@ -213,9 +213,9 @@ def run_twice(device: Device, built: BuiltProgram) -> list[float]:
 
 def test_a_binary_comes_back_only_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path))
-    cache.write_binary("key", b"binary")
-    assert cache.read_binary("key") == b"binary" and cache.read_binary("other") is None
-    assert cache.clear() == 1 and cache.read_binary("key") is None
+    cache_files.write_binary("key", b"binary")
+    assert cache_files.read_binary("key") == b"binary" and cache_files.read_binary("other") is None
+    assert cache_files.clear() == 1 and cache_files.read_binary("key") is None
     assert not list(tmp_path.iterdir())
 
 

@@ -15,8 +15,8 @@ pytestmark = pytest.mark.needs("gcc")
 #: Keeps a speed for devices by their names, and prints what there is then.
 MEASURED = """
 import clrt, json, sys
-from clrt.device.discover import find_devices
-from clrt.device.speeds import Speed, keep_speed
+from clrt.device.discovery.discover import find_devices
+from clrt.device.discovery.measured_speeds import Speed, keep_speed
 speeds = json.loads(sys.argv[1])
 for info, _ in find_devices():
     if info.name in speeds:

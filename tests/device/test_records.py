@@ -9,12 +9,12 @@ import pyopencl as cl
 import pytest
 
 from clrt.accel import cwbvh, layouts, triangle_forms
+from clrt.bench.numerics.bsdf_cases import variants
 from clrt.device.open import Device
-from clrt.device.program import build, make_kernel
-from clrt.device.records import c_typedef, record
-from clrt.rendering import records
-from clrt.scene.materials import MATERIALS
-from clrt.study.bsdfs import variants
+from clrt.device.programs.program import build, make_kernel
+from clrt.device.programs.struct_types import c_typedef, record
+from clrt.rendering.compile import records
+from clrt.scene.materials.material_types import MATERIALS
 
 RECORDS: dict[str, np.dtype[Any]] = {
     f"{module.__name__.rsplit('.', 1)[1]}_{name}": value for module in (records, layouts, cwbvh, triangle_forms)

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clrt.device import background, cache
-from clrt.device.environment import ROOM
+from clrt.device.discovery.driver_caches import ROOM
+from clrt.device.programs import background_compile, cache_files as cache
 from clrt.errors import KernelError
 from clrt.output.images import read_image
 
@@ -69,7 +69,7 @@ def test_whatever_the_home_is(tmp_path: Path, home: str) -> None:
 @pytest.mark.parametrize("missing", [0, 1])
 def test_a_folder_without_room_is_not_taken(tmp_path: Path, missing: int) -> None:
     """As on a full disk, or beyond a quota."""
-    code = f"from clrt.device.environment import _writable; print(_writable({str(tmp_path)!r}))"
+    code = f"from clrt.device.discovery.driver_caches import _writable; print(_writable({str(tmp_path)!r}))"
     places = surroundings(TMPDIR=str(tmp_path), HOME=str(tmp_path))
     most = ROOM - missing
     done = subprocess.run([sys.executable, "-c", code], env=places, capture_output=True, text=True,
@@ -78,20 +78,20 @@ def test_a_folder_without_room_is_not_taken(tmp_path: Path, missing: int) -> Non
 
 
 def test_a_compiler_that_hangs_is_given_up(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
-    monkeypatch.setattr(background, "SLOW", 0.1)
-    monkeypatch.setattr(background, "LIMIT", 0.4)
+    monkeypatch.setattr(background_compile, "SLOW", 0.1)
+    monkeypatch.setattr(background_compile, "LIMIT", 0.4)
     comes_back, start = threading.Event(), time.monotonic()
     with pytest.raises(KernelError, match="Fake GPU has been compiling a kernel for 0.4 s"):
-        background.in_background("Fake GPU", comes_back.wait)
+        background_compile.in_background("Fake GPU", comes_back.wait)
     assert 0.4 <= time.monotonic() - start < 100
     assert "Fake GPU has been compiling a kernel for 0.1 s" in caplog.text
     comes_back.set()
 
 
 def test_what_a_compiler_gives_or_raises_comes_through() -> None:
-    assert background.in_background("Fake GPU", lambda: 7) == 7
+    assert background_compile.in_background("Fake GPU", lambda: 7) == 7
     with pytest.raises(ZeroDivisionError):
-        background.in_background("Fake GPU", lambda: 1 // 0)
+        background_compile.in_background("Fake GPU", lambda: 1 // 0)
 
 
 def test_what_cannot_be_kept_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from clrt.device import speeds
-from clrt.device.describe import DeviceInfo
-from clrt.device.discover import find_devices
-from clrt.device.speeds import Speed, keep_speed, kept_speed
+from clrt.device.discovery import measured_speeds
+from clrt.device.discovery.device_info import DeviceInfo
+from clrt.device.discovery.discover import find_devices
+from clrt.device.discovery.measured_speeds import Speed, keep_speed, kept_speed
 
 from .fake_drivers import make_driver, run
 
@@ -30,7 +30,7 @@ def test_a_speed_comes_back(info: DeviceInfo, monkeypatch: pytest.MonkeyPatch) -
     assert kept_speed(info) is None and keep_speed(info, SPEED)
     assert kept_speed(info) == SPEED and SPEED.mrays == pytest.approx(15)
     assert kept_speed(replace(info, driver="2")) is None
-    monkeypatch.setattr(speeds, "kernel_digest", lambda: "another")
+    monkeypatch.setattr(measured_speeds, "kernel_digest", lambda: "another")
     assert kept_speed(info) is None
 
 

@@ -10,12 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from clrt.device import cache, discover, verdicts
-from clrt.device.describe import DeviceInfo
-from clrt.device.discover import as_dict, choose, find_devices
-from clrt.device.sources import kernel_digest
-from clrt.device.speeds import Speed
-from clrt.device.verdicts import Verdict, forget_verdicts, keep_verdict, kept_verdict
+from clrt.device.discovery import discover, check_results
+from clrt.device.discovery.check_results import Verdict, forget_verdicts, keep_verdict, kept_verdict
+from clrt.device.discovery.device_info import DeviceInfo
+from clrt.device.discovery.discover import as_dict, choose, find_devices
+from clrt.device.discovery.measured_speeds import Speed
+from clrt.device.programs import cache_files
+from clrt.device.programs.kernel_files import kernel_digest
 from clrt.errors import DeviceError
 
 PASSED = Verdict(True, [], "2026-11-21T20:00:00+00:00", 9.5, kernel_digest(), {"sqrt, ulp": 0.5, "denormals": "kept"})
@@ -62,7 +63,7 @@ def test_another_driver_is_not_checked(info: DeviceInfo) -> None:
 @pytest.mark.parametrize("changed", ["kernel_digest", "version"])
 def test_other_kernels_are_not_checked(info: DeviceInfo, changed: str, monkeypatch: pytest.MonkeyPatch) -> None:
     keep_verdict(info, FAILED)
-    monkeypatch.setattr(verdicts, changed, lambda *_: "another")
+    monkeypatch.setattr(check_results, changed, lambda *_: "another")
     assert kept_verdict(info) is None
 
 
@@ -88,9 +89,9 @@ def test_a_folder_that_cannot_be_used(info: DeviceInfo, folder: Path, monkeypatc
     monkeypatch.setenv("CLRT_CACHE_DIR", str(folder / "file"))
     assert not keep_verdict(info, FAILED) and kept_verdict(info) is None and forget_verdicts() == 0
     monkeypatch.setenv("CLRT_CACHE_DIR", str(folder))
-    (folder / f"{info.id}.{verdicts.KIND}").mkdir()
+    (folder / f"{info.id}.{check_results.KIND}").mkdir()
     assert not keep_verdict(info, FAILED) and kept_verdict(info) is None
-    assert forget_verdicts() == 0 and cache.clear() == 0
+    assert forget_verdicts() == 0 and cache_files.clear() == 0
 
 
 def test_a_device_that_failed_is_used_only_if_named(info: DeviceInfo, caplog: pytest.LogCaptureFixture) -> None:

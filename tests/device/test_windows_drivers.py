@@ -10,10 +10,10 @@ from pathlib import Path
 import pyopencl as cl
 import pytest
 
-from clrt.device import loader
-from clrt.device.drivers import Driver
-from clrt.device.install_advice import no_device
-from clrt.device.windows_drivers import installed_in, not_loaded, pip_drivers
+from clrt.device.discovery import loader
+from clrt.device.discovery.drivers import Driver
+from clrt.device.discovery.install_advice import no_device
+from clrt.device.discovery.windows_drivers import installed_in, not_loaded, pip_drivers
 
 
 def test_the_loader_that_the_wheel_bundles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

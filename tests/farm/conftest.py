@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 
 from clrt.farm.cluster import Cluster, connect
-from clrt.farm.processes import Processes
+from clrt.farm.local_processes import Processes
 
 
 @pytest.fixture

@@ -6,12 +6,12 @@ import os
 from typing import Any
 
 from clrt.errors import DeviceError
-from clrt.farm import remote
-from clrt.rendering.worker import Share, Worker
+from clrt.farm import worker_tasks
+from clrt.rendering.accumulation.device_worker import Share, Worker
 
-if not hasattr(remote, "right"):    # Dask loads this more than once
-    setattr(remote, "right", (remote.identity, remote.render_share, Worker.ended))
-_identity, _share, _ended = getattr(remote, "right")
+if not hasattr(worker_tasks, "right"):    # Dask loads this more than once
+    setattr(worker_tasks, "right", (worker_tasks.identity, worker_tasks.render_share, Worker.ended))
+_identity, _share, _ended = getattr(worker_tasks, "right")
 _first: list[Worker] = []
 
 
@@ -45,10 +45,10 @@ def ended_of_a_lost_device(self: Worker) -> Share | None:
 
 match os.environ.get("CLRT_TEST_FAULT"):
     case "version":
-        setattr(remote, "identity", another_version)
+        setattr(worker_tasks, "identity", another_version)
     case "nan":
-        setattr(remote, "render_share", share_of_nans)
+        setattr(worker_tasks, "render_share", share_of_nans)
     case "crash":
-        setattr(remote, "render_share", share_that_crashes)
+        setattr(worker_tasks, "render_share", share_that_crashes)
     case "lost":
         setattr(Worker, "ended", ended_of_a_lost_device)

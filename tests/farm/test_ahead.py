@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clrt.farm.ahead import Ahead
-from clrt.rendering.tiles import TILE_PIXELS
-from clrt.rendering.work import Part, Work
+from clrt.farm.next_pass import Ahead
+from clrt.rendering.accumulation.work_queue import Part, Work
+from clrt.rendering.film.tiles import TILE_PIXELS
 
 PIXEL = np.dtype([("count", np.int64)])
 TILES = (4, 9)

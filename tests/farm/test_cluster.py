@@ -12,8 +12,8 @@ import dask
 import pytest
 
 from clrt.farm.cluster import Cluster, connect
-from clrt.farm.processes import Processes
-from clrt.farm.remote import as_it_is
+from clrt.farm.local_processes import Processes
+from clrt.farm.worker_tasks import as_it_is
 
 
 @pytest.fixture

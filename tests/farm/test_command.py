@@ -13,7 +13,7 @@ import pytest
 import clrt
 from clrt.errors import DeviceError, UsageError
 from clrt.farm.cluster import connect, local_cluster
-from clrt.farm.renderer import FarmRenderer
+from clrt.farm.farm_renderer import FarmRenderer
 from clrt.output.images import read_image
 
 from ..rendering.checkpoints import run

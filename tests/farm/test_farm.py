@@ -16,16 +16,16 @@ import numpy as np
 import pytest
 
 import clrt
+from clrt.device.discovery.check_results import Verdict, keep_verdict
 from clrt.device.open import Device
-from clrt.device.sources import kernel_digest
-from clrt.device.verdicts import Verdict, keep_verdict
+from clrt.device.programs.kernel_files import kernel_digest
 from clrt.errors import DeviceError
 from clrt.farm import dispatch
-from clrt.farm.bands import Banded
+from clrt.farm.banded_picture import Banded
 from clrt.farm.cluster import Cluster, connect
+from clrt.farm.farm_renderer import FarmRenderer
+from clrt.farm.local_processes import Processes
 from clrt.farm.orders import PictureOrder
-from clrt.farm.processes import Processes
-from clrt.farm.renderer import FarmRenderer
 from clrt.farm.whole_pictures import WholePictures
 from clrt.output.images import read_image
 from clrt.rendering.renderer import Renderer
@@ -50,9 +50,9 @@ def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
 @pytest.fixture
 def small_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
     """So that a pass is many of them."""
-    monkeypatch.setattr("clrt.farm.picture.TASK_SECONDS", 0.02)
-    monkeypatch.setattr("clrt.farm.picture.FIRST_SAMPLES", 1 << 12)
-    monkeypatch.setattr("clrt.farm.picture.FEWEST_TILES", 5)
+    monkeypatch.setattr("clrt.farm.farm_picture.TASK_SECONDS", 0.02)
+    monkeypatch.setattr("clrt.farm.farm_picture.FIRST_SAMPLES", 1 << 12)
+    monkeypatch.setattr("clrt.farm.farm_picture.FEWEST_TILES", 5)
 
 
 def alone(scene: Scene, **options: Any) -> Renderer:

@@ -17,14 +17,14 @@ import pytest
 from clrt.cli.goal import Goal
 from clrt.cli.progress import PlainProgress
 from clrt.errors import UsageError
-from clrt.farm import remote
-from clrt.farm.asking import ask
-from clrt.farm.bands import Banded
+from clrt.farm import worker_tasks
+from clrt.farm.banded_picture import Banded
 from clrt.farm.cluster import Cluster
+from clrt.farm.farm_renderer import FarmRenderer
+from clrt.farm.local_processes import Processes
 from clrt.farm.orders import PictureOrder
-from clrt.farm.processes import Processes
-from clrt.farm.remote import Answer
-from clrt.farm.renderer import FarmRenderer
+from clrt.farm.worker_request import ask
+from clrt.farm.worker_tasks import Answer
 from clrt.scene.model import Camera
 
 from ..rendering.checkpoints import run
@@ -46,8 +46,8 @@ def sleeper(cluster: Cluster, seed: int, speed: float = 1e7) -> FarmRenderer:
 
 def test_a_scene_that_was_forgotten(cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
     """A worker keeps two; it is given the first anew, and none of its tasks counts as failed."""
-    monkeypatch.setattr("clrt.farm.picture.FIRST_SAMPLES", 1 << 12)
-    first, *others = [sleeper(cluster, seed) for seed in range(1 + remote.MOST_KEPT)]
+    monkeypatch.setattr("clrt.farm.farm_picture.FIRST_SAMPLES", 1 << 12)
+    first, *others = [sleeper(cluster, seed) for seed in range(1 + worker_tasks.MOST_KEPT)]
     assert run(first, spp=64).film.samples == 64 * SIZE[0] * SIZE[1] and first.session.dispatch.former
     assert others[0].session.guides() == {}, "it was forgotten in its turn"
 

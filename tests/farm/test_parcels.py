@@ -14,10 +14,10 @@ import pytest
 
 import clrt
 from clrt.errors import SceneError
-from clrt.farm.parcels import LARGE, pack, unpack
-from clrt.rendering.identity import scene_hash
+from clrt.farm.serialization import LARGE, pack, unpack
+from clrt.rendering.checkpoint.identity import scene_hash
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Instance, Mesh, Scene
-from clrt.scene.textures import Picture, Texture
 
 SCENES = Path(__file__).parents[2] / "scenes"
 

@@ -13,7 +13,7 @@ import pytest
 from clrt.errors import DeviceError
 from clrt.farm import cluster
 from clrt.farm.cluster import connect
-from clrt.farm.processes import Processes
+from clrt.farm.local_processes import Processes
 from clrt.threads import Event, beside
 
 #: Seconds to answer in.

@@ -21,9 +21,9 @@ from clrt.live.picks import Picks, Thing
 from clrt.live.settings import Settings
 from clrt.live.snapshot import Snapshot
 from clrt.scene.editing import with_material
-from clrt.scene.instancing import FEW_TRIANGLES
+from clrt.scene.geometry.instancing import FEW_TRIANGLES
 from clrt.scene.lights import PointLight
-from clrt.scene.materials import Diffuse, Mirror
+from clrt.scene.materials.material_types import Diffuse, Mirror
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
 
 from ..rendering.pictures import quad

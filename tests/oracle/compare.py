@@ -13,14 +13,14 @@ from unittest.mock import patch
 
 import numpy as np
 
+from clrt.bench.numerics.kernel_probe import choices
+from clrt.bench.renderers.agreement import block_means
+from clrt.bench.significance import FAMILY, corrected, t_test
 from clrt.device.open import Device
-from clrt.rendering.compile import compile_scene
-from clrt.rendering.session import Session
-from clrt.scene import instancing
+from clrt.rendering.accumulation.single_device import Session
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.geometry import instancing
 from clrt.scene.model import Scene
-from clrt.study.agreement import block_means
-from clrt.study.probe import choices
-from clrt.study.significance import FAMILY, corrected, t_test
 
 from .paths import Paths
 from .scenes import SIZE

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clrt.scene.material import Material
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials.material import Material
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Scene
 
 from .corners import Corners

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from clrt.scene.material import Material
+from clrt.scene.materials.material import Material
 from clrt.scene.model import Scene
 
 from .camera import camera_rays

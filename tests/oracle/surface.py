@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from clrt.scene.material import Material
-from clrt.scene.textures import Texture
+from clrt.scene.materials.material import Material
+from clrt.scene.materials.textures import Texture
 
 from .geometry import Geometry, Hits
 from .textures import color_at, number_at

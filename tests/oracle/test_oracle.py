@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.kernel_probe import choices
 from clrt.device.open import Device
-from clrt.rendering.compile import compile_scene
-from clrt.scene.material import Material
-from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, MetallicRoughness
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.materials.material import Material
+from clrt.scene.materials.material_types import MATERIALS, Dielectric, Diffuse, MetallicRoughness
 from clrt.scene.model import Camera, Mesh, RenderSettings, Scene, Sphere
-from clrt.scene.validate import scene_problems
-from clrt.study.probe import choices
+from clrt.scene.validation.validate import scene_problems
 
 from .compare import ROUNDS, verdict
 from .draws import DRAWERS, Draws, random_material

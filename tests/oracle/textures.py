@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.scene.textures import Texture
+from clrt.scene.materials.textures import Texture
 
 from .vectors import Doubles, Whole
 

@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.errors import SceneError, UsageError
-from clrt.output.compare import compare, compare_files, relmse
 from clrt.output.image import Image
+from clrt.output.image_error import compare, compare_files, relmse
 from clrt.output.images import read_image, write_image
 
 needs_flip = pytest.mark.needs("flip_evaluator")

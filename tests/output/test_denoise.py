@@ -15,10 +15,10 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
-from clrt.output.compare import relmse
 from clrt.output.denoise import Denoiser, raw_path
+from clrt.output.image_error import relmse
 from clrt.output.images import read_image
-from clrt.rendering.guides import render_guides
+from clrt.rendering.accumulation.denoiser_guides import render_guides
 from clrt.scene.model import RenderSettings
 
 from ..rendering.test_variants import everything

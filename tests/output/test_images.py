@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from clrt.errors import OutputError, UsageError
 from clrt.output.images import RGBE_MAX, check_writable, read_image, rgbe_rounded, write_image
-from clrt.output.rows import write_rows
-from clrt.output.view import to_display
+from clrt.output.row_writer import write_rows
+from clrt.output.view_transform import to_display
 
 FloatArray = NDArray[np.float32]
 

@@ -15,9 +15,9 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
+from clrt.output.aov_files import CHANNELS, drawn
 from clrt.output.images import read_image, write_image
-from clrt.output.layers import CHANNELS, drawn
-from clrt.output.view import to_display
+from clrt.output.view_transform import to_display
 from clrt.rendering.aovs import AOVS
 
 SCENE = """

@@ -12,9 +12,9 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.errors import OutputError
+from clrt.formats.images.image_reader import linear_from_srgb
+from clrt.output.error_plots import check_plot, plot_errors, plot_history
 from clrt.output.images import read_image
-from clrt.output.plots import check_plot, plot_errors, plot_history
-from clrt.scene.pictures import linear_from_srgb
 
 #: The first and second colour of matplotlib's cycle.
 BLUE, ORANGE = (0x1f, 0x77, 0xb4), (0xff, 0x7f, 0x0e)

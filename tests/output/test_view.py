@@ -11,9 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.errors import UsageError
+from clrt.formats.images.image_reader import linear_from_srgb
 from clrt.output.ocio import ACES, ocio_view
-from clrt.output.view import VIEWS, to_display, view_called
-from clrt.scene.pictures import linear_from_srgb
+from clrt.output.view_transform import VIEWS, to_display, view_called
 
 
 #: Views in which grey is not quite: the rows of their matrices add up to 1 in the fourth place.

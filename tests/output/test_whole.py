@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from clrt.errors import OutputError
 from clrt.output.images import EXTENSIONS, read_image, write_image
-from clrt.output.rows import BLOCK_ROWS, write_rows
+from clrt.output.row_writer import BLOCK_ROWS, write_rows
+from clrt.output.truncation import check_whole
 from clrt.output.video import VIDEOS, write_video
-from clrt.output.whole import check_whole
 
 if sys.platform == "win32":
     pytest.skip("there are no limits of a file's size", allow_module_level=True)

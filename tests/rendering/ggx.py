@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from clrt.scene.materials import MetallicRoughness
-from clrt.scene.presets import F0_PRESETS
-from clrt.scene.textures import untextured
+from clrt.scene.materials.material_types import MetallicRoughness
+from clrt.scene.materials.presets import F0_PRESETS
+from clrt.scene.materials.textures import untextured
 
 Doubles = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.scene.lights import DirectionalLight, Light, PointLight
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Environment, Mesh, Scene, Sphere
 
 Doubles = NDArray[np.float64]

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.scene.microfacets import albedos, shadowing
+from clrt.scene.materials.microfacets import albedos, shadowing
 
 from . import sheen
 

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from clrt.bench.numerics.kernel_probe import choices
+from clrt.bench.significance import mean_test
 from clrt.device.open import Device
-from clrt.rendering.compile import compile_scene
-from clrt.rendering.film import Film
-from clrt.rendering.session import Session
+from clrt.rendering.accumulation.single_device import Session
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.rendering.film.film import Film
+from clrt.scene.materials.material_types import Material
 from clrt.scene.model import Camera, Mesh, Sampler, Scene
-from clrt.scene.materials import Material
-from clrt.study.significance import mean_test
-from clrt.study.probe import choices
 
 
 Doubles = NDArray[np.float64]

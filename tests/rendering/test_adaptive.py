@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.device.open import Device
-from clrt.output.compare import relmse
-from clrt.rendering.adaptive import FLOOR_SPP, worth_doubling
+from clrt.formats.load_scene import load
+from clrt.output.image_error import relmse
+from clrt.rendering.error_estimate.adaptive_sampling import FLOOR_SPP, worth_doubling
+from clrt.rendering.film.tiles import TILE, over_pixels, tile_pixels, tile_sums, tiles_of
 from clrt.rendering.renderer import Renderer, State
-from clrt.rendering.tiles import TILE, over_pixels, tile_pixels, tile_sums, tiles_of
-from clrt.scene.file import load
 from clrt.scene.model import Scene
 
 from .test_noise import outdoors, room
@@ -103,8 +103,8 @@ def test_interrupted_and_cut_it_is_the_same_picture(device: Device, monkeypatch:
     """Bit for bit, by however many calls it got there, and stopped inside a pass."""
     at_once = end(renderer(device, room()), spp=64).film.pixels
     running = renderer(device, room())
-    monkeypatch.setattr("clrt.rendering.session.FEWEST_TILES", 4)
-    monkeypatch.setattr("clrt.device.launch.TARGET_SECONDS", 1e-9)
+    monkeypatch.setattr("clrt.rendering.accumulation.single_device.FEWEST_TILES", 4)
+    monkeypatch.setattr("clrt.device.launches.launch.TARGET_SECONDS", 1e-9)
     stops = 0
     while (state := end(running, spp=64, time=running.seconds + 1e-6)) and running.stop_reason == "time":
         stops += 1

@@ -14,13 +14,13 @@ import pytest
 
 import clrt
 from clrt.device.open import Device
-from clrt.device.program import build, compile_ahead
+from clrt.device.programs.program import build, compile_ahead
 from clrt.errors import UsageError
 from clrt.output.images import read_image
-from clrt.rendering import ahead
-from clrt.rendering.ahead import outline
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
+from clrt.rendering.compile import compile_ahead as ahead
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_ahead import outline
+from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.threads import beside
 
 SCENES = Path(__file__).parents[2] / "scenes"

@@ -10,16 +10,16 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
-from clrt.device.program import files_of
+from clrt.device.programs.program import files_of
 from clrt.errors import CheckpointError, UsageError
+from clrt.rendering.accumulation.first_hits import first_hit_program
 from clrt.rendering.aovs import AOVS, chosen_aovs
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
-from clrt.rendering.first_hits import first_hit_program
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.rendering.renderer import Renderer
-from clrt.scene.materials import Dielectric, Diffuse, Mirror
+from clrt.scene.materials.material_types import Dielectric, Diffuse, Mirror
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
-from clrt.scene.textures import Picture, Texture
 
 from ..covering import others
 from .pictures import frame, quad, view_rays

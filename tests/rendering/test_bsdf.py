@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.bsdf_cases import Bsdfs, bsdfs
+from clrt.bench.numerics.jacobians import check_density
+from clrt.bench.numerics.samplers import AREA, scattering_rows
+from clrt.bench.numerics.scattering import FITTED, ROUNDING, Scattered, above, cases, reciprocity, scatter
+from clrt.bench.significance import rejected
 from clrt.device.open import Device
-from clrt.scene.materials import MATERIALS, Diffuse, Material, MetallicRoughness
-from clrt.study.bsdfs import Bsdfs, bsdfs
-from clrt.study.jacobians import check_density
-from clrt.study.samplers import AREA, scattering_rows
-from clrt.study.scattering import FITTED, ROUNDING, Scattered, above, cases, reciprocity, scatter
-from clrt.study.significance import rejected
+from clrt.scene.materials.material_types import MATERIALS, Diffuse, Material, MetallicRoughness
 
-from tests.oracle.draws import DRAWERS, Draws, random_material
-from tests.oracle.scenes import todays_seed
+from ..oracle.draws import DRAWERS, Draws, random_material
+from ..oracle.scenes import todays_seed
 
 from .ggx import cook_torrance
 

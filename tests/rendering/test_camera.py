@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.numerics.kernel_probe import choices
+from clrt.bench.significance import sidak
 from clrt.device.open import Device
-from clrt.rendering.compile import compile_scene
-from clrt.rendering.guides import render_guides
-from clrt.scene.materials import Diffuse
+from clrt.rendering.accumulation.denoiser_guides import render_guides
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, Environment, Projection, RenderSettings, Scene, Sphere
-from clrt.study.probe import choices
-from clrt.study.significance import sidak
 
 from ..covering import others
 from .pictures import film, frame, pixel_p_values, session

@@ -12,7 +12,7 @@ import pytest
 
 from clrt.device.open import Device
 from clrt.errors import ClrtError, OutputError, UsageError
-from clrt.rendering.checkpoint_file import write_checkpoint
+from clrt.rendering.checkpoint.checkpoint_file import write_checkpoint
 from clrt.rendering.renderer import Renderer
 
 from ..covering import covering
@@ -22,8 +22,8 @@ from .checkpoints import renderer, run, same
 @pytest.fixture
 def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
     """So that a pass is many of them."""
-    monkeypatch.setattr("clrt.rendering.session.FEWEST_TILES", 9)
-    monkeypatch.setattr("clrt.device.launch.TARGET_SECONDS", 1e-9)
+    monkeypatch.setattr("clrt.rendering.accumulation.single_device.FEWEST_TILES", 9)
+    monkeypatch.setattr("clrt.device.launches.launch.TARGET_SECONDS", 1e-9)
 
 
 @covering("stops, adaptive", [{"spp": 40}, {"error": 0.1}], [False, True])
@@ -68,7 +68,7 @@ def interrupt_after(running: Renderer, launches: int) -> None:
 def test_from_whatever_was_written_on_the_way(device: Device, tmp_path: Path, small_launches: None, adaptive: bool,
                                               monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where nobody asked it to stop: checkpoints from all over the render lead to the same end."""
-    monkeypatch.setattr("clrt.rendering.checkpoint.COST", 0)
+    monkeypatch.setattr("clrt.rendering.checkpoint.checkpoints.COST", 0)
     path: Path = tmp_path / "a.ck"
     written = []
 
@@ -76,7 +76,7 @@ def test_from_whatever_was_written_on_the_way(device: Device, tmp_path: Path, sm
         write_checkpoint(to, *content, **how)
         written.append(to.read_bytes())
 
-    monkeypatch.setattr("clrt.rendering.checkpoint.write_checkpoint", write)
+    monkeypatch.setattr("clrt.rendering.checkpoint.checkpoints.write_checkpoint", write)
     at_once = renderer(device, adaptive=adaptive, checkpoint=path)
     run(at_once, spp=24)
     checkpoints = list(written)
@@ -120,7 +120,7 @@ def test_a_link_stays_one_and_nothing_else_is_left(device: Device, tmp_path: Pat
 def test_it_costs_little(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The next one is not due before fifty times what writing the last one took."""
     now = [100.0]
-    monkeypatch.setattr("clrt.rendering.checkpoint.time.perf_counter", lambda: now[0])
+    monkeypatch.setattr("clrt.rendering.checkpoint.checkpoints.time.perf_counter", lambda: now[0])
     running = renderer(device, checkpoint=tmp_path / "a.ck", checkpoint_seconds=30.0)
     checkpoints = running._checkpoints
     assert checkpoints is not None
@@ -128,7 +128,7 @@ def test_it_costs_little(device: Device, tmp_path: Path, monkeypatch: pytest.Mon
     def slow(*content: Any, **how: Any) -> None:
         now[0] += 2.0
 
-    monkeypatch.setattr("clrt.rendering.checkpoint.write_checkpoint", slow)
+    monkeypatch.setattr("clrt.rendering.checkpoint.checkpoints.write_checkpoint", slow)
     run(running, spp=1)
     now[0] += 99.0
     assert not checkpoints.due

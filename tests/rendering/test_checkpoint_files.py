@@ -14,9 +14,9 @@ import pytest
 
 from clrt.device.open import Device
 from clrt.errors import CheckpointError
-from clrt.rendering.checkpoint_file import MAGIC, older, read_checkpoint
-from clrt.rendering.kept import KINDS
-from clrt.scene.materials import Diffuse
+from clrt.rendering.checkpoint.checkpoint_file import MAGIC, older, read_checkpoint
+from clrt.rendering.checkpoint.saved_state import KINDS
+from clrt.scene.materials.material_types import Diffuse
 
 from .checkpoints import SIZE, renderer, run, same
 from .test_noise import room
@@ -193,7 +193,7 @@ def test_other_scenes_and_kernels_are_refused(device: Device, kept: Path, monkey
             renderer(device, changed, checkpoint=kept, resume=True)
     renamed = replace(scene, name="x", meshes=[replace(mesh, name="y"), *others])
     renderer(device, renamed, checkpoint=kept, resume=True, spp=100)
-    monkeypatch.setattr("clrt.rendering.identity.kernel_digest", lambda: "0" * 64)
+    monkeypatch.setattr("clrt.rendering.checkpoint.identity.kernel_digest", lambda: "0" * 64)
     with pytest.raises(CheckpointError, match="other kernels"):
         renderer(device, checkpoint=kept, resume=True)
 

@@ -11,10 +11,10 @@ import pytest
 
 import clrt
 from clrt.device.open import Device
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
-from clrt.rendering.film import Film
-from clrt.scene.materials import Dielectric, Diffuse, Mirror
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.rendering.film.film import Film
+from clrt.scene.materials.material_types import Dielectric, Diffuse, Mirror
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 
 from .checkpoints import renderer, run, same

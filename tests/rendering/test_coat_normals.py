@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.bsdf_cases import bsdfs, uniform
+from clrt.bench.numerics.kernel_probe import Doubles
+from clrt.bench.numerics.scattering import FITTED, FLIP, above
+from clrt.bench.significance import chi2_test, mean_test, rejected
 from clrt.device.open import Device
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.materials import Dielectric, MetallicRoughness
+from clrt.scene.materials.material_types import Dielectric, MetallicRoughness
+from clrt.scene.materials.textures import Texture
 from clrt.scene.model import Environment, Scene, Sphere
-from clrt.scene.textures import Texture
-from clrt.study.bsdfs import bsdfs, uniform
-from clrt.study.probe import Doubles
-from clrt.study.scattering import FITTED, FLIP, above
-from clrt.study.significance import chi2_test, mean_test, rejected
 
 from .ggx import bump_shadowing, masking
 from .layers import Below, mean, under_coat

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.bsdf_cases import bsdfs
+from clrt.bench.numerics.kernel_probe import Doubles
+from clrt.bench.numerics.scattering import above
 from clrt.device.open import Device
-from clrt.scene.materials import Conductor
-from clrt.scene.presets import F0_PRESETS
-from clrt.scene.presets import CONDUCTORS
-from clrt.study.bsdfs import bsdfs
-from clrt.study.probe import Doubles
-from clrt.study.scattering import above
+from clrt.scene.materials.material_types import Conductor
+from clrt.scene.materials.presets import F0_PRESETS
+from clrt.scene.materials.presets import CONDUCTORS
 
 from .ggx import masking
 

@@ -9,14 +9,14 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clrt.device.launch import Launches
+from clrt.device.launches.launch import Launches
 from clrt.device.open import Device
 from clrt.errors import DeviceError, KernelError
-from clrt.rendering import on_device
-from clrt.rendering.crew import Crew
+from clrt.rendering.accumulation import scene_on_device
+from clrt.rendering.accumulation.device_worker import Worker
+from clrt.rendering.accumulation.multi_device import Crew
+from clrt.rendering.accumulation.single_device import Session
 from clrt.rendering.renderer import Renderer
-from clrt.rendering.session import Session
-from clrt.rendering.worker import Worker
 
 from .checkpoints import SIZE, renderer, run, same
 from .test_checkpoint import interrupt_after
@@ -32,9 +32,9 @@ def crew(device: Device, count: int = 2, **options: Any) -> Renderer:
 @pytest.fixture
 def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
     """So that a pass is many of them."""
-    monkeypatch.setattr("clrt.rendering.team.FEWEST_TILES", 5)
-    monkeypatch.setattr("clrt.rendering.session.FEWEST_TILES", 5)
-    monkeypatch.setattr("clrt.device.launch.TARGET_SECONDS", 1e-9)
+    monkeypatch.setattr("clrt.rendering.accumulation.device_pool.FEWEST_TILES", 5)
+    monkeypatch.setattr("clrt.rendering.accumulation.single_device.FEWEST_TILES", 5)
+    monkeypatch.setattr("clrt.device.launches.launch.TARGET_SECONDS", 1e-9)
 
 
 @pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
@@ -155,7 +155,7 @@ def test_ctrl_c_among_the_notes_of_a_launch(device: Device, small_launches: None
 def test_one_that_cannot_begin_is_left_out(device: Device, caplog: pytest.LogCaptureFixture, call: str,
                                            error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever its driver says while buffers or programs are made; alone it is an error of clrt's."""
-    make, refused = vars(on_device)[call], list[bool]()
+    make, refused = vars(scene_on_device)[call], list[bool]()
 
     def refuse(*arguments: Any) -> Any:
         if not refused:
@@ -163,7 +163,7 @@ def test_one_that_cannot_begin_is_left_out(device: Device, caplog: pytest.LogCap
             raise error
         return make(*arguments)
 
-    monkeypatch.setattr(on_device, call, refuse)
+    monkeypatch.setattr(scene_on_device, call, refuse)
     running = crew(device, 2)
     assert len(running.session.shares()) == 1 and "is left out" in caplog.text
     refused.clear()

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 import clrt
 from clrt.device.open import Device
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
-from clrt.scene import instancing
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.geometry import instancing
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.material import Culling
-from clrt.scene.materials import Dielectric, Diffuse, Material, Mirror
+from clrt.scene.materials.material import Culling
+from clrt.scene.materials.material_types import Dielectric, Diffuse, Material, Mirror
 from clrt.scene.model import Camera, Environment, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
 
 from ..covering import covering, others

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.bsdf_cases import bsdfs
+from clrt.bench.numerics.kernel_probe import Doubles
 from clrt.device.open import Device
-from clrt.scene.materials import Dielectric, Diffuse
+from clrt.scene.materials.material_types import Dielectric, Diffuse
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
-from clrt.study.bsdfs import bsdfs
-from clrt.study.probe import Doubles
 
 from .pictures import film, quad
 

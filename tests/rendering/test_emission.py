@@ -7,8 +7,8 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from clrt.rendering.emission import mean_texels
-from clrt.scene.textures import Picture, Texture, Wrap
+from clrt.rendering.compile.lights.mean_emission import mean_texels
+from clrt.scene.materials.textures import Picture, Texture, Wrap
 
 from ..oracle.textures import color_at
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.rendering.environment import pack_sky
+from clrt.rendering.compile.lights.environment_map import pack_sky
+from clrt.scene.default_sky import default_sky
 from clrt.scene.model import Environment
-from clrt.scene.sky import default_sky
 
 from . import skies
 

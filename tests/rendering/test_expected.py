@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clrt.rendering.expected import REACH, SINGLE_MOST, Doubles, expected
+from clrt.rendering.film.expected_radiance import REACH, SINGLE_MOST, Doubles, expected
 
 pytestmark = pytest.mark.statistics
 

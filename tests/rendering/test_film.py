@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
+from clrt.bench.numerics.film_sums import accumulate, stream_errors
+from clrt.bench.numerics.kernel_probe import Probe
 from clrt.device.open import Device
-from clrt.rendering.film import RELATIVE_FLOOR, Film
-from clrt.scene.materials import Diffuse
+from clrt.rendering.film.film import RELATIVE_FLOOR, Film
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
-from clrt.study.accumulation import accumulate, stream_errors
-from clrt.study.probe import Probe
 
 from ..covering import others
 from .pictures import box, film, quad

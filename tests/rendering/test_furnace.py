@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.numerics.bsdf_cases import bsdfs
+from clrt.bench.numerics.furnace import SMITHS, Reflected, evenly, inexact, measure_glass, measure_metals
+from clrt.bench.numerics.scattering import ROUNDING, above, reciprocity
 from clrt.device.open import Device
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
-from clrt.scene.file import load
-from clrt.scene.materials import Dielectric, MetallicRoughness
-from clrt.scene.metallic_roughness import Smith
+from clrt.formats.load_scene import load
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.materials.material_types import Dielectric, MetallicRoughness
+from clrt.scene.materials.metallic_roughness import Smith
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
-from clrt.scene.textures import Picture, Texture
-from clrt.study.bsdfs import bsdfs
-from clrt.study.furnace import SMITHS, Reflected, evenly, inexact, measure_glass, measure_metals
-from clrt.study.scattering import ROUNDING, above, reciprocity
 
 from . import ggx
 from .pictures import film

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.device.sources import kernel_folder
-from clrt.scene import microfacets
-from clrt.scene.metallic_roughness import Smith
-from clrt.study.albedo_tables import Table, evaluate, mean_scale
-from clrt.study.furnace import SMITHS
+from clrt.bench.numerics.albedo_tables import Table, evaluate, mean_scale
+from clrt.bench.numerics.furnace import SMITHS
+from clrt.device.programs.kernel_files import kernel_folder
+from clrt.scene.materials import microfacets
+from clrt.scene.materials.metallic_roughness import Smith
 
 from . import ggx
 

@@ -9,9 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt.device.open import Device
-from clrt.rendering import pixels
-from clrt.rendering.guides import render_guides
-from clrt.scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from clrt.rendering.accumulation import per_pixel_kernel
+from clrt.rendering.accumulation.denoiser_guides import render_guides
+from clrt.scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 
 from .pictures import film, frame, quad, session, view_rays
@@ -170,8 +170,8 @@ def test_launches_agree(device: Device, monkeypatch: pytest.MonkeyPatch) -> None
     scene = Scene(meshes=[back(Mirror()), front(Diffuse(color=RED))], camera=INSIDE,
                   render=RenderSettings(size=(60, 40)))
     whole = guides(device, scene)
-    monkeypatch.setattr(pixels, "FIRST_LAUNCH_SAMPLES", 1)
-    monkeypatch.setattr(pixels, "FEWEST_TILES", 2)
+    monkeypatch.setattr(per_pixel_kernel, "FIRST_LAUNCH_SAMPLES", 1)
+    monkeypatch.setattr(per_pixel_kernel, "FEWEST_TILES", 2)
     for name, picture in guides(device, scene).items():
         assert picture.tobytes() == whole[name].tobytes(), name
 

@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.bsdf_cases import uniform
+from clrt.bench.numerics.kernel_probe import Doubles, Probe
+from clrt.bench.numerics.scattering import FITTED
+from clrt.bench.rays.shapes import icosphere
+from clrt.bench.significance import chi2_test, mean_test, rejected
 from clrt.device.open import Device
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.material import Material
-from clrt.scene.materials import Conductor, Dielectric, Diffuse, MetallicRoughness, Mirror, Phong
+from clrt.scene.materials.material import Material
+from clrt.scene.materials.material_types import Conductor, Dielectric, Diffuse, MetallicRoughness, Mirror, Phong
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Integrator, Mesh, RenderSettings, Scene, Sphere
-from clrt.scene.textures import Picture, Texture
-from clrt.study.bsdfs import uniform
-from clrt.study.probe import Doubles, Probe
-from clrt.study.scattering import FITTED
-from clrt.study.shapes import icosphere
-from clrt.study.significance import chi2_test, mean_test, rejected
 
 from .ggx import bump_shadowing
 from .pictures import film, quad

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.rendering.host_memory import KEPT, HostMemory
-from clrt.rendering.records import PIXEL
+from clrt.rendering.compile.records import PIXEL
+from clrt.rendering.film.host_memory import KEPT, HostMemory
 
 SHAPE = (3, 5)
 #: How others look at a film: its fields, some of its rows, several fields, its bytes as a checkpoint's writer does.

@@ -13,22 +13,22 @@ import numpy as np
 import pytest
 
 import clrt
-from clrt.accel.kernels import HitTests
+from clrt.accel.traversal_kernels import HitTests
 from clrt.cli.frames import FILES, Sequence
 from clrt.cli.goal import Goal
 from clrt.cli.outputs import Outputs
 from clrt.device.open import Device
-from clrt.farm.bands import Banded
+from clrt.farm.banded_picture import Banded
 from clrt.farm.orders import PictureOrder
 from clrt.live.settings import Settings
-from clrt.rendering.choices import Choices
-from clrt.rendering.identity import ENDS, NAMES, ROUNDING, UNSEEN, differences, facts_of, scene_hash
-from clrt.rendering.options import choices_of, settings_of
-from clrt.rendering.report import render_report
+from clrt.rendering.checkpoint.identity import ENDS, NAMES, ROUNDING, UNSEEN, differences, facts_of, scene_hash
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.render_report import render_report
+from clrt.rendering.renderer_options import choices_of, settings_of
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
-from clrt.scene.materials import MATERIALS
+from clrt.scene.materials.material_types import MATERIALS
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import RenderSettings, Scene
-from clrt.scene.textures import Picture, Texture
 
 from ..covering import others
 

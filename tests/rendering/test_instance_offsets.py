@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.numerics.cases.instances import lit_plane, transforms_of_kinds
+from clrt.bench.numerics.cases.subject import Subject
+from clrt.bench.numerics.kernel_probe import Probe
 from clrt.device.open import Device
-from clrt.rendering import placements
-from clrt.scene import instancing
+from clrt.rendering.compile.geometry import pack_instances
+from clrt.scene.geometry import instancing
 from clrt.scene.model import Scene
-from clrt.study.cases.instances import lit_plane, transforms_of_kinds
-from clrt.study.cases.subject import Subject
-from clrt.study.probe import Probe
 
 from .test_instances import SETTINGS, by_hand
 
@@ -32,7 +32,7 @@ def test_planes_do_not_shadow_themselves(device: Device, monkeypatch: pytest.Mon
     scene = replace(lit_plane(transforms_of_kinds()["turned"][0]), render=replace(SETTINGS, integrator="direct"))
     assert Subject(device.info.index).picture(scene).all()
     assert not np.any(met_again(Probe(device, scene), scene))
-    monkeypatch.setattr(placements, "ROUNDINGS", 0.0)
+    monkeypatch.setattr(pack_instances, "ROUNDINGS", 0.0)
     at_the_bound = {"LEAST * largest(absolute3(p))": "ZERO"}
     assert np.any(met_again(Probe(device, scene, changes=at_the_bound), scene))
 

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.numerics.cases.instances import transforms_of_kinds
+from clrt.bench.numerics.kernel_probe import choices
+from clrt.bench.significance import mean_test
 from clrt.device.open import Device
-from clrt.rendering.compile import compile_scene
-from clrt.rendering.first_hits import first_hits
-from clrt.rendering.guides import render_guides
-from clrt.rendering.identity import facts_of
-from clrt.scene import instancing
+from clrt.rendering.accumulation.denoiser_guides import render_guides
+from clrt.rendering.accumulation.first_hits import first_hits
+from clrt.rendering.checkpoint.identity import facts_of
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.geometry import instancing
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.materials import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
-from clrt.scene.textures import Picture, Texture
-from clrt.study.cases.instances import transforms_of_kinds
-from clrt.study.probe import choices
-from clrt.study.significance import mean_test
 
 from ..covering import covering, others
 from . import rays
@@ -239,7 +239,7 @@ def test_only_what_saves_memory_becomes_instances(device: Device, monkeypatch: p
 
 def test_checkpoints_tell_instances_apart() -> None:
     """By what they show, not by how many objects say it."""
-    from clrt.rendering.choices import Choices
+    from clrt.rendering.compile.choices import Choices
 
     scene = crowd("turned")
     moved, painted = list(scene.instances), list(scene.instances)

@@ -23,7 +23,7 @@ SIZE, SPP = (40, 24), 12
 #: Places that are tried of each call, spread at random over all lines that it runs.
 PLACES = 40
 #: Of the package, where there is state between two lines; not in callbacks of the garbage collector.
-FOLDERS = tuple(str(Path(clrt.__file__).parent / name) for name in ("rendering", "query.py", "tree_query.py", "accel"))
+FOLDERS = tuple(str(Path(clrt.__file__).parent / name) for name in ("rendering", "queries", "accel"))
 
 
 def run(call: Callable[[], object], last: int = -1) -> int:
@@ -39,9 +39,9 @@ def places(lines: int) -> Iterator[int]:
 @pytest.fixture
 def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
     """So that a pass is some of them."""
-    monkeypatch.setattr("clrt.rendering.team.FEWEST_TILES", 5)
-    monkeypatch.setattr("clrt.rendering.session.FEWEST_TILES", 5)
-    monkeypatch.setattr("clrt.device.launch.TARGET_SECONDS", 1e-9)
+    monkeypatch.setattr("clrt.rendering.accumulation.device_pool.FEWEST_TILES", 5)
+    monkeypatch.setattr("clrt.rendering.accumulation.single_device.FEWEST_TILES", 5)
+    monkeypatch.setattr("clrt.device.launches.launch.TARGET_SECONDS", 1e-9)
 
 
 def renderer(device: Device, count: int, adaptive: bool) -> Renderer:

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.bsdf_cases import bsdfs
+from clrt.bench.numerics.furnace import SMITHS, evenly
+from clrt.bench.numerics.kernel_probe import Doubles
+from clrt.bench.numerics.scattering import ROUNDING, reciprocity
 from clrt.device.open import Device
-from clrt.scene.materials import MetallicRoughness
-from clrt.scene.textures import Picture, Texture
-from clrt.study.bsdfs import bsdfs
-from clrt.study.furnace import SMITHS, evenly
-from clrt.study.probe import Doubles
-from clrt.study.scattering import ROUNDING, reciprocity
+from clrt.scene.materials.material_types import MetallicRoughness
+from clrt.scene.materials.textures import Picture, Texture
 
 from ..oracle.scenes import todays_seed
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.bsdf_cases import Bsdfs, bsdfs, uniform
+from clrt.bench.numerics.kernel_probe import Doubles
+from clrt.bench.numerics.scattering import FLIP, above
 from clrt.device.open import Device
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
-from clrt.scene.materials import MetallicRoughness
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.materials.material_types import MetallicRoughness
 from clrt.scene.model import Scene, Sphere
-from clrt.study.bsdfs import Bsdfs, bsdfs, uniform
-from clrt.study.probe import Doubles
-from clrt.study.scattering import FLIP, above
 
 from . import sheen
 from .ggx import masking

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 import clrt
+from clrt.bench.numerics.bsdf_cases import variants
 from clrt.device.open import Device
 from clrt.scene.lights import DirectionalLight, Light, PointLight, SpotLight
-from clrt.scene.material import Material
-from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, MetallicRoughness
+from clrt.scene.materials.material import Material
+from clrt.scene.materials.material_types import MATERIALS, Dielectric, Diffuse, MetallicRoughness
 from clrt.scene.model import Camera, Mesh, Scene, Sphere
-from clrt.study.bsdfs import variants
 
 from .pictures import quad
 

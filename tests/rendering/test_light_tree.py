@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.numerics.cases.subject import unit_vectors
+from clrt.bench.numerics.kernel_probe import Probe, choices
+from clrt.bench.significance import chi2_test, sidak
 from clrt.device.open import Device
-from clrt.rendering.compile import compile_scene
+from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.lights import PointLight
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Mesh, Scene, Sphere
-from clrt.study.cases.subject import unit_vectors
-from clrt.study.probe import Probe, choices
-from clrt.study.significance import chi2_test, sidak
 
 from .lamps import lamps, point_lights, with_infinite
 from .test_lights import points_and_normals

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.bsdf_cases import bsdfs
+from clrt.bench.numerics.kernel_probe import Doubles
+from clrt.bench.numerics.scattering import above
+from clrt.bench.significance import sidak
 from clrt.device.open import Device
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.lights import DirectionalLight, Light, PointLight
-from clrt.scene.materials import BlinnPhong, Dielectric, Diffuse, Material, Mirror, Phong
+from clrt.scene.materials.material_types import BlinnPhong, Dielectric, Diffuse, Material, Mirror, Phong
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
-from clrt.study.bsdfs import bsdfs
-from clrt.study.probe import Doubles
-from clrt.study.scattering import above
-from clrt.study.significance import sidak
 
 from .pictures import film, pixel_means, pixel_p_values, pixel_points, quad
 

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.device import program
-from clrt.device.loops import loop_turns, measured_turns
+from clrt.device.launches.driver_loop_limits import loop_turns, measured_turns
 from clrt.device.open import Device
+from clrt.device.programs import program
 from clrt.errors import DeviceError
-from clrt.query import RayQuery
-from clrt.rendering import compile as compiling
-from clrt.rendering import loop_limit
-from clrt.rendering.first_hits import first_hits
-from clrt.rendering.guides import render_guides
+from clrt.queries.mesh import RayQuery
+from clrt.rendering.accumulation import checked_loops
+from clrt.rendering.accumulation.accumulation import Accumulation
+from clrt.rendering.accumulation.denoiser_guides import render_guides
+from clrt.rendering.accumulation.first_hits import first_hits
+from clrt.rendering.accumulation.work_queue import Part, Work
+from clrt.rendering.compile import compile_scene as compiling
 from clrt.rendering.renderer import Renderer
-from clrt.rendering.accumulation import Accumulation
-from clrt.rendering.work import Part, Work
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, Mesh, Scene
 
 from ..check.sabotage import sabotaged
@@ -56,7 +56,7 @@ def picture(device: Device, depth: int = 6, rows: int = 3, spp: int = SPP) -> ND
 
 def limit(patch: pytest.MonkeyPatch, turns: int) -> None:
     """Has the renderer believe that the device's driver ends loops after so many turns."""
-    for module in (compiling, loop_limit):
+    for module in (compiling, checked_loops):
         patch.setattr(module, "loop_turns", lambda device: turns)
 
 

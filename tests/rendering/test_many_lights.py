@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.significance import mean_test, sidak
 from clrt.device.open import Device
 from clrt.scene.lights import PointLight
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, RenderSettings, Scene
-from clrt.study.probe import Probe
-from clrt.study.significance import mean_test, sidak
 
 from .lamps import lamps, with_infinite
 from .pictures import film, quad

@@ -8,11 +8,11 @@ from typing import Any, get_args, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.rendering.materials import Tables, pack_materials
-from clrt.rendering.textures import Textures
-from clrt.scene.materials import MATERIALS, Material
-from clrt.scene.textures import Picture, Texture
-from clrt.study.bsdfs import variants
+from clrt.bench.numerics.bsdf_cases import variants
+from clrt.rendering.compile.materials.pack_materials import Tables, pack_materials
+from clrt.rendering.compile.materials.pack_textures import Textures
+from clrt.scene.materials.material_types import MATERIALS, Material
+from clrt.scene.materials.textures import Picture, Texture
 
 from ..covering import covering
 

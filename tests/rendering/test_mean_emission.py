@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from clrt.rendering.emission import mean_texels
-from clrt.scene.textures import Picture, Texture, Wrap
+from clrt.rendering.compile.lights.mean_emission import mean_texels
+from clrt.scene.materials.textures import Picture, Texture, Wrap
 
 WRAPS: tuple[Wrap, ...] = ("repeat", "mirror", "clamp")
 

@@ -10,12 +10,12 @@ from scipy.stats import binomtest
 
 from clrt.device.open import Device
 from clrt.errors import UsageError
-from clrt.rendering.film import RELATIVE_FLOOR, Film
-from clrt.rendering.noise import NoiseEstimate
-from clrt.rendering.records import PIXEL
+from clrt.rendering.compile.records import PIXEL
+from clrt.rendering.error_estimate.error_estimate import NoiseEstimate
+from clrt.rendering.film.film import RELATIVE_FLOOR, Film
+from clrt.rendering.film.tiles import tile_sums
 from clrt.rendering.renderer import Renderer
-from clrt.rendering.tiles import tile_sums
-from clrt.scene.materials import Diffuse, MetallicRoughness
+from clrt.scene.materials.material_types import Diffuse, MetallicRoughness
 from clrt.scene.model import Camera, Environment, RenderSettings, Sampler, Scene, Sphere
 
 from .pictures import box, quad

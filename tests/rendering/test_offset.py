@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.numerics.kernel_probe import Probe
 from clrt.device.open import Device
 from clrt.scene.model import Mesh, Scene, Sphere
-from clrt.study.probe import Probe
 
 from ..covering import covering
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.significance import chi2_test
 from clrt.device.open import Device
 from clrt.rendering.renderer import Renderer
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.materials import Diffuse, Material, Mirror
+from clrt.scene.materials.material_types import Diffuse, Material, Mirror
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Mesh, RenderSettings, Scene, Sphere
-from clrt.scene.textures import Picture, Texture
-from clrt.study.significance import chi2_test
 
 pytestmark = pytest.mark.statistics
 

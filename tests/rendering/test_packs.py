@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.accel.kernels import TREES
+from clrt.accel.traversal_kernels import TREES
+from clrt.bench.numerics.kernel_probe import Probe
 from clrt.device.open import Device
 from clrt.scene.model import Scene
-from clrt.study.probe import Probe
 
 from ..accel.cases import box
 from ..covering import others

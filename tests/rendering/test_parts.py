@@ -9,14 +9,14 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clrt.device.memory import OVERLAP, VARIABLE, largest_buffer, part_count, part_records, parts
+from clrt.device.launches.memory_plan import OVERLAP, VARIABLE, largest_buffer, part_count, part_records, parts
 from clrt.device.open import Device
 from clrt.errors import NoRoomError, UsageError
-from clrt.rendering.guides import render_guides
-from clrt.rendering.crew import Crew
+from clrt.rendering.accumulation.denoiser_guides import render_guides
+from clrt.rendering.accumulation.multi_device import Crew
+from clrt.rendering.accumulation.single_device import Session
 from clrt.rendering.renderer import Renderer
-from clrt.rendering.session import Session
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Mesh, Scene, Sphere
 
 from ..covering import others
@@ -147,7 +147,7 @@ def test_where_there_is_no_room_windows_are_halved(device: Device, monkeypatch: 
         return make(context, flags, size, hostbuf)
 
     monkeypatch.setattr(cl, "Buffer", stingy)
-    monkeypatch.setattr("clrt.rendering.worker.FEWEST_TILES", 4)
+    monkeypatch.setattr("clrt.rendering.accumulation.device_worker.FEWEST_TILES", 4)
     running = Renderer(scene(), device=device.info.index, layout="bvh8", spp=4, size=(90, 66))
     state = list(running.passes(spp=4))[-1]
     assert isinstance(running.session, Crew) and running.session.workers[0].window_tiles == 13

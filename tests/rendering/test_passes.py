@@ -11,9 +11,9 @@ import pytest
 
 from clrt.device.open import Device
 from clrt.errors import UsageError
+from clrt.rendering.film.state import State
+from clrt.rendering.render_report import render_report
 from clrt.rendering.renderer import Renderer
-from clrt.rendering.report import render_report
-from clrt.rendering.state import State
 from clrt.scene.lights import PointLight
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clrt.rendering.past_cache import CHUNK, write_past_cache
+from clrt.rendering.checkpoint.direct_io import CHUNK, write_past_cache
 
 LENGTHS = [[], [0, 1], [CHUNK], [3, CHUNK - 3], [CHUNK + 1], [5, 0, 2 * CHUNK + 7, 100], [4096, 4096, 13]]
 #: The temporary folder's, and one in memory where there is that, whose kernels may not know such writes.

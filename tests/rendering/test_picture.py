@@ -14,8 +14,8 @@ from clrt.api import render
 from clrt.device.open import Device
 from clrt.errors import UsageError
 from clrt.output.images import read_image
-from clrt.rendering.guides import render_guides
-from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
+from clrt.rendering.accumulation.denoiser_guides import render_guides
+from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Integrator, RenderSettings, Scene, Sphere
 
 from ..covering import others

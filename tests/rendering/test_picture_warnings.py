@@ -12,7 +12,7 @@ import pytest
 import clrt
 from clrt.device.open import Device
 from clrt.scene.lights import PointLight
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, Environment, Scene, Sphere
 
 from .pictures import quad

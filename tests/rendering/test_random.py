@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.numerics.random_numbers import Draw, draw_on, independence, repetitions, uniformity
+from clrt.bench.significance import rejected
 from clrt.device.open import Device
 from clrt.scene.model import RenderSettings, Scene
-from clrt.study.probe import Probe
-from clrt.study.significance import rejected
-from clrt.study.random_numbers import Draw, draw_on, independence, repetitions, uniformity
 
 COUNT = 1 << 15
 #: Text of rng.cl and what weakens it: fewer rounds, indices that can be exchanged, that end early, or are forgotten.

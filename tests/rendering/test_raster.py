@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.rays.raster_speed import seen_both_ways
 from clrt.device.open import Device
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
-from clrt.scene.file import load
+from clrt.formats.load_scene import load
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.materials import Diffuse, Mirror
+from clrt.scene.materials.material_types import Diffuse, Mirror
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
-from clrt.study.raster import seen_both_ways
 
 from ..covering import others
 from .pictures import box, film, frame, quad, session, view_rays

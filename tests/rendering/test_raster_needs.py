@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from clrt.device.arrays import on_device
-from clrt.device.memory import VARIABLE
+from clrt.device.launches.device_arrays import on_device
+from clrt.device.launches.memory_plan import VARIABLE
 from clrt.device.open import Device
 from clrt.errors import DeviceError, NoRoomError, SceneError, UsageError
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
-from clrt.rendering.crew import Crew
-from clrt.rendering.raster import Bins
+from clrt.rendering.accumulation.multi_device import Crew
+from clrt.rendering.accumulation.raster_bins import Bins
+from clrt.rendering.accumulation.single_device import first_launch
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.rendering.renderer import Renderer
-from clrt.rendering.session import first_launch
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.materials import Dielectric, Diffuse, Mirror
+from clrt.scene.materials.material_types import Dielectric, Diffuse, Mirror
 from clrt.scene.model import Environment, Scene, Sphere
 
 from .test_raster import AHEAD, PLANTED, SETTINGS, SIZE, ball, plain

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.significance import mean_test, sidak
 from clrt.device.open import Device
 from clrt.scene.lights import DirectionalLight, PointLight
-from clrt.scene.materials import Diffuse, Material, MetallicRoughness, Mirror
-from clrt.scene.metallic_roughness import Smith
+from clrt.scene.materials.material_types import Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.materials.metallic_roughness import Smith
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
-from clrt.study.significance import mean_test, sidak
 
 from .ggx import albedo
 from .pictures import box, film, pixel_means, pixel_p_values, pixel_points, quad

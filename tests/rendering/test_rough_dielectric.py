@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.bsdf_cases import bsdfs, uniform, view
+from clrt.bench.numerics.kernel_probe import Doubles
+from clrt.bench.numerics.scattering import above
 from clrt.device.open import Device
-from clrt.rendering.choices import Choices
-from clrt.rendering.compile import compile_scene
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.lights import Light, PointLight
-from clrt.scene.materials import Dielectric, Diffuse, Material, MetallicRoughness
+from clrt.scene.materials.material_types import Dielectric, Diffuse, Material, MetallicRoughness
 from clrt.scene.model import Camera, Environment, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
-from clrt.study.bsdfs import bsdfs, uniform, view
-from clrt.study.probe import Doubles
-from clrt.study.scattering import above
 
 from .ggx import masking
 from .pictures import film, quad

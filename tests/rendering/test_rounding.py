@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clrt.device import program
+from clrt.bench.numerics.cases.devices import ROUNDING, everything
+from clrt.bench.numerics.cases.subject import Subject
 from clrt.device.open import Device
-from clrt.study.cases.devices import ROUNDING, everything
-from clrt.study.cases.subject import Subject
+from clrt.device.programs import program
 
 from ..check.sabotage import sabotaged
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from clrt.device.open import Device
-from clrt.device.sources import kernel_folder
+from clrt.device.programs.kernel_files import kernel_folder
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.materials import MetallicRoughness
+from clrt.scene.materials.material_types import MetallicRoughness
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Scene
-from clrt.scene.textures import Picture, Texture
 
 from .sheen import albedo, interpolated
 from .test_textures import quad, seen

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.significance import mean_test, sidak
 from clrt.device.open import Device
-from clrt.rendering.film import Film
-from clrt.scene.materials import Diffuse
+from clrt.rendering.film.film import Film
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, Integrator, Mesh, RenderSettings, Scene, Sphere
-from clrt.study.probe import Probe
-from clrt.study.significance import mean_test, sidak
 
 from . import rays
 from .lamps import directions

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.numerics.bsdf_cases import variants
 from clrt.device.open import Device
-from clrt.scene import instancing
-from clrt.scene.materials import MATERIALS, Diffuse, Material
+from clrt.scene.geometry import instancing
+from clrt.scene.materials.material_types import MATERIALS, Diffuse, Material
 from clrt.scene.model import Camera, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
-from clrt.study.bsdfs import variants
 
 from .lamps import directions
 from .pictures import film

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.significance import mean_test, sidak
 from clrt.device.open import Device
 from clrt.scene.lights import DirectionalLight, Light, PointLight, SpotLight
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene
-from clrt.study.probe import Probe
-from clrt.study.significance import mean_test, sidak
 
 from .lamps import directions, lamps
 from .pictures import film, pixel_means, pixel_points, quad

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.rendering.records import SKY_STEP
-from clrt.rendering.steps import LEVELS, steps
+from clrt.rendering.compile.lights.piecewise_constant import LEVELS, steps
+from clrt.rendering.compile.records import SKY_STEP
 
 RNG = np.random.default_rng(0)
 WEIGHTS = {

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.numerics.kernel_probe import Probe
+from clrt.bench.significance import mean_test, sidak
 from clrt.device.open import Device
 from clrt.scene.lights import DirectionalLight, Light
-from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
+from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, Environment, Integrator, Mesh, RenderSettings, Scene
-from clrt.study.probe import Probe
-from clrt.study.significance import mean_test, sidak
 
 from .ggx import cook_torrance
 from .pictures import film, pixel_means, pixel_points, quad

@@ -11,13 +11,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from clrt.bench.numerics.kernel_probe import Probe
 from clrt.device.open import Device
 from clrt.rendering.renderer import Renderer
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.materials import Diffuse, Material, MetallicRoughness
+from clrt.scene.materials.material_types import Diffuse, Material, MetallicRoughness
+from clrt.scene.materials.textures import Channel, Picture, Texture, Wrap
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
-from clrt.scene.textures import Channel, Picture, Texture, Wrap
-from clrt.study.probe import Probe
 
 from ..covering import covering, others
 from .ggx import bump_shadowing

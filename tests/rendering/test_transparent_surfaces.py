@@ -9,11 +9,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
-from clrt.accel.kernels import TREES
+from clrt.accel.traversal_kernels import TREES
 from clrt.device.open import Device
-from clrt.scene import instancing
+from clrt.scene.geometry import instancing
 from clrt.scene.lights import DirectionalLight
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, Instance, Integrator, Mesh, RenderSettings, Scene, Sphere
 
 from .pictures import film

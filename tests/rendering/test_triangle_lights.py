@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.kernel_probe import choices
 from clrt.device.open import Device
-from clrt.rendering.compile import compile_scene
-from clrt.scene.materials import Diffuse
+from clrt.rendering.compile.compile_scene import compile_scene
+from clrt.scene.materials.material_types import Diffuse
+from clrt.scene.materials.textures import WHITE, Texture
 from clrt.scene.model import Mesh, Scene
-from clrt.scene.textures import WHITE, Texture
-from clrt.study.probe import choices
 
 pytestmark = pytest.mark.statistics
 

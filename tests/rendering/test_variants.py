@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.accel.kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, HitTests
+from clrt.accel.traversal_kernels import BOX_TESTS, SPHERE_TESTS, TREES, TRIANGLE_TESTS, HitTests
+from clrt.bench.numerics.bsdf_cases import variants
+from clrt.bench.numerics.kernel_probe import choices
 from clrt.device.open import Device
 from clrt.errors import UsageError
-from clrt.rendering import pack as pack_module
-from clrt.rendering import session as session_module
-from clrt.rendering.choices import LANES, OFFSETS, Choices
-from clrt.rendering.compile import compile_scene
+from clrt.rendering.accumulation import single_device as session_module
+from clrt.rendering.compile import pack_scene as pack_module
+from clrt.rendering.compile.choices import LANES, OFFSETS, Choices
+from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
-from clrt.scene.materials import MATERIALS, Dielectric, Diffuse, MetallicRoughness, Mirror
+from clrt.scene.materials.material_types import MATERIALS, Dielectric, Diffuse, MetallicRoughness, Mirror
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Instance, Integrator, Mesh, RenderSettings, Sampler, Scene, Sphere
-from clrt.scene.textures import Picture, Texture
-from clrt.study.bsdfs import variants
-from clrt.study.probe import choices
 
 from ..covering import others
 from . import rays

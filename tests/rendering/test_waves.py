@@ -10,10 +10,10 @@ import pytest
 
 from clrt.device.open import Device
 from clrt.errors import UsageError
-from clrt.rendering.choices import Choices
-from clrt.rendering.film import Film
+from clrt.rendering.compile.choices import Choices
+from clrt.rendering.film.film import Film
+from clrt.rendering.film.tiles import tile_sums
 from clrt.rendering.renderer import Renderer
-from clrt.rendering.tiles import tile_sums
 from clrt.scene.model import Scene
 
 from ..covering import others

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clrt.rendering.tiles import RUN, row_by_row, scattered, tile_by_tile
-from clrt.rendering.work import Part, Work
+from clrt.rendering.accumulation.work_queue import Part, Work
+from clrt.rendering.film.tiles import RUN, row_by_row, scattered, tile_by_tile
 
 
 @pytest.mark.parametrize("seed", range(8))

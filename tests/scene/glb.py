@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.scene.gltf import read_gltf
+from clrt.formats.gltf.reader import read_gltf
 from clrt.scene.model import Model
 from .shapes import icosphere
 

@@ -11,11 +11,11 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from clrt.errors import ClrtError, SceneError, UsageError
+from clrt.formats.load_scene import load
 from clrt.scene.animation import Animation, Keyframe, frames, turntable
-from clrt.scene.curves import smooth
-from clrt.scene.file import load
 from clrt.scene.model import Camera, Scene
-from clrt.scene.validate import scene_problems
+from clrt.scene.splines import smooth
+from clrt.scene.validation.validate import scene_problems
 
 UNEVEN = np.array([0.0, 0.5, 2.0, 2.25, 5.0])
 SCENE = """

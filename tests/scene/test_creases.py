@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from clrt.errors import SceneError
-from clrt.scene.creases import MOST_AROUND, creased
-from clrt.scene.file import load
+from clrt.formats.load_scene import load
+from clrt.scene.geometry.creases import MOST_AROUND, creased
+from clrt.scene.geometry.normals import smooth_normals
 from clrt.scene.model import Mesh
-from clrt.scene.normals import smooth_normals
 from .shapes import cube, icosphere
 
 EPS = float(np.finfo(np.float32).eps)

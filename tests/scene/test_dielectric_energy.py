@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.scene import dielectric_energy as energy
-from clrt.scene.material import ALPHA_MIN
-from clrt.scene.materials import Dielectric
-from clrt.scene.microfacets import albedo
+from clrt.scene.materials import dielectric_energy as energy
+from clrt.scene.materials.material import ALPHA_MIN
+from clrt.scene.materials.material_types import Dielectric
+from clrt.scene.materials.microfacets import albedo
 
 from ..covering import others
 from .microsurface import reflected_part

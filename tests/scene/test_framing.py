@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from clrt.scene.framing import FILL, bounds, frame
+from clrt.formats.frame_model import FILL, bounds, frame
+from clrt.scene.default_sky import SUN, default_sky
 from clrt.scene.model import Mesh
-from clrt.scene.sky import SUN, default_sky
 
 BOXES = {"cube": ((-1, -1, -1), (1, 1, 1)), "tower": ((0, 0, 0), (1, 30, 1)), "plate": ((-5, 0, -5), (5, 0, 5)),
          "wall": ((-5, 0, 0), (5, 3, 0)), "line": ((2, 2, 2), (9, 2, 2)), "tiny": ((0, 0, 0), (1e-20, 2e-20, 1e-20)),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tests.fuzz import FORMATS, GOOD, case, outcome, run, seeds_in
-from tests.fuzz_seeds import write_seeds
+from ..fuzz import FORMATS, GOOD, case, outcome, run, seeds_in
+from ..fuzz_seeds import write_seeds
 
 
 def test_damaged_files(tmp_path: Path) -> None:

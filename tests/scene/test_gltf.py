@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from clrt.errors import SceneError
-from clrt.scene.file import load
-from clrt.scene.gltf import read_gltf
-from clrt.scene.materials import MetallicRoughness
+from clrt.formats.gltf.reader import read_gltf
+from clrt.formats.load_scene import load
+from clrt.scene.materials.material_types import MetallicRoughness
 from clrt.scene.model import Model
 from .glb import TRIANGLE, Gltf, ball, read
 from .shapes import cube, icosphere

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clrt.errors import SceneError
-from clrt.scene.gltf import read_gltf
+from clrt.formats.gltf.reader import read_gltf
 from .glb import Gltf, ball
 
 

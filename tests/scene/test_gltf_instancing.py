@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from clrt.errors import SceneError
-from clrt.scene import instancing
-from clrt.scene.file import load
-from clrt.scene.gltf import read_gltf
-from clrt.scene.instancing import baked
+from clrt.formats.gltf.reader import read_gltf
+from clrt.formats.load_scene import load
+from clrt.scene.geometry import instancing
+from clrt.scene.geometry.instancing import baked
 from clrt.scene.model import Model
 from .glb import Gltf, ball
 

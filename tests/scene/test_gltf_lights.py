@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from clrt.errors import SceneError
+from clrt.formats.load_scene import load
 from clrt.output.scenes import save_scene
-from clrt.scene.file import load
+from clrt.scene.default_sky import SUN
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
-from clrt.scene.sky import SUN
 
 from .glb import Gltf
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clrt.scene.material import Material, as_color
-from clrt.scene.materials import Dielectric, MetallicRoughness
-from clrt.scene.textures import Texture
+from clrt.scene.materials.material import Material, as_color
+from clrt.scene.materials.material_types import Dielectric, MetallicRoughness
+from clrt.scene.materials.textures import Texture
 from .glb import TRIANGLE, Gltf, ball, read
 from .shapes import icosphere
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.scene.layer_energy import ENTRY, STEPS, tables
-from clrt.scene.microfacets import albedos
+from clrt.scene.materials.layer_energy import ENTRY, STEPS, tables
+from clrt.scene.materials.microfacets import albedos
 
 from ..rendering import sheen
 from ..rendering.layers import Left, taken_from_gloss, under_coat, under_fibres

@@ -9,10 +9,10 @@ import pytest
 from trimesh.exchange.ply import load_ply
 
 from clrt.errors import SceneError
-from clrt.scene.materials import Diffuse
-from clrt.scene.meshes import read_mesh
+from clrt.formats.models import read_mesh
+from clrt.formats.ply import plain_ply
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Mesh
-from clrt.scene.ply import plain_ply
 from .shapes import cube, icosphere, volume
 
 VERTICES, FACES = icosphere(1)

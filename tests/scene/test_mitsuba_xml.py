@@ -10,18 +10,18 @@ from hypothesis import given, settings, strategies as st
 from scipy.spatial.transform import Rotation
 
 from clrt.errors import SceneError
-from clrt.scene.cie import rgb_of_spectrum
-from clrt.scene.file import load
-from clrt.scene.materials import Conductor, Dielectric, Diffuse, Mirror
-from clrt.scene.mitsuba_lights import rows_at_middles
-from clrt.scene.mitsuba_primitives import cube, cylinder, disk, rectangle, sphere
-from clrt.scene.mitsuba_reader import MitsubaScene, read_mitsuba
-from clrt.scene.mitsuba_textures import _pair
-from clrt.scene.mitsuba_values import transform
-from clrt.scene.mitsuba_xml import UnsupportedError, read_xml
+from clrt.formats.images.image_reader import linear_from_srgb
+from clrt.formats.load_scene import load
+from clrt.formats.mitsuba.lights import rows_at_middles
+from clrt.formats.mitsuba.primitives import cube, cylinder, disk, rectangle, sphere
+from clrt.formats.mitsuba.reader import MitsubaScene, read_mitsuba
+from clrt.formats.mitsuba.textures import _pair
+from clrt.formats.mitsuba.values import transform
+from clrt.formats.mitsuba.xml import UnsupportedError, read_xml
+from clrt.scene.materials.material_types import Conductor, Dielectric, Diffuse, Mirror
+from clrt.scene.materials.textures import Texture
 from clrt.scene.model import Mesh, Scene
-from clrt.scene.pictures import linear_from_srgb
-from clrt.scene.textures import Texture
+from clrt.scene.spectra import rgb_of_spectrum
 
 LIGHT = '<emitter type="constant"/>'
 

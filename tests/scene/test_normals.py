@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from clrt.scene.normals import choose_normals, smooth_normals, weld
+from clrt.scene.geometry.normals import choose_normals, smooth_normals, weld
 from .shapes import cube, icosphere
 
 EPS = float(np.finfo(np.float32).eps)

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from clrt.errors import SceneError
-from clrt.scene.material import as_color
-from clrt.scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror
-from clrt.scene.meshes import read_mesh
-from clrt.scene.mtl import material, read_library
-from clrt.scene.mtl_maps import Maps
-from clrt.scene.obj import parse_obj
-from clrt.scene.textures import Texture
+from clrt.formats.models import read_mesh
+from clrt.formats.wavefront.mtl import material, read_library
+from clrt.formats.wavefront.mtl_maps import Maps
+from clrt.formats.wavefront.obj import parse_obj
+from clrt.scene.materials.material import as_color
+from clrt.scene.materials.material_types import Dielectric, Diffuse, MetallicRoughness, Mirror
+from clrt.scene.materials.textures import Texture
 
 MTL = {
     "Kd 0.5 0.25 2": Diffuse(color=(0.5, 0.25, 1)),

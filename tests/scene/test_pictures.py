@@ -14,14 +14,14 @@ import imageio.v3 as imageio
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from numpy.typing import NDArray
 from PIL import Image
+from numpy.typing import NDArray
 
 from clrt.errors import SceneError
+from clrt.formats.images import decoder
+from clrt.formats.images.image_reader import read_picture, read_texels
+from clrt.formats.images.radiance_hdr import read_radiance
 from clrt.output.images import rgbe_rounded, write_image
-from clrt.scene import decoder
-from clrt.scene.pictures import read_picture, read_texels
-from clrt.scene.radiance import read_radiance
 
 FloatArray = NDArray[np.float32]
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from clrt.errors import SceneError
-from clrt.rendering.identity import scene_hash
-from clrt.scene.file import load
+from clrt.formats.load_scene import load
+from clrt.rendering.checkpoint.identity import scene_hash
 from clrt.scene.lights import DirectionalLight, PointLight
-from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
+from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror
 from clrt.scene.model import Camera, RenderSettings, Sphere
 from .glb import Gltf
 from .shapes import icosphere
@@ -198,7 +198,7 @@ def test_files_that_are_no_scene(name: str, sentence: str, tmp_path: Path) -> No
 
 def test_scenes_load_without_opencl(folder: Path) -> None:
     """In a fresh interpreter where importing pyopencl fails."""
-    code = ("import sys; sys.modules['pyopencl'] = None; from clrt.scene.file import load; "
+    code = ("import sys; sys.modules['pyopencl'] = None; from clrt.formats.load_scene import load; "
             "print(len(load(sys.argv[1]).meshes))")
     path = write(folder, GOOD)
     done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)

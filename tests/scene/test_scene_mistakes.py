@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from clrt.errors import SceneError
-from clrt.scene.file import load
+from clrt.formats.load_scene import load
 
 BAD = """
 mesch = 3

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from clrt.scene.geometry.transform import (quaternion, rotation, scaling, transform_camera, transform_mesh,
+                                           translation, unit)
 from clrt.scene.model import Camera, Mesh
-from clrt.scene.transform import quaternion, rotation, scaling, transform_camera, transform_mesh, translation, unit
 from .shapes import icosphere, volume
 
 EPS = float(np.finfo(np.float32).eps)

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clrt.scene.file import load
-from clrt.scene.materials import Diffuse
+from clrt.formats.load_scene import load
+from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Camera, Instance, Mesh, Scene, Sphere
-from clrt.scene.winding import backward_emitters
+from clrt.scene.validation.winding import backward_emitters
 
 LAMP = Diffuse(emission=(1.0, 1.0, 1.0))
 CUBE = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32)

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from clrt.errors import SceneError
-from clrt.rendering.choices import Choices
-from clrt.rendering.identity import facts_of
+from clrt.formats.load_scene import load
+from clrt.formats.toml.writer import scene_files, started
 from clrt.output.scenes import save_scene
+from clrt.rendering.checkpoint.identity import facts_of
+from clrt.rendering.compile.choices import Choices
 from clrt.scene.animation import Animation, Keyframe
 from clrt.scene.editing import materials_of, with_material
-from clrt.scene.file import load
 from clrt.scene.lights import PointLight
-from clrt.scene.materials import Dielectric, Diffuse, MetallicRoughness, Mirror
+from clrt.scene.materials.material_types import Dielectric, Diffuse, MetallicRoughness, Mirror
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Instance, Mesh, RenderSettings, Scene, Sphere
-from clrt.scene.textures import Picture, Texture
-from clrt.scene.writing import scene_files, started
 from .glb import Gltf, ball
 from .test_gltf import cameras
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.study.contestants import Contestant, Picture
-from clrt.study.reference import Reference
+from clrt.bench.convergence.contestants import Contestant, Picture
+from clrt.bench.convergence.reference import Reference
 
 TRUTH = np.random.default_rng(3).uniform(0, 2, (48, 64, 3))
 MEANS = np.tile(TRUTH.mean((0, 1)), (2, 1))

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.convergence.contestants import Picture
+from clrt.bench.renderers.agreement import Means, agreement, block_means, compared, means_of
+from clrt.bench.significance import FAMILY, sidak
 from clrt.errors import UsageError
 from clrt.scene.model import RenderSettings, Scene
-from clrt.study.agreement import Means, agreement, block_means, compared, means_of
-from clrt.study.contestants import Picture
-from clrt.study.significance import FAMILY, sidak
 
 SCENE = np.random.default_rng(3).uniform(0.05, 2, (64, 96, 3))
 SEEDS = range(16)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, t
 
-from clrt.study.bias import mean_tests
-from clrt.study.converge import Effort, figures, take_turns
-from clrt.study.reference import Reference
+from clrt.bench.convergence.bias import mean_tests
+from clrt.bench.convergence.converge import Effort, figures, take_turns
+from clrt.bench.convergence.reference import Reference
 
 from .known import EXACT, TRUTH, sampler
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from clrt.bench.renderers.blender import compared, judge
+from clrt.bench.renderers.blender_scenes import COLORS, MATERIALS, SCENES, SHAPES, bumps, emissive_square
 from clrt.cli.bench_blender import blender_command
 from clrt.errors import UsageError
-from clrt.study.blender import compared, judge
-from clrt.study.blender_scenes import COLORS, MATERIALS, SCENES, SHAPES, bumps, emissive_square
 
 
 def test_error_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

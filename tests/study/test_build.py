@@ -11,11 +11,11 @@ import pytest
 
 import clrt
 from clrt.accel.builders import BUILDERS
+from clrt.bench.rays.build_speed import measure_builders, measure_growth
+from clrt.bench.rays.cold_start import measure_fresh
+from clrt.bench.rays.shapes import icosphere
+from clrt.bench.rays.workloads import Workload, camera_rays, closed_room
 from clrt.device.open import Device
-from clrt.study.build import measure_builders, measure_growth
-from clrt.study.fresh import measure_fresh
-from clrt.study.shapes import icosphere
-from clrt.study.workloads import Workload, camera_rays, closed_room
 
 SCENE = closed_room(*icosphere(3))
 RAYS = camera_rays(np.array([0.0, 0.2, 2.5]), np.zeros(3), (50, 40))
@@ -69,7 +69,7 @@ def test_peak_of_memory_is_what_was_touched_at_a_time() -> None:
     """In a process of its own: 200 MB twice, one after the other."""
     program = """
 import numpy
-from clrt.study.fresh import peak_bytes
+from clrt.bench.rays.cold_start import peak_bytes
 peaks = [peak_bytes()]
 for _ in range(2):
     numpy.ones(25_000_000)

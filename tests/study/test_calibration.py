@@ -7,9 +7,9 @@ from math import isnan, nan
 import numpy as np
 import pytest
 
-from clrt.study.calibration import calibration, calibrations, noise_ratio
-from clrt.study.converge import Effort, figures, take_turns
-from clrt.study.reference import Reference
+from clrt.bench.convergence.calibration import calibration, calibrations, noise_ratio
+from clrt.bench.convergence.converge import Effort, figures, take_turns
+from clrt.bench.convergence.reference import Reference
 
 from .known import EXACT, TRUTH, UNIT, sampler
 

@@ -8,20 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clrt.bench.numerics.cases import departures
+from clrt.bench.numerics.cases.departures import lit_scenes
+from clrt.bench.numerics.cases.distances import distances
+from clrt.bench.numerics.cases.slivers import sliver_tube
+from clrt.bench.numerics.cases.spheres import exact_hits, measure_spheres
+from clrt.bench.numerics.cases.subject import Subject, ulps
+from clrt.bench.numerics.cases.watertight import measure_watertight, misses, placed
+from clrt.bench.numerics.families import FAMILIES, FIGURES, measure_families
+from clrt.bench.numerics.hard_light import measure_pictures
+from clrt.bench.numerics.numerics import GEOMETRY
+from clrt.bench.numerics.row import Row
+from clrt.bench.rays.shapes import icosphere
 from clrt.device.open import Device
 from clrt.scene.lights import DirectionalLight
-from clrt.study.cases import departures
-from clrt.study.cases.departures import lit_scenes
-from clrt.study.cases.distances import distances
-from clrt.study.cases.slivers import sliver_tube
-from clrt.study.cases.spheres import exact_hits, measure_spheres
-from clrt.study.cases.subject import Subject, ulps
-from clrt.study.cases.watertight import measure_watertight, misses, placed
-from clrt.study.families import FAMILIES, FIGURES, measure_families
-from clrt.study.numerics import GEOMETRY
-from clrt.study.pictures import measure_pictures
-from clrt.study.row import Row
-from clrt.study.shapes import icosphere
 
 
 @pytest.mark.parametrize("measure", [*GEOMETRY, measure_pictures], ids=lambda measure: str(measure.__name__))
@@ -72,7 +72,7 @@ def test_fixed_offsets_are_found_out(device: Device, monkeypatch: pytest.MonkeyP
 
 def test_pictures_off_by_a_hundredth_are_found_out(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """The floors stay as white as they are."""
-    monkeypatch.setattr("clrt.study.pictures.ALBEDO", 0.505)
+    monkeypatch.setattr("clrt.bench.numerics.hard_light.ALBEDO", 0.505)
     rows = [row for row in measure_pictures(Subject(device.info.index), quick=True) if row.unit == "standard errors"]
     wrong = [row.what for row in rows if row.wrong]
     assert wrong == ["a point light", "a lamp like a ball", "a tiny lamp", "992 lamps"]
@@ -115,7 +115,7 @@ def test_lit_scenes_fill_the_picture(device: Device) -> None:
 
 
 def test_a_family_is_measured_side_by_side(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("clrt.study.families.FAMILIES", {"sphere": FAMILIES["sphere"]})
+    monkeypatch.setattr("clrt.bench.numerics.families.FAMILIES", {"sphere": FAMILIES["sphere"]})
     [(family, tests)] = measure_families(device.info.index, quick=True)
     assert family == "sphere" and tuple(tests) == FAMILIES["sphere"]
     assert all({"mrays", "ratio", "cpu_ratio", *FIGURES["sphere"]} <= set(test) for test in tests.values())

@@ -13,19 +13,19 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
+from clrt.bench.combinations.combinations import ROUNDS, keep_scenes, verdict, verdicts
+from clrt.bench.combinations.identities import PROPERTIES, Side, single_lights, strategies
+from clrt.bench.combinations.random_draws import Draws
+from clrt.bench.combinations.random_scenes import BATCH, random_scene
+from clrt.bench.numerics.kernel_probe import choices
 from clrt.device.open import Device
-from clrt.rendering.compile import compile_scene
-from clrt.rendering.session import Session
+from clrt.rendering.accumulation.single_device import Session
+from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.scene.lights import LIGHTS, PointLight
-from clrt.scene.materials import MATERIALS, Diffuse, Material
+from clrt.scene.materials.material_types import MATERIALS, Diffuse, Material
+from clrt.scene.materials.textures import Texture
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
-from clrt.scene.textures import Texture
-from clrt.scene.validate import scene_problems
-from clrt.study.combinations import ROUNDS, keep_scenes, verdict, verdicts
-from clrt.study.identities import PROPERTIES, Side, single_lights, strategies
-from clrt.study.probe import choices
-from clrt.study.random_draws import Draws
-from clrt.study.random_scenes import BATCH, random_scene
+from clrt.scene.validation.validate import scene_problems
 
 #: Other scenes every day, or those of the seed in this environment variable.
 VARIABLE = "CLRT_COMBINATIONS_SEED"

@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from clrt.bench.convergence.contestants import CHOICES, MORE_CHOICES, Picture, choices_on
+from clrt.bench.convergence.converge import Effort, Point, figures, measure_convergence, take_turns
+from clrt.bench.convergence.reference import FIRST_SEED, STEP_SPP, Reference, render_reference
 from clrt.cli.bench_converge import NAMES, converge_command
-from clrt.device.cache import REFERENCES
 from clrt.device.open import Device
+from clrt.device.programs.cache_files import REFERENCES
+from clrt.formats.load_scene import load
 from clrt.output.images import read_image
 from clrt.rendering.renderer import Renderer
-from clrt.scene.file import load
 from clrt.scene.model import Camera, Scene
-from clrt.study.contestants import CHOICES, MORE_CHOICES, Picture, choices_on
-from clrt.study.converge import Effort, Point, figures, measure_convergence, take_turns
-from clrt.study.reference import FIRST_SEED, STEP_SPP, Reference, render_reference
 
 from .known import EXACT, MEANS, TRUTH, sampler
 

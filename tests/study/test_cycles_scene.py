@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clrt.bench.renderers.cycles_scene import BSDFS, check_scene, frame_of_axes, sphere_triangles, turned
 from clrt.errors import UsageError
-from clrt.scene.materials import MATERIALS, Material, MetallicRoughness
+from clrt.scene.materials.material_types import MATERIALS, Material, MetallicRoughness
 from clrt.scene.model import Camera, RenderSettings, Scene, Sphere
-from clrt.study.cycles_scene import BSDFS, check_scene, frame_of_axes, sphere_triangles, turned
 
 
 def ball(material: Material) -> Scene:

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import clrt
+from clrt.bench.numerics.aimed_rays import all_rays, rays_of_kinds
+from clrt.bench.numerics.exact_hits import UNDECIDED, closest_bounds
+from clrt.bench.rays.ray_speed import Rays
+from clrt.bench.rays.shapes import icosphere, soup
+from clrt.bench.rays.workloads import Mesh
 from clrt.device.open import Device
-from clrt.study.aimed import all_rays, rays_of_kinds
-from clrt.study.exact import UNDECIDED, closest_bounds
-from clrt.study.rays import Rays
-from clrt.study.shapes import icosphere, soup
-from clrt.study.workloads import Mesh
 
 from ..rendering.rays import hit_triangles
 

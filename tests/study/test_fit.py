@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
-from clrt.study.fit import fit_logarithm
+from clrt.bench.rays.line_fit import fit_logarithm
 
 RNG = np.random.default_rng(4)
 SIZES = [10_000, 31_623, 100_000, 316_228, 1_000_000, 10_000_000]

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from clrt.bench.renderers.plastic_floor import MATERIALS, VIEWS, floor_scene, judges, lights, measure_floor
+from clrt.bench.renderers.plastic_floor_model import MODELS, Lamp, Plastic, floor_radiance
 from clrt.cli.bench_floor import floor_command
-from clrt.scene.materials import MetallicRoughness
+from clrt.scene.materials.material_types import MetallicRoughness
 from clrt.scene.model import Environment, Scene
-from clrt.study.floor import MATERIALS, VIEWS, floor_scene, judges, lights, measure_floor
-from clrt.study.floor_model import MODELS, Lamp, Plastic, floor_radiance
-from tests.oracle.materials.metallic_roughness import CookTorrance
-from tests.oracle.surface import Surface
+from ..oracle.materials.metallic_roughness import CookTorrance
+from ..oracle.surface import Surface
 
 
 def directions(count: int) -> np.ndarray:

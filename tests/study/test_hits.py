@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import clrt
-from clrt.accel.kernels import TREELESS
+from clrt.accel.traversal_kernels import TREELESS
+from clrt.bench.numerics.aimed_rays import all_rays, rays_of_kinds
+from clrt.bench.rays.hit_agreement import Case, Effort, measure_case
+from clrt.bench.rays.ray_speed import differing
+from clrt.bench.rays.shapes import icosphere, soup
 from clrt.device.open import Device
-from clrt.study.aimed import all_rays, rays_of_kinds
-from clrt.study.hits import Case, Effort, measure_case
-from clrt.study.rays import differing
-from clrt.study.shapes import icosphere, soup
-from clrt.tree_query import HIT
+from clrt.queries.base import HIT
 
 EFFORT = Effort(rays=300, subdivisions=0, soup=0, list_tests=1 << 17, exact_tests=1 << 18)
 CASES = {"icosphere": Case("icosphere", icosphere(2), True), "soup": Case("soup", soup(500), False)}

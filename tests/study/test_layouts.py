@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import clrt
-from clrt.accel.kernels import TREELESS
+from clrt.accel.traversal_kernels import TREELESS
+from clrt.bench.rays.layout_speed import measure_layouts
+from clrt.bench.rays.shapes import icosphere
+from clrt.bench.rays.workloads import closed_room
 from clrt.device.open import Device
-from clrt.study.layouts import measure_layouts
-from clrt.study.shapes import icosphere
-from clrt.study.workloads import closed_room
 
 BALL = icosphere(4)
 

@@ -12,14 +12,14 @@ import pytest
 from click.testing import CliRunner
 from numpy.typing import NDArray
 
+from clrt.bench.convergence.contestants import Picture, choices_on
+from clrt.bench.renderers.agreement import compared, means_of
+from clrt.bench.renderers.mitsuba_data import block_test, cases, judge, pixel_test
 from clrt.cli.bench_mitsuba_data import mitsuba_data_command
 from clrt.errors import UsageError
+from clrt.formats.images.image_reader import read_texels
+from clrt.formats.mitsuba.reader import read_mitsuba
 from clrt.output.image import Image
-from clrt.scene.mitsuba_reader import read_mitsuba
-from clrt.scene.pictures import read_texels
-from clrt.study.agreement import compared, means_of
-from clrt.study.contestants import Picture, choices_on
-from clrt.study.mitsuba_data import block_test, cases, judge, pixel_test
 
 SIZE = 16
 #: A wall that faces the camera and a lamp at the camera's place, or a sky; its radiance is known at every point.

@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from clrt.bench.renderers.mitsuba_bsdfs import BSDFS, finer
+from clrt.bench.renderers.mitsuba_renderer import newest_llvm
+from clrt.bench.renderers.mitsuba_scene import mitsuba_scene, rows_at_poles
 from clrt.errors import UsageError
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
-from clrt.scene.materials import MATERIALS, Conductor, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from clrt.scene.materials.material_types import (MATERIALS, Conductor, Dielectric, Diffuse, Material,
+                                                 MetallicRoughness, Mirror)
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
-from clrt.scene.textures import Picture, Texture
-from clrt.study.mitsuba_bsdfs import BSDFS, finer
-from clrt.study.mitsuba_renderer import newest_llvm
-from clrt.study.mitsuba_scene import mitsuba_scene, rows_at_poles
 
 RNG = np.random.default_rng(5)
 

@@ -14,13 +14,13 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
+from clrt.bench.interleaved import Contestant, race
+from clrt.bench.rays.embree import EmbreeRays, EmbreeScene
+from clrt.bench.rays.libraries import LIBRARIES
+from clrt.bench.rays.library_speed import agreement
+from clrt.bench.rays.ray_speed import Rays
+from clrt.bench.rays.workloads import bumpy_ball, closed_room
 from clrt.device.open import Device
-from clrt.study.embree import EmbreeRays, EmbreeScene
-from clrt.study.libraries import LIBRARIES
-from clrt.study.peers import agreement
-from clrt.study.race import Contestant, race
-from clrt.study.rays import Rays
-from clrt.study.workloads import bumpy_ball, closed_room
 
 from ..rendering.rays import hit_triangles
 

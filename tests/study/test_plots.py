@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from clrt.study import plots
+from clrt.bench.numerics import plots
 
 pytest.importorskip("matplotlib")
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from clrt.bench.numerics import samplers
+from clrt.bench.numerics.row import Row
 from clrt.device.open import Device
-from clrt.study import samplers
-from clrt.study.row import Row
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clrt.study.aimed import rays_of_kinds
-from clrt.study.rays import Floats
-from clrt.study.resize import SIMPLE, resized, simplified
-from clrt.study.shapes import icosphere, soup
-from clrt.study.workloads import Faces, bumpy_ball
+from clrt.bench.numerics.aimed_rays import rays_of_kinds
+from clrt.bench.rays.ray_speed import Floats
+from clrt.bench.rays.resize import SIMPLE, resized, simplified
+from clrt.bench.rays.shapes import icosphere, soup
+from clrt.bench.rays.workloads import Faces, bumpy_ball
 
 
 def areas(vertices: Floats, faces: Faces) -> NDArray[np.float64]:

@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clrt.bench.rays.workloads import Mesh, joined
+from clrt.bench.theses.experiments import DEPTHS, QUICK, Models, experiments, measure_theses
+from clrt.bench.theses.figures import column, dragon, statue, tree, tube, write_models
+from clrt.bench.theses.thesis_scenes import GLASS, dragon_scene, hall, tree_scene
 from clrt.device.open import Device
+from clrt.formats.load_scene import load
+from clrt.formats.models import read_model
 from clrt.rendering.renderer import Renderer
-from clrt.scene.file import load
-from clrt.scene.meshes import read_model
-from clrt.scene.validate import scene_problems
-from clrt.study.figures import column, dragon, statue, tree, tube, write_models
-from clrt.study.theses import DEPTHS, QUICK, Models, experiments, measure_theses
-from clrt.study.theses_scenes import GLASS, dragon_scene, hall, tree_scene
-from clrt.study.workloads import Mesh, joined
+from clrt.scene.validation.validate import scene_problems
 
 MODELS = Path(__file__).parents[2] / "scenes" / "models"
 FIGURES = {"dragon": (dragon(), 19_332), "wood": (tree()[0], 84), "leaves": (tree()[1], 180),
@@ -111,7 +111,7 @@ def test_figures_of_frames(device: Device) -> None:
 
 def test_command_prints_draws_and_stores_figures(tmp_path: Path) -> None:
     program = f"""
-import clrt.study.theses as theses
+import clrt.bench.theses.experiments as theses
 theses.QUICK = theses.QUICK._replace(smaller=40, rounds=1)
 from clrt.cli import main
 main(["bench", "theses", "--quick", "--tree", {str(MODELS / "tree.obj")!r}, "--json", "t.json", "--plot", "t.png"])

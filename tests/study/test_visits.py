@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 import clrt
 from clrt.accel.wide import EMPTY
-from clrt.device.arrays import DeviceArray
+from clrt.bench.rays.node_visits import visits_a_ray
+from clrt.bench.rays.ray_speed import Rays
+from clrt.bench.rays.shapes import icosphere
+from clrt.device.launches.device_arrays import DeviceArray
 from clrt.device.open import Device
-from clrt.study.rays import Rays
-from clrt.study.shapes import icosphere
-from clrt.study.visits import visits_a_ray
 
 RNG = np.random.default_rng(2)
 BALL = icosphere(3)

@@ -9,13 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 import clrt
+from clrt.bench.rays.ray_speed import Floats
+from clrt.bench.rays.workloads import (GAP, Faces, Mesh, bounce_rays, bumpy_ball, camera_rays, closed_room,
+                                       light_rays, rotated_copies, subdivide, surface_points, workloads)
 from clrt.device.open import Device
-from clrt.study.rays import Floats
-from clrt.study.workloads import (GAP, Faces, Mesh, bounce_rays, bumpy_ball, camera_rays, closed_room,
-                                  light_rays, rotated_copies, subdivide, surface_points, workloads)
 
+from clrt.bench.significance import chi2_test, sidak
 from ..rendering.rays import icosphere
-from clrt.study.significance import chi2_test, sidak
 
 Doubles = NDArray[np.float64]
 RNG = np.random.default_rng(11)

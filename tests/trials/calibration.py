@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from math import isfinite
 from statistics import median
 
+from clrt.bench.convergence.calibration import RIGHT, calibration, noise_ratio
 from clrt.rendering.renderer import Renderer
-from clrt.study.calibration import RIGHT, calibration, noise_ratio
 
 from .references import true_relmse, with_references
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import clrt
 from clrt.errors import CheckpointError
-from clrt.rendering.checkpoint_file import MAGIC, older, read_checkpoint
-from clrt.rendering.kept import KINDS
+from clrt.rendering.checkpoint.checkpoint_file import MAGIC, older, read_checkpoint
+from clrt.rendering.checkpoint.saved_state import KINDS
 from clrt.rendering.renderer import Renderer
 
 from ..cli.test_checkpoints import worker_of

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import sqrt
 
+from clrt.bench.convergence.reference import render_reference
 from clrt.rendering.renderer import Renderer
-from clrt.study.reference import render_reference
 
 from .references import STEPS, small, true_relmse
 from .renders import GALLERY

@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 
 import clrt
-from clrt.scene.material import Material
-from clrt.scene.materials import Diffuse, MetallicRoughness, Mirror
+from clrt.bench.numerics.kernel_probe import Doubles
+from clrt.bench.rays.shapes import icosphere
+from clrt.scene.materials.material import Material
+from clrt.scene.materials.material_types import Diffuse, MetallicRoughness, Mirror
+from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene
-from clrt.scene.textures import Picture, Texture
-from clrt.study.probe import Doubles
-from clrt.study.shapes import icosphere
 
 WHITE = (1.0, 1.0, 1.0)
 MATERIALS: dict[str, Material] = {

@@ -11,8 +11,8 @@ from pathlib import Path
 from statistics import median
 
 from clrt.output.images import read_image
-from clrt.rendering.checkpoint_file import read_checkpoint
-from clrt.rendering.kept import KINDS
+from clrt.rendering.checkpoint.checkpoint_file import read_checkpoint
+from clrt.rendering.checkpoint.saved_state import KINDS
 
 from .renders import CORNELL, await_rendering, start
 

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from clrt.study.fresh import CACHES, peak_bytes
-from clrt.study.resize import resized
-from clrt.study.workloads import bumpy_ball
+from clrt.bench.rays.cold_start import CACHES, peak_bytes
+from clrt.bench.rays.resize import resized
+from clrt.bench.rays.workloads import bumpy_ball
 
 TRIANGLES = 1_600_000
 #: What is done first is measured with what came before.

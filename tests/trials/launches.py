@@ -51,7 +51,7 @@ def measured(scene: str, device: str) -> dict[str, Any]:
     import pyopencl as cl
 
     import clrt
-    from clrt.device.launch import run_seconds
+    from clrt.device.launches.launch import run_seconds
 
     launched: list[tuple[str, cl.Event]] = []
     enqueue = cl.enqueue_nd_range_kernel

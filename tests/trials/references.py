@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import clrt
-from clrt.output.compare import relmse
-from clrt.rendering.state import State
-from clrt.study.reference import Reference, render_reference
+from clrt.bench.convergence.reference import Reference, render_reference
+from clrt.output.image_error import relmse
+from clrt.rendering.film.state import State
 
 from .renders import GALLERY
 

@@ -11,7 +11,7 @@ SCENES = Path(__file__).parents[2] / "scenes"
 GALLERY = sorted(SCENES.glob("*.toml"))
 CORNELL = SCENES / "cornell.toml"
 #: A device may write checkpoints all the time, so that a signal often comes while one is written.
-ALL_THE_TIME = ("-c", "import clrt.rendering.checkpoint as checkpoint; checkpoint.COST = 0; "
+ALL_THE_TIME = ("-c", "import clrt.rendering.checkpoint.checkpoints as checkpoint; checkpoint.COST = 0; "
                       "from clrt.cli import main; main()")
 CLRT = ("-P", "-m", "clrt")
 

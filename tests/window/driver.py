@@ -13,9 +13,9 @@ from imgui_bundle import hello_imgui, imgui
 from imgui_bundle.immapp import testing
 from numpy.typing import NDArray
 
+from clrt.formats.images.image_reader import read_texels
 from clrt.live.settings import Settings
 from clrt.live.snapshot import Snapshot
-from clrt.scene.pictures import read_texels
 from clrt.scene.model import Scene
 from clrt.window.app import App
 

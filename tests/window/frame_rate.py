@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from imgui_bundle import imgui
 
+from clrt.formats.load_scene import load
 from clrt.live.settings import Settings
 from clrt.live.snapshot import Snapshot
-from clrt.scene.file import load
 
 from .driver import Driver, drive
 

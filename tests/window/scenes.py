@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from clrt.scene.lights import PointLight
-from clrt.scene.materials import Diffuse, MetallicRoughness
+from clrt.scene.materials.material_types import Diffuse, MetallicRoughness
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 
 SKY = (0.2, 0.4, 0.8)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from clrt.formats.images.image_reader import read_texels
+from clrt.formats.load_scene import load
 from clrt.output.images import read_image
-from clrt.scene.file import load
-from clrt.scene.materials import Diffuse
-from clrt.scene.pictures import read_texels
+from clrt.scene.materials.material_types import Diffuse
 
 from .driver import Driver, drive
 from .scenes import two_balls

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clrt.output.view import to_display
-from clrt.scene.material import SHARED
-from clrt.scene.materials import MATERIALS, Diffuse
-from clrt.scene.presets import CONDUCTORS
-from clrt.scene.textures import WHITE, Texture
+from clrt.output.view_transform import to_display
+from clrt.scene.materials.material import SHARED
+from clrt.scene.materials.material_types import MATERIALS, Diffuse
+from clrt.scene.materials.presets import CONDUCTORS
+from clrt.scene.materials.textures import WHITE, Texture
 
 from .driver import Driver, at, changed, drive, halves
 from .scenes import SKY, two_balls

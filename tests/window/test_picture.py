@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 
-from clrt.output.view import to_display
+from clrt.output.view_transform import to_display
 
 from .driver import Driver, changed, drive, halves
 from .scenes import two_balls

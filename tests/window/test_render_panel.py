@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clrt.output.view import to_display
+from clrt.output.view_transform import to_display
 
 from .driver import Driver, at, changed, drive, halves
 from .scenes import SKY, two_balls

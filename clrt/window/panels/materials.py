@@ -8,9 +8,9 @@ from typing import Any, get_args, get_type_hints
 
 from imgui_bundle import imgui
 
-from ...scene.material import SHARED, Material
 from ...scene.editing import free_name
-from ...scene.materials import MATERIALS, Diffuse
+from ...scene.materials.material import SHARED, Material
+from ...scene.materials.material_types import MATERIALS, Diffuse
 from ..editor import Editor
 from ..fields import choose, edit_fields
 

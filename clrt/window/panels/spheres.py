@@ -7,7 +7,7 @@ from dataclasses import replace
 from imgui_bundle import imgui
 
 from ...scene.editing import free_name
-from ...scene.materials import Diffuse, Material
+from ...scene.materials.material_types import Diffuse, Material
 from ...scene.model import Sphere
 from ..editor import Editor
 from ..fields import choose, edit_fields

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.scene.materials import Conductor
-from clrt.scene.presets import CONDUCTORS
+from clrt.scene.materials.material_types import Conductor
+from clrt.scene.materials.presets import CONDUCTORS
 
 from ..surface import Surface
 from ..vectors import Doubles, dot

@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from clrt.scene.metallic_roughness import MetallicRoughness
+from clrt.scene.materials.metallic_roughness import MetallicRoughness
 
 from ..surface import Surface
 from ..vectors import Doubles, dot

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.scene.materials import Dielectric
+from clrt.scene.materials.material_types import Dielectric
 
 from ..surface import Surface
 from ..vectors import Bools, Doubles, dot, unit

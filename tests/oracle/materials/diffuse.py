@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.scene.materials import Diffuse
+from clrt.scene.materials.material_types import Diffuse
 
 from ..surface import Surface
 from ..vectors import Doubles

@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from tests.rendering import sheen
+from ...rendering import sheen
 
 from ..textures import bilinear
 from ..vectors import Doubles

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.scene.metallic_roughness import MetallicRoughness
+from clrt.scene.materials.metallic_roughness import MetallicRoughness
 
 from ..surface import Surface
 from ..vectors import Doubles, dot

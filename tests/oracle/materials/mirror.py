@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.scene.materials import Mirror
+from clrt.scene.materials.material_types import Mirror
 
 from ..surface import Surface
 from ..vectors import Doubles

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.scene.materials import BlinnPhong, Phong
+from clrt.scene.materials.material_types import BlinnPhong, Phong
 
 from ..surface import Surface
 from ..vectors import Doubles, Frame, dot

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clrt.scene.metallic_roughness import MetallicRoughness
-from clrt.scene.presets import F0_PRESETS
+from clrt.scene.materials.metallic_roughness import MetallicRoughness
+from clrt.scene.materials.presets import F0_PRESETS
 
 from ..surface import Surface
 from ..vectors import Doubles

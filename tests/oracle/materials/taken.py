@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from clrt.scene.metallic_roughness import MetallicRoughness
-from clrt.scene.textures import Texture
+from clrt.scene.materials.metallic_roughness import MetallicRoughness
+from clrt.scene.materials.textures import Texture
 
 from ..surface import Surface
 from ..vectors import Doubles

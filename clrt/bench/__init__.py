@@ -1,0 +1,1 @@
+"""Experiments that anyone can repeat: what is claimed of speed and error is measured here."""

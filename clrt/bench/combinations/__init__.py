@@ -1,0 +1,1 @@
+"""Identities that pictures of random scenes obey."""

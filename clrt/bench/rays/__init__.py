@@ -1,0 +1,1 @@
+"""Rays per second, tree builds, and other ray libraries."""

@@ -1,0 +1,1 @@
+"""Other renderers: scenes translated for them, and images compared with theirs."""

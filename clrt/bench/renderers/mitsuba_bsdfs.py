@@ -1,0 +1,204 @@
+"""Conversion of materials to Mitsuba 3: its own plugins where they are equivalent, wrapped in `height_correlated`
+(mitsuba_smith.py) where their Smith term differs, and `gltf` (mitsuba_gltf.py).
+
+To add a material, write its conversion in BSDFS.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import UsageError
+from ...formats.images.image_reader import linear_from_srgb
+from ...scene.materials.material import ALPHA_MIN, as_color
+from ...scene.materials.material_types import Conductor, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from ...scene.materials.textures import Texture, Wrap, untextured
+from ...scene.model import Mesh, Sphere
+
+Plugin = dict[str, Any]
+Floats = NDArray[np.float32]
+
+#: Largest alpha for which the separable Smith term loses less than 4e-4 of the height-correlated albedo.
+NEARLY_SMOOTH = 0.09
+#: Cut-outs are upsampled by this factor in each dimension before thresholding.
+CUTS = 4
+CHANNELS = ("red", "green", "blue", "alpha")
+
+
+def bsdf(owner: Mesh | Sphere) -> Plugin:
+    """Return the plugin of the owner's material, with vertex colors. Raises UsageError for an unsupported feature."""
+    material = owner.material
+    if type(material) not in BSDFS:
+        raise UsageError(f"{owner.name}: Mitsuba is not told of {material.kernel} yet")
+    try:
+        plugin = BSDFS[type(material)](material)
+        if isinstance(owner, Mesh) and owner.colors is not None:
+            plugin = _painted(plugin, material)
+        if material.normal_map is not None:
+            # Mitsuba's bump shadowing (Estevez et al. 2019) affects specular lobes, too, ours does not; nor do we flip
+            # normals.
+            if plugin["type"] == "gltf":
+                plugin |= {"bumps": True}
+            plugin = {"type": "normalmap", "normalmap": _bend(material.normal_map), "bsdf": plugin,
+                      "use_shadowing_function": isinstance(material, Diffuse), "flip_invalid_normals": False}
+        plugin = plugin if isinstance(material, Dielectric) else {"type": "twosided", "front": plugin}
+        if material.one_sided:
+            raise ValueError("surfaces with one side")
+        if material.opacity != 1:
+            plugin = {"type": "mask", "opacity": _opacity(material), "bsdf": plugin}
+    except ValueError as error:
+        raise UsageError(f"{owner.name}: Mitsuba cannot draw {error}") from None
+    return plugin
+
+
+def rgb(values: Any) -> Plugin:
+    return {"type": "rgb", "value": [float(value) for value in values]}
+
+
+def color(value: Any) -> Plugin:
+    """Return a color; a texture becomes a bitmap that is already linear."""
+    if not isinstance(value, Texture):
+        return rgb(value)
+    return _bitmap(value, linear_from_srgb(_channels(value, "red", "green", "blue")) * np.array(as_color(value.factor)))
+
+
+def number(value: Any) -> Any:
+    """Return a number; a texture becomes a bitmap."""
+    if not isinstance(value, Texture):
+        return float(value)
+    return _bitmap(value, _channels(value, *[value.channel] * 3) * np.max(value.factor))
+
+
+def medium(material: Dielectric) -> Plugin | None:
+    """Return the interior medium if the material absorbs."""
+    if material.attenuation_distance is None:
+        return None
+    rates = np.array(material.parameters()["absorption"])
+    most = float(max(rates.max(), 1e-30))
+    return {"type": "homogeneous", "albedo": 0.0, "sigma_t": rgb(rates / most), "scale": most}
+
+
+def _channels(texture: Texture, *names: str) -> Floats:
+    """Return the named channels, (h, w, names), in [0, 1]."""
+    return np.asarray(texture.picture.texels[..., [CHANNELS.index(name) for name in names]] / 255, np.float32)
+
+
+def _opacity(material: Material) -> Any:
+    """Return the opacity. A cut-out is thresholded at a higher resolution, since Mitsuba would filter the result.
+
+    (In Mitsuba, passing a cut-out counts towards the path depth.)
+    """
+    texture, cutoff = material.opacity, material.alpha_cutoff
+    if cutoff is None or not isinstance(texture, Texture):
+        return number(texture if cutoff is None or isinstance(texture, Texture) else float(texture >= cutoff))
+    fine = finer(_channels(texture, *[texture.channel] * 3) * np.max(texture.factor), texture.wrap, CUTS)
+    return _bitmap(replace(texture, filter="nearest"), fine >= cutoff)
+
+
+def finer(texels: Any, wrap: tuple[Wrap, Wrap], times: int) -> Any:
+    """Upsample (h, w, channels) by linear interpolation to (times·h, times·w, channels)."""
+    for axis in (0, 1):
+        size = texels.shape[axis]
+        at = (np.arange(times * size) + 0.5) / times - 0.5
+        low = np.floor(at).astype(int)
+        share = np.expand_dims(at - low, [1, 2] if axis == 0 else [0, 2])
+        ends = [each % size if wrap[axis] == "repeat" else each.clip(0, size - 1) for each in (low, low + 1)]
+        texels = np.take(texels, ends[0], axis) * (1 - share) + np.take(texels, ends[1], axis) * share
+    return texels
+
+
+def _bend(texture: Texture) -> Plugin:
+    """Return a linear normal map that includes the factor, in the frame of u and v."""
+    axes = texture.image_axes   # Mitsuba bends along u and v, however to_uv turns the image
+    if np.abs(np.abs(axes) - 0.5).max() < 0.499:
+        raise ValueError(f"the normal map {texture.picture.name}, which is not turned by quarters")
+    xyz = _channels(texture, "red", "green", "blue")
+    xyz[..., :2] = 0.5 + (xyz[..., :2] - 0.5) @ axes * np.max(texture.factor)
+    return _bitmap(texture, xyz)
+
+
+def _bitmap(texture: Texture, texels: Any) -> Plugin:
+    if texture.wrap[0] != texture.wrap[1]:
+        raise ValueError("a texture that wraps in two ways")
+    to_picture = np.eye(4)
+    to_picture[:2][:, [0, 1, 3]] = texture.to_picture
+    return {"type": "bitmap", "bitmap": np.asarray(texels, np.float32), "raw": True, "to_uv": to_picture,
+            "wrap_mode": texture.wrap[0], "filter_type": "bilinear" if texture.filter == "linear" else "nearest"}
+
+
+def _painted(plugin: Plugin, material: Material) -> Plugin:
+    """Replace a white color by vertex colors."""
+    if not isinstance(material, Diffuse) or material.color != (1.0, 1.0, 1.0):
+        raise ValueError("vertex colours but of diffuse, whose color is [1, 1, 1]")
+    return plugin | {"reflectance": {"type": "mesh_attribute", "name": "vertex_color"}}
+
+
+def _diffuse(material: Diffuse) -> Plugin:
+    return {"type": "diffuse", "reflectance": color(material.color)}
+
+
+def _mirror(material: Mirror) -> Plugin:
+    return {"type": "conductor", "material": "none", "specular_reflectance": color(material.color)}
+
+
+def _metallic_roughness(material: MetallicRoughness) -> Plugin:
+    """Return `principled`, exactly GGX, Schlick's Fresnel and separable Smith for pure metals; otherwise `gltf`."""
+    if material.features() & {"THROUGH", "SPECULAR"}:
+        raise ValueError("metallic_roughness with transmission or specular")
+    if material.smith not in ("separable", "height_correlated"):
+        raise ValueError('metallic_roughness but with smith = "separable" or "height_correlated"')
+    values, multiple = material.parameters(), "MULTIPLE_SCATTERING" in material.features()
+    if "LAYERS" in material.features():
+        return _layers(material) | {"multiple": multiple}
+    if material.smith == "separable" and values["metallic"] == 1 and not material.textures() and not multiple:
+        lobes = material.lobes
+        return {"type": "principled", "metallic": 1.0, "roughness": sqrt(lobes.alpha), "base_color": rgb(lobes.f0)}
+    return {"type": "gltf", "color": color(values["color"]), "f0": rgb(values["f0"]),
+            "metallic": number(values["metallic"]), "roughness": number(values["roughness"]),
+            "smith": material.smith, "coupling": material.coupled_by, "multiple": multiple}
+
+
+def _layers(material: MetallicRoughness) -> Plugin:
+    if material.textures() or material.smith != "height_correlated" or material.coupled_by != "albedo":
+        raise ValueError('layers but without textures, over smith = "height_correlated" and coupling = "albedo"')
+    values = material.parameters()
+    return {"type": "gltf_layers", "color": color(values["color"]), "f0": rgb(values["f0"]),
+            "metallic": number(values["metallic"]), "roughness": number(material.roughness),
+            "clearcoat": number(material.clearcoat), "clearcoat_roughness": number(material.clearcoat_roughness),
+            "sheen_color": color(material.sheen_color), "sheen_roughness": number(material.sheen_roughness)}
+
+
+def _dielectric(material: Dielectric) -> Plugin:
+    if material.thin and material.rough:
+        raise ValueError("glass that is thin and rough")
+    if material.scatters_again:
+        raise ValueError("rough glass's further bounces; set multiple_scattering = false")
+    if material.thin and untextured(material.color) != (1.0, 1.0, 1.0):
+        raise ValueError("thin glass in color: its own is not crossed again by what bounces inside")
+    plugin = {"type": "thindielectric" if material.thin else "dielectric", "int_ior": material.ior, "ext_ior": 1.0,
+              "specular_transmittance": color(material.color)}
+    return _rough(plugin | {"type": "roughdielectric"}, material.roughness) if material.rough else plugin
+
+
+def _conductor(material: Conductor) -> Plugin:
+    values = material.parameters()
+    plugin = {"type": "roughconductor", "eta": rgb(values["eta"]), "k": rgb(values["k"])}
+    return _rough(plugin, material.roughness)
+
+
+def _rough(plugin: Plugin, roughness: float | Texture) -> Plugin:
+    """Add GGX and the height-correlated Smith term to a plugin."""
+    alpha = max(untextured(roughness)**2, ALPHA_MIN)
+    plugin = plugin | {"distribution": "ggx", "alpha": alpha}
+    return plugin if alpha <= NEARLY_SMOOTH else {"type": "height_correlated", "alpha": alpha, "bsdf": plugin}
+
+
+BSDFS: dict[type[Material], Callable[[Any], Plugin]] = {
+    Diffuse: _diffuse, Mirror: _mirror, MetallicRoughness: _metallic_roughness, Dielectric: _dielectric,
+    Conductor: _conductor}

@@ -1,0 +1,203 @@
+"""Conversion of a scene to Mitsuba 3: dictionaries of plugins by the names of its manual, for its `rgb` variants.
+
+The result has numbers, strings and numpy arrays only, so that Mitsuba is not required here: 4x4 arrays are transforms,
+3-dimensional arrays are images, and a plugin of type "mesh" has a mesh's arrays (mitsuba_renderer.py builds it).
+Materials are converted in mitsuba_bsdfs.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, radians, tan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import UsageError
+from ...rendering.compile.features import biased_by
+from ...scene.editing import materials_of, with_material
+from ...scene.geometry.instancing import unfolded
+from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
+from ...scene.materials.material_types import Dielectric
+from ...scene.materials.textures import Texture
+from ...scene.model import Camera, Environment, Mesh, Scene, Sphere
+from .mitsuba_bsdfs import Plugin, bsdf, color, medium, rgb
+
+#: Near and far clip distances, relative to the distance of the look-at point.
+NEAR, FAR = 1e-4, 1e6
+#: Distance of a sun's disc, relative to that distance.
+SUN_DISTANCE = 1e5
+#: The texture that represents a spot light's falloff: texels per side, and the widest cone.
+SPOT_TEXELS, SPOT_DEGREES = 2048, 80
+#: Largest angular diameter of a sun, for which the disc's diameter is twice its distance.
+SUN_DEGREES = 90
+
+
+def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
+    """Return the plugins of `scene` with its own settings. Raises UsageError for an unsupported feature."""
+    if scene.render.filter != "box":
+        raise UsageError(f'{scene.name}: Mitsuba is compared with filter = "box"')
+    if scene.render.integrator not in ("path", "direct"):
+        raise UsageError(f'{scene.name}: Mitsuba has no integrator "{scene.render.integrator}"')
+    if scene.render.back_face_culling != "none":
+        raise UsageError(f"{scene.name}: Mitsuba culls no back faces; leave out back_face_culling")
+    if biases := biased_by(scene.render):
+        raise UsageError(f"{scene.name}: Mitsuba clamps nothing; leave out {' and '.join(biases)}")
+    depth = scene.render.max_depth if scene.render.integrator == "path" else min(scene.render.max_depth, 2)
+    owners: list[Mesh | Sphere] = [*unfolded(scene).meshes, *scene.spheres]
+    absorbs = any(isinstance(owner.material, Dielectric) and medium(owner.material) for owner in owners)
+    plugins: Plugin = {"type": "scene", "sensor": _sensor(scene, sampler),
+                       "integrator": {"type": "volpath" if absorbs else "path", "max_depth": depth}}
+    plugins |= {f"{'mesh' if isinstance(owner, Mesh) else 'sphere'}{i}": _surface(owner)
+                for kind in (Mesh, Sphere) for i, owner in enumerate(each for each in owners if isinstance(each, kind))}
+    plugins |= {f"light{i}": _light(light, scene.camera) for i, light in enumerate(scene.lights)}
+    return plugins | _environment(scene.environment)
+
+
+def single_bounces(scene: Scene) -> Scene:
+    """Return the scene with rough glass restricted to a single microfacet bounce, as in Mitsuba."""
+    for material in materials_of(scene).values():
+        if isinstance(material, Dielectric) and material.scatters_again:
+            scene = with_material(scene, material, replace(material, multiple_scattering=False))
+    return scene
+
+
+def _sensor(scene: Scene, sampler: str) -> Plugin:
+    """Return the camera and its film with a box filter one pixel wide."""
+    camera, (width, height) = scene.camera, scene.render.size
+    distance = _distance(camera)
+    to_world = _frame(camera.position, np.subtract(camera.look_at, camera.position), camera.up)
+    lens: Plugin = {"type": "perspective", "fov": camera.fov_degrees, "fov_axis": "y"}
+    if camera.projection == "equirectangular":
+        raise UsageError(f"{scene.name}: Mitsuba has no equirectangular camera")
+    if camera.projection == "orthographic":
+        tall = camera.view_height or 2 * distance * tan(radians(camera.fov_degrees) / 2)
+        lens = {"type": "orthographic"}    # x from -1 to 1
+        to_world = to_world @ np.diag([tall * width / height / 2, tall * width / height / 2, 1, 1])
+    elif camera.aperture_radius:
+        lens |= {"type": "thinlens", "aperture_radius": camera.aperture_radius,
+                 "focus_distance": camera.focus_distance or distance}
+    return {**lens, "to_world": to_world, "near_clip": NEAR * distance, "far_clip": FAR * distance,
+            "sampler": {"type": sampler},
+            "film": {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
+                     "component_format": "float32", "rfilter": {"type": "box"}}}
+
+
+def _frame(position: Any, direction: Any, up: Any = (0.0, 1.0, 0.0)) -> NDArray[np.float64]:
+    """Return the local-to-world matrix of cameras and spot lights, which look along +z with +x to the image's left."""
+    forward = np.asarray(direction, np.float64)
+    forward /= np.linalg.norm(forward)
+    left = np.cross(np.asarray(up, np.float64), forward)
+    left /= np.linalg.norm(left)
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([left, np.cross(forward, left), forward, position])
+    return matrix
+
+
+def _surface(owner: Mesh | Sphere) -> Plugin:
+    """Return a mesh or sphere with its BSDF, interior medium, and emission if it has any."""
+    shape = _mesh(owner) if isinstance(owner, Mesh) else _sphere(owner)
+    shape["bsdf"] = bsdf(owner)
+    if isinstance(owner.material, Dielectric) and (inside := medium(owner.material)):
+        shape["interior"] = inside
+    if any(owner.material.radiance):
+        if owner.material.double_sided:
+            raise UsageError(f"{owner.name}: Mitsuba's area lights emit from one side; leave out double_sided")
+        if isinstance(owner, Sphere) and isinstance(owner.material.emission, Texture):
+            raise UsageError(f"{owner.name}: Mitsuba samples the light of painted balls as if they were turned")
+        shape["emitter"] = {"type": "area", "radiance": color(owner.material.emission)}
+    return shape
+
+
+def _mesh(mesh: Mesh) -> Plugin:
+    arrays: Plugin = {"vertices": mesh.vertices, "faces": mesh.faces, "normals": mesh.normals}
+    sets = {texture.uv_set for texture in mesh.material.textures()}
+    if len(sets) > 1:
+        raise UsageError(f"{mesh.name}: Mitsuba's meshes have one set of texture coordinates")
+    if sets:
+        arrays["uv"] = mesh.uv1 if sets == {1} else mesh.uv
+    if mesh.colors is not None:
+        arrays["colors"] = mesh.colors[:, :3]
+    return {"type": "mesh", **arrays}
+
+
+def _sphere(sphere: Sphere) -> Plugin:
+    """Return a sphere rotated to clrt's texture coordinates: from z down, and from −x, the middle, towards −y."""
+    place = np.eye(4)
+    place[:3] = np.column_stack([(0, 0, -sphere.radius), (-sphere.radius, 0, 0), (0, sphere.radius, 0), sphere.center])
+    return {"type": "sphere", "to_world": place}
+
+
+def _distance(camera: Camera) -> float:
+    """Return the distance from the camera to its look-at point."""
+    return float(np.linalg.norm(np.subtract(camera.look_at, camera.position)))
+
+
+def _light(light: Light, camera: Camera) -> Plugin:
+    if not isinstance(light, DirectionalLight) and light.range is not None:
+        raise UsageError("light: Mitsuba is not told of ranges")
+    if isinstance(light, PointLight):
+        return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
+    if isinstance(light, SpotLight):
+        return _spot(light)
+    if light.angle_degrees:
+        return _sun(light, camera)
+    return {"type": "directional", "direction": list(light.direction), "irradiance": rgb(light.irradiance)}
+
+
+def _sun(light: DirectionalLight, camera: Camera) -> Plugin:
+    """Return a disc so far away that its direction is the same everywhere; Mitsuba has no emitter for a sun."""
+    if light.angle_degrees > SUN_DEGREES:
+        raise UsageError(f"light: Mitsuba is compared with suns of up to {SUN_DEGREES} degrees; this one has "
+                         f"angle_degrees = {light.angle_degrees:g}")
+    far = SUN_DISTANCE * _distance(camera)
+    towards = -np.asarray(light.direction) / np.linalg.norm(light.direction)
+    radius = far * tan(radians(light.angle_degrees) / 2)
+    place = _frame(camera.look_at + far * towards, light.direction, _up_for(light.direction))
+    return {"type": "disk", "to_world": place @ np.diag([radius, radius, 1, 1]),
+            "emitter": {"type": "area", "radiance": rgb(light.radiance)}}
+
+
+def _up_for(direction: Any) -> tuple[float, float, float]:
+    """Return an axis that is not parallel to the direction."""
+    return (0.0, 1.0, 0.0) if abs(direction[1]) < 0.9 * float(np.linalg.norm(direction)) else (1.0, 0.0, 0.0)
+
+
+def _spot(light: SpotLight) -> Plugin:
+    """Return a spot light. Mitsuba's falloff is linear in the angle; ours is represented by a projected texture."""
+    if light.outer_degrees > SPOT_DEGREES:
+        raise UsageError(f"spot: Mitsuba is told of cones up to {SPOT_DEGREES} degrees from their axis")
+    across = (np.arange(SPOT_TEXELS) * 2 + 1) / SPOT_TEXELS - 1
+    off = np.hypot(across[:, None], across) * tan(radians(light.outer_degrees))
+    inner, outer = cos(radians(light.inner_degrees)), cos(radians(light.outer_degrees))
+    falloff = np.clip((1 / np.sqrt(1 + off**2) - outer) / (inner - outer), 0, 1) ** 2
+    return {"type": "spot", "to_world": _frame(light.position, light.direction, _up_for(light.direction)),
+            "intensity": rgb(light.intensity), "cutoff_angle": light.outer_degrees, "beam_width": light.outer_degrees,
+            "texture": {"type": "bitmap", "bitmap": np.repeat(falloff[..., None], 3, 2).astype(np.float32),
+                        "raw": True, "wrap_mode": "clamp"}}
+
+
+def _environment(environment: Environment) -> Plugin:
+    """Return the environment; no plugin if it is black, since Mitsuba samples all emitters equally."""
+    color = environment.strength * np.asarray(environment.color)
+    if environment.image is None:
+        return {"sky": {"type": "constant", "radiance": rgb(color)}} if color.any() else {}
+    angle = np.radians(environment.rotation_degrees)
+    turned = np.eye(4)
+    turned[np.ix_([0, 2], [0, 2])] = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+    return {"sky": {"type": "envmap", "bitmap": rows_at_poles(environment.image), "to_world": turned,
+                    "scale": environment.strength}}
+
+
+def rows_at_poles(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Resample an environment map to 2h + 1 rows, the first and last at the poles, with the same linear interpolation.
+
+    Ours, (h, w, 3), has rows at (row + ½)/h; Mitsuba's H rows are at row/(H − 1). Every other new row is one of ours;
+    those between them are what both interpolate.
+    """
+    padded = np.concatenate([image[:1], image, image[-1:]])
+    rows = np.empty((2 * len(image) + 1, *image.shape[1:]), np.float32)
+    rows[1::2] = image
+    rows[::2] = (padded[:-1] + padded[1:]) / 2
+    return rows

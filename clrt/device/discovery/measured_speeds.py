@@ -1,0 +1,54 @@
+"""Measured speeds of devices (bench/rays/device_speed.py), cached with the compiled programs.
+
+A speed is valid for one device and driver, and for the kernels and version of clrt that were measured.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from math import isfinite
+from typing import TYPE_CHECKING
+
+from ..programs import cache_files
+from ..programs.kernel_files import kernel_digest
+from .check_results import identity_of
+
+if TYPE_CHECKING:
+    from .device_info import DeviceInfo
+
+#: Suffix of the files.
+KIND = "bench.json"
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Throughput of the kernels alone, in millions of rays per second."""
+
+    mrays_primary: float
+    mrays_bounce: float
+    mrays_shadow: float
+
+    @property
+    def mrays(self) -> float:
+        """Return the throughput for equal numbers of rays of each kind."""
+        return 3 / (1 / self.mrays_primary + 1 / self.mrays_bounce + 1 / self.mrays_shadow)
+
+
+def keep_speed(info: DeviceInfo, speed: Speed) -> bool:
+    """Store the speed of a device; return False if that is not possible."""
+    kept = {"measured": identity_of(info), "kernels": kernel_digest(), "bench": asdict(speed)}
+    return cache_files.write_file(f"{info.id}.{KIND}", json.dumps(kept, indent=1).encode())
+
+
+def kept_speed(info: DeviceInfo) -> Speed | None:
+    """Return the stored speed of a device in its present state, or None."""
+    content = cache_files.read_file(f"{info.id}.{KIND}")
+    try:
+        kept = json.loads(content or b"null")
+        speed = Speed(**{name: float(mrays) for name, mrays in kept["bench"].items()})
+        right = all(isfinite(mrays) and mrays > 0 for mrays in asdict(speed).values())
+        current = kept["measured"] == identity_of(info) and kept["kernels"] == kernel_digest()
+        return speed if right and current else None
+    except (ValueError, TypeError, LookupError, AttributeError, OverflowError, RecursionError):
+        return None

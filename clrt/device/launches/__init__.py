@@ -1,0 +1,1 @@
+"""Work on a device: bounded launches, buffers, and host memory lent to commands."""

@@ -1,0 +1,1 @@
+"""Workarounds for PoCL: processor names, damaged caches, a missing linker."""

@@ -1,0 +1,1 @@
+"""Programs: composed from kernel files, compiled in the background, cached."""

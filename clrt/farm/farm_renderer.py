@@ -1,0 +1,77 @@
+"""A renderer on the devices of a cluster's workers; the client needs none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..device.open import Device, Selectors
+from ..errors import DeviceError, UsageError
+from ..rendering.accumulation.scene_on_device import SceneOnDevice
+from ..rendering.render_warnings import PictureWarnings
+from ..rendering.renderer import Renderer, State
+from ..scene.model import Camera, Scene
+from ..scene.validation.validate import validate
+from .cluster import Cluster
+from .farm_picture import FarmPicture
+from .orders import Order
+
+#: Device name in a checkpoint before the workers are known.
+FARM = "a farm"
+
+
+class FarmRenderer(Renderer):
+    """Renderer of a scene on a cluster. It is used like `Renderer`; `device` selects among each worker's devices.
+
+    simulated: samples per second of workers that only sleep, to measure the overhead (simulated.py).
+    """
+
+    session: FarmPicture
+
+    def __init__(self, scene: Scene, cluster: Cluster, *, simulated: float | None = None,
+                 **options: Any) -> None:
+        self._cluster, self._simulated = cluster, simulated
+        super().__init__(scene, **options)
+
+    def passes(self, *, spp: int | None = None, time: float | None = None, error: float | None = None,
+               reference: NDArray[np.float32] | None = None) -> Iterator[State]:
+        """See `Renderer.passes`. If the cluster fails, the samples so far are kept in the checkpoint."""
+        try:
+            yield from super().passes(spp=spp, time=time, error=error, reference=reference)
+        except DeviceError:
+            self._keep(last=True)
+            if self._checkpoints is not None:
+                self._checkpoints.wait()
+            raise
+
+    def _open(self, device: Selectors, lanes: int | None, on_phase: Callable[[str], None],
+              before: Renderer | None) -> None:
+        validate(self.scene)
+        given = [device] if device is None or isinstance(device, str | int | Device) else list(device)
+        selectors = tuple(each for each in given if isinstance(each, str | int))
+        if len(selectors) < len(given) - (given == [None]):
+            raise UsageError("a farm's devices are those of its workers; name them, instead of opening any")
+        self.devices = []
+        self._lanes, self._selectors = lanes, selectors
+
+    def _make_picture(self, before: Sequence[SceneOnDevice] = ()) -> FarmPicture:
+        order = Order(self.scene, self.choices, self._lanes, self._planned_spp, self._selectors,
+                      self._simulated)
+        picture = FarmPicture(self._cluster, order, self.choices.pixel)
+        facts = picture.dispatch.wait_for()[0].facts or {}
+        self.warnings = PictureWarnings(self.scene, facts["report"]["kernel"]["features"])
+        return picture
+
+    def _turn_to(self, camera: Camera) -> None:
+        """Start a new image. Many images are better rendered by one worker each (whole_pictures.py)."""
+        self.scene = replace(self.scene, camera=camera)
+        self.session = self._make_picture()
+
+    @property
+    def name(self) -> str:
+        """Return the names of all devices that render."""
+        return (self.session.told("name") if hasattr(self, "session") else "") or FARM

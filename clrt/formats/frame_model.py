@@ -1,0 +1,92 @@
+"""A camera that frames a whole model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..scene.geometry.instancing import meshes_by_id
+from ..scene.model import Camera, Instance, Mesh
+
+#: Direction from the model to the camera: in front (+Z), 28° to the right and 17° above.
+THREE_QUARTER = (0.53, 0.34, 1.0)
+FOV_DEGREES = 30.0
+#: Fraction of a square image's width or height, whichever is tighter, that the model fills.
+FILL = 0.92
+#: Maximum number of iterations that center the model along the looser axis; it converges after 3 to 6.
+ROUNDS = 20
+
+Doubles = NDArray[np.float64]
+
+
+def frame(meshes: list[Mesh], instances: Sequence[Instance] = ()) -> Camera:
+    """Return the nearest three-quarter view that has every vertex inside a square image, with the model centered.
+
+    Only vertices that faces use count; instances count by the corners of their mesh's bounding box. The model fills
+    FILL of the image's width or height, and its left and right margins are equal, as are the top and bottom ones.
+    """
+    back = np.array(THREE_QUARTER) / np.linalg.norm(THREE_QUARTER)
+    right = np.cross([0.0, 1.0, 0.0], back) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], back))
+    axes = np.array([right, np.cross(back, right), back])
+    vertices = _extremes(meshes, instances)
+    middle = vertices.min(axis=0) / 2 + vertices.max(axis=0) / 2
+    x, y, z = axes @ (vertices - middle).T
+    # From (cx, cy, d) a vertex is inside if |x - cx| <= slope (d - z): cx + slope d and slope d - cx have lower bounds,
+    # whose sum bounds d alone.
+    slope = FILL * math.tan(math.radians(FOV_DEGREES) / 2)
+    distance = max(float(np.max(slope * z + s) + np.max(slope * z - s)) for s in (x, y)) / (2 * slope)
+    distance = distance if distance > 0 else 1.0
+    center = middle + np.array([_center(x, z, distance), _center(y, z, distance), 0.0]) @ axes
+    return Camera(position=_vector(center + distance * back), look_at=_vector(center), fov_degrees=FOV_DEGREES)
+
+
+def bounds(meshes: list[Mesh], instances: Sequence[Instance] = ()) -> tuple[Doubles, Doubles]:
+    """Return the bounding box, lowest and highest (3,), of the vertices that faces use and of instances' boxes."""
+    vertices = _extremes(meshes, instances)
+    return vertices.min(axis=0), vertices.max(axis=0)
+
+
+def _extremes(meshes: list[Mesh], instances: Sequence[Instance]) -> Doubles:
+    """Return the vertices that faces use, and the corners of the instances' transformed bounding boxes, (n, 3)."""
+    boxes = {}
+    for key, mesh in meshes_by_id(instances).items():
+        used = _used_vertices([mesh])
+        ends = np.stack([used.min(axis=0), used.max(axis=0)])
+        boxes[key] = np.array([ends[[x, y, z], [0, 1, 2]] for x, y, z in np.ndindex(2, 2, 2)])
+    corners = [boxes[id(each.mesh)] @ each.to_world[:, :3].T + each.to_world[:, 3] for each in instances]
+    return np.concatenate([*([_used_vertices(meshes)] if meshes else []), *corners])
+
+
+def _used_vertices(meshes: list[Mesh]) -> Doubles:
+    """Return the vertices that faces use, (n, 3)."""
+    rows = []
+    for mesh in meshes:
+        used = np.zeros(len(mesh.vertices), bool)
+        used[mesh.faces] = True
+        rows.append(mesh.vertices[used])
+    return np.concatenate(rows).astype(np.float64)
+
+
+def _center(x: Doubles, z: Doubles, distance: float) -> float:
+    """Return the camera's x for which the model's two edges are equally far from the image center.
+
+    The model's half width in the image is the maximum of (x_i - x_j) / (2 distance - z_i - z_j) over all pairs. Each
+    iteration takes the best pair for the last ratio (Dinkelbach 1967); the ratio grows until the pair stays the same.
+    """
+    slope, pair = 0.0, (0, 0)
+    for _ in range(ROUNDS):
+        last, pair = pair, (int(np.argmax(x + slope * z)), int(np.argmin(x - slope * z)))
+        if pair == last:
+            break
+        high, low = pair
+        slope = float((x[high] - x[low]) / (2 * distance - z[high] - z[low]))
+    high, low = pair
+    return float(x[high] + slope * z[high] + x[low] - slope * z[low]) / 2
+
+
+def _vector(values: Doubles) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z

@@ -1,0 +1,219 @@
+"""Schema of the parts of a glTF 2.0 document that are read, with the specification's names (Khronos 2021, section 5).
+
+Imported only when a glTF file is read, since it needs pydantic. Unknown properties are ignored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Literal, TypeVar
+
+from pydantic import Field, ValidationError
+
+from ...errors import SceneError
+from ...scene.editing import free_name
+from .material_schema import Image, Index, Material, Part, Sampler, Texture, Vec3, Vec4
+
+Item = TypeVar("Item")
+Count = Annotated[int, Field(ge=1)]
+NonNegative = Annotated[float, Field(ge=0)]
+ComponentType = Literal[5120, 5121, 5122, 5123, 5125, 5126]
+
+#: Supported extensions.
+EXTENSIONS = frozenset(f"KHR_materials_{name}" for name in (
+    "clearcoat", "emissive_strength", "ior", "sheen", "specular", "transmission", "volume")) | frozenset({
+        "EXT_mesh_gpu_instancing", "EXT_texture_webp", "KHR_draco_mesh_compression", "KHR_lights_punctual",
+        "KHR_mesh_quantization", "KHR_texture_transform"})
+
+
+class Asset(Part):
+    version: str
+    minVersion: str | None = None
+
+
+class Buffer(Part):
+    byteLength: Count
+    uri: str | None = None
+
+
+class BufferView(Part):
+    buffer: Index
+    byteLength: Count
+    byteOffset: Index = 0
+    byteStride: Annotated[int, Field(ge=4, le=252)] | None = None
+
+
+class SparseIndices(Part):
+    bufferView: Index
+    byteOffset: Index = 0
+    componentType: Literal[5121, 5123, 5125]
+
+
+class SparseValues(Part):
+    bufferView: Index
+    byteOffset: Index = 0
+
+
+class Sparse(Part):
+    count: Count
+    indices: SparseIndices
+    values: SparseValues
+
+
+class Accessor(Part):
+    componentType: ComponentType
+    count: Count
+    type: Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"]
+    bufferView: Index | None = None
+    byteOffset: Index = 0
+    normalized: bool = False
+    sparse: Sparse | None = None
+
+
+class Draco(Part):
+    bufferView: Index
+    attributes: dict[str, Index]
+
+
+class PrimitiveExtensions(Part):
+    KHR_draco_mesh_compression: Draco | None = None
+
+
+class Primitive(Part):
+    attributes: dict[str, Index]
+    indices: Index | None = None
+    material: Index | None = None
+    mode: Annotated[int, Field(ge=0, le=6)] = 4
+    targets: list[dict[str, Index]] = []
+    extensions: PrimitiveExtensions = PrimitiveExtensions()
+
+
+class Mesh(Part):
+    primitives: list[Primitive]
+    weights: list[float] = []
+    name: str | None = None
+
+
+class Perspective(Part):
+    yfov: Annotated[float, Field(gt=0, lt=3.14159)]
+
+
+class Orthographic(Part):
+    ymag: float
+
+
+class Camera(Part):
+    perspective: Perspective | None = None
+    orthographic: Orthographic | None = None
+    name: str | None = None
+
+
+class Spot(Part):
+    innerConeAngle: Annotated[float, Field(ge=0)] = 0.0
+    outerConeAngle: Annotated[float, Field(gt=0, le=1.5708)] = 0.7853981633974483
+
+
+class Light(Part):
+    type: Literal["directional", "point", "spot"]
+    color: tuple[NonNegative, NonNegative, NonNegative] = (1.0, 1.0, 1.0)
+    intensity: NonNegative = 1.0
+    range: float | None = None
+    spot: Spot = Spot()
+
+
+class Lights(Part):
+    lights: list[Light] = []
+
+
+class UsedLight(Part):
+    light: Index
+
+
+class Instancing(Part):
+    attributes: dict[str, Index]
+
+
+class NodeExtensions(Part):
+    EXT_mesh_gpu_instancing: Instancing | None = None
+    KHR_lights_punctual: UsedLight | None = None
+
+
+class DocumentExtensions(Part):
+    KHR_lights_punctual: Lights = Lights()
+
+
+class Node(Part):
+    children: list[Index] = []
+    mesh: Index | None = None
+    camera: Index | None = None
+    skin: Index | None = None
+    weights: list[float] = []
+    matrix: Annotated[list[float], Field(min_length=16, max_length=16)] | None = None
+    translation: Vec3 = (0.0, 0.0, 0.0)
+    rotation: Vec4 = (0.0, 0.0, 0.0, 1.0)
+    scale: Vec3 = (1.0, 1.0, 1.0)
+    name: str | None = None
+    extensions: NodeExtensions = NodeExtensions()
+
+
+class Scene(Part):
+    nodes: list[Index] = []
+
+
+class Document(Part):
+    """A whole glTF document."""
+
+    asset: Asset
+    extensionsRequired: list[str] = []
+    extensionsUsed: list[str] = []
+    accessors: list[Accessor] = []
+    buffers: list[Buffer] = []
+    bufferViews: list[BufferView] = []
+    cameras: list[Camera] = []
+    images: list[Image] = []
+    materials: list[Material] = []
+    meshes: list[Mesh] = []
+    nodes: list[Node] = []
+    scene: Index | None = None
+    samplers: list[Sampler] = []
+    scenes: list[Scene] = []
+    textures: list[Texture] = []
+    extensions: DocumentExtensions = DocumentExtensions()
+
+
+def parse_document(text: bytes) -> Document:
+    """Parse a JSON text. Raises SceneError with every property that the specification does not allow, for a version
+    other than 2, and for a required extension that is not in EXTENSIONS."""
+    try:
+        document = Document.model_validate_json(text)
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+        raise SceneError([f"{_path(detail['loc'])}: {detail['msg']}; export the file again" for detail in details[:12]]
+                         ) from None
+    if not document.asset.version.startswith("2."):
+        raise SceneError(f'asset.version is "{document.asset.version}"; only glTF 2 is supported, export it as 2.0')
+    missing = sorted(set(document.extensionsRequired) - EXTENSIONS)
+    if missing:
+        raise SceneError(f"needs the extension {', '.join(missing)}, which is not supported; export without it")
+    return document
+
+
+def entry(items: Sequence[Item], index: int, name: str, user: str) -> Item:
+    """Return items[index]; raises SceneError if it does not exist. `name`: the kind of item, such as "accessor"."""
+    if index >= len(items):
+        raise SceneError(f"{user} uses {name} {index}, but the file has {len(items)}; export the file again")
+    return items[index]
+
+
+def material_names(document: Document) -> list[str]:
+    """Return a unique name for each material."""
+    names: dict[str, None] = {}
+    for index, source in enumerate(document.materials):
+        names[free_name(source.name or f"material {index}", names)] = None
+    return list(names)
+
+
+def _path(location: tuple[int | str, ...]) -> str:
+    """Format a location in the document, such as accessors[3].count."""
+    words = [f"[{part}]" if isinstance(part, int) else f".{part}" for part in location]
+    return "".join(words).removeprefix(".") or "the document"

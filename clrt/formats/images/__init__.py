@@ -1,0 +1,1 @@
+"""Image files, decoded in a process of its own where a decoder may crash."""

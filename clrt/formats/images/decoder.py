@@ -1,0 +1,130 @@
+"""Decoding of images and compressed meshes in a child process, since the libraries may crash, hang or exhaust memory if
+a file is damaged.
+
+The process starts with the first file, is reused for later ones, and exits after being idle for a while.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+import threading
+from contextlib import suppress
+from pathlib import Path
+from signal import strsignal
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...awake import wait_awake
+from ...errors import SceneError
+from ...file_names import utf8_path
+from ...threads import Event, beside
+
+#: Time limit per file in seconds. The largest supported image takes a tenth of it.
+LIMIT = 60.0
+Arrays = dict[str, NDArray[Any]]
+
+_lock = threading.Lock()
+_running: _Process | None = None
+
+
+def decode(kind: str, source: Path | bytes, suffix: str = "") -> tuple[Arrays, dict[str, Any]]:
+    """Decode a file, or bytes of a file with the name suffix `suffix`, and return its arrays and other facts.
+
+    kind: a function of scene.decoding. Raises SceneError with its message, or with how the process ended.
+    """
+    try:
+        if isinstance(source, Path):
+            with utf8_path(source.absolute()) as path:
+                return _decoded(kind, path)
+        with tempfile.TemporaryDirectory(prefix="clrt-") as folder:
+            file = Path(folder) / f"embedded{suffix}"
+            file.write_bytes(source)
+            return decode(kind, file)
+    except OSError as error:
+        raise SceneError("the system refuses its decoder a process or a temporary file "
+                         f"({error.strerror or error})") from error
+
+
+def _decoded(kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
+    global _running
+    with _lock:
+        if _running is not None and _running.owner == os.getpid():
+            with suppress(_Ended):  # it may merely have exited after being idle
+                return _running.decode(kind, file)
+        _running = _Process()
+        try:
+            return _running.decode(kind, file)
+        except _Ended as end:
+            _running = None
+            raise SceneError(f"the decoder {end}; the file is damaged or too large") from None
+
+
+class _Ended(Exception):
+    """The decoder process has ended; the message says how."""
+
+
+class _Process:
+    """Child process that runs scene.decoding. `owner`: the pid that started it; a forked process must not use it."""
+
+    def __init__(self) -> None:
+        import subprocess    # most scenes need no decoder
+
+        path = os.pathsep.join(os.path.abspath(folder) for folder in sys.path)
+        self.owner = os.getpid()
+        self._popen = subprocess.Popen(
+            [sys.executable, "-P", "-m", "clrt.formats.images.decoder_process"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1"})
+        assert self._popen.stdin and self._popen.stdout
+        self._requests, self._replies = self._popen.stdin, self._popen.stdout
+
+    def decode(self, kind: str, file: Path) -> tuple[Arrays, dict[str, Any]]:
+        """Decode a file, see `decode` of the module. Raises _Ended if the process ends or has to be killed."""
+        ended, late = Event(), Event()
+
+        def watch() -> None:
+            if not wait_awake(ended, LIMIT):
+                late.set()
+                self._popen.kill()
+
+        beside(watch, daemon=True)
+        try:
+            self._requests.write(json.dumps([kind, str(file)]).encode() + b"\n")
+            self._requests.flush()
+            reply = json.loads(self._replies.readline() or "null")
+            if reply is None:
+                raise EOFError
+            arrays = {name: self._array(shape, dtype) for name, (shape, dtype) in reply["arrays"].items()}
+        except (OSError, EOFError):
+            raise _Ended(f"took more than {LIMIT:g} s" if late.is_set() else self._how_it_ended()) from None
+        except BaseException:  # e.g. KeyboardInterrupt: later replies would not match their requests
+            self._popen.kill()
+            raise
+        finally:
+            ended.set()
+        if "error" in reply:
+            raise SceneError(reply["error"])
+        return arrays, reply["facts"]
+
+    def _array(self, shape: list[int], dtype: str) -> NDArray[Any]:
+        array = np.empty(shape, dtype)
+        view = array.reshape(-1).view(np.uint8).data
+        while len(view):
+            count = self._replies.readinto(view)  # type: ignore[attr-defined]
+            if not count:
+                raise EOFError
+            view = view[count:]
+        return array
+
+    def _how_it_ended(self) -> str:
+        self._popen.kill()  # no effect if it has already ended; the exit code then is its own
+        with suppress(OSError):
+            self._requests.close()
+        self._replies.close()
+        code = self._popen.wait()
+        return f"crashed with signal {-code} ({strsignal(-code)})" if code < 0 else f"ended with code {code}"

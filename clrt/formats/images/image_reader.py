@@ -1,0 +1,98 @@
+"""Image file reading: environment maps and images to compare as linear Rec. 709, textures as stored."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ..referenced_files import check_file
+from .decoder import decode
+from .radiance_hdr import read_radiance
+
+#: Magic bytes of images embedded in glTF, and the file suffix of that format.
+EMBEDDED = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg", b"RIFF": ".webp"}
+
+
+def read_picture(path: Path) -> NDArray[np.float32]:
+    """Return an image's pixels: (h, w, 3) float32, linear, row 0 on top, NaN and Inf kept.
+
+    Float files (.exr, .hdr) are used unchanged; integer ones (.png, .jpg and others) are decoded from sRGB. One channel
+    is grey; alpha is dropped. Raises SceneError naming the file if it is missing, empty, damaged, cropped (a data
+    window that differs from the display window), or has no color channels.
+    """
+    _check_stored(path)
+    if (radiance := read_radiance(path)) is not None:
+        return radiance
+    pixels, names = _stored(path, str(path))
+    colours = pixels[..., _colour_channels(str(path), names)]
+    if colours.dtype == np.float32:
+        return colours
+    return linear_from_srgb(np.asarray(colours / np.float32(np.iinfo(colours.dtype).max), np.float32))
+
+
+def read_texels(source: Path | bytes, name: str = "") -> NDArray[np.uint8]:
+    """Return the texels of an image file of at most 16 bits per channel, or of the bytes of one (PNG, JPEG, WebP).
+
+    (h, w, 4) uint8 as stored, row 0 on top, unassociated alpha. `name`: the bytes' name in messages. Raises SceneError
+    as `read_picture`, and for images of floats, which would lose most of their range.
+    """
+    if isinstance(source, Path):
+        _check_stored(source)
+    name = name or str(source)
+    pixels, names = _stored(source, name)
+    if pixels.dtype == np.float32:
+        raise SceneError(f"{name}: holds floats, but textures have 8 bits a channel; convert it to PNG")
+    if pixels.dtype == np.uint16:
+        pixels = (pixels.astype(np.uint32) + 128) // 257
+    texels = np.full((*pixels.shape[:2], 4), 255, np.uint8)
+    texels[..., :3] = pixels[..., _colour_channels(name, names)]
+    for channel, letter in enumerate(names):
+        if letter.upper() == "A":
+            texels[..., 3] = pixels[..., channel]
+    return texels
+
+
+def _check_stored(path: Path) -> None:
+    check_file(path, "picture")
+    if path.stat().st_size == 0:
+        raise SceneError(f"{path}: the picture file is empty; write it again")
+
+
+def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], list[str]]:
+    """Return the pixels as stored, and the names of the channels."""
+    suffix = ""
+    if isinstance(source, bytes):
+        suffix = next((ending for start, ending in EMBEDDED.items() if source.startswith(start)), "")
+        if not suffix:
+            raise SceneError(f"{name}: is neither PNG, JPEG nor WebP; convert it")
+    try:
+        arrays, facts = decode("picture", source, suffix)
+    except SceneError as error:
+        raise SceneError(f"{name}: cannot be decoded as a picture: {error}") from None
+    pixels = arrays["pixels"]
+    if facts["cropped"]:
+        height, width = pixels.shape[:2]
+        full_width, full_height = facts["whole"]
+        raise SceneError(f"{name}: the file holds {width}x{height} pixels of a {full_width}x{full_height} picture; "
+                         "save it uncropped")
+    return pixels, facts["channels"]
+
+
+def linear_from_srgb(encoded: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Decode sRGB (IEC 61966-2-1) values in [0, 1] to linear; same shape and dtype."""
+    power = ((encoded.astype(np.float64) + 0.055) / 1.055) ** 2.4
+    return np.where(encoded <= 0.04045, encoded / 12.92, power).astype(np.float32)
+
+
+def _colour_channels(file: str, names: list[str]) -> list[int]:
+    """Return the indices of red, green and blue among a file's channels."""
+    upper = [name.upper() for name in names]
+    if len(names) <= 2:  # grey, or grey and alpha
+        return [0, 0, 0]
+    if not {"R", "G", "B"} <= set(upper):
+        raise SceneError(f"{file}: no channels R, G, B, but {', '.join(names)}; save its colour layer alone")
+    return [upper.index(channel) for channel in "RGB"]

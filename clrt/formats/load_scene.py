@@ -1,0 +1,92 @@
+"""Scene loading: a TOML scene file, a Mitsuba XML file, or a bare model with a default camera and sky."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import tomllib
+from os import PathLike
+from pathlib import Path
+
+from ..errors import SceneError
+from ..scene.default_sky import SUN, default_sky
+from ..scene.model import Scene
+from ..scene.provenance import source_of_model
+from ..scene.validation.validate import scene_problems
+from .frame_model import frame
+from .models import SUFFIXES, read_model
+from .referenced_files import check_file, name_of
+from .toml.reader import SceneReader, camera_problems
+
+
+log = logging.getLogger(__name__)
+#: Stands for a TOML scene on standard input; its file names are relative to the working directory.
+STDIN = Path("-")
+
+
+def load(path: str | Path, camera: str | None = None) -> Scene:
+    """Load a scene from a .toml file, a Mitsuba .xml file, a model file (whose meshes get a sky, a sun and a camera),
+    or from standard input for "-".
+
+    A glTF model's first camera and its lights are used if it has any. camera: name of a camera in a model file to use
+    instead. Raises one SceneError with all problems of the file, each as "FILE: object: value is wrong; remedy".
+    """
+    if not isinstance(path, (str, PathLike)):
+        raise SceneError(f"{path!r} is no path of a scene; name a file, such as \"scene.toml\"")
+    path = Path(path)
+    check_scene(path)
+    reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower(), _load_model)
+    scene, problems = reader(path)
+    if camera is not None:
+        scene.camera = scene.cameras.get(camera, scene.camera)
+        problems += camera_problems(camera, scene.cameras, "--camera")
+    problems += scene_problems(scene)
+    if problems:
+        raise SceneError([f"{path}: {problem}" for problem in problems])
+    return scene
+
+
+def check_scene(path: Path) -> None:
+    """Raise SceneError unless `path` is STDIN or an existing file with the suffix of a scene or a model."""
+    if path == STDIN:
+        return
+    is_model = path.suffix.lower() in SUFFIXES
+    check_file(path, "model" if is_model else "scene")
+    if not is_model and path.suffix.lower() not in _READERS:
+        raise SceneError(f"{path}: a scene must be one of {', '.join((*_READERS, *SUFFIXES))}; convert it")
+
+
+def _load_model(path: Path) -> tuple[Scene, list[str]]:
+    """Load a bare model with the default sky, its own lights or the sun, and its first camera or one that frames it."""
+    model = read_model(path)
+    camera = next(iter(model.cameras.values()), None) or frame(model.meshes, model.instances)
+    return Scene(meshes=model.meshes, instances=model.instances, camera=camera, cameras=model.cameras,
+                 environment=default_sky(), lights=model.lights or [SUN], name=name_of(path),
+                 source=source_of_model(path, model)), []
+
+
+def _load_toml(path: Path) -> tuple[Scene, list[str]]:
+    """Load a TOML scene, and return it with the problems of its file."""
+    try:
+        content = sys.stdin.buffer.read() if path == STDIN else path.read_bytes()
+        document = tomllib.loads(content.decode())
+    except (ValueError, RecursionError) as error:  # also for invalid UTF-8 and for numbers of 4300 digits
+        raise SceneError(f"{path}: is not valid TOML: {error}") from None
+    reader = SceneReader(path, document)
+    scene = reader.scene()
+    return scene, reader.problems
+
+
+def _load_mitsuba(path: Path) -> tuple[Scene, list[str]]:
+    """Load a Mitsuba scene, logging a warning per model that only approximates Mitsuba's."""
+    from .mitsuba.reader import read_mitsuba
+    try:
+        scene, differences, _ = read_mitsuba(path)
+    except SceneError as error:
+        raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+    for difference in differences:
+        log.warning("%s: %s", path, difference)
+    return scene, []
+
+
+_READERS = {".toml": _load_toml, ".xml": _load_mitsuba}

@@ -1,0 +1,254 @@
+"""Conversion of Mitsuba's shapes to meshes, spheres and instances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import SceneError
+from ...scene.geometry.normals import smooth_normals
+from ...scene.geometry.transform import transform_mesh, unit
+from ...scene.materials.material import Material
+from ...scene.materials.material_types import Dielectric, Diffuse
+from ...scene.model import FloatArray, Instance, Mesh, Sphere
+from ...scene.validation.validate import index_problems
+from ..models import read_model
+from ..ply import ply_records
+from .materials import Look, MaterialReader, absorbing
+from .primitives import cube, cylinder, disk, rectangle, sphere
+from .textures import Attribute, TextureReader
+from .values import Doubles
+from .xml import Plugin, UnsupportedError
+
+PRIMITIVES: dict[str, Callable[[], Mesh]] = {
+    "rectangle": rectangle, "cube": cube, "disk": disk, "cylinder": cylinder, "sphere": sphere}
+FILES = ("obj", "ply")
+#: Tolerance for a transform to be a rotation, translation and uniform scale.
+UNEVEN = 1e-5
+Part = Mesh | Sphere
+Attributes = Mapping[str, FloatArray]
+
+
+class ShapeReader:
+    """Reader for the shapes of one scene.
+
+    stand_in: a material for shapes whose own is not supported; without one these are rejected. missing: the unsupported
+    features of these, by the name of the mesh or sphere.
+    """
+
+    def __init__(self, textures: TextureReader, materials: MaterialReader, stand_in: Material | None) -> None:
+        self._textures = textures
+        self._materials = materials
+        self._stand_in = stand_in
+        self.missing: dict[str, list[str]] = {}
+        self._groups: dict[Plugin, list[Part]] = {}
+
+    def parts(self, plugin: Plugin) -> Iterator[Part | Instance]:
+        """Yield what a <shape> renders; nothing for a group, which its instances render."""
+        if plugin.kind == "instance":
+            yield from self._instances(plugin)
+        elif plugin.kind != "shapegroup":
+            yield from self._shape(plugin)
+
+    def _shape(self, plugin: Plugin) -> Iterator[Part]:
+        if plugin.kind not in (*PRIMITIVES, *FILES):
+            plugin.refuse_kind(", ".join((*PRIMITIVES, *FILES, "shapegroup", "instance")))
+        to_world = plugin.transform("to_world")
+        look = self._lit(plugin, self._look(plugin))
+        if plugin.value("flip_normals", bool, False):
+            plugin.refuse("flip_normals is not supported", "turn the shape's faces", "flip_normals")
+        mirrored = bool(np.linalg.det(to_world[:3, :3]) < 0)
+        if plugin.kind == "sphere":
+            to_world = to_world @ _ball(plugin)
+            inwards = mirrored and (any(look.material.radiance) or "TRANSMISSION" in look.material.features())
+            if not inwards and (ball := _sphere(to_world, look, plugin.where)):
+                yield ball
+                return
+        elif plugin.kind == "cylinder":
+            to_world = to_world @ _between(plugin)
+        mirrored = float(np.linalg.det(to_world[:3, :3])) < 0
+        if plugin.kind in PRIMITIVES:
+            mesh = PRIMITIVES[plugin.kind]()
+            turns = mirrored and plugin.kind == "sphere"
+            pieces: list[tuple[Mesh, Attributes]] = [(_turned(mesh) if turns else mesh, {})]
+        else:
+            pieces = list(_from_file(plugin, mirrored))
+        for mesh, attributes in pieces:
+            yield _dressed(transform_mesh(mesh, to_world), look, attributes, plugin)
+
+    def _look(self, plugin: Plugin) -> Look:
+        """Return the material of the shape's BSDF and interior medium; or `stand_in` if it is not supported."""
+        try:
+            return self._own_look(plugin)
+        except UnsupportedError as error:
+            if self._stand_in is None:
+                raise
+            self.missing[plugin.where] = error.features
+            return Look(self._stand_in)
+
+    def _own_look(self, plugin: Plugin) -> Look:
+        bsdfs = plugin.all("bsdf")
+        grey = 0.0 if plugin.all("emitter") else 0.5  # Mitsuba's default for a shape without a BSDF
+        look = self._materials.look(bsdfs[-1]) if bsdfs else Look(Diffuse(color=(grey, grey, grey)))
+        for medium in plugin.all("medium"):
+            look = look._replace(material=absorbing(look.material, medium))
+        return look
+
+    def _lit(self, plugin: Plugin, look: Look) -> Look:
+        """Return the look with the emission of the shape's area emitter."""
+        for emitter in plugin.all("emitter"):
+            if emitter.kind != "area":
+                emitter.refuse_kind("area on a shape")
+            radiance = self._textures.color(emitter, "radiance", 1.0, emitted=True)
+            if isinstance(radiance, Attribute):
+                emitter.refuse("radiance is an attribute", "write a color or a bitmap", "radiance by an attribute")
+            look = look._replace(material=replace(look.material, emission=radiance))
+        return look
+
+    def _instances(self, plugin: Plugin) -> Iterator[Instance | Sphere]:
+        groups = plugin.all("shape")
+        if len(groups) != 1 or groups[0].kind != "shapegroup":
+            raise SceneError(f"{plugin.where}: refers to no shapegroup; write one <ref> to one")
+        to_world = plugin.transform("to_world")
+        if groups[0] not in self._groups:
+            self._groups[groups[0]] = [part for shape in groups[0].all("shape") for part in self._shape(shape)]
+        for part in self._groups[groups[0]]:
+            if isinstance(part, Mesh):
+                yield Instance(part, to_world, name=plugin.where)
+                continue
+            place = np.eye(4)
+            place[:3, :3] *= part.radius
+            place[:3, 3] = part.center
+            moved = _sphere(to_world @ place, Look(part.material), plugin.where)
+            if moved is None:
+                plugin.refuse("stretches a sphere", "scale evenly", "stretched sphere")
+            yield moved
+
+
+def _ball(plugin: Plugin) -> Doubles:
+    """Return the matrix that gives a sphere of radius 1 the plugin's radius and center."""
+    matrix = np.eye(4)
+    matrix[:3, :3] *= plugin.value("radius", float, 1.0)
+    matrix[:3, 3] = plugin.point("center") or (0.0, 0.0, 0.0)
+    return matrix
+
+
+def _between(plugin: Plugin) -> Doubles:
+    """Return the matrix that takes a cylinder along z to the axis from p0 to p1; rotated about it by the basis of Duff
+    et al. 2017 ("Building an Orthonormal Basis, Revisited")."""
+    start, end = np.array(plugin.point("p0") or (0, 0, 0)), np.array(plugin.point("p1") or (0, 0, 1))
+    radius, along = plugin.value("radius", float, 1.0), end - start
+    x, y, z = unit(along).tolist()
+    if not along.any():
+        raise SceneError(f"{plugin.where}: p0 and p1 are one point; move one")
+    sign = 1.0 if z >= 0 else -1.0
+    a = -1 / (sign + z)
+    frame = np.eye(4)
+    frame[:3] = np.column_stack([(1 + sign * x * x * a, sign * x * y * a, -sign * x), (x * y * a, sign + y * y * a, -y),
+                                 (x, y, z), start])
+    return frame @ np.diag([radius, radius, float(np.linalg.norm(along)), 1.0])
+
+
+def _sphere(to_world: Doubles, look: Look, name: str) -> Sphere | None:
+    """Return the transformed sphere of radius 1; None if it becomes an ellipsoid, or if it is textured.
+
+    Also if a mirroring transform turns it inside out and its sides differ.
+    """
+    linear = to_world[:3, :3]
+    squares = linear.T @ linear
+    radius = float(np.cbrt(abs(np.linalg.det(linear))))
+    sided = any(look.material.radiance) or isinstance(look.material, Dielectric)
+    if np.linalg.det(linear) < 0 and sided or look.material.textures():
+        return None
+    if np.abs(squares - radius**2 * np.eye(3)).max() > UNEVEN * radius**2:
+        return None
+    x, y, z = to_world[:3, 3].tolist()
+    return Sphere(center=(x, y, z), radius=radius, material=look.material, name=name)
+
+
+def _turned(mesh: Mesh) -> Mesh:
+    """Return the mesh turned inside out."""
+    return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]),
+                   normals=None if mesh.normals is None else -mesh.normals)
+
+
+def _from_file(plugin: Plugin, mirrored: bool) -> Iterator[tuple[Mesh, Attributes]]:
+    """Yield the meshes of a file, with smooth normals if it has none, as in Mitsuba.
+
+    Those follow the winding in world space, which a mirroring transform inverts; a file's own normals keep their side.
+    """
+    path = Path(plugin.value("filename", str, ""))
+    flat = plugin.value("face_normals", bool, False)
+    downward = plugin.value("flip_tex_coords", bool, plugin.kind == "obj")
+    own = _ply(path) if plugin.kind == "ply" else None
+    for mesh, attributes in [own] if own else [(mesh, {}) for mesh in read_model(path).meshes]:
+        if mesh.uv is not None and downward != (own is None):
+            mesh.uv[:, 1] = 1 - mesh.uv[:, 1]
+        mesh.colors, mesh.tangents = None, None
+        if flat:
+            mesh.normals = None
+        if mirrored and mesh.normals is None:
+            mesh = _turned(mesh)
+        if not flat and mesh.normals is None:
+            mesh.normals = smooth_normals(mesh.vertices, mesh.faces)
+        yield mesh, attributes
+
+
+def _ply(path: Path) -> tuple[Mesh, Attributes] | None:
+    """Read a plain PLY file with all its attributes; None for others."""
+    records = ply_records(path)
+    if records is None:
+        return None
+    vertex, face = records
+
+    def columns(*names: str) -> FloatArray | None:
+        names_there = vertex.dtype.names or ()
+        if not set(names) <= {*names_there}:
+            return None
+        return np.column_stack([vertex[name] for name in names]).astype(np.float32)
+
+    vertices = columns("x", "y", "z")
+    assert vertices is not None  # guaranteed by ply_records
+    faces = face["corners list"]["indices"]
+    if problems := index_problems(faces, len(vertices), f'mesh "{path.stem}"'):
+        raise SceneError([f"{path}: {problem}" for problem in problems])
+    uv = next((found for pair in ("uv", "st") if (found := columns(*pair)) is not None), None)
+    mesh = Mesh(vertices, faces.astype(np.int32), name=path.stem,
+                normals=columns("nx", "ny", "nz"), uv=uv)
+    attributes = {f"{prefix}_{name}": values for prefix, table in (("vertex", vertex), ("face", face))
+                  for name, values in _attributes(table).items()}
+    return mesh, attributes
+
+
+def _attributes(table: np.ndarray[tuple[int], np.dtype[np.void]]) -> dict[str, FloatArray]:
+    """Collect columns color_0, color_1 … into arrays (n, k), by name."""
+    groups: dict[str, list[str]] = {}
+    for column in table.dtype.names or ():
+        name, _, place = column.rpartition("_")
+        if name and place.isdigit() or name and place in "rgb":
+            groups.setdefault(name, []).append(column)
+    return {name: np.column_stack([table[column] for column in columns]).astype(np.float32)
+            for name, columns in groups.items()}
+
+
+def _dressed(mesh: Mesh, look: Look, attributes: Attributes, plugin: Plugin) -> Mesh:
+    """Return the mesh with its material, and the colors of an attribute; a face attribute splits shared vertices."""
+    mesh = replace(mesh, material=look.material, name=plugin.where)
+    if mesh.uv is None and look.material.textures():
+        raise SceneError(f"{plugin.where}: has a texture and no texture coordinates; add them to the file")
+    if look.attribute is None:
+        return mesh
+    name, low, high = look.attribute
+    if name not in attributes:
+        raise SceneError(f'{plugin.where}: has no attribute "{name}"; the file has '
+                         f"{', '.join(sorted(attributes)) or 'none'}")
+    colors = (np.array(low) + attributes[name] * np.subtract(high, low)).clip(0, 1).astype(np.float32)
+    if name.startswith("vertex_"):
+        return replace(mesh, colors=colors)
+    corners = mesh.faces.ravel()
+    normals, uv = (None if array is None else array[corners] for array in (mesh.normals, mesh.uv))
+    return replace(mesh, vertices=mesh.vertices[corners], faces=np.arange(len(corners), dtype=np.int32).reshape(-1, 3),
+                   colors=np.repeat(colors, 3, axis=0), normals=normals, uv=uv)

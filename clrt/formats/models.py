@@ -1,0 +1,153 @@
+"""Model file reading. STL, OFF and uncommon PLY files use trimesh's parsers; other readers are our own.
+
+The parsers are called directly, since a trimesh.Trimesh does not say whether the file had normals. They pass on NaN
+and invalid indices and raise arbitrary exceptions, so all they return is validated here.
+"""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import SceneError
+from ..scene.geometry.instancing import baked
+from ..scene.geometry.normals import Normals, choose_normals
+from ..scene.materials.material_types import Diffuse
+from ..scene.model import Mesh, Model
+from ..scene.validation.validate import index_problems, mesh_problems
+from .images.image_reader import linear_from_srgb
+from .ply import plain_ply
+from .referenced_files import check_file, name_of
+
+log = logging.getLogger(__name__)
+
+SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
+
+
+def read_mesh(path: Path, normals: Normals = "file") -> list[Mesh]:
+    """Return the meshes of a model file, as `read_model` reads them, with its instances as further ones."""
+    model = read_model(path, normals)
+    return model.meshes + [baked(each) for each in model.instances]
+
+
+def read_model(path: Path, normals: Normals = "file") -> Model:
+    """Read a model file: meshes, one per material, each with at least one triangle and valid arrays, and cameras.
+
+    Polygons become triangle fans. `normals`: see `choose_normals`. Raises SceneError naming the file, the mesh, and the
+    index or vertex that is wrong.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise SceneError(f"{path}: a model must be one of {', '.join(SUFFIXES)}; convert it")
+    check_file(path, "model")
+    if suffix in (".glb", ".gltf"):
+        from .gltf.reader import read_gltf
+        return read_gltf(path, normals)
+    try:
+        return Model(meshes=_meshes(_parse(path, suffix), name_of(path), normals))
+    except SceneError as error:
+        raise SceneError([f"{path}: {problem}" for problem in error.problems]) from None
+
+
+def _parse(path: Path, suffix: str) -> dict[str, Any]:
+    """Parse the file into the keyword arguments of trimesh's own classes."""
+    try:
+        with np.errstate(all="ignore"), path.open("rb") as file:
+            parts: dict[str, Any]
+            if suffix == ".obj":
+                from .wavefront.obj import parse_obj
+                parts = {"geometry": parse_obj(path)}
+            elif suffix == ".ply" and (plain := plain_ply(path)):
+                parts = plain
+            elif suffix == ".ply":
+                from trimesh.exchange.ply import load_ply
+                parts = load_ply(file, skip_materials=True)
+            elif suffix == ".stl":
+                from trimesh.exchange.stl import load_stl
+                parts = load_stl(file)
+            else:
+                from trimesh.exchange.off import load_off
+                parts = load_off(file)
+            return parts
+    except SceneError:
+        raise
+    except Exception as error:  # a damaged file may make trimesh's parsers raise anything
+        # On undecodable bytes trimesh raises an ImportError about an encoding detector: no help to the user.
+        detail = "" if isinstance(error, ImportError) else f" ({type(error).__name__}: {error})"
+        raise SceneError(f"cannot be read as {suffix[1:].upper()}{detail}; export the model again") from error
+
+
+def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:
+    """Build meshes from trimesh's keyword arguments for one mesh or for several."""
+    several = parts.get("geometry", {stem: parts})
+    pieces = {name: piece for name, piece in several.items() if _size(piece.get("faces"))}
+    if not pieces:
+        raise SceneError("holds no triangles (points, lines and PLY strips are not drawn); export a triangle mesh")
+    meshes, problems = [], []
+    for name, piece in pieces.items():
+        try:
+            meshes.append(_mesh(str(name), piece, normals))
+        except SceneError as error:
+            problems += error.problems
+    if problems:
+        raise SceneError(problems)
+    return meshes
+
+
+def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
+    """Build one mesh from trimesh's arrays, with its indices validated before use."""
+    try:
+        with np.errstate(over="ignore"):
+            vertices = np.ascontiguousarray(piece["vertices"], np.float32)
+            stored = piece.get("vertex_normals")
+            stored = None if stored is None else np.ascontiguousarray(stored, np.float32)
+            uv = None if piece.get("uv") is None else _downward(np.asarray(piece["uv"], np.float32))
+        faces = _triangles(np.asarray(piece["faces"], np.int64), name)
+    except (TypeError, ValueError):
+        raise SceneError(f'mesh "{name}": its lines have different numbers of values; export it again') from None
+    colors = _linear_colors(piece.get("vertex_colors"))
+    plain = Diffuse() if colors is None else Diffuse(color=(1.0, 1.0, 1.0))
+    material = piece.get("material") or plain
+    if uv is None and material.textures():
+        log.warning('mesh "%s" has no texture coordinates; the textures of its material are left out', name)
+        material = material.without_textures()
+    mesh = Mesh(vertices, faces.astype(np.int32), material, name=name, material_name=piece.get("material_name", ""),
+                uv=uv, colors=colors)
+    problems = index_problems(faces, len(vertices), f'mesh "{name}"') or mesh_problems(mesh, "mesh")
+    if problems:
+        raise SceneError(problems)
+    mesh.normals = choose_normals(normals, vertices, mesh.faces, stored)
+    return mesh
+
+
+def _downward(uv: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Convert texture coordinates (n, k) with v upwards, as these formats have them, or with u alone, to (n, 2)."""
+    v = uv[:, 1] if uv.shape[1] > 1 else np.zeros(len(uv), np.float32)
+    return np.nan_to_num(np.stack([uv[:, 0], 1 - v], axis=1))
+
+
+def _linear_colors(colors: Any) -> NDArray[np.float32] | None:
+    """Convert these formats' vertex colors, sRGB-encoded and up to 255 if integers, to linear."""
+    if colors is None:
+        return None
+    given = np.asarray(colors)
+    encoded = np.asarray(given / (255 if np.issubdtype(given.dtype, np.integer) else 1), np.float32)[:, :3]
+    return linear_from_srgb(np.nan_to_num(encoded).clip(0, 1))
+
+
+def _triangles(polygons: NDArray[np.int64], name: str) -> NDArray[np.int64]:
+    """Split polygons of k corners, (m, k), into fans of k − 2 triangles."""
+    if polygons.ndim != 2 or polygons.shape[1] < 3:
+        raise SceneError(f'mesh "{name}": its faces have fewer than 3 corners; export triangles')
+    if polygons.shape[1] == 3:
+        return polygons
+    fans = [polygons[:, [0, corner, corner + 1]] for corner in range(1, polygons.shape[1] - 1)]
+    return np.stack(fans, axis=1).reshape(-1, 3)
+
+
+def _size(array: Any) -> int:
+    return 0 if array is None else len(array)

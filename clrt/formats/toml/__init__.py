@@ -1,0 +1,1 @@
+"""clrt's scene files."""

@@ -1,0 +1,104 @@
+"""The [[instance]] tables of the scene file, which repeat what [[mesh]] tables show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import prod
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import SceneError
+from ...scene.geometry.transform import Matrix, transform_camera, transform_faults, transform_light, transform_mesh
+from ...scene.materials.material_types import Material
+from ...scene.model import Instance, Model
+from ...scene.validation.field_types import show, unknown
+from ...scene.validation.limits import Ge, Le
+from .placement import Placing
+
+
+#: Maximum number of instances per table.
+MOST_INSTANCES = 2_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Repeat(Placing):
+    """Keys of an entry of `repeat`: `count` copies, each placed relative to the one before it."""
+
+    count: Annotated[int, Ge(1), Le(MOST_INSTANCES)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class InstanceTable(Placing):
+    """Keys of [[instance]]; the entries of its `repeat` are read separately."""
+
+    mesh: str
+    name: str | None = None
+    material: str | None = None
+    repeat: Any = ()
+
+
+class InstanceReader:
+    """Instances by the names of the mesh tables that they refer to."""
+
+    def __init__(self) -> None:
+        self._shown: dict[str, list[list[Instance]]] = {}
+
+    def add(self, name: str | None, shown: Model) -> None:
+        """Register what a mesh table of this name, or of none, shows; an empty model if the table is invalid."""
+        own = [Instance(mesh, name=mesh.name) for mesh in shown.meshes]
+        if name is not None:
+            self._shown.setdefault(name, []).append(own + shown.instances)
+
+    def problems(self, mesh: object, where: str) -> list[str]:
+        """Return a problem unless exactly one table has the name `mesh`."""
+        tables = self._shown.get(str(mesh), [])
+        wrong = f"names {len(tables)} meshes; rename them" if tables else unknown(mesh, self._shown)
+        return [] if len(tables) == 1 else [f"{where}.mesh: {show(mesh)} {wrong}"]
+
+    def materials(self, table: InstanceTable) -> list[Material | None]:
+        """Return the materials of what the table's mesh shows, without the table's own."""
+        return [each.material for each in self._shown.get(str(table.mesh), [[]])[0]]
+
+    def read(self, table: InstanceTable, repeats: Sequence[Repeat], material: Material | None, where: str,
+             ) -> list[Instance]:
+        """Return the instances of what the mesh shows, and their copies; raises SceneError for invalid transforms."""
+        if (count := prod(repeat.count for repeat in repeats)) > MOST_INSTANCES:
+            raise SceneError(f"{where}.repeat: makes {count} copies; write counts of at most {MOST_INSTANCES} in all")
+        matrices = table.to_world(where)[None]
+        for i, repeat in enumerate(repeats):
+            matrices = repeated(matrices, repeat.to_world(f"{where}.repeat[{i}]"), repeat.count)
+        for fault, found in transform_faults(matrices[:, :3]).items():
+            if found.any():
+                copy = f", of copy {found.argmax()}," if found.size > 1 else ""
+                raise SceneError(f"{where}: its transform{copy} {fault}; write a scale without 0")
+        shown = self._shown.get(str(table.mesh), [[]])[0]
+        return [replace(moved(each, matrix), material=material or each.material, name=table.name or each.name)
+                for matrix in matrices for each in shown]
+
+
+def repeated(matrices: NDArray[np.float64], step: Matrix, count: int) -> NDArray[np.float64]:
+    """Return the matrices (n, 4, 4) and count − 1 copies of them, each `step` after the last: (count·n, 4, 4)."""
+    copies = [matrices]
+    with np.errstate(all="ignore"):    # the caller reports overflow
+        for _ in range(count - 1):
+            copies.append(step @ copies[-1])
+    return np.concatenate(copies)
+
+
+def placed(model: Model, matrix: Matrix, material: Material | None, others: dict[str, Material]) -> Model:
+    """Apply an affine matrix to a model. material: replaces its own; others: replacements by their own names."""
+    meshes = [transform_mesh(replace(mesh, material=others.get(mesh.material_name, material or mesh.material)), matrix)
+              for mesh in model.meshes]
+    instances = [replace(moved(each, matrix), material=others.get(each.mesh.material_name, material or each.material))
+                 for each in model.instances]
+    cameras = {name: transform_camera(camera, matrix) for name, camera in model.cameras.items()}
+    return Model(meshes=meshes, instances=instances, cameras=cameras,
+                 lights=[transform_light(light, matrix) for light in model.lights])
+
+
+def moved(instance: Instance, matrix: Matrix) -> Instance:
+    """Return the instance transformed by a further affine matrix."""
+    return replace(instance, to_world=(matrix @ np.vstack([instance.to_world, [0.0, 0.0, 0.0, 1.0]]))[:3])

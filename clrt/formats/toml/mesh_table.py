@@ -1,0 +1,87 @@
+"""The [[mesh]] table of the scene file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+
+from ...errors import SceneError
+from ...scene.geometry.creases import creased
+from ...scene.geometry.instancing import meshes_by_id
+from ...scene.geometry.normals import Normals, choose_normals
+from ...scene.materials.material_types import Diffuse
+from ...scene.model import Instance, Mesh, Model, Vector
+from ...scene.validation.limits import Ge, Le, Lt
+from ...scene.validation.validate import mesh_problems
+from ..models import read_model
+from .placement import Placing
+
+Vertex = Annotated[int, Ge(0), Lt(2**31)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshTable(Placing):
+    """Keys of [[mesh]]."""
+
+    name: str | None = None
+    file: str | None = None
+    vertices: tuple[Vector, ...] | None = None
+    faces: tuple[tuple[Vertex, Vertex, Vertex], ...] | None = None
+    uv: tuple[tuple[float, float], ...] | None = None
+    material: str | None = None
+    materials: Mapping[str, str] | None = None
+    normals: Normals = "file"
+    crease_degrees: Annotated[float, Ge(0), Le(180)] | None = None
+    lights: bool = False
+    visible: bool = True
+
+    def read(self, folder: Path, where: str) -> Model:
+        """Read its file, which is relative to `folder`, or its vertices and faces, untransformed.
+
+        Raises SceneError for a file that cannot be read, indices out of range, no geometry or both kinds, and
+        crease_degrees without computed normals.
+        """
+        if self.crease_degrees is None:
+            return self._read(folder, where)
+        if self.normals != "smooth":
+            raise SceneError(f'{where}: has crease_degrees, but normals = "{self.normals}"; write normals = "smooth"')
+        model = self._read(folder, where)
+        meshes = {number: creased(mesh, self.crease_degrees)
+                  for number, mesh in meshes_by_id([*model.instances, *map(Instance, model.meshes)]).items()}
+        return replace(model, meshes=[meshes[id(mesh)] for mesh in model.meshes],
+                       instances=[replace(each, mesh=meshes[id(each.mesh)]) for each in model.instances])
+
+    def _read(self, folder: Path, where: str) -> Model:
+        inline = self.vertices is not None or self.faces is not None or self.uv is not None
+        if self.file is not None and inline:
+            raise SceneError(f"{where}: has a file and vertices, faces or uv; keep one of them")
+        if self.file is not None:
+            return self._from_file(self.file, folder, where)
+        if self.vertices is None or self.faces is None:
+            missing = "faces" if self.vertices else "vertices" if self.faces else "file"
+            raise SceneError(f"{where}: {missing} is missing; write a file, or vertices and faces")
+        with np.errstate(over="ignore"):
+            vertices = np.array(self.vertices, np.float32).reshape(-1, 3)
+        faces = np.array(self.faces, np.int32).reshape(-1, 3)
+        uv = None if self.uv is None else np.array(self.uv, np.float32).reshape(-1, 2)
+        mesh = Mesh(vertices, faces, Diffuse(), name=self.name or "mesh", uv=uv)
+        problems = mesh_problems(mesh, where)
+        if problems:
+            raise SceneError(problems)
+        mesh.normals = choose_normals(self.normals, vertices, faces, None)
+        return Model(meshes=[mesh])
+
+    def _from_file(self, file: str, folder: Path, where: str) -> Model:
+        try:
+            model = read_model(folder / file, self.normals)
+        except SceneError as error:
+            raise SceneError([f"{where}.file: {problem}" for problem in error.problems]) from None
+        if self.name is not None:
+            parts: list[Mesh | Instance] = [*model.meshes, *model.instances]
+            for part in parts:
+                part.name = self.name if len(parts) == 1 else f"{self.name} {part.name}"
+        return model

@@ -1,0 +1,35 @@
+"""Keys of a scene file that transform a mesh or an instance to the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ...errors import SceneError
+from ...scene.geometry.transform import Matrix, rotation, scaling, translation
+from ...scene.model import Vector
+from ...scene.validation.field_types import show
+
+Row = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placing:
+    """Transform keys. A point is scaled, then rotated about the fixed x, y and z axes in this order, then translated;
+    or it is multiplied by `matrix`, four rows."""
+
+    translate: Vector = (0.0, 0.0, 0.0)
+    scale: Vector = (1.0, 1.0, 1.0)
+    rotate_degrees: Vector = (0.0, 0.0, 0.0)
+    matrix: tuple[Row, Row, Row, Row] | None = None
+
+    def to_world(self, where: str) -> Matrix:
+        """Return the table's transform. Raises SceneError if it is given twice or is not affine."""
+        if self.matrix is None:
+            return translation(self.translate) @ rotation(self.rotate_degrees) @ scaling(self.scale)
+        if any(getattr(self, key.name) != key.default for key in fields(Placing) if key.name != "matrix"):
+            raise SceneError(f"{where}: has a matrix and translate, scale or rotate_degrees; keep one of them")
+        if self.matrix[3] != (0.0, 0.0, 0.0, 1.0):
+            raise SceneError(f"{where}.matrix[3]: {show(self.matrix[3])} is not affine; write [0, 0, 0, 1]")
+        return np.array(self.matrix, np.float64)

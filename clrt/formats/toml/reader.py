@@ -1,0 +1,290 @@
+"""Conversion of a TOML document to a scene, collecting all problems in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ...errors import SceneError
+from ...scene.animation import Animation, Keyframe
+from ...scene.default_sky import SUN, default_sky
+from ...scene.geometry.instancing import meshes_by_id
+from ...scene.lights import LIGHTS, Light
+from ...scene.materials.material_types import MATERIALS, Diffuse, Material
+from ...scene.materials.textures import WHITE, Texture
+from ...scene.model import Camera, Environment, Instance, Model, RenderSettings, Scene, Sphere
+from ...scene.provenance import Origin, Source, material_of, parts_of
+from ...scene.validation.field_types import field_problems, show, unknown, usable
+from ..images.image_reader import read_picture
+from ..referenced_files import name_of
+from .instance_table import InstanceReader, InstanceTable, Repeat, placed
+from .mesh_table import MeshTable
+from .texture_table import TextureReader
+from .values import toml_key
+
+Kind = TypeVar("Kind")
+Table = Mapping[str, Any]
+SECTIONS = ("camera", "cameras", "animation", "keyframe", "render", "environment", "materials", "mesh", "instance",
+            "sphere", "light")
+
+
+class SceneReader:
+    """Reader for one document. `problems` holds its problems; parts with problems are left out or at their defaults."""
+
+    def __init__(self, path: Path, document: Table) -> None:
+        """Create a reader for a document read from `path`; the files that it names are relative to that folder."""
+        self._path = path
+        self._document: Table = _frozen(document)
+        self._materials: dict[str, Material] = {}
+        self._textures = TextureReader(path.parent)
+        self._cameras: dict[str, Camera] = {}
+        self._instances = InstanceReader()
+        self._source = Source()
+        self.problems = [f'key "{key}" {unknown(key, SECTIONS)}' for key in document if key not in SECTIONS]
+
+    def scene(self) -> Scene:
+        for name, values in self._table("cameras").items():
+            self._cameras[name] = self._camera(values, f"cameras.{name}")
+        lens = self._table("camera")
+        camera = Camera() if "name" in lens else self._camera(lens, "camera")
+        render = self._build(RenderSettings, self._table("render"), "render")
+        environment = self._environment(self._table("environment"))
+        for name, values in self._table("materials").items():
+            where = f"materials.{name}"
+            self._materials[name] = self._typed(MATERIALS, values, where) or Diffuse()
+        spheres = [self._sphere(values, f"sphere[{i}]") for i, values in enumerate(self._tables("sphere"))]
+        lights: list[Light] = [self._typed(LIGHTS, values, f"light[{i}]") or SUN  # keeps the later ones' numbers
+                               for i, values in enumerate(self._tables("light"))]
+        models = [self._mesh(values, f"mesh[{i}]") for i, values in enumerate(self._tables("mesh"))]
+        lights += [light for model in models for light in model.lights]
+        meshes = [mesh for model in models for mesh in model.meshes]
+        instances = [instance for model in models for instance in model.instances]
+        instances += [one for i, values in enumerate(self._tables("instance"))
+                      for one in self._instance(values, f"instance[{i}]")]
+        return Scene(meshes=meshes, instances=instances, lights=lights, spheres=[each for each in spheres if each],
+                     camera=self._named_camera(lens) if "name" in lens else camera, cameras=self._cameras,
+                     environment=environment or Environment(), render=render or RenderSettings(),
+                     name=name_of(self._path), animation=self._animation(), materials=self._materials,
+                     source=self._sources())
+
+    def _sources(self) -> Source:
+        self._source.files += [(picture, (self._path.parent / name).resolve())
+                               for name, picture in self._textures.pictures.items()]
+        return self._source
+
+    def _camera(self, values: Any, where: str) -> Camera:
+        """Return the camera; if it is invalid, one with its position, look_at and up, so that these are checked."""
+        if not isinstance(values, dict):
+            self.problems.append(f"{where}: {show(values)} is not a table; write its keys below [{where}]")
+            return Camera()
+        camera = self._build(Camera, values, where)
+        place = {key: values[key] for key in ("position", "look_at", "up") if key in values}
+        return camera or (Camera() if field_problems(Camera, place, where) else Camera(**usable(Camera, place)))
+
+    def _named_camera(self, values: Table) -> Camera:
+        """Return the camera of `cameras` that the table names."""
+        name = str(values["name"])
+        self.problems += camera_problems(name, self._cameras, "camera.name")
+        self.problems += [f"camera: has a name and {key}; keep one of them" for key in values if key != "name"]
+        return self._cameras.get(name, Camera())
+
+    def _animation(self) -> Animation | None:
+        """Return the animation; None if there is none or if it is invalid."""
+        if not {"animation", "keyframe"} & set(self._document):
+            return None
+        table = self._table("animation")
+        if "keyframes" in table:
+            self.problems.append("animation.keyframes: is written as tables of their own; write [[keyframe]]")
+        whole = self._build(Animation, {key: table[key] for key in table if key != "keyframes"}, "animation")
+        keys = [self._keyframe(values, f"keyframe[{i}]") for i, values in enumerate(self._tables("keyframe"))]
+        known = tuple(key for key in keys if key)
+        return replace(whole, keyframes=known) if whole and len(known) == len(keys) else None
+
+    def _keyframe(self, values: Any, where: str) -> Keyframe | None:
+        if isinstance(values, dict):
+            return self._build(Keyframe, values, where)
+        self.problems.append(f"{where}: {show(values)} is not a table; write [[keyframe]]")
+        return None
+
+    def _table(self, name: str) -> Table:
+        """Return the section [name], empty if there is none."""
+        table = self._document.get(name, {})
+        if isinstance(table, dict):
+            return table
+        self.problems.append(f"{name}: {show(table)} is not a table; write [{name}]")
+        return {}
+
+    def _tables(self, name: str) -> Sequence[Any]:
+        """Return the sections [[name]]."""
+        tables = self._document.get(name, ())
+        if isinstance(tables, tuple):
+            return tables
+        self.problems.append(f"{name}: is not a list of tables; write [[{name}]] in double brackets")
+        return ()
+
+    def _build(self, kind: type[Kind], values: Table, where: str) -> Kind | None:
+        """Return kind(**values), or None if they are invalid."""
+        problems = field_problems(kind, values, where)
+        self.problems += problems
+        return None if problems else kind(**usable(kind, values))
+
+    def _typed(self, kinds: Sequence[type[Kind]], values: Any, where: str) -> Kind | None:
+        """Return a material or light of the class whose `kernel` is the table's `type`."""
+        known = {kind.kernel: kind for kind in kinds}  # type: ignore[attr-defined]
+        if not isinstance(values, dict):
+            self.problems.append(f"{where}: {show(values)} is not a table; write its keys below [{where}]")
+        elif "type" not in values:
+            self.problems.append(f"{where}: type is missing; write one of {', '.join(known)}")
+        elif str(values["type"]) not in known:
+            self.problems.append(f"{where}.type: {show(values['type'])} {unknown(values['type'], known)}")
+        else:
+            rest = {key: value for key, value in values.items() if key != "type"}
+            rest = {key: self._texture(value, f"{where}.{key}") if isinstance(value, dict) else value
+                    for key, value in rest.items()}
+            made = self._build(known[str(values["type"])], rest, where)
+            conflicts = made.conflicts() if isinstance(made, Material) else []
+            self.problems += [f"{where}.{conflict}" for conflict in conflicts]
+            return None if conflicts else made
+        return None
+
+    def _texture(self, values: Table, where: str) -> Texture:
+        """Return the texture that a table describes, or a white one if it is invalid."""
+        return self._tried(self._textures.read, values, where) or Texture(picture=WHITE)
+
+    def _environment(self, values: Table) -> Environment | None:
+        values, image = dict(values), None
+        if (sky := values.pop("sky", None)) is not None:
+            image = default_sky().image
+            if sky != "default":
+                self.problems.append(f'environment.sky: {show(sky)} is unknown; write "default"')
+            self.problems += [f"environment: has a sky and {key}; keep one of them" for key in ("color", "image")
+                              if key in values]
+        if "image" in values:
+            image = self._picture(values["image"])
+            self._source.files += [] if image is None else [(image, (self._path.parent / values["image"]).resolve())]
+            if "color" in values:
+                self.problems.append("environment: has a color and an image; keep one of them")
+        return self._build(Environment, {**values, "image": image}, "environment")
+
+    def _picture(self, name: Any) -> Any:
+        if not isinstance(name, str):
+            self.problems.append(f"environment.image: {show(name)} is not a text; write a file name in quotes")
+            return None
+        try:
+            return read_picture(self._path.parent / name)
+        except SceneError as error:
+            self.problems += [f"environment.image: {problem}" for problem in error.problems]
+            return None
+
+    def _material(self, values: Table, where: str) -> Material | None:
+        """Return the material that the table names, or None if it names none."""
+        return self._named_material(values["material"], f"{where}.material") if "material" in values else None
+
+    def _named_material(self, name: Any, where: str) -> Material:
+        """Return the material of this name, or a grey one if there is none."""
+        if str(name) not in self._materials:
+            self.problems.append(f"{where}: {show(name)} {unknown(name, self._materials)}")
+        return self._materials.get(str(name), Diffuse())
+
+    def _sphere(self, values: Any, where: str) -> Sphere | None:
+        if not isinstance(values, dict):
+            self.problems.append(f"{where}: {show(values)} is not a table; write [[sphere]]")
+            return None
+        material = self._material(values, where) or Diffuse()
+        return self._build(Sphere, {**values, "material": material}, where)
+
+    def _mesh(self, values: Any, where: str) -> Model:
+        """Return what one table shows, in world coordinates."""
+        if not isinstance(values, dict):
+            self.problems.append(f"{where}: {show(values)} is not a table; write [[mesh]]")
+            return Model(meshes=[])
+        material = self._material(values, where)
+        table = self._build(MeshTable, _one_scale(values), where)
+        geometry = {key: values[key] for key in ("file", "vertices", "faces") if key in values}
+        model, matrix = None, None
+        if table or not field_problems(MeshTable, geometry, where):
+            model = self._tried((table or MeshTable(**geometry)).read, self._path.parent, where)
+            matrix = self._tried((table or MeshTable()).to_world, where)
+        if matrix is not None and not matrix[:3, :3].any():
+            self.problems.append(f"{where}: its transform leaves nothing but a point; write a scale without 0")
+        if model is None or matrix is None:
+            model = Model(meshes=[])
+        else:
+            own = {mesh.material_name for mesh in (*model.meshes, *meshes_by_id(model.instances).values())}
+            before = list(map(material_of, parts_of(model)))
+            model = placed(model, matrix, material, self._others(values, own, where))
+            self._source.meshes.append(Origin(self._located(values), parts_of(model), before))
+        for name, camera in model.cameras.items():
+            self._source.cameras.setdefault(name, self._cameras.setdefault(name, camera))
+        self._instances.add(str(values["name"]) if "name" in values else None, model)
+        shown = model if table is None or table.visible else Model(meshes=[])
+        return replace(shown, lights=model.lights if table and table.lights else [])
+
+    def _located(self, values: Table) -> Table:
+        """Return the table of a mesh with an absolute path."""
+        return {**values, "file": (self._path.parent / values["file"]).resolve()} if "file" in values else values
+
+    def _others(self, values: Table, own: set[str], where: str) -> dict[str, Material]:
+        """Return the table's replacements for the file's `own` materials, by their names."""
+        pairs = values.get("materials", {})
+        if not isinstance(pairs, dict):
+            self.problems.append(f"{where}.materials: {show(pairs)} is not a table; "
+                                 'write { "name in the file" = "NAME" }')
+            return {}
+        if pairs and "material" in values:
+            self.problems.append(f"{where}: has a material and materials; keep one of them")
+        named = own - {""}
+        self.problems += [f'{where}.materials: "{name}" '
+                          + (unknown(name, named) if named else "is unknown, since the model names no materials; write "
+                             'material = "NAME"') for name in pairs if name not in own]
+        return {name: self._named_material(other, f"{where}.materials.{toml_key(name)}")
+                for name, other in pairs.items()}
+
+    def _instance(self, values: Any, where: str) -> list[Instance]:
+        if not isinstance(values, dict):
+            self.problems.append(f"{where}: {show(values)} is not a table; write [[instance]]")
+            return []
+        material = self._material(values, where)
+        table = self._build(InstanceTable, _one_scale(values), where)
+        self.problems += self._instances.problems(values["mesh"], where) if "mesh" in values else []
+        repeats = self._repeats(values.get("repeat", ()), f"{where}.repeat")
+        made = table and self._tried(self._instances.read, table, repeats, material, where) or []
+        self._source.instances.append(Origin(values, made, self._instances.materials(table) if table and made else []))
+        return made
+
+    def _repeats(self, values: Any, where: str) -> list[Repeat]:
+        if not isinstance(values, tuple) or not all(isinstance(entry, dict) for entry in values):
+            self.problems.append(f"{where}: {show(values)} is not a list of tables; write [{{ count = 3, … }}]")
+            return []
+        built = [self._build(Repeat, _one_scale(entry), f"{where}[{i}]") for i, entry in enumerate(values)]
+        return [each for each in built if each]
+
+    def _tried(self, read: Callable[..., Kind], *arguments: Any) -> Kind | None:
+        """Return read(*arguments), or None if it raises SceneError, whose problems are collected."""
+        try:
+            return read(*arguments)
+        except SceneError as error:
+            self.problems += error.problems
+            return None
+
+
+def camera_problems(name: str, cameras: Mapping[str, Camera], where: str) -> list[str]:
+    """Return a problem if there is no camera of this name."""
+    if name in cameras:
+        return []
+    remedy = unknown(name, cameras) if cameras else "is unknown, since neither [cameras] nor a model file has one"
+    return [f"{where}: {show(name)} {remedy}"]
+
+
+def _one_scale(values: Table) -> Table:
+    """Return the table with a single number for `scale` expanded to three."""
+    return {**values, "scale": (scale,) * 3} if isinstance(scale := values.get("scale"), (int, float)) else values
+
+
+def _frozen(value: Any) -> Any:
+    """Convert TOML's arrays to tuples, recursively."""
+    if isinstance(value, list):
+        return tuple(map(_frozen, value))
+    return {key: _frozen(entry) for key, entry in value.items()} if isinstance(value, dict) else value

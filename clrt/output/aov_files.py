@@ -1,0 +1,70 @@
+"""AOVs in image files: layers of an .exr, or separate .png files."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .view_transform import to_display
+
+FloatArray = NDArray[np.float32]
+Pictures = Mapping[str, NDArray[np.generic]]
+
+#: Channel names of the AOVs: colors, vectors, distances along the view, numbers.
+CHANNELS = {"albedo": "RGB", "normal": "XYZ", "geometric_normal": "XYZ", "position": "XYZ", "depth": "Z",
+            "primitive": "X", "object": "X", "material": "X", "direct": "RGB", "indirect": "RGB", "variance": "RGB",
+            "samples": "X"}
+#: Largest integer up to which float32 represents all integers.
+LARGEST_ID = 1 << 24
+_log = logging.getLogger(__name__)
+
+
+def layered(pixels: FloatArray, aovs: Pictures) -> tuple[FloatArray, list[str]]:
+    """Return all in one array (height, width, n) float32, and the channel names: R, G, B, albedo.R, depth.Z …"""
+    for name, aov in aovs.items():
+        if aov.dtype.kind in "iu" and aov.max(initial=0) > LARGEST_ID:
+            _log.warning("%s: numbers beyond %d are rounded in an .exr; Image.aovs has them", name, LARGEST_ID)
+    names = [*"RGB", *(f"{name}.{channel}" for name in aovs for channel in CHANNELS[name])]
+    layers = [aov.astype(np.float32).reshape(*aov.shape[:2], -1) for aov in aovs.values()]
+    return np.concatenate([pixels, *layers], axis=2), names
+
+
+def files_beside(path: Path, names: Iterable[str]) -> dict[str, Path]:
+    """Return the AOVs' paths for an image at `path`: <stem>.<name>.png for a .png; none for other formats."""
+    png = path.suffix.lower() == ".png"
+    return {name: path.with_name(f"{path.stem}.{name}{path.suffix}") for name in names if png}
+
+
+def drawn(name: str, aov: NDArray[np.generic], view: str, exposure: float) -> NDArray[np.uint8]:
+    """Return a visualization of an AOV as 8-bit colors (height, width, 3); see docs/aovs.md."""
+    values = aov.astype(np.float32).reshape(*aov.shape[:2], -1)
+    match name:
+        case "direct" | "indirect":
+            return to_display(values, view, exposure)
+        case "variance":
+            return to_display(np.sqrt(np.nan_to_num(values)), view, exposure)
+        case "albedo":
+            return to_display(values)
+        case "normal" | "geometric_normal":
+            shown = np.where(values.any(axis=2, keepdims=True), 0.5 + 0.5 * values, 0)
+        case "position":
+            low, high = values.min(axis=(0, 1)), values.max(axis=(0, 1))
+            shown = (values - low) / np.where(high > low, high - low, 1)
+        case "depth":
+            shown = np.where(np.isfinite(values), values.min(), 0) / values
+        case "samples":
+            shown = values / max(values.max(), 1)
+        case _:
+            shown = _colors_of(aov)
+    return to_display(np.broadcast_to(shown, (*aov.shape[:2], 3)).astype(np.float32), "raw")
+
+
+def _colors_of(ids: NDArray[np.generic]) -> NDArray[np.floating]:
+    """Map each id to a color that differs from those of nearby ids (hues a golden ratio apart); −1 is black."""
+    numbers = ids.astype(np.float64)[..., None]
+    hues = numbers * ((np.sqrt(5) - 1) / 2) + np.arange(3) / 3
+    return np.where(numbers < 0, 0, 0.6 + 0.4 * np.cos(2 * np.pi * hues))

@@ -1,0 +1,1 @@
+"""Samples accumulated on one device or several."""

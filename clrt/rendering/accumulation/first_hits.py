@@ -1,0 +1,81 @@
+"""First-hit AOVs: what each pixel's camera rays hit first (kernels/first_hit.cl)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...device.programs.preamble import typedefs
+from ...device.programs.struct_types import record
+from ...scene.materials.material_types import Material
+from ...scene.model import Scene
+from ..compile.compile_scene import CompiledScene
+from .accumulation import Accumulation
+from .per_pixel_kernel import render_pixels
+
+#: AOVs averaged over each pixel's rays, and AOVs of the ray through its centre.
+MEANS = ("albedo", "normal", "geometric_normal")
+OF_THE_MIDDLE = ("position", "depth", "primitive", "object", "material")
+#: Camera rays per pixel.
+SAMPLES = 16
+
+
+def first_hits(session: Accumulation, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
+    """Return the AOVs of MEANS and OF_THE_MIDDLE in `names`, for the scene that the session renders.
+
+    As in docs/aovs.md: (height, width, 3) float32, but depth (height, width) float32 and ids (height, width) int32.
+    Raises KernelError and DeviceError if the device fails.
+    """
+    means = [name for name in MEANS if name in names]
+    source, kind = first_hit_program(session.compiled, names)
+    seen = render_pixels(session, source, "first_hit", kind, SAMPLES if means else 0)
+    pictures: dict[str, NDArray[np.generic]] = {name: np.ascontiguousarray(seen[name]) for name in means}
+    missed = seen["primitive"] < 0
+    if "position" in (kind.names or ()):
+        pictures |= _places(session, seen["position"].astype(np.float64), missed)
+    ids = _ids(session, scene, seen)
+    pictures |= {name: np.where(missed, -1, numbers).astype(np.int32) for name, numbers in ids.items()}
+    return {name: picture for name, picture in pictures.items() if name in names}
+
+
+def first_hit_program(compiled: CompiledScene, names: Collection[str]) -> tuple[str, np.dtype[Any]]:
+    """Return the program text, with only what `names` needs, and the record that it writes."""
+    lists = {"SEEN_MEANS": [name for name in MEANS if name in names],
+             "SEEN_MIDDLE": ["position"] if {"position", "depth"} & set(names) else []}
+    fields = {"primitive": "i4", "instance": "i4", "pad": "2i4"}
+    for name in sum(lists.values(), []):
+        fields |= {name: "3f4", f"pad_{name}": "i4"}
+    kind = record(**fields)
+    defines = [f"#define {macro}(X) {' '.join(f'X({name})' for name in listed)}" for macro, listed in lists.items()]
+    bent = "normal" in names and "NORMAL_MAPS" in compiled.features
+    materials = ["bsdf.cl"] if bent or "albedo" in names else []
+    return compiled.source_of("first_hit.cl", f"#define SEEN_MATERIALS {len(materials)}", typedefs({"FirstHit": kind}),
+                              *defines, SEEN_FILES=materials), kind
+
+
+def _places(session: Accumulation, seen: NDArray[np.float64],
+            missed: NDArray[np.bool_]) -> dict[str, NDArray[np.generic]]:
+    """Return position and depth of points (height, width, 3) given in the compiled scene's frame."""
+    camera, frame = session.compiled.camera, session.compiled.frame
+    axis = np.subtract(camera.look_at, camera.position, dtype=np.float64)
+    ahead = seen - camera.position
+    if camera.projection == "equirectangular":
+        depth = np.linalg.norm(ahead, axis=-1) / frame.unit
+    else:
+        depth = ahead @ (axis / np.linalg.norm(axis)) / frame.unit
+    return {"position": np.where(missed[..., None], 0, seen / frame.unit + frame.center).astype(np.float32),
+            "depth": np.where(missed, np.inf, depth).astype(np.float32)}
+
+
+def _ids(session: Accumulation, scene: Scene, seen: NDArray[Any]) -> dict[str, NDArray[np.int64]]:
+    """Return the ids at first hits: the scene's object, its primitive, and its material."""
+    which, primitive = session.compiled.objects.met(seen["primitive"], seen["instance"])
+    distinct: dict[Material, int] = {}
+    users = [mesh.material for mesh in scene.meshes]
+    users += [instance.material or instance.mesh.material for instance in scene.instances]
+    users += [sphere.material for sphere in scene.spheres]
+    materials = np.array([*(distinct.setdefault(material, len(distinct)) for material in users), -1])
+    return {"primitive": primitive, "object": which, "material": materials[which]}

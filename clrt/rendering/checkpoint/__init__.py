@@ -1,0 +1,1 @@
+"""Checkpoints: the saved state of a render, its identity, its file."""

@@ -1,0 +1,113 @@
+"""Identity of an image: facts by name, which two renders must share for one to resume the other.
+
+These are all fields of the scene, its settings and the choices, except for those listed here, so that new fields are
+included automatically. Excluded are names, contents of a scene that are not visible, stop conditions, and what affects
+only rounding (lanes and BVHs; also the device).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from ...device.programs.kernel_files import kernel_digest
+from ...scene.geometry.instancing import prototypes
+from ...scene.model import RenderSettings, Scene
+from ..compile.choices import Choices
+
+#: Fields excluded from a Scene, from its settings, from Choices, and from everything in a scene.
+UNSEEN = {"name", "render", "cameras", "animation", "materials", "source"}
+ENDS = {"spp"}
+ROUNDING = {"lanes", "layout", "builder", "paths", "tree", "first_hits"}
+NAMES = {"name", "material_name"}
+
+
+def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:
+    """Return each setting as text, and the SHA-256 of each part of the scene and of the kernels."""
+    width, height = scene.render.size
+    values = {**values_of(scene.render, choices), "size": f"{width}x{height}"}
+    return {"version": version("clrt"), "kernels": kernel_digest(),
+            **{name: str(value) for name, value in values.items()},
+            **{part: _digest(_part(scene, part)) for part in parts_of(scene)}}
+
+
+def values_of(settings: RenderSettings, choices: Choices) -> dict[str, Any]:
+    """Return the settings and choices that determine an image, by name; hit tests one by one."""
+    values = {field.name: getattr(settings, field.name) for field in fields(settings) if field.name not in ENDS}
+    for field in fields(choices):
+        value = getattr(choices, field.name)
+        if is_dataclass(value):
+            values |= {each.name: getattr(value, each.name) for each in fields(value)}
+        elif field.name not in ROUNDING:
+            values[field.name] = value
+    return values
+
+
+def parts_of(scene: Scene) -> list[str]:
+    """Return the names of the visible parts of a scene."""
+    return [field.name for field in fields(scene) if field.name not in UNSEEN]
+
+
+def scene_hash(scene: Scene) -> str:
+    """Return the SHA-256 of everything that emits, reflects or is visible in the scene."""
+    return _digest([_part(scene, part) for part in parts_of(scene)])
+
+
+def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:
+    """Return the differences between two renders' facts, each in a few words, settings with both values."""
+    told = []
+    for name in {**wanted, **found}:
+        if (other := found.get(name)) == (value := wanted.get(name)):
+            continue
+        if name == "direct_light":
+            told.append(f"{'without' if value == 'True' else 'with'} --aov direct or indirect")
+        else:
+            hidden = name == "kernels" or name in {field.name for field in fields(Scene)}
+            told.append(f"other {name}" if hidden else f"{name} {other} instead of {value}")
+    return told
+
+
+def _part(scene: Scene, name: str) -> object:
+    """Return a part of the scene; for instances each mesh once, and the transforms."""
+    if name != "instances":
+        return getattr(scene, name)
+    meshes, which = prototypes(scene.instances)
+    return meshes, which, [(each.to_world, each.material or each.mesh.material) for each in scene.instances]
+
+
+def _digest(value: object) -> str:
+    digest = hashlib.sha256()
+    for piece in _pieces(value):
+        digest.update(piece)
+    return digest.hexdigest()
+
+
+def _pieces(value: object) -> Iterator[bytes | memoryview]:
+    """Yield bytes that identify `value` uniquely: of an array with its dtype and shape, of numbers as floats."""
+    match value:
+        case np.ndarray():
+            yield f"{value.dtype.str}{value.shape}".encode()
+            yield np.ascontiguousarray(value).reshape(-1).view(np.uint8).data
+        case list() | tuple():
+            yield f"[{len(value)}".encode()
+            for item in value:
+                yield from _pieces(item)
+        case int() | float() | np.number():
+            yield f"{float(value)!r},".encode()
+        case None | str():
+            yield f"{value!r},".encode()
+        case dict():
+            yield from _pieces([[name, value[name]] for name in sorted(value)])
+        case _ if is_dataclass(value):
+            yield f"{type(value).__name__}:".encode()
+            for field in fields(value):
+                if field.name not in NAMES:
+                    yield f"{field.name}=".encode()
+                    yield from _pieces(getattr(value, field.name))
+        case _:
+            raise TypeError(f"a {type(value).__name__} in a scene, whose content is not known")

@@ -1,0 +1,1 @@
+"""A scene compiled for a device: packed buffers, features and program text."""

@@ -1,0 +1,117 @@
+"""Compile-time features, preamble and files of a packed scene: a program contains only what its scene needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ...accel.layouts import NO_RAYS
+from ...accel.traversal_kernels import tree_defines, tree_features, tree_files
+from ...device.programs.preamble import defines, scene_struct, type_list, typedefs
+from ...scene.materials.material_types import MATERIALS, Material
+from ...scene.materials.textures import Texture
+from ...scene.model import RenderSettings
+from ..film.tiles import TILE
+from .camera_kernel import camera_file
+from .choices import OFFSETS, Choices
+from .lights.pack_lights import SURFACES, TYPES
+from .pack_scene import Packed
+from .pixel_filters import filter_reach
+from .records import COUNTS, GUIDE, LAUNCH, OUTLINE
+
+#: Path-tracing integrators, and the kernel files of the integrators that compute light; others show first hits
+#: (kernels/picture.cl).
+WITH_LIGHT = ("path", "direct")
+INTEGRATORS = {"path": "path.cl", "direct": "path.cl", "local": "whitted.cl", "raster": "whitted.cl"}
+
+
+def biased_by(settings: RenderSettings) -> list[str]:
+    """Return the names of the settings that darken the image however many samples it has."""
+    clamps = ("clamp_direct", "clamp_indirect") if settings.integrator in WITH_LIGHT else ()
+    return [name for name in clamps if getattr(settings, name)]
+
+
+def features_of(packed: Packed, choices: Choices, loop_limit: bool) -> set[str]:
+    """Return the macros that are defined for compilation: features of the scene and of the materials that it uses.
+
+    loop_limit: whether the device limits loop iterations (see device.loops).
+    """
+    scene, emitters, materials = packed.scene, packed.emitters, packed.materials
+    local = scene.render.integrator in ("local", "raster")
+    features = {f"MATERIAL_{kind.kernel.upper()}" for kind in materials.used}
+    features |= {f"LIGHT_{kind.upper()}" for kind in emitters.types}
+    features |= set().union(*(material.features() for material in packed.shapes.users))
+    has = {**tree_features(bool(scene.meshes), bool(scene.spheres), packed.shapes.lone, packed.tree is not NO_RAYS),
+           "SPHERES": bool(scene.spheres), "INSTANCES": bool(scene.instances),
+           "SMOOTH_NORMALS": any(mesh.normals is not None for mesh in scene.meshes),
+           "VERTEX_COLORS": any(mesh.colors is not None for mesh in scene.meshes),
+           "TEXTURES": packed.uv_sets > 0, "NORMAL_MAPS": materials.normal_maps,
+           "EMISSION_TEXTURES": any(isinstance(user.emission, Texture) for user in packed.shapes.users),
+           "OPACITY": bool(materials.with_value("opacity")), "NEXT_HIT": bool(materials.with_value("opacity")),
+           "SKY": packed.sky.kernel is not None, "LIGHTS": emitters.count > 0, "LIGHT_TREE": emitters.choice.tree,
+           "EMITTERS": any(t in SURFACES for t in emitters.types),
+           "DOUBLE_SIDED_LIGHTS": any(user.double_sided and any(user.radiance) for user in packed.shapes.users),
+           "LIGHT_RANGES": any(getattr(light, "range", None) for light in scene.lights),
+           "LOCAL": local, "NO_SHADOWS": local and not scene.render.shadows,
+           "RASTER": scene.render.integrator == "raster", "PIXEL_MIDDLE": scene.render.integrator == "depth",
+           "CAMERA_CULLING": (scene.render.back_face_culling == "camera"
+                              and any(user.is_culled for user in packed.shapes.users)),
+           "CLAMP": bool(biased_by(scene.render)),
+           "DIRECT_LIGHT": choices.direct_light, "LOOP_LIMIT": loop_limit}
+    has["HORIZON"] = has["SMOOTH_NORMALS"] or has["NORMAL_MAPS"]
+    return features | {name for name, present in has.items() if present}
+
+
+def preamble_of(packed: Packed, choices: Choices, features: set[str], part_bytes: int | None) -> str:
+    """Return the definitions that precede all kernel files. part_bytes: see CompiledScene."""
+    emitters, materials = packed.emitters, packed.materials
+    # Only programs that use lengths in scene units depend on the unit: all others are shared between units.
+    lengths = choices.offset != "bound" or packed.scene.render.integrator == "depth"
+    unit = {"SCENE_UNIT": packed.frame.unit} if lengths else {}
+    surfaces = [t for t in emitters.types if t in SURFACES]
+    rasterised = [typedefs({"Outline": OUTLINE}), defines({"FILTER_REACH": filter_reach(packed.scene.render.filter)})]
+    return "\n".join([
+        defines({"LANES": choices.lanes, "TILE": TILE, **tree_defines(packed.tree), **unit}),
+        defines({"CHOICES": emitters.choice.choices, "INFINITE_LIGHTS": emitters.choice.infinite}),
+        defines({feature: 1 for feature in sorted(features)}),
+        typedefs({"Counts": COUNTS, "Pixel": choices.pixel, "Guide": GUIDE, "Launch": LAUNCH}),
+        scene_struct(packed.buffers, part_bytes),
+        type_list("MATERIAL_TYPES", _numbered(materials.used)),
+        type_list("OPACITY_TYPES", _numbered(materials.with_value("opacity"))),
+        type_list("NORMAL_MAPPED_TYPES", _numbered(materials.mapped("normal_map"))),
+        type_list("COAT_MAPPED_TYPES", _numbered(materials.mapped("clearcoat_normal_map"))),
+        type_list("COATED_TYPES", _numbered(materials.featured("COAT_NORMALS"))),
+        type_list("SPREADING_TYPES", _numbered(materials.featured("TRANSMISSION_LOBES"))),
+        type_list("ABSORBING_TYPES", _numbered(materials.featured("ATTENUATION"))),
+        defines({"UV_SETS": packed.uv_sets}),
+        *(f"#define READ_{name} {'TEXTURED' if reads else 'CONSTANT'}" for name, reads in materials.reads.items()),
+        type_list("LIGHT_TYPES", [(t, TYPES.index(t)) for t in emitters.types]),
+        type_list("EMITTER_TYPES", [(t, TYPES.index(t)) for t in surfaces]),
+        *(rasterised if "RASTER" in features else [])])
+
+
+def files_for(packed: Packed, choices: Choices, features: set[str]) -> dict[str, list[str]]:
+    """Return the files that each `#include NAME` in the kernels is replaced by."""
+    scene, emitters, sky = packed.scene, packed.emitters, packed.sky
+    integrator, lights = scene.render.integrator, [f"light/{t}.cl" for t in emitters.types if t != "sky"]
+    parts = sorted({part for kind in packed.materials.used for part in kind.parts})
+    return {**tree_files(packed.tree.name, choices.tests, bool(scene.meshes), bool(scene.spheres), packed.shapes.lone,
+                         bool(scene.instances)),
+            **{f"{part}_FILE": [f"bsdf/{part.lower()}.cl"] if part in features else [] for part in parts},
+            "PLACEMENT_FILE": ["placement.cl"] if scene.instances else [],
+            "OFFSET": [OFFSETS[choices.offset]],
+            "MATERIAL_FILES": [f"bsdf/{kind.kernel}.cl" for kind in packed.materials.used],
+            "LIGHT_CHOICE": emitters.choice.files, "MIS_WEIGHTS": ["mis.cl"],
+            "LIGHT_TREE_FILE": ["light/tree.cl"] if emitters.choice.tree else [],
+            "LIGHT_FILES": lights + ([sky.kernel] if sky.kernel else []),
+            "VISIBILITY": ["visibility/layers.cl" if "OPACITY" in features else "visibility/opaque.cl"],
+            "OPACITY_FILE": ["opacity.cl"] if "OPACITY" in features else [],
+            "TEXTURE_FILES": ["texture.cl"] if packed.uv_sets else [],
+            "NORMAL_MAPS_FILE": ["normal_maps.cl"] if packed.materials.normal_maps else [],
+            "HORIZON_FILE": ["horizon.cl"] if "HORIZON" in features else [],
+            "SAMPLER": [f"sampler/{scene.render.sampler}.cl"], "CAMERA": [camera_file(scene.camera, integrator)],
+            "FILTER": ["filter/box.cl" if scene.render.filter == "box" else "filter/table.cl"],
+            "INTEGRATOR": [INTEGRATORS.get(integrator, "picture.cl")], "PICTURE": [f"picture/{integrator}.cl"]}
+
+
+def _numbered(kinds: Iterable[type[Material]]) -> list[tuple[str, int]]:
+    return [(kind.kernel, MATERIALS.index(kind)) for kind in kinds]

@@ -1,0 +1,1 @@
+"""Geometry packed for the device."""

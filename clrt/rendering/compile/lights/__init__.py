@@ -1,0 +1,1 @@
+"""Lights packed for the device, and the distributions that light sampling uses."""

@@ -1,0 +1,147 @@
+"""Scene packing: from a scene to device buffers. All packing goes through this module."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...accel.build import FEW_SPHERES, fitting_layout
+from ...accel.layouts import NO_RAYS, Layout, leaf_spheres
+from ...accel.traversal_kernels import tree_buffers
+from ...device.open import Device
+from ...device.programs.preamble import Buffers
+from ...scene.geometry.instancing import arranged
+from ...scene.geometry.scaling import Frame, frame_of, in_frame
+from ...scene.materials.material_types import Material
+from ...scene.model import Scene
+from ...threads import beside
+from .choices import Choices
+from .geometry.pack_geometry import Corners, normal_records, sphere_records, triangle_records
+from .geometry.pack_instances import Objects, Placements
+from .geometry.vertex_attributes import pack_corners
+from .lights.environment_map import Sky
+from .lights.pack_lights import Emitters, pack_emitters
+from .materials.pack_materials import Materials, Tables, pack_materials
+from .materials.pack_textures import Textures
+from .pixel_filters import filter_quantiles
+from .records import COUNTS
+from .reuse_cache import Carried
+
+
+class Shapes:
+    """The scene in its frame, starting with the meshes that only its instances show.
+
+    triangles: of all meshes; spheres: (s, 4) float32, center and radius; lone: whether there are so few spheres that
+    they are not in the BVH.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        scene, *of_objects = arranged(scene)
+        self.frame = frame_of(scene)
+        scene = in_frame(scene, self.frame)
+        self.objects = Objects([len(mesh.faces) for mesh in scene.meshes], len(scene.spheres), *of_objects)
+        self.placements = Placements(scene.instances, rest=bool(scene.meshes or scene.spheres))
+        self.scene = replace(scene, meshes=self.placements.meshes + scene.meshes)
+        self.triangles = Corners(self.scene.meshes)
+        self.spheres = np.array([(*s.center, s.radius) for s in scene.spheres], np.float32).reshape(-1, 4)
+        self.lone = 0 < len(self.spheres) <= FEW_SPHERES
+
+    @cached_property
+    def users(self) -> list[Material]:
+        """Materials of meshes, spheres and instances."""
+        return [*(mesh.material for mesh in self.scene.meshes), *(sphere.material for sphere in self.scene.spheres),
+                *self.placements.materials]
+
+    def _follows_rays(self, choices: Choices) -> bool:
+        """Return whether rays are traced: `raster` traces only shadow rays and those of mirrors, glass and cut-outs."""
+        render = self.scene.render
+        return (render.integrator != "raster" or render.shadows or choices.first_hits
+                or any(user.is_specular or "TRANSMISSION" in user.features()
+                       or "opacity" in user.surface_parameters(render.back_face_culling) for user in self.users))
+
+    def tree(self, choices: Choices, device: Device | None, carried: Carried) -> Layout:
+        """Return the BVH over everything but lone spheres; NO_RAYS if none is needed."""
+        if not self._follows_rays(choices):
+            return NO_RAYS
+        in_tree, test = self.spheres[:0] if self.lone else self.spheres, choices.tests.triangle
+        layout = choices.layout or fitting_layout(device, len(self.triangles), len(in_tree), test,
+                                                  bool(self.scene.instances), choices.tree)
+        return carried.tree(device, layout, choices.builder, self.scene.meshes, self.triangles, in_tree, test,
+                            self.placements)
+
+    def buffers(self, codes: NDArray[np.int32], emitters: Emitters, normals: NDArray[Any],
+                rays: bool) -> dict[str, tuple[str, Any]]:
+        """Return the buffers of the surfaces; codes: of the users' materials; rays: whether any are traced."""
+        meshes, spheres = self.scene.meshes, self.spheres
+        of_meshes, of_spheres, of_instances = np.split(codes, np.cumsum([len(meshes), len(spheres)]))
+        buffers: dict[str, tuple[str, Any]] = {}
+        if self.lone and rays:
+            every = np.arange(len(spheres), dtype=np.int32)
+            first = len(self.triangles) - self.placements.before
+            buffers["leaf_spheres"] = ("LeafSphere", leaf_spheres(spheres, every, first))
+        if len(self.triangles):
+            buffers["triangles"] = ("Triangle", triangle_records(meshes, of_meshes, emitters.triangle))
+        if any(mesh.normals is not None for mesh in meshes):
+            buffers["normals"] = ("Normals", normals)
+        if len(spheres):
+            buffers["spheres"] = ("Sphere", sphere_records(spheres, of_spheres, emitters.sphere))
+        if self.scene.instances:
+            buffers["placements"] = ("Placement", self.placements.records(of_instances))
+        return buffers
+
+
+@dataclass(frozen=True)
+class Packed:
+    """Packed scene, without its program. counts: a COUNTS record; uv_sets: number of UV sets that its textures use."""
+
+    shapes: Shapes
+    tree: Layout
+    materials: Materials
+    emitters: Emitters
+    sky: Sky
+    uv_sets: int
+    buffers: Buffers
+    counts: NDArray[Any]
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, see `Shapes`."""
+        return self.shapes.scene
+
+    @property
+    def frame(self) -> Frame:
+        """The frame, see `Shapes`."""
+        return self.shapes.frame
+
+
+def pack_scene(scene: Scene, choices: Choices, device: Device | None, carried: Carried) -> Packed:
+    """Pack a valid scene; device: where large BVHs are built, if given; carried: cache from the previous scene."""
+    shapes = Shapes(scene)
+    packing = beside(lambda: carried.sky(scene.environment))    # takes as long as a BVH build; neither uses all cores
+    try:
+        tree = shapes.tree(choices, device, carried)
+        normals = normal_records(shapes.scene.meshes)
+    finally:    # else it could replace the next scene's environment
+        sky = packing()
+    textures, tables = Textures(), Tables()
+    emitters = pack_emitters(shapes.scene, sky, textures)
+    materials = pack_materials(shapes.users, textures, tables, scene.render.back_face_culling)
+    buffers = tree_buffers(tree) | shapes.buffers(materials.codes, emitters, normals, tree is not NO_RAYS)
+    buffers |= pack_corners(shapes.scene.meshes, textures.uv_sets, materials.normal_maps)
+    buffers |= materials.buffers | tables.buffers() | textures.buffers() | emitters.buffers | sky.buffers
+    if scene.render.filter != "box":
+        buffers["filter"] = ("Filter", filter_quantiles(scene.render.filter))
+    return Packed(shapes, tree, materials, emitters, sky, textures.uv_sets, buffers, _counts(shapes, emitters))
+
+
+def _counts(shapes: Shapes, emitters: Emitters) -> NDArray[Any]:
+    counts = np.zeros(1, COUNTS)
+    counts["triangles"], counts["spheres"] = len(shapes.triangles), len(shapes.spheres)
+    counts["lights"] = emitters.count
+    for kind, count in emitters.counts.items():
+        counts[f"{kind}_lights"] = count
+    return counts

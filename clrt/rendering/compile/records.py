@@ -1,0 +1,100 @@
+"""Device records of a render, except those of BVHs (accel.layouts). The kernels' typedefs are generated from them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...device.programs.struct_types import record
+
+TRIANGLE = record(p0="3f4", material="i4", p1="3f4", light="i4", p2="3f4", normals="i4")
+NORMALS = record(n0="3f4", pad0="i4", n1="3f4", pad1="i4", n2="3f4", pad2="i4")
+TEXCOORDS = record(uv0="2f4", uv1="2f4", uv2="2f4", pad="2f4")
+COLORS = record(c0="4f4", c1="4f4", c2="4f4")
+#: sign: of the bitangent, or 0 where there is no tangent.
+TANGENTS = record(t0="3f4", sign="f4", t1="3f4", pad1="f4", t2="3f4", pad2="f4")
+SPHERE = record(center="3f4", radius="f4", material="i4", light="i4", pad="2i4")
+#: An instance (kernels/placement.cl). first: its mesh's first triangle; material: a code, or −1 for the triangles' own;
+#: unit: 1 over the greatest entry of the matrix, negative if it mirrors.
+PLACEMENT = record(to_world="(3,4)f4", rounding0="3f4", first="i4", rounding1="3f4", material="i4", rounding2="3f4",
+                   unit="f4")
+
+#: A light, a group of lights, or an infinite light (kernels/light/choice.cl, tree.cl).
+LIGHT_GROUP = record(center="3f4", radius="f4", axis="3f4", cos_cone="f4", intensity="f4", below="i4", above="i4",
+                     cos_reach="f4")
+LIGHT_PLACE = np.dtype([("group", "i4")])
+#: texture: of its radiance, or −1; primitive: the triangle with its texture coordinates; double_sided: 1 if it emits
+#: from both sides.
+TRIANGLE_LIGHT = record(p0="3f4", area="f4", e1="3f4", parallelogram="i4", e2="3f4", texture="i4", normal="3f4",
+                        primitive="i4", radiance="3f4", double_sided="i4")
+#: sphere: its number among the spheres.
+SPHERE_LIGHT = record(center="3f4", radius="f4", radiance="3f4", texture="i4", sphere="i4", double_sided="i4",
+                      pad="2i4")
+#: per_range2: 1 over the square of its range, 0 without one.
+POINT_LIGHT = record(position="3f4", pad="i4", intensity="3f4", per_range2="f4")
+#: outer: 1 − the cosine of the outer cone's angle; slope: 1 over the difference to that of the inner cone.
+SPOT_LIGHT = record(position="3f4", outer="f4", axis="3f4", slope="f4", intensity="3f4", per_range2="f4")
+DIRECTIONAL_LIGHT = record(towards="3f4", pad0="i4", irradiance="3f4", pad1="i4")
+#: height: 1 − the cosine of half its angular diameter.
+SUN_LIGHT = record(towards="3f4", height="f4", radiance="3f4", pad="i4")
+
+ENVIRONMENT = record(color="3f4", pad="f4", width="i4", height="i4", rotation_cos="f4", rotation_sin="f4")
+SKY_TEXEL = record(radiance="3f4", density="f4")
+#: Fields are read one at a time, so records of half the size cost nothing: two of them share 16 bytes.
+SKY_STEP = np.dtype([("top", "f4"), ("start", "i4")])
+
+COUNTS = record(triangles="i4", spheres="i4", lights="i4", triangle_lights="i4", sphere_lights="i4", point_lights="i4",
+                spot_lights="i4", directional_lights="i4", sun_lights="i4", sky_lights="i4", pad="2i4")
+#: clamped: if CLAMP is compiled in, the radiance that clamping removed from the samples, averaged over channels.
+PIXEL = record(sum="3f4", count="u4", sum_error="3f4", dropped="u4", square="3f4", rays="u4", square_error="3f4",
+               clamped="f4")
+LAUNCH = record(position="3f4", width="u4", right="3f4", height="u4", up="3f4", max_depth="i4", forward="3f4",
+                seed="u4", first_pixel="u4", pixel_count="u4", first_sample="u4", sample_count="u4",
+                block_bits="u4", lens_radius="f4", clamp_direct="f4", clamp_indirect="f4")
+#: u_row, v_row: rows that map (u, v, 1) to the image's coordinates. first: of its texels.
+TEXTURE = record(u_row="3f4", width="i4", v_row="3f4", height="i4", first="i4", wrap_u="i4", wrap_v="i4", nearest="i4",
+                 uv_set="i4", shift="u4", pad="2i4")
+TEXEL = np.dtype([("rgba", "u4")])
+#: Linear value of an sRGB-encoded byte.
+LINEAR = np.dtype([("linear", "f4")])
+#: Denoiser guides of a pixel (kernels/guides.cl); every field not named pad is an image.
+GUIDE = record(albedo="3f4", pad0="i4", normal="3f4", pad1="i4")
+#: If DIRECT_LIGHT is compiled in, a pixel also stores the sum of its samples' direct light.
+DIRECT = record(direct="3f4", pad0="u4", direct_error="3f4", pad1="u4")
+PIXEL_WITH_DIRECT = np.dtype([*PIXEL.descr, *DIRECT.descr])
+#: A projected primitive (kernels/raster/outline.cl). edge0 … nearness: functions of the image position, or for a sphere
+#: its centre and radius; instance: negative for spheres; rows: range of pixel rows that it may cover.
+OUTLINE = record(edge0="3f4", primitive="i4", edge1="3f4", instance="i4", edge2="3f4", first_row="i4", nearness="3f4",
+                 last_row="i4")
+#: An entry of the layer energy tables (clrt/scene/materials/layer_energy.py).
+LAYER_PARTS = record(part="8f4")
+#: A filter's quantile, in pixels from a pixel's edge.
+FILTER = np.dtype([("quantile", "f4")])
+
+
+def material_record(values: Iterable[Mapping[str, Any]]) -> np.dtype[Any]:
+    """Return the record of materials of one type, with these values by name: the union over all of them.
+
+    Rows of a multiple of four come first, as long as the longest, then triples, each followed by a scalar or padding,
+    then the other scalars; texture numbers are int32.
+    """
+    sizes: dict[str, int] = {}
+    scalar: dict[str, str] = {}
+    for named in values:
+        for name, value in named.items():
+            sizes[name] = max(sizes.get(name, 0), len(value) if isinstance(value, tuple) else 1)
+        scalar |= {name: "i4" if name.endswith("_texture") else "f4" for name in named}
+    triples = [name for name, size in sizes.items() if size == 3]
+    scalars = [name for name, size in sizes.items() if size == 1]
+    fields = {name: f"{size}f4" for name, size in sizes.items() if size > 3}
+    for i, triple in enumerate(triples):
+        fields[triple] = "3f4"
+        name = scalars.pop(0) if scalars else f"pad{i}"
+        fields[name] = scalar.get(name, "f4")
+    for name in scalars:
+        fields[name] = scalar[name]
+    for i in range(-len(scalars) % 4):
+        fields[f"rest{i}"] = "f4"
+    return record(**fields)

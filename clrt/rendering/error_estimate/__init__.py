@@ -1,0 +1,1 @@
+"""The estimated error of a picture, its history, and adaptive sampling."""

@@ -1,0 +1,1 @@
+"""The film on the host: means, variances and counts per pixel."""

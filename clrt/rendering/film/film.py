@@ -1,0 +1,168 @@
+"""Accumulated image on the host: mean, error estimate and counts from the device's sums (kernels/film.cl)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .expected_radiance import REACH, expected
+from .row_bands import in_bands
+from .tiles import TILE, tile_sums
+
+#: Added to the squared reference in relMSE, so that black pixels do not cause a division by zero.
+RELATIVE_FLOOR = 0.01
+
+
+def _in_planes(values: NDArray[Any]) -> NDArray[Any]:
+    """Return (3, height, width) as a view of shape (height, width, 3), keeping the planar memory layout: numpy's inner
+    loops then run over rows instead of three values."""
+    return np.moveaxis(values, 0, -1)
+
+
+def _sums(pixels: NDArray[Any], name: str) -> NDArray[np.float64]:
+    total = np.moveaxis(pixels[name], -1, 0).astype(np.float64, order="C")
+    total += np.moveaxis(pixels[f"{name}_error"], -1, 0)
+    return _in_planes(total)
+
+
+def _padded(values: NDArray[np.float64], rows: tuple[int, int]) -> NDArray[np.float64]:
+    """Pad with REACH columns on both sides and `rows` rows above and below, replicating the edge."""
+    return _in_planes(np.pad(np.moveaxis(values, -1, 0), [(0, 0), rows, (REACH, REACH)], "edge"))
+
+
+class Film:
+    """Host copy of the device's film. pixels: (height, width) PIXEL records, or PIXEL_WITH_DIRECT; `unwanted` is polled
+    during error estimation, which raises `Unwanted` once it returns True."""
+
+    unwanted: Callable[[], bool] = staticmethod(lambda: False)
+
+    def __init__(self, pixels: NDArray[Any]) -> None:
+        self.pixels = pixels
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height)."""
+        height, width = self.pixels.shape
+        return width, height
+
+    @cached_property
+    def mean(self) -> NDArray[np.float64]:
+        """(height, width, 3): mean of the accepted samples; 0 where there are none."""
+        return self._mean_of("sum")
+
+    @property
+    def direct(self) -> NDArray[np.float64]:
+        """(height, width, 3): part of the mean due to path depths 1 and 2; only if the film stores it separately."""
+        return self._mean_of("direct")
+
+    def picture(self) -> NDArray[np.float32]:
+        """Return (height, width, 3): the mean as displayed and written, row by row in memory."""
+        picture = np.empty((*self.pixels.shape, 3), np.float32)
+        self._fill_with_mean(picture, "sum")
+        return picture
+
+    def _mean_of(self, name: str) -> NDArray[np.float64]:
+        mean = _in_planes(np.empty((3, *self.pixels.shape)))
+        self._fill_with_mean(mean, name)
+        return mean
+
+    def _fill_with_mean(self, mean: NDArray[np.floating[Any]], name: str) -> None:
+        def fill(rows: slice) -> None:
+            pixels = self.pixels[rows]
+            mean[rows] = _sums(pixels, name) / np.maximum(pixels["count"], 1)[..., None]
+
+        in_bands(mean.shape, fill)
+
+    @property
+    def variance(self) -> NDArray[np.float64]:
+        """(height, width, 3): variance of the mean, i.e. the sample variance over n; NaN below two samples."""
+        return np.concatenate(in_bands(self.mean.shape, self._variance))
+
+    def _variance(self, rows: slice) -> NDArray[np.float64]:
+        """Return `variance` for these rows; mean², its upper bound, where squares were too large to be summed
+        (film.cl)."""
+        pixels, most = self.pixels[rows], self.mean[rows] ** 2
+        count = pixels["count"].astype(np.float64)[..., None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            squares = _sums(pixels, "square") / count
+            summed = squares >= (1 - 1e-6) * most    # also false for NaN
+            variance = np.where(summed, np.maximum(squares - most, 0) / (count - 1), most)
+        return np.where(count < 2, np.nan, variance)
+
+    @property
+    def relative_to(self) -> NDArray[np.float32]:
+        """(height, width, 3): denominator of errors in relMSE, √(expected² + 0.01), with an estimate of the expected
+        value (rendering/film/expected_radiance.py)."""
+        return self._judged[0]
+
+    @cached_property
+    def noise(self) -> float | None:
+        """√relMSE for independent samples: sqrt(mean(Var[mean] / (expected² + 0.01))) over all values.
+
+        None before every pixel has two samples.
+        """
+        count = self.pixels["count"]
+        if not count.size or count.min() < 2:
+            return None
+        return float(np.sqrt(np.sum(self.tile_limits) / self.mean.size))
+
+    @property
+    def tile_limits(self) -> NDArray[np.float64]:
+        """(rows, columns): Var[mean] / (expected² + 0.01), summed over a tile's values; NaN below two samples."""
+        return self._judged[1]
+
+    @cached_property
+    def _judged(self) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+        """`relative_to` and `tile_limits`, computed together since they share intermediate results."""
+        mean, height = self.mean, len(self.mean)
+        relative = np.empty_like(mean, np.float32)
+
+        def judge(rows: slice) -> NDArray[np.float64]:
+            there = slice(max(rows.start - REACH, 0), min(rows.stop + REACH, height))
+            beyond = (there.start - rows.start + REACH, rows.stop + REACH - there.stop)
+            variance = self._variance(there)
+            squared = expected(_padded(mean[there], beyond), _padded(variance, beyond)) ** 2 + RELATIVE_FLOOR
+            relative[rows] = np.sqrt(squared)
+            return tile_sums(variance[rows.start - there.start:][:rows.stop - rows.start] / squared)
+
+        return relative, np.concatenate(in_bands(mean.shape, judge, self.unwanted))
+
+    @property
+    def clamped_part(self) -> float:
+        """Fraction of all light that clamping removed, as a mean over the image; 0 if it is black."""
+        clamped = float(np.mean(self.pixels["clamped"] / np.maximum(self.pixels["count"], 1), dtype=np.float64))
+        return clamped / whole if (whole := clamped + float(self.mean.mean())) else 0.0
+
+    @property
+    def samples(self) -> int:
+        """Number of samples in the film, including dropped ones."""
+        return self._totals["count"] + self.nonfinite_samples
+
+    @property
+    def tile_samples(self) -> NDArray[np.int64]:
+        """(rows, columns): samples per pixel of each tile, taken from its first pixel."""
+        pixels = self.pixels[::TILE, ::TILE]
+        return np.asarray(pixels["count"] + pixels["dropped"], np.int64)
+
+    @property
+    def nonfinite_samples(self) -> int:
+        """Number of samples that were dropped because they were NaN or infinite."""
+        return self._totals["dropped"]
+
+    @property
+    def rays(self) -> int:
+        """Number of rays traced; each counter wraps at 2³², long after its image has converged. All rays of a tile may
+        be counted in its first pixel (kernels/wave.cl)."""
+        return self._totals["rays"]
+
+    @cached_property
+    def _totals(self) -> dict[str, int]:
+        """Sums of the counters over all pixels, which lie so far apart that one pass over them takes as long as for
+        one."""
+        names = ("count", "dropped", "rays")
+        sums = in_bands(self.pixels.shape, lambda rows: [self.pixels[name][rows].sum(dtype=np.int64) for name in names])
+        return dict(zip(names, map(int, np.sum(sums, axis=0))))

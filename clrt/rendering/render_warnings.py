@@ -1,0 +1,98 @@
+"""Warnings about a render: logged once each, and listed in its report."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..scene.model import RenderSettings, Scene
+from ..scene.validation.winding import backward_emitters
+from .compile.features import INTEGRATORS, WITH_LIGHT, biased_by
+from .film.film import Film
+
+#: Linear radiance below which a .png of 8 bits is black: half a level of sRGB's straight part.
+BLACK = 0.5 / 255 / 12.92
+#: Cause of a black image if no other is known.
+DARK = "no light reaches what the camera sees"
+_log = logging.getLogger(__name__)
+
+
+def nonfinite_warnings(dropped: int, samples: int) -> list[str]:
+    """Return one warning if samples were dropped, else none."""
+    return [f"{dropped} of {samples} samples were not finite and were dropped, so the picture may be too dark; look "
+            "for extreme values in lights, textures and materials"] if dropped else []
+
+
+def bias_warnings(settings: RenderSettings, removed: float | None) -> list[str]:
+    """Return one warning if a setting biases the image, else none. removed: the fraction of the light, if known."""
+    if not (names := biased_by(settings)):
+        return []
+    part = "" if removed is None else f": {removed:.2%} of the light was removed"
+    return [f"the picture is biased by {' and '.join(names)}{part}; the estimated error does not include this bias"]
+
+
+def black_warnings(settings: RenderSettings, features: Iterable[str], brightest: float, cause: str) -> list[str]:
+    """Return one warning if an image of light is black although something emits: its brightest value is below BLACK.
+    cause: the likely cause if that value is 0."""
+    if brightest >= BLACK or not _shows_light(settings) or _is_dark(features):
+        return []
+    if brightest > 0:
+        stops = np.ceil(-np.log2(2 * brightest))
+        cause = f"its brightest value is {brightest:.2g}; --exposure {stops:.0f} makes it visible"
+    x, y = (length // 2 for length in settings.size)
+    advice = f"; `clrt debug SCENE --pixel {x},{y}` shows why" if settings.integrator in WITH_LIGHT else ""
+    return [f"the picture is black: {cause}{advice}"]
+
+
+class PictureWarnings:
+    """Warnings about the renders of one scene. features: those of its program."""
+
+    def __init__(self, scene: Scene, features: Iterable[str]) -> None:
+        self._scene, self._features, self._logged = scene, list(features), set[str]()
+        self._backward = backward_emitters(scene) if _shows_light(scene.render) else []
+        self._of_scene = [f'the emissive mesh "{name}" emits light only away from the scene; reverse the order of its '
+                          "faces' vertices, or set double_sided = true in its material" for name in self._backward]
+        if _shows_light(scene.render) and _is_dark(self._features):
+            self._of_scene.append("the picture is black: nothing in this scene emits light")
+        for text in self._of_scene:
+            _log.warning("%s: %s", scene.name, text)
+
+    def of(self, film: Film) -> list[str]:
+        """Return all warnings for the image so far, one line each; for a band of an image only those of the scene."""
+        return [*self._of_scene, *self._of_film(film)]
+
+    def log(self, film: Film) -> None:
+        """Log the warnings of a finished image that were not logged for the scene or for previous images."""
+        for text in self._of_film(film):
+            if text not in self._logged:
+                _log.warning("%s: %s", self._scene.name, text)
+            self._logged.add(text)
+
+    def _of_film(self, film: Film) -> list[str]:
+        settings = self._scene.render
+        if film.size != settings.size or not film.samples:
+            return []
+        return [*nonfinite_warnings(film.nonfinite_samples, film.samples), *bias_warnings(settings, film.clamped_part),
+                *black_warnings(settings, self._features, float(film.mean.max()), self._cause(film))]
+
+    def _cause(self, film: Film) -> str:
+        """Return the likely cause of an image without any light."""
+        if film.nonfinite_samples == film.samples:
+            return "none of its samples was finite"
+        if self._scene.render.max_depth == 1:
+            return "max_depth is 1, which shows emission alone, and the camera sees no emitter"
+        if self._backward:
+            return f'"{self._backward[0]}" emits light only away from the scene'
+        if film.rays == film.samples:
+            return "camera rays hit nothing, or only surfaces that reflect nothing"
+        return DARK
+
+
+def _shows_light(settings: RenderSettings) -> bool:
+    return settings.integrator in INTEGRATORS
+
+
+def _is_dark(features: Iterable[str]) -> bool:
+    return not {"LIGHTS", "SKY"} & set(features)

@@ -1,0 +1,1 @@
+"""Transforms, normals, tangents, and checked arrays of meshes and rays."""

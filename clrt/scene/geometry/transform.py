@@ -1,0 +1,122 @@
+"""4x4 float64 matrices that act on column vectors: p' = M p. `A @ B` applies B first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import reduce
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..lights import DirectionalLight, Light, PointLight
+from ..model import Camera, Mesh, Vector
+
+Matrix = NDArray[np.float64]
+#: A transform is singular if it scales volumes by less than this, relative to the cube of its longest column.
+SINGULAR = 1e-12
+
+
+def translation(offset: Vector) -> Matrix:
+    """Return the translation by `offset`."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset
+    return matrix
+
+
+def scaling(factors: Vector) -> Matrix:
+    """Return the scaling of each axis by its factor; negative factors mirror."""
+    return np.diag([*factors, 1.0])
+
+
+def rotation(degrees: Vector) -> Matrix:
+    """Return the rotation about the fixed x axis, then the fixed y axis, then the fixed z axis: Rz Ry Rx.
+
+    Positive angles are counter-clockwise looking against the axis.
+    """
+    matrix = np.eye(4)
+    for axis, angle in enumerate(np.radians(degrees)):
+        turn = np.eye(4)
+        first, second = (axis + 1) % 3, (axis + 2) % 3
+        turn[[first, second], [first, second]] = np.cos(angle)
+        turn[second, first] = np.sin(angle)
+        turn[first, second] = -np.sin(angle)
+        matrix = turn @ matrix
+    return matrix
+
+
+def quaternion(x: float, y: float, z: float, w: float) -> Matrix:
+    """Return the rotation of a quaternion (x, y, z, w) of any length but zero."""
+    x, y, z, w = np.array([x, y, z, w]) / np.linalg.norm([x, y, z, w])
+    matrix = np.eye(4)
+    matrix[:3, :3] = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+    return matrix
+
+
+def transform_mesh(mesh: Mesh, matrix: Matrix) -> Mesh:
+    """Return the mesh transformed by an affine `matrix`; computed in float64, stored in float32.
+
+    Normals are transformed by the inverse transpose (its cofactors, which singular matrices have, too). A mirroring
+    matrix would turn the surface inside out, so the faces' winding is reversed. Values beyond float32's range become
+    Inf, which `validate` rejects.
+    """
+    if np.array_equal(matrix, np.eye(4)):
+        return mesh
+    linear = matrix[:3, :3]
+    mirrored = np.linalg.det(linear) < 0
+    with np.errstate(over="ignore", invalid="ignore"):
+        vertices = (mesh.vertices @ linear.T + matrix[:3, 3]).astype(np.float32)
+    normals = mesh.normals
+    if normals is not None:
+        cofactors = np.cross(linear[[1, 2, 0]], linear[[2, 0, 1]]) * (-1 if mirrored else 1)
+        normals = unit(normals @ cofactors.T).astype(np.float32)
+    tangents = mesh.tangents
+    if tangents is not None:
+        turned = unit(tangents[:, :3] @ linear.T)
+        tangents = np.column_stack([turned, -tangents[:, 3] if mirrored else tangents[:, 3]]).astype(np.float32)
+    faces = np.ascontiguousarray(mesh.faces[:, ::-1]) if mirrored else mesh.faces
+    return replace(mesh, vertices=vertices, faces=faces, normals=normals, tangents=tangents)
+
+
+def transform_camera(camera: Camera, matrix: Matrix) -> Camera:
+    """Return the camera under an affine `matrix`; its angle is kept, and its lengths scale like `up`."""
+    corners = np.array([[*camera.position, 1], [*camera.look_at, 1], [*camera.up, 0]]) @ matrix.T
+    position, look_at, up = corners[:, :3].tolist()
+    stretch = float(np.linalg.norm(up) / np.linalg.norm(camera.up))
+    focus, height = (length and length * stretch for length in (camera.focus_distance, camera.view_height))
+    return replace(camera, position=position, look_at=look_at, up=up, focus_distance=focus, view_height=height,
+                   aperture_radius=camera.aperture_radius * stretch)
+
+
+def transform_light(light: Light, matrix: Matrix) -> Light:
+    """Return the light under an affine `matrix`, moved and rotated; its strength and range are kept, as in glTF."""
+    turned: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    if not isinstance(light, PointLight):
+        x, y, z = unit(matrix[:3, :3] @ light.direction).tolist()
+        turned = x, y, z
+        if isinstance(light, DirectionalLight):
+            return replace(light, direction=turned)
+    x, y, z = (matrix[:3] @ [*light.position, 1.0]).tolist()
+    moved = replace(light, position=(x, y, z))
+    return moved if isinstance(moved, PointLight) else replace(moved, direction=turned)
+
+
+def transform_faults(to_world: NDArray[np.float64]) -> dict[str, NDArray[np.bool_]]:
+    """Return which affine transforms (k, 3, 4) cannot be inverted, (k,), by a description of the fault."""
+    with np.errstate(all="ignore"):
+        length = np.linalg.norm(to_world[..., :3], axis=1).max(axis=1, initial=0)
+        volume = np.abs(np.linalg.det(to_world[..., :3] / np.maximum(length, 1e-300)[:, None, None]))
+    finite = np.isfinite(to_world).all(axis=(1, 2))
+    return {"is not finite": ~finite, "flattens the mesh": finite & ~(volume > SINGULAR)}
+
+
+def unit(vectors: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Normalize each row, safe from overflow; rows that are zero or not finite become zero."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # numpy reduces many short rows slowly, but whole columns fast.
+        largest = reduce(np.maximum, np.moveaxis(np.abs(vectors), -1, 0)).astype(np.float64)[..., None]
+        scaled = vectors / largest
+        rows = scaled / np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., None]
+    usable = (largest > 0) & np.isfinite(largest)
+    return np.where(usable, rows, 0.0)

@@ -1,0 +1,1 @@
+"""Materials as plain data, with their textures and energy tables."""

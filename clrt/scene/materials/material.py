@@ -1,0 +1,133 @@
+"""Fields and methods that all materials share (scene.materials)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from ..validation.limits import Ge, Le
+from .textures import NonNegative, Texture
+
+Unit = Annotated[float, Ge(0), Le(1)]
+Albedo = tuple[Unit, Unit, Unit]
+Radiance = tuple[NonNegative, NonNegative, NonNegative]
+Parameter = float | tuple[float, ...] | Texture
+#: Rays for which back faces are invisible (`RenderSettings.back_face_culling`).
+Culling = Literal["none", "camera", "all"]
+
+#: Below this alpha GGX exceeds float32 (D ~ 1/(pi alpha²)), also in the kernel; use `Mirror` for perfect reflection.
+ALPHA_MIN = 1e-4
+
+
+def tuples_for_lists(record: Any) -> None:
+    """Convert a dataclass's lists and arrays of numbers to tuples, so that either may be given and it is hashable."""
+    for field in fields(record):
+        value = getattr(record, field.name)
+        if hasattr(value, "tolist"):
+            value = value.tolist()
+        if isinstance(value, list):
+            object.__setattr__(record, field.name, tuple(value))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """Base class of materials.
+
+    emission: radiance in W·sr⁻¹·m⁻² that its front side emits. double_sided: its back side emits, too, and is not
+    subject to back-face culling (glTF's doubleSided). normal_map: perturbs the shading normal (glTF's convention:
+    linear, x to the right and y up in the image); its factor scales x and y. opacity: the fraction of light that
+    interacts with the surface; the rest passes straight through. With an alpha_cutoff (alpha mask) the surface is
+    opaque where the opacity reaches it, and absent elsewhere. one_sided: invisible from behind.
+    """
+
+    kernel: ClassVar[str]
+    #: Features with a kernel file of their own, bsdf/<name>.cl: `#include <NAME>_FILE`.
+    parts: ClassVar[tuple[str, ...]] = ()
+    emission: Radiance | Texture = (0.0, 0.0, 0.0)
+    normal_map: Texture | None = None
+    opacity: Unit | Texture = 1.0
+    alpha_cutoff: Unit | None = None
+    one_sided: bool = False
+    double_sided: bool = False
+
+    def __post_init__(self) -> None:
+        tuples_for_lists(self)
+
+    def parameters(self) -> dict[str, Parameter]:
+        """Return the values its kernel reads: numbers, triples, rows of a multiple of four, or textures in their place.
+
+        A parameter that only others of its type return is the field of that name, or 0 if there is no such field.
+        """
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in SHARED}
+
+    def surface_parameters(self, culling: Culling) -> dict[str, Parameter]:
+        """Return the values of the fields above that surface kernels read, unless they are the defaults.
+
+        The kernels' one_sided is 1 if no ray hits the back face, 0.5 if no camera ray does.
+        """
+        parameters: dict[str, Parameter] = {}
+        if self.normal_map is not None:
+            parameters["normal_map"] = self.normal_map
+        one_sided = 1.0 if self.one_sided or culling == "all" and self.is_culled else 0.0
+        if culling == "camera" and self.is_culled:
+            one_sided = max(one_sided, 0.5)
+        if self.opacity != 1 or one_sided:
+            cutoff = -1.0 if self.alpha_cutoff is None else self.alpha_cutoff
+            # Not a field's name: materials without it get 0, and are opaque whatever the alpha of vertex colors.
+            parameters["cutoff"] = 0.0 if self.opacity == 1 else cutoff
+            parameters |= {"opacity": self.opacity, "one_sided": one_sided}
+        return parameters
+
+    @property
+    def is_culled(self) -> bool:
+        """Whether back-face culling applies; not to transmissive materials, whose back faces light inside must hit."""
+        return not (self.double_sided or "TRANSMISSION" in self.features())
+
+    @property
+    def radiance(self) -> Radiance:
+        """Return the emitted radiance, the maximum (factor) if it is textured."""
+        return as_color(self.emission.factor) if isinstance(self.emission, Texture) else self.emission
+
+    def conflicts(self) -> list[str]:
+        """Return what is wrong with its combination of fields: "FIELD: fault; remedy"."""
+        return []
+
+    def without_textures(self: Self) -> Self:
+        """Return the material with each texture replaced by its factor."""
+        colors = {field.name for field in fields(self) if isinstance(field.default, tuple)}
+        maps = {field.name for field in fields(self) if field.default is None}
+        plain: dict[str, Any] = {name: as_color(value.factor) if name in colors else value.factor
+                                 for name, value in vars(self).items() if isinstance(value, Texture)}
+        return replace(self, **plain | dict.fromkeys(maps & plain.keys()))
+
+    @property
+    def bent_by(self) -> Texture | None:
+        """The normal map whose texture coordinates its tangents follow, if it has one."""
+        return self.normal_map
+
+    def textures(self) -> list[Texture]:
+        """Return all its textures."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return [value for value in values if isinstance(value, Texture)]
+
+    @property
+    def is_specular(self) -> bool:
+        """Whether it scatters into discrete directions only, which light sampling cannot find."""
+        return False
+
+    def in_unit(self, unit: float) -> Material:
+        """Return the material for a scene whose lengths are all multiplied by `unit`."""
+        return self
+
+    def features(self) -> frozenset[str]:
+        """Return the macros to define, for parts of the kernel that only some materials of this type need."""
+        return frozenset()
+
+
+#: Fields that the material's own kernel file does not read.
+SHARED = frozenset(field.name for field in fields(Material))
+
+
+def as_color(factor: float | Radiance) -> Radiance:
+    """Return a color from three numbers, or from one for all channels."""
+    return factor if isinstance(factor, tuple) else (factor, factor, factor)

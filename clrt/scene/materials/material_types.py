@@ -1,0 +1,161 @@
+"""Materials: plain data, one dataclass each. A material's BSDF is `kernels/bsdf/<kernel>.cl`.
+
+To add one: write its kernel file, write its dataclass here and list it in MATERIALS, where the scene file, the
+validation, the packing and the tests of every BSDF find it. Field types carry their limits (limits.py), which
+`validate` checks for scenes from files and from Python alike. MetallicRoughness has a file of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import log
+from typing import Annotated, ClassVar
+
+from ..validation.limits import Ge, Gt, Le
+from .dielectric_energy import ROWS, tables
+from .material import Albedo as Albedo, Material as Material, Parameter, Unit
+from .metallic_roughness import MetallicRoughness as MetallicRoughness
+from .presets import CONDUCTORS, ConductorPreset
+from .textures import Texture
+
+Index = Annotated[float, Ge(0.01), Le(100)]
+Extinction = Annotated[float, Ge(0), Le(100)]
+
+#: Lower limit of colors when taking their logarithm.
+BLACK = 1e-30
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diffuse(Material):
+    """Lambertian reflection: f = color/π."""
+
+    kernel: ClassVar[str] = "diffuse"
+    color: Albedo | Texture = (0.8, 0.8, 0.8)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conductor(Material):
+    """Metal with a measured complex index of refraction eta + i·k per channel and a GGX microfacet distribution.
+
+    `preset` takes both from a table (scene.presets), unless they are given. alpha = roughness². Single scattering only.
+    """
+
+    kernel: ClassVar[str] = "conductor"
+    preset: ConductorPreset = "gold"
+    eta: tuple[Index, Index, Index] | None = None
+    k: tuple[Extinction, Extinction, Extinction] | None = None
+    roughness: Unit | Texture = 0.3
+
+    def parameters(self) -> dict[str, Parameter]:
+        eta, k = CONDUCTORS[self.preset]
+        return {"eta": self.eta or eta, "k": self.k or k, "roughness": self.roughness}
+
+    def conflicts(self) -> list[str]:
+        if (self.eta is None) == (self.k is None):
+            return []
+        given, other = ("k", "eta") if self.eta is None else ("eta", "k")
+        return [f"{given}: is there without {other}; write both, or a preset alone"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mirror(Material):
+    """Perfect mirror that reflects the fraction `color` at every angle."""
+
+    kernel: ClassVar[str] = "mirror"
+    color: Albedo | Texture = (1.0, 1.0, 1.0)
+
+    @property
+    def is_specular(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dielectric(Material):
+    """Glass or water: the Fresnel equations give the fractions reflected and refracted.
+
+    ior: index of refraction inside over that outside; color: the fraction of the refracted light that is transmitted.
+    roughness: of the surface, with alpha = roughness² of the GGX distribution; 0 is smooth. thin: a sheet without an
+    interior, which does not bend light and transmits `color` from face to face. Inside others light is attenuated to
+    attenuation_color per attenuation_distance, in scene units (glTF's KHR_materials_volume; None: no attenuation).
+    multiple_scattering: compensates the energy that single scattering between microfacets loses
+    (scene.dielectric_energy), so that rough glass loses no light.
+    """
+
+    kernel: ClassVar[str] = "dielectric"
+    parts: ClassVar[tuple[str, ...]] = ("ROUGH_DIELECTRIC", "DIELECTRIC_ENERGY")
+    color: Albedo | Texture = (1.0, 1.0, 1.0)
+    ior: Annotated[float, Ge(0.25), Le(4)] = 1.5
+    roughness: Unit | Texture = 0.0
+    multiple_scattering: bool = True
+    thin: bool = False
+    attenuation_color: Albedo = (1.0, 1.0, 1.0)
+    attenuation_distance: Annotated[float, Gt(0)] | None = None
+
+    def parameters(self) -> dict[str, Parameter]:
+        values: dict[str, Parameter] = {"color": self.color, "ior": self.ior}
+        if self.rough:
+            values["roughness"] = self.roughness
+        if self.scatters_again:
+            one = None if isinstance(self.roughness, Texture) else self.roughness
+            values |= {"energy": tables(self.ior, one, self.thin), "last_row": ROWS - 1.0 if one is None else 0.0}
+        if self.thin:
+            values["thin"] = 1.0
+        if (distance := self.attenuation_distance) is not None:
+            values["absorption"] = tuple(min(-log(max(part, BLACK)) / distance, 1 / BLACK)
+                                         for part in self.attenuation_color)
+        return values
+
+    @property
+    def rough(self) -> bool:
+        """Whether the surface, or some of it, is rough."""
+        return isinstance(self.roughness, Texture) or self.roughness > 0
+
+    @property
+    def scatters_again(self) -> bool:
+        """Whether multiple scattering between microfacets is compensated."""
+        return self.multiple_scattering and not self.is_specular
+
+    @property
+    def is_specular(self) -> bool:
+        return not self.rough or (self.ior == 1 and not self.thin)
+
+    def conflicts(self) -> list[str]:
+        fault = "attenuation_distance: a thin sheet has no inside; leave it out, or thin"
+        return [fault] if self.thin and self.attenuation_distance is not None else []
+
+    def in_unit(self, unit: float) -> Dielectric:
+        distance = self.attenuation_distance
+        return self if distance is None else replace(self, attenuation_distance=distance * unit)
+
+    def features(self) -> frozenset[str]:
+        has = {"TRANSMISSION": True, "ROUGH_DIELECTRIC": self.rough, "TRANSMISSION_LOBES": self.rough,
+               "DIELECTRIC_ENERGY": self.scatters_again,
+               "THIN_DIELECTRIC": self.thin, "ATTENUATION": self.attenuation_distance is not None}
+        return frozenset(name for name, present in has.items() if present)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Phong(Material):
+    """Phong's model: a Lambertian lobe and a specular lobe around the mirror direction (Nadolny 3.1–3.3).
+
+    specular: color of the specular lobe, which is narrower the larger `shininess` is. ambient: the fraction of `color`
+    that the local integrator multiplies with the sky's light. In the path integrators the Lambertian lobe is limited to
+    1 − specular, and the specular lobe reflects `specular` at normal incidence (Lafortune and Willems 1994).
+    """
+
+    kernel: ClassVar[str] = "phong"
+    color: Albedo | Texture = (0.8, 0.8, 0.8)
+    specular: Albedo | Texture = (0.2, 0.2, 0.2)
+    shininess: Annotated[float, Ge(0), Le(10000)] = 32.0
+    ambient: Unit = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlinnPhong(Phong):
+    """Blinn's model: Phong's with the half vector; about as wide at four times the shininess."""
+
+    kernel: ClassVar[str] = "blinn_phong"
+
+
+MATERIALS: tuple[type[Material], ...] = (Diffuse, MetallicRoughness, Mirror, Dielectric, Conductor, Phong,
+                                         BlinnPhong)

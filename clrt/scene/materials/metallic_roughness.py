@@ -1,0 +1,140 @@
+"""glTF's metallic-roughness material."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
+
+from ..validation.limits import Ge, Le
+from . import layer_energy
+from .material import ALPHA_MIN, Albedo, Material, Parameter, Radiance, Unit
+from .presets import F0_PRESETS, Preset
+from .textures import Texture
+
+Smith = Literal["height_correlated", "separable", "schlick", "schlick_ibl"]
+Coupling = Literal["albedo", "fresnel", "half_vector"]
+
+
+class Lobes(NamedTuple):
+    """f0: specular reflectance at normal incidence; albedo: of the diffuse lobe, uncoupled; alpha: roughness²."""
+
+    f0: tuple[float, ...]
+    albedo: tuple[float, ...]
+    alpha: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class MetallicRoughness(Material):
+    """Cook–Torrance with GGX over a diffuse lobe (glTF's base material; Suchiński 6.5–6.15, Nadolny 3.5–3.13).
+
+    alpha = roughness². `preset` takes F0 (and for metals the color) from the table. `smith` selects the
+    masking–shadowing term: height-correlated (glTF), separable G1·G1, or Schlick-GGX with k = (r+1)²/8 ("schlick")
+    or k = r²/2 ("schlick_ibl").
+
+    `coupling` selects how the specular lobe attenuates the diffuse one: "albedo", (1 − E(wi))(1 − E(wo))/(1 − mean E)
+    with the directional albedo E of the specular lobe, which conserves energy (Kelemen and Szirmay-Kalos 2001; Kulla
+    and Conty 2017); "fresnel", (1 − F(cos wi))(1 − F(cos wo)), which loses some; or "half_vector", 1 − F(wi·h) of the
+    theses and glTF, which gains some. `multiple_scattering` compensates what single scattering between microfacets
+    loses: white metal then reflects all light, and colored metal becomes more saturated. By default both conserve
+    energy with the height-correlated term; with the others they are as in the theses: "fresnel" and single scattering.
+
+    The rest are glTF's extensions, with their names. `ior`, `specular` and `specular_color`: F0 of the dielectric part,
+    ((ior − 1)/(ior + 1))²·specular·specular_color, and F at grazing angles, `specular`. `clearcoat`: a clear film,
+    affected by `clearcoat_normal_map` alone. `sheen_color`: fibres. `transmission`: the fraction of the dielectric part
+    that is a thin transmissive sheet.
+    """
+
+    kernel: ClassVar[str] = "metallic_roughness"
+    parts: ClassVar[tuple[str, ...]] = ("LAYERS", "LAYER_ENERGY", "SHEEN", "GGX_ALBEDO",
+                                        *(f"ALBEDO_{smith.upper()}" for smith in get_args(Smith)))
+    color: Albedo | Texture = (0.8, 0.8, 0.8)
+    metallic: Unit | Texture = 0.0
+    roughness: Unit | Texture = 0.5
+    preset: Preset | None = None
+    smith: Smith = "height_correlated"
+    coupling: Coupling | None = None
+    multiple_scattering: bool | None = None
+    ior: Annotated[float, Ge(1), Le(4)] = 1.5
+    specular: Unit | Texture = 1.0
+    specular_color: Radiance | Texture = (1.0, 1.0, 1.0)
+    clearcoat: Unit | Texture = 0.0
+    clearcoat_roughness: Unit | Texture = 0.0
+    clearcoat_normal_map: Texture | None = None
+    sheen_color: Albedo | Texture = (0.0, 0.0, 0.0)
+    sheen_roughness: Unit | Texture = 0.0
+    transmission: Unit | Texture = 0.0
+
+    def parameters(self) -> dict[str, Parameter]:
+        color, f0, metallic = self.color, (((self.ior - 1) / (self.ior + 1))**2,) * 3, self.metallic
+        if self.preset is not None:
+            f0, metallic = F0_PRESETS[self.preset]
+            color = f0 if metallic else color
+        return {"color": color, "metallic": metallic, "roughness": self.roughness, "f0": f0,
+                "smith": float(get_args(Smith).index(self.smith)),
+                "coupling": float(get_args(Coupling).index(self.coupled_by)),
+                "multiple": float("MULTIPLE_SCATTERING" in self.features())} | self._layers()
+
+    @property
+    def coupled_by(self) -> Coupling:
+        """Return `coupling`, or its default if it is None."""
+        return self.coupling or ("albedo" if self.smith == "height_correlated" else "fresnel")
+
+    def _layers(self) -> dict[str, Parameter]:
+        """Return the parameters of the extensions in use."""
+        has, values = self.features(), dict[str, Parameter]()
+        if "SPECULAR" in has:
+            values |= {"specular": self.specular, "specular_color": self.specular_color}
+        if "CLEARCOAT" in has:
+            values |= {"clearcoat": self.clearcoat, "clearcoat_roughness": self.clearcoat_roughness}
+            values |= {} if self.clearcoat_normal_map is None else {"clearcoat_normal_map": self.clearcoat_normal_map}
+        if "SHEEN" in has:
+            values |= {"sheen_color": self.sheen_color, "sheen_roughness": self.sheen_roughness}
+        if "LAYER_ENERGY" in has:
+            rows = [layer_energy.rows(roughness) for roughness in self._roughnesses(has)]
+            values |= {"layer_energy": layer_energy.tables(*rows, self.smith),
+                       "last_rows": tuple(len(each) - 1.0 for each in rows)}
+        return values | ({"transmission": self.transmission} if "THROUGH" in has else {})
+
+    def _roughnesses(self, has: frozenset[str]) -> tuple[Unit | Texture, ...]:
+        """Return the roughnesses of base, film and fibres; for an absent layer, any number."""
+        return (self.roughness, self.clearcoat_roughness if "CLEARCOAT" in has else 0.0,
+                self.sheen_roughness if "SHEEN" in has else 1.0)
+
+    @property
+    def bent_by(self) -> Texture | None:
+        return self.normal_map or (self.clearcoat_normal_map if self.clearcoat != 0 else None)
+
+    @property
+    def lobes(self) -> Lobes:
+        """Return its constant parameters as lobes; TypeError if one of them is a texture."""
+        single = self.parameters()
+        color, f0, metallic, roughness = (single[name] for name in ("color", "f0", "metallic", "roughness"))
+        if not (isinstance(color, tuple) and isinstance(f0, tuple) and isinstance(metallic, float | int)
+                and isinstance(roughness, float | int)):
+            raise TypeError("a texture has no lobes of its own")
+        f0 = tuple(f + metallic * (c - f) for f, c in zip(f0, color))
+        return Lobes(f0, tuple((1 - metallic) * c for c in color), max(roughness**2, ALPHA_MIN))
+
+    def features(self) -> frozenset[str]:
+        metallic = self.metallic if self.preset is None else F0_PRESETS[self.preset][1]
+        layers = {"CLEARCOAT": self.clearcoat != 0, "SHEEN": self.sheen_color != (0, 0, 0),
+                  "THROUGH": self.transmission != 0}
+        further = self.coupled_by == "albedo" if self.multiple_scattering is None else self.multiple_scattering
+        # With the albedo coupling the diffuse lobe reflects what the specular one does not, so only metal loses energy.
+        further &= metallic != 0 or self.coupled_by != "albedo" or layers["THROUGH"]
+        above = layers["CLEARCOAT"] or layers["SHEEN"]
+        coupled = metallic != 1 or above    # the coupled lobe also carries what layers take from the gloss
+        fitted = further or (coupled and self.coupled_by == "albedo")
+        # A clearcoat's own albedo is that of the height-correlated form.
+        forms = {self.smith} if fitted else set()
+        forms |= {"height_correlated"} if layers["CLEARCOAT"] else set()
+        has = {f"SMITH_{self.smith.upper()}": True, f"COUPLING_{self.coupled_by.upper()}": coupled,
+               "MULTIPLE_SCATTERING": further, "GGX_ALBEDO": bool(forms), **layers,
+               **{f"ALBEDO_{form.upper()}": True for form in forms},
+               "COAT_NORMALS": layers["CLEARCOAT"] and self.bent_by is not None,
+               "LAYERS": any(layers.values()), "LAYER_ENERGY": above,
+               "LAYER_ROWS": above and any(isinstance(r, Texture) for r in (self.roughness, self.clearcoat_roughness,
+                                                                            self.sheen_roughness)),
+               "SPECULAR": self.specular != 1 or self.specular_color != (1, 1, 1),
+               "TRANSMISSION": layers["THROUGH"], "TRANSMISSION_LOBES": layers["THROUGH"]}
+        return frozenset(name for name, present in has.items() if present)

@@ -1,0 +1,73 @@
+"""Textures: images that a material's parameter is looked up in, by a surface's texture coordinates.
+
+Coordinates are glTF's: (0, 0) is the upper left corner of the image, (1, 1) the lower right one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..validation.limits import Ge, Lt
+
+Channel = Literal["red", "green", "blue", "alpha"]
+Wrap = Literal["repeat", "mirror", "clamp"]
+NonNegative = Annotated[float, Ge(0)]
+Pair = tuple[float, float]
+Value = TypeVar("Value")
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Image of a texture. texels: (h, w, 4) uint8, row 0 on top, unassociated alpha. Textures may share one."""
+
+    texels: NDArray[np.uint8]
+    name: str = "picture"
+
+
+WHITE = Picture(np.full((1, 1, 4), 255, np.uint8), "white")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Texture:
+    """Texture: an image, and its mapping to a surface.
+
+    Colors are decoded from sRGB, numbers are linear and read from one `channel`; `factor`, one number or three,
+    multiplies them. The coordinates of `uv_set` are scaled, rotated by `rotation_degrees` (counter-clockwise on the
+    upright image), and translated by `offset`, as in KHR_texture_transform. filter: bilinear, or the nearest texel.
+    """
+
+    picture: Picture
+    factor: NonNegative | tuple[NonNegative, NonNegative, NonNegative] = 1.0
+    channel: Channel = "red"
+    uv_set: Annotated[int, Ge(0), Lt(2)] = 0
+    offset: Pair = (0.0, 0.0)
+    scale: Pair = (1.0, 1.0)
+    rotation_degrees: float = 0.0
+    wrap: tuple[Wrap, Wrap] = ("repeat", "repeat")
+    filter: Literal["linear", "nearest"] = "linear"
+
+    @property
+    def to_picture(self) -> NDArray[np.float64]:
+        """The matrix (2, 3) from (u, v, 1) to image coordinates, both from 0 to 1."""
+        angle = np.radians(self.rotation_degrees)
+        c, s = np.cos(angle), np.sin(angle)
+        turned = np.array([[c, s], [-s, c]]) @ np.diag(self.scale)
+        return np.column_stack([turned, self.offset])
+
+    @property
+    def image_axes(self) -> NDArray[np.float64]:
+        """(2, 2): unit vectors to the image's right and up, on the plane of u and −v."""
+        (a, b), (c, d) = self.to_picture[:, :2]
+        axes = np.array([np.sign(a * d - b * c) * np.array([d, c]), [-c, d]])
+        return np.asarray(axes / np.hypot(c, d))
+
+
+def untextured(value: Value | Texture) -> Value:
+    """Return a material's parameter that must not be a texture; raises ValueError if it is one."""
+    if isinstance(value, Texture):
+        raise ValueError(f"the texture {value.picture.name}")
+    return value

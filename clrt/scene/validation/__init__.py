@@ -1,0 +1,1 @@
+"""What can be wrong with a scene, found before anything is compiled."""

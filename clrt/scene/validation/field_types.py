@@ -1,0 +1,189 @@
+"""Validation of plain values against a dataclass's field types, with problems as sentences.
+
+The scene file and scenes built in Python are both validated here, so the limits and messages are the same.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from functools import lru_cache
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from ..materials.textures import Texture
+from .limits import Ge, Gt, Le, Limit, Lt
+
+#: Fields whose values are not plain data; the code that uses them validates them.
+ELSEWHERE = frozenset({"image", "material", "materials", "mesh", "picture", "to_world"})
+INT64_END = 2**63
+FLOAT32_MAX = float(np.finfo(np.float32).max)
+#: More problems than this in one object are counted, not listed.
+MOST = 12
+
+
+def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[str]:
+    """Return what is wrong with `values` as the fields of the dataclass `kind`: each as
+    "where.field: value ...".
+
+    Finds missing and unknown fields, wrong types, values outside the limits of the type, and numbers that float32
+    cannot represent (NaN, Inf and out of range). Numbers may be numpy scalars; sequences must be tuples.
+    """
+    plain = {name: plain_value(value) for name, value in values.items()}
+    hints = _hints(kind)
+    problems: list[str] = []
+    for field in fields(kind):
+        if field.name in plain:
+            problems += _problems(hints[field.name], plain[field.name], f"{where}.{field.name}")
+        elif field.default is MISSING and field.default_factory is MISSING:
+            problems.append(f"{where}: {field.name} is missing; add it")
+    problems += [f'{where}: key "{name}" {unknown(name, hints)}' for name in plain if name not in hints]
+    if problems:
+        more = [f"{where}: {len(problems) - MOST} more mistakes like these"] if len(problems) > MOST else []
+        return problems[:MOST] + more
+    return [f"{where}.{name}: {show(value)} is beyond the range of float32; write a smaller number"
+            for name, value in plain.items() if _too_large(value)]
+
+
+def usable(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return valid `values` for the fields of `kind` in a form that numpy can use: integers of more than 64 bits, for
+    which it has no type, become floats if the field accepts these."""
+    hints = _hints(kind)
+    return {name: _floats(hints[name], value) for name, value in values.items()}
+
+
+def unknown(name: object, known: Iterable[str]) -> str:
+    """Return the message that a name is not among the `known` ones, with the closest match."""
+    import difflib
+
+    known = sorted(known)
+    near = difflib.get_close_matches(str(name), known, 1) or [word for word in known if word.startswith(f"{name}_")]
+    if near:
+        return f'is unknown; did you mean "{near[0]}"?'
+    return f"is unknown; write one of {', '.join(known)}" if known else "is unknown; none is defined"
+
+
+def show(value: object) -> str:
+    """Format a value as in the scene file, shortened."""
+    if isinstance(value, str):
+        text = f'"{value}"'
+    elif isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, tuple):
+        text = f"[{', '.join(show(entry) for entry in value[:20])}]"
+    elif isinstance(value, dict):
+        text = f"{{ {', '.join(f'{key} = {show(entry)}' for key, entry in value.items())} }}"
+    else:
+        # Python refuses to format integers of more than 4300 decimal digits.
+        text = hex(value) if isinstance(value, int) and value.bit_length() > 1024 else repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+@lru_cache
+def _hints(kind: type) -> dict[str, Any]:
+    """Return the types of a dataclass's fields, with their limits."""
+    hints = get_type_hints(kind, include_extras=True)
+    return {field.name: Any if field.name in ELSEWHERE else hints[field.name] for field in fields(kind)}
+
+
+def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
+    """Yield the problems of a `value` of the type `hint`: a number, string, Literal, tuple, limits, texture or None."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        yield from _problems(parts[0], value, path) if _fault(parts[0], value) else _outside(parts[1:], value, path)
+    elif NoneType in parts:
+        yield from () if value is None else _problems(parts[0], value, path)
+    elif origin in (Union, UnionType):
+        yield from _problems(_meant(parts, value), value, path)
+        if isinstance(value, Texture):
+            yield from _problems(_factor(parts[0], value), value.factor, f"{path}.factor")
+    elif hint is Texture and not isinstance(value, Texture):
+        yield f'{path}: {show(value)} is no texture; write {{ image = "FILE" }}'
+    elif isinstance(hint, type) and is_dataclass(hint):
+        yield from (field_problems(hint, {field.name: getattr(value, field.name) for field in fields(hint)}, path)
+                    if isinstance(value, hint) else [f"{path}: {show(value)} is no {hint.__name__}; write one"])
+    elif origin is Literal:
+        if not (isinstance(value, str) and value in parts):
+            yield f"{path}: {show(value)} {unknown(value, parts)}"
+    elif origin is tuple and isinstance(value, tuple):
+        kinds = (parts[0],) * len(value) if parts[-1] is ... else parts
+        if len(value) <= len(kinds):
+            for i, (kind, entry) in enumerate(zip(kinds, value)):
+                yield from _problems(kind, entry, f"{path}[{i}]")
+        if len(value) != len(kinds):
+            yield f"{path}: {show(value)} has {len(value)} entries; write {len(kinds)}"
+    elif hint is not Any and (fault := _fault(origin or hint, value)):
+        yield f"{path}: {show(value)} {fault}"
+
+
+def _floats(hint: Any, value: Any) -> Any:
+    """Return a valid value with integers of more than 64 bits as floats if the type accepts these."""
+    origin, parts = get_origin(hint), get_args(hint)
+    if hint is float:
+        return value if abs(value) < INT64_END else float(value)
+    if origin is Annotated:
+        return _floats(parts[0], value)
+    if origin in (Union, UnionType) and value is not None:
+        return _floats(_meant(parts, value), value)
+    if origin is tuple:
+        kinds = (parts[0],) * len(value) if parts[-1] is ... else parts
+        return tuple(map(_floats, kinds, value))
+    return value
+
+
+def _meant(parts: tuple[Any, ...], value: Any) -> Any:
+    """Return the member of a union that a value is validated against: the one that it is of, else the first."""
+    kinds = [(get_origin(part) or part, part) for part in parts]
+    return next((part for kind, part in kinds if isinstance(kind, type) and isinstance(value, kind)), parts[0])
+
+
+def _factor(plain: Any, texture: Texture) -> Any:
+    """Return the type of a texture's factor, given the type of the plain value; a color also accepts one number."""
+    one = get_origin(plain) is tuple and not isinstance(texture.factor, tuple)
+    return get_args(plain)[0] if one else plain
+
+
+def _outside(limits: Iterable[Limit], value: float, path: str) -> Iterator[str]:
+    """Yield the limits that a number violates."""
+    for limit in limits:
+        keeps, is_wrong, remedy = _LIMITS[type(limit)]
+        if not keeps(value, limit.bound):
+            yield f"{path}: {show(value)} {is_wrong} {limit.bound}; {remedy} {limit.bound}"
+
+
+def _fault(kind: Any, value: Any) -> str:
+    """Return why a value is not of a plain type, and the remedy; empty if it is."""
+    if isinstance(value, _ACCEPTED[kind]) and isinstance(value, bool) == (kind is bool):
+        finite = not isinstance(value, float) or math.isfinite(value)
+        return "" if finite else "is not a finite number; write one"
+    if kind is tuple and isinstance(value, (list, np.ndarray)):
+        return f"is a {type(value).__name__}; write a tuple"
+    return _REMEDIES[kind]
+
+
+_ACCEPTED: dict[Any, Any] = {float: (float, int), int: int, str: str, bool: bool, tuple: tuple}
+_REMEDIES = {float: "is not a number; write one without quotes",
+             int: "is not a whole number; write one without quotes or decimal point",
+             str: "is not a text; write it in quotes",
+             bool: "is neither true nor false; write one of them",
+             tuple: "is not a list; write the numbers in brackets"}
+_LIMITS: dict[type, tuple[Callable[[float, float], bool], str, str]] = {
+    Ge: (operator.ge, "is below", "write at least"), Le: (operator.le, "is above", "write at most"),
+    Gt: (operator.gt, "is not above", "write more than"), Lt: (operator.lt, "is not below", "write less than")}
+
+
+def plain_value(value: Any) -> Any:
+    """Convert numpy scalars to Python's, also inside tuples."""
+    if isinstance(value, tuple):
+        return tuple(map(plain_value, value))
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _too_large(value: Any) -> bool:
+    if isinstance(value, tuple):
+        return any(map(_too_large, value))
+    return isinstance(value, (float, int)) and abs(value) > FLOAT32_MAX

@@ -1,1 +1,0 @@
-"""Reproducible experiments that measure the speed and accuracy claimed for clrt."""
