@@ -20,8 +20,7 @@ def directions(rng: np.random.Generator, count: int) -> Doubles:
 
 
 def lamps(count: int, seed: int = 0, low: float = -1.0) -> Scene:
-    """Return triangles, spheres and point lights, a third each, with powers over four decades, in [-1, 1]³ above
-    `low`.
+    """Return triangles, spheres and point lights, a third each, with powers over four decades, in [-1, 1]³ above `low`.
     """
     rng = np.random.default_rng(seed)
     places = rng.uniform((-1.0, low, -1.0), 1.0, (count, 3))

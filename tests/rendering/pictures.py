@@ -22,8 +22,7 @@ Doubles = NDArray[np.float64]
 
 
 def session(device: Device, scene: Scene, sampler: Sampler = "independent", **chosen: Any) -> Session:
-    """Return a session of the scene with its own settings except for the sampler: the tests assume independent
-    samples.
+    """Return a session of the scene with its own settings except for the sampler: the tests assume independent samples.
 
     `chosen`: see Choices. Compiled programs are shared between sessions.
     """
@@ -69,8 +68,8 @@ def frame(camera: Camera) -> tuple[Doubles, Doubles, Doubles, float]:
 
 
 def pixel_points(camera: Camera, size: tuple[int, int], height: float, steps: int = 4) -> Doubles:
-    """Return the points (h, w, steps², 3) of the plane y = height at Gauss–Legendre nodes of each pixel (see
-    pixel_means).
+    """Return the points (h, w, steps², 3) of the plane y = height at Gauss–Legendre nodes of
+    each pixel (see pixel_means).
     """
     nodes = (np.polynomial.legendre.leggauss(steps)[0] + 1) / 2
     x, y = np.meshgrid(np.add.outer(np.arange(size[0]), nodes).ravel(), np.add.outer(np.arange(size[1]), nodes).ravel())

@@ -38,8 +38,7 @@ def grid(side: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
 
 
 def hit_triangles(corners: Doubles, origin: Doubles, direction: Doubles) -> tuple[Doubles, Integers, Doubles]:
-    """Return (n,) t of the closest hit among triangles (m, 3, 3), inf for a miss; its index; and the decision's
-    margin.
+    """Return (n,) t of the closest hit among triangles (m, 3, 3), inf for a miss; its index; and the decision's margin.
 
     Möller–Trumbore. A ray's margin is the least relative distance, over all relevant triangles, of a
     barycentric coordinate from an edge, and of the next t from the closest.
@@ -60,8 +59,8 @@ def hit_triangles(corners: Doubles, origin: Doubles, direction: Doubles) -> tupl
 
 
 def hit_spheres(spheres: Doubles, origin: Doubles, direction: Doubles) -> tuple[Doubles, Integers, Doubles]:
-    """Intersect spheres (m, 4), centre and radius, like `hit_triangles`; the margin is the discriminant's distance
-    from 0.
+    """Intersect spheres (m, 4), centre and radius, like `hit_triangles`; the margin is the
+    discriminant's distance from 0.
     """
     f = origin[:, None] - spheres[:, :3]
     a, b = np.sum(direction**2, axis=1)[:, None], np.sum(f * direction[:, None], axis=2)

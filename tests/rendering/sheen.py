@@ -36,8 +36,8 @@ def across(cosines: Doubles, n: float) -> Doubles:
 
 
 def interpolated(across: int, along: int) -> Doubles:
-    """Return (across, along) coefficients in powers of x = 2·√cos − 1 and y = 1 + 2·log10(roughness), by Chebyshev
-    points.
+    """Return (across, along) coefficients in powers of x = 2·√cos − 1 and y = 1 +
+    2·log10(roughness), by Chebyshev points.
     """
     x, y = chebyshev.chebpts1(across), chebyshev.chebpts1(along)
     values = np.array([albedo(((x + 1) / 2)**2, 1 / 10**(r - 1)) for r in y])

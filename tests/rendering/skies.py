@@ -44,8 +44,8 @@ def turned(w: Doubles, degrees: float) -> Doubles:
 
 def irradiance(image: NDArray[np.float32], normal: Doubles, rotation_degrees: float = 0.0, steps: int = 24,
                where: NDArray[np.bool_] | None = None) -> Doubles:
-    """Return ∫ L max(w·normal, 0) dω (3,), by the midpoint rule with steps² points per texel, over the texels in
-    `where`.
+    """Return ∫ L max(w·normal, 0) dω (3,), by the midpoint rule with steps² points per texel,
+    over the texels in `where`.
     """
     height, width = image.shape[:2]
     u = (np.arange(width * steps) + 0.5) / (width * steps)

@@ -39,8 +39,7 @@ def truth(device: Device, scene: Scene) -> NDArray[np.float32]:
 
 
 def test_tiles_of_a_picture_that_they_do_not_divide() -> None:
-    """Sums and pixel counts per tile equal those of a loop over the pixels if the size is not a multiple of the
-    tile's.
+    """Sums and pixel counts per tile equal those of a loop over the pixels if the size is not a multiple of the tile's.
     """
     rng = np.random.default_rng(1)
     values, (rows, columns) = rng.random((SIZE[1], SIZE[0], 3)), tiles_of(SIZE)
@@ -58,8 +57,8 @@ def test_tiles_of_a_picture_that_they_do_not_divide() -> None:
 def test_what_is_worth_doubling(most: float) -> None:
     """No tile left out is worth more than a chosen one unless it did not fit in the budget; errors may be 0.
 
-    A tile's error weighs as much as its four neighbours' errors together; the error is extended constantly at the
-    border.
+    A tile's error weighs as much as its four neighbours' errors together; the error is extended
+    constantly at the border.
     """
     rng = np.random.default_rng(2)
     samples, rays = 2 ** rng.integers(4, 9, (5, 6)), rng.integers(0, 2000, (5, 6)).astype(float)
@@ -118,8 +117,7 @@ def test_interrupted_and_cut_it_is_the_same_picture(device: Device, monkeypatch:
 
 @pytest.mark.parametrize("size", [SIZE, (8, 8), (12, 5)], ids=str)
 def test_it_stops_at_an_error(device: Device, size: tuple[int, int]) -> None:
-    """It stops at the requested error without planned samples, also for images of one or two tiles, doubled as a
-    whole.
+    """It stops at the requested error without planned samples, also for images of one or two tiles, doubled as a whole.
     """
     running = Renderer(outdoors(), device=device.info.index, size=size, seed=1, adaptive=True)
     state = end(running, error=0.01)

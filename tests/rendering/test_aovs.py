@@ -116,8 +116,7 @@ def test_albedo_and_normals_are_of_the_first_surface() -> None:
 
 
 def test_textures_and_normal_maps_are_seen() -> None:
-    """Albedo is that of the texels; normal maps bend the normal but not the geometric one; without albedo it works
-    too.
+    """Albedo is that of the texels; normal maps bend the normal but not the geometric one; without albedo it works too.
     """
     def plain(*rgb: int) -> Texture:
         return Texture(picture=Picture(np.full((2, 2, 4), (*rgb, 255), np.uint8)))
@@ -167,8 +166,7 @@ def test_albedo_is_a_mean_over_the_pixel() -> None:
 @pytest.mark.parametrize("options", [
     {}, *others({"adaptive": True}, {"lanes": 1, "filter": "blackman_harris"})], ids=str)
 def test_direct_and_indirect_light_add_up_to_the_picture(options: dict[str, Any]) -> None:
-    """Direct and indirect light sum to the image exactly, and the image is the same without these AOVs. Direct light
-    is
+    """Direct and indirect light sum to the image exactly, and the image is the same without these AOVs. Direct light is
     that of paths of depth 2, so it equals the image of max_depth 2 from the same samples."""
     pixels, found = rendered(everything(), "indirect,direct", 32, **options)
     assert list(found) == ["indirect", "direct"]
@@ -184,8 +182,8 @@ def test_direct_and_indirect_light_add_up_to_the_picture(options: dict[str, Any]
     {"aperture_radius": 0.3, "focus_distance": 2.0},
     *others({"projection": "orthographic"}, {"projection": "equirectangular"})], ids=str)
 def test_depth_is_what_the_integrator_of_it_shows(camera: dict[str, Any]) -> None:
-    """The depth AOV equals the depth integrator's image for every camera; with a lens it uses the ray through its
-    centre.
+    """The depth AOV equals the depth integrator's image for every camera; with a lens it uses
+    the ray through its centre.
     """
     scene = ball_on_floor()
     scene.camera = replace(scene.camera, **camera)

@@ -41,8 +41,7 @@ def every(device: Device) -> Bsdfs:
 
 def taken() -> list[tuple[Material, float]]:
     """Return every material at every angle, but transmissive ones, which take ten times as long, at every third angle
-    (every
-    second of two), with an offset that changes per material. The study covers all of them."""
+    (every second of two), with an offset that changes per material. The study covers all of them."""
     through: dict[Material, list[float]] = {}
     for material, cosine in cases():
         if "TRANSMISSION" in material.features():
@@ -69,8 +68,7 @@ def test_no_light_is_made(found: list[Scattered]) -> None:
 
 def test_rows_of_the_study(found: list[Scattered]) -> None:
     """The study's rows: the tests above, densities that integrate to at most 1, weights equal to value over density,
-    unit
-    vectors, and failures exactly below the horizon."""
+    unit vectors, and failures exactly below the horizon."""
     rows = list(scattering_rows(found, SAMPLES))
     assert len(rows) == 5 and not [row for row in rows if row.wrong]
 
@@ -171,8 +169,8 @@ def test_one_way_light_is_rejected(device: Device) -> None:
 
 
 def test_registry_is_covered() -> None:
-    """The cases contain each material with both ends of its ranges, each flag and option; and each angle, also
-    transmitted.
+    """The cases contain each material with both ends of its ranges, each flag and option; and
+    each angle, also transmitted.
     """
     materials = [material for material, _ in taken()]
     assert set(materials) == {material for material, _ in cases()}

@@ -98,8 +98,7 @@ def test_right_is_cross_of_forward_and_up(device: Device) -> None:
 def test_a_point_out_of_focus_is_an_even_disc(device: Device, depth: float) -> None:
     """It has the radius R·|s − d|/d on the plane of focus, at s, for a lens of radius R and a point at d.
 
-    Its second moment about its centre is half the radius squared, plus a sixth of the squared pixel side, as pixels
-    are
+    Its second moment about its centre is half the radius squared, plus a sixth of the squared pixel side, as pixels are
     squares; its inner part has as large a share of the light as of the area.
     """
     lens = Camera(position=(0.0, 0.0, 10.0), look_at=(0.0, 0.0, 0.0), fov_degrees=10, aperture_radius=1.0)
@@ -123,8 +122,7 @@ def test_a_point_out_of_focus_is_an_even_disc(device: Device, depth: float) -> N
 
 def test_all_around_is_the_environments_own_picture(device: Device) -> None:
     """Along +Z it is the environment map as stored, except for rotation and strength, and rotates with the camera.
-    Pixels
-    are means over their area.
+    Pixels are means over their area.
     """
     image = np.random.default_rng(5).random((6, 12, 3)).astype(np.float32)
     size, steps = (24, 12), 16
@@ -148,8 +146,7 @@ def test_all_around_is_the_environments_own_picture(device: Device) -> None:
 @pytest.mark.parametrize("filter", ["tent", "blackman_harris"])
 def test_all_around_closes_at_its_ends(device: Device, filter: str) -> None:
     """Filters continue across the seam and the poles: the image stays within the environment map's range, and one that
-    is
-    constant along longitude stays so."""
+    is constant along longitude stays so."""
     image = np.repeat(np.random.default_rng(6).random((4, 1, 3)), 8, axis=1).astype(np.float32)
     camera = Camera(position=(0.0, 0.0, 0.0), look_at=(0.0, 0.0, 1.0), projection="equirectangular")
     settings = RenderSettings(size=(4, 2), spp=4096, filter=filter)  # type: ignore[arg-type]

@@ -49,8 +49,8 @@ def test_light_that_is_all_of_a_sample(device: Device, balls: list[Sphere], edge
 
 @pytest.mark.parametrize("lanes", [1, 8])
 def test_what_is_left_and_what_was_taken_are_the_picture(device: Device, lanes: int) -> None:
-    """Paths are the same with and without clamps: no pixel is brighter, and result plus removed light equals the
-    original.
+    """Paths are the same with and without clamps: no pixel is brighter, and result plus removed
+    light equals the original.
     """
     def grey(found: Film) -> Any:
         return found.mean.mean(axis=2)

@@ -73,8 +73,7 @@ def film(wo: Doubles, wi: Doubles, n: Doubles, alpha: float) -> Doubles:
 def test_coat_and_base_have_normals_of_their_own(device: Device, base: str | None, coat: str | None,
                                                  metallic: float) -> None:
     """eval is coat·film plus the attenuated base, each with its own normal's cosines, for wi and its mirror image
-    below the
-    surface; 0 below. A base that is not all gloss is compared only where nothing goes to the mirror image.
+    below the surface; 0 below. A base that is not all gloss is compared only where nothing goes to the mirror image.
 
     A material with both maps is included, so that all cases run the same program.
     """
@@ -153,8 +152,7 @@ def test_samples_follow_the_density_and_make_no_light(device: Device) -> None:
 
 def test_each_lobe_is_reciprocal(device: Device) -> None:
     """Each lobe is divided by its own normal's cosine: the film over a black base, and the base below a smooth film,
-    where
-    neither reflects below the surface."""
+    where neither reflects below the surface."""
     maps: dict[str, Any] = {"normal_map": texture("right"), "clearcoat_normal_map": texture("up"), "clearcoat": 1.0}
     black, body = MetallicRoughness(color=(0.0,) * 3, specular=0.0, clearcoat_roughness=0.7, **maps), MetallicRoughness(
         color=COLOR, roughness=0.8, sheen_color=(0.3,) * 3, sheen_roughness=0.6, clearcoat_roughness=0.0, **maps)

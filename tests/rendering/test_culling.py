@@ -62,8 +62,7 @@ def test_the_camera_looks_through_back_faces(device: Device, integrator: Integra
 def test_mirrored_instances(device: Device, monkeypatch: pytest.MonkeyPatch, axes: tuple[int, int, int], keeps: bool,
                             culling: Culling, few_triangles: int) -> None:
     """A mirrored wall's front is the mirror image of the wall's front, for culling and for emission. The second
-    instance is
-    behind the camera; a single one would become a mesh."""
+    instance is behind the camera; a single one would become a mesh."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", few_triangles)
     places = [np.column_stack([np.diag(axes), [0.0, height, 0.0]]) for height in (5.0, 50.0)]
     camera = Camera(position=(0, 10, 0), look_at=(0, 0, 0), up=(0, 0, 1), fov_degrees=5)

@@ -35,8 +35,8 @@ FURNACE: dict[Material, float] = {
 
 
 def with_specks(scene: Scene) -> Scene:
-    """Return the scene with specks of all materials, and a smooth one, too small and far away to be seen, so that all
-    scenes use one program."""
+    """Return the scene with specks of all materials, and a smooth one, too small and far away to be seen,
+    so that all scenes use one program."""
     specks = [Sphere(center=(30.0, 30.0, 30.0 + i), radius=1e-3, material=material)
               for i, material in enumerate([*FURNACE, Mirror(), Dielectric()])]
     smooth = quad([(30, 30, 29), (30.001, 30, 29), (30.001, 30.001, 29), (30, 30.001, 29)], Diffuse())

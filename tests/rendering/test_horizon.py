@@ -220,8 +220,7 @@ def furnace(material: Material, seed: int) -> Scene:
 @pytest.mark.parametrize("seed", range(3))
 def test_white_gloss_in_a_white_furnace_is_white(device: Device, mapped: bool, seed: int) -> None:
     """With random normals a mirror is white exactly; rough metals with multiple scattering are white in the mean,
-    within
-    five standard errors and the error of the fits."""
+    within five standard errors and the error of the fits."""
     normal_map = bumps(seed) if mapped else None
     assert np.abs(film(device, furnace(Mirror(color=WHITE, normal_map=normal_map), seed)).mean - 1).max() < 1e-5
     for roughness in (0.2, 0.6, 1.0):

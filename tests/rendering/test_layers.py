@@ -70,8 +70,7 @@ def test_coat_lies_over_what_was_there(device: Device, metallic: float) -> None:
 
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
 def test_sheen_is_charlies(device: Device, roughness: float) -> None:
-    """color·(2 + n)·sin^n/(2 pi)·cos wi/(4 (o + i − o·i)), over the larger E if it exceeds 1, plus the attenuated
-    base.
+    """color·(2 + n)·sin^n/(2 pi)·cos wi/(4 (o + i − o·i)), over the larger E if it exceeds 1, plus the attenuated base.
     """
     woolly = MetallicRoughness(color=COLOR, sheen_color=(0.9, 0.6, 0.3), sheen_roughness=roughness)
     found, n, some = shown(device, woolly), roughness**-2, slice(1000)

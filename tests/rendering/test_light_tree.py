@@ -129,8 +129,7 @@ def test_few_lights_are_chosen_by_what_they_bring(device: Device) -> None:
 
 def test_a_tree_is_nearly_as_good(device: Device) -> None:
     """Choosing among 2000 equal point lights by exact contribution has zero variance; the light BVH's relative
-    variance is
-    below 1, and that of a uniform choice is above 10.
+    variance is below 1, and that of a uniform choice is above 10.
     """
     places = np.random.default_rng(2).uniform((-10, 0.1, -10), (10, 2, 10), (2000, 3))
     probe = Probe(device, Scene(lights=point_lights(places)))

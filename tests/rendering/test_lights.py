@@ -153,9 +153,8 @@ def test_shadow_rays_end_before_their_lamp(device: Device) -> None:
 
 @pytest.mark.parametrize("kind", ["sphere", "quad", "triangle"])
 def test_shadow_rays_end_before_a_lamp_near_by(device: Device, kind: str) -> None:
-    """At distances of 1e-4 to 10 times its size, for any position of emitter and points: a q close to 0 does not bound
-    its
-    rounding error."""
+    """At distances of 1e-4 to 10 times its size, for any position of emitter and points: a q close to 0
+    does not bound its rounding error."""
     rng = np.random.default_rng(3)
     for _ in range(20):
         size, turn = 10.0 ** rng.uniform(-2, 3), np.linalg.qr(rng.normal(size=(3, 3)))[0]

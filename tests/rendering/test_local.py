@@ -96,8 +96,7 @@ def test_shadows_are_hard_and_only_ambient_is_left(device: Device) -> None:
 def test_mirrors_are_followed_to_the_depth(device: Device, depth: int) -> None:
     """Two mirrors face each other below an emissive lid; slanted rays count their reflections.
 
-    A ray with slope 1 from the middle of a gap of 1 hits mirrors after 0.5, 1.5 and 2.5, each with reflectance 0.8,
-    and
+    A ray with slope 1 from the middle of a gap of 1 hits mirrors after 0.5, 1.5 and 2.5, each with reflectance 0.8, and
     reaches the lid at 3 after three mirrors: visible from depth 4 on.
     """
     sheets = [quad([(x, -9, 9), (x, -9, -9), (x, 3, -9), (x, 3, 9)], Mirror(color=(0.8,) * 3)) for x in (-0.5, 0.5)]

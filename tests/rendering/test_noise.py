@@ -48,8 +48,7 @@ def test_noise_is_the_error(device: Device, make: Callable[[], Scene], sampler: 
     """The estimated √relMSE is within a factor of 1.2 for three of four images, tested with 30, and of 1.5 for all.
 
     The true error of such a small image is random, too, and the reference has a 32nd of the variance of the image with
-    most
-    samples. The halves of a jittered grid are not stratified themselves, so its error is overestimated.
+    most samples. The halves of a jittered grid are not stratified themselves, so its error is overestimated.
     """
     scene, index, size = make(), device.info.index, (48, 48)
     truth = list(Renderer(scene, device=index, size=size, seed=1, spp=2048).passes(spp=2048))[-1].film.mean

@@ -46,8 +46,8 @@ def seen(device: Device, *meshes: Mesh, lanes: int | None = None, spp: int = SPP
 
 
 def test_layers_show_what_is_behind_as_far_as_they_are_clear(device: Device) -> None:
-    """Three partly opaque emitters over a light: each channel is attenuated by those above it. Each sample sees one
-    layer.
+    """Three partly opaque emitters over a light: each channel is attenuated by those above it.
+    Each sample sees one layer.
     """
     opacities = [0.25, 0.5, 0.75]
     veils = [quad(replace(lamp(*(16.0 * row for row in np.eye(3)[i])), opacity=opacity), 3.0 - i)

@@ -50,8 +50,7 @@ def test_hits_are_those_of_all_triangles(device: Device, order: tuple[int, ...],
 
 @pytest.mark.parametrize("layout", TREES)
 def test_length_of_directions_changes_only_t(device: Device, layout: str) -> None:
-    """Rays that start on or just above a floor and leave it, scaled by powers of two, so that all digits are
-    preserved.
+    """Rays that start on or just above a floor and leave it, scaled by powers of two, so that all digits are preserved.
     """
     scene = Scene(meshes=[mesh(np.concatenate([PARTS[0], PARTS[3]]))])
     rng = np.random.default_rng(2)

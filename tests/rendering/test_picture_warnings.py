@@ -71,8 +71,8 @@ def test_only_integrators_that_clrt_debug_follows_point_to_it(device: Device, ca
 
 
 def test_samples_that_are_not_finite(device: Device, caplog: pytest.LogCaptureFixture) -> None:
-    """An environment texel beyond the film's range: dropped samples are counted, and named as the cause if all are
-    lost.
+    """An environment texel beyond the film's range: dropped samples are counted, and named as
+    the cause if all are lost.
     """
     sky = np.ones((2, 4, 3), np.float32)
     sky[0, 0] = 1e35

@@ -206,8 +206,7 @@ PLANTED = planted(painted(BELL))
 
 @pytest.mark.parametrize("scene, lanes", [(PLANTED, 8), *others((BELL, 1))], ids=["planted, 8", "wide filter, 1"])
 def test_pictures_are_those_of_local(device: Device, scene: Scene, lanes: int) -> None:
-    """They agree sample by sample except at edges; mirrors, glass, alpha masks, textures and shadows use the first
-    hit.
+    """They agree sample by sample except at edges; mirrors, glass, alpha masks, textures and shadows use the first hit.
     """
     one, other = (film(device, replace(scene, render=replace(scene.render, integrator=integrator)), lanes=lanes).mean
                   for integrator in ("raster", "local"))
@@ -216,8 +215,8 @@ def test_pictures_are_those_of_local(device: Device, scene: Scene, lanes: int) -
 
 @pytest.mark.parametrize("integrator", ["raster", "local"])
 def test_without_shadows_all_that_faces_a_light_is_lit(device: Device, integrator: Any) -> None:
-    """A sphere between a sun overhead and the ground: without shadows color·(sky + sun) everywhere; with them there is
-    one below the sphere."""
+    """A sphere between a sun overhead and the ground: without shadows color·(sky + sun) everywhere; with them
+    there is one below the sphere."""
     sun, sky, red = DirectionalLight(direction=(0, -1, 0), irradiance=(np.pi,) * 3), (0.1, 0.2, 0.3), (0.7, 0.3, 0.2)
     shade = Sphere(center=(0.0, 3.0, 0.0), radius=1.0)
     camera = Camera(position=(0.0, 1.0, 0.0), look_at=(0.0, 0.0, 0.0), up=(0.0, 0.0, -1.0), fov_degrees=100)

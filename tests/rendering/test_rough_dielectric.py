@@ -32,8 +32,7 @@ DOWN = Camera(position=(0.0, 0.0, 4.0), fov_degrees=0.02)
 
 def walter(eta: float, alpha: float, wo: Doubles, wi: Doubles) -> Doubles:
     """Return f·|cos wi| (n,) by eq. 20 and 21 (Walter et al. 2007), for light that arrives along wi, from a medium of
-    index
-    eta if that is below, and leaves along wo into one of index 1; G of both as in eq. 99 of Heitz 2014."""
+    index eta if that is below, and leaves along wo into one of index 1; G of both as in eq. 99 of Heitz 2014."""
     refracted = wi[:, 2] < 0
     sum_ = np.where(refracted[:, None], -(eta * wi + wo), wi + wo)
     h = sum_ / np.linalg.norm(sum_, axis=1, keepdims=True)

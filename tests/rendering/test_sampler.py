@@ -112,8 +112,7 @@ def test_stratified_samples_lie_one_in_each_cell(device: Device, block_bits: int
 @pytest.mark.parametrize("sampler", SAMPLERS)
 def test_pixels_dimensions_and_seeds_are_unrelated(device: Device, sampler: Sampler) -> None:
     """One sample of many pixels is uniform, and independent of another dimension, seed or neighbouring pixel, and in
-    its two
-    components, for samples without an order of their own."""
+    its two components, for samples without an order of their own."""
     probe, count, p_values = probe_of(device, sampler), 1 << 15, {}
     pixels = 7 * (1 << 20) + np.arange(count)
     for sample in (0, 5):
@@ -132,8 +131,7 @@ def test_pixels_dimensions_and_seeds_are_unrelated(device: Device, sampler: Samp
 @pytest.mark.parametrize("sampler", SAMPLERS)
 @pytest.mark.parametrize("spp", [1, 4, 13])
 def test_pictures_are_unbiased(device: Device, sampler: Sampler, spp: int) -> None:
-    """A sphere light on a floor, L = ρ·L·r²·cos θ/d² with cos θ = h/d (no bounce): over 64 seeds the images' means
-    have
+    """A sphere light on a floor, L = ρ·L·r²·cos θ/d² with cos θ = h/d (no bounce): over 64 seeds the images' means have
     the mean of a float64 quadrature."""
     albedo, radiance, radius, height = 0.5, 40.0, 0.1, 2.0
     floor = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse(color=(albedo,) * 3))

@@ -44,8 +44,7 @@ def test_warps_follow_their_densities(probe: Probe) -> None:
 
 def test_lights_follow_their_densities(device: Device) -> None:
     """Spheres and triangles of all sizes, environment maps, and light selection. An emitter's density is its closed
-    form, an
-    environment map's integrates to 1, and the selection probabilities sum to 1."""
+    form, an environment map's integrates to 1, and the selection probabilities sum to 1."""
     tests = light_tests(device, SAMPLES, 1)
     assert len(tests) == 21 and not rejected({test.name: test.density for test in tests})
     assert max(test.error for test in tests) < DENSITY

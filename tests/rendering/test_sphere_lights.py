@@ -27,8 +27,7 @@ FACES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 
 def irradiance(distance: float, radius: float, cosine: float, n: int = 512) -> float:
     """Return E/L of a sphere whose centre is at `distance` in a direction with that cosine to the normal: the clamped
-    cosine
-    averaged over the cone that it subtends (midpoint rule; in 1 − cos of the cone's angle)."""
+    cosine averaged over the cone that it subtends (midpoint rule; in 1 − cos of the cone's angle)."""
     sine2 = (radius / distance) ** 2
     height = sine2 / (1 + np.sqrt(1 - sine2))
     h, phi = np.meshgrid((np.arange(n) + 0.5) / n * height, (np.arange(n) + 0.5) / n * np.pi)
@@ -44,9 +43,8 @@ def frame_around(n: Doubles) -> Doubles:
 
 
 def lit(kind: str, integrator: Integrator, radius: float, gap: float, cosine: float, rng: np.random.Generator) -> Scene:
-    """Return a receiver lit by a sphere of some radius at `gap` radii, with its centre at that cosine to the normal,
-    seen
-    from half the gap."""
+    """Return a receiver lit by a sphere of some radius at `gap` radii, with its centre at that cosine to the
+    normal, seen from half the gap."""
     n, p = directions(rng, 1)[0], rng.uniform(-3, 3, 3) * radius * 10.0 ** rng.uniform(-8, 0)
     turn, distance = frame_around(n), radius * (1 + gap)
     toward = turn @ [np.sqrt(1 - cosine**2), 0, cosine]

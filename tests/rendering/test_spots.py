@@ -54,8 +54,7 @@ def spots(count: int, seed: int = 0) -> list[SpotLight]:
 @pytest.mark.parametrize(("inner", "outer"), [(0.0, 45.0), (20.0, 30.0), (29.9999, 30.0), (0.0, 90.0), (0.0, 1e-3)])
 def test_irradiance(device: Device, inner: float, outer: float) -> None:
     """On the axis, off it by fractions of the outer angle, and outside; near and far. A narrow cone is axis-aligned,
-    so that
-    float32 represents the points' angles."""
+    so that float32 represents the points' angles."""
     light = SpotLight(position=(0.0, 0.0, 0.0), direction=(3.0, -4.0, 0.0) if outer > 1 else (2.0, 0.0, 0.0),
                       intensity=(60.0, 5.0, 1.0), inner_degrees=inner, outer_degrees=outer)
     axis, aside = np.array(light.direction) / np.linalg.norm(light.direction), np.array([0.0, 0.0, 1.0])
@@ -75,8 +74,7 @@ def test_irradiance(device: Device, inner: float, outer: float) -> None:
 @pytest.mark.parametrize("unit", [1.0, 1e4])
 def test_ranges_end_light(device: Device, unit: float) -> None:
     """I/d²·max(1 − (d/range)⁴, 0), the attenuation recommended by KHR_lights_punctual; together with a light without
-    range,
-    at two scene scales. This integrator evaluates every light."""
+    range, at two scene scales. This integrator evaluates every light."""
     reach = 2.0 * unit
     lights: list[Light] = [
         PointLight(position=(0.0, 0.0, 0.0), intensity=(3.0, 2.0, 1.0), range=reach),

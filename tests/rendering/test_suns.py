@@ -69,8 +69,7 @@ def test_irradiance(device: Device, angle: float, tilt: float) -> None:
 
 def test_what_is_sampled_is_what_is_seen(device: Device) -> None:
     """Several overlapping discs: each sample's direction is inside its disc; the radiance there is that of all discs
-    around
-    it, each weighted by the power heuristic against its light sampling pdf."""
+    around it, each weighted by the power heuristic against its light sampling pdf."""
     lights = [sun((0.3, -1.0, 0.1), 20.0), sun((0.2, -1.0, 0.2), 15.0, (1.0, 7.0, 2.0)),
               sun((0.4, -1.0, 0.0), 0.53, (5.0, 1.0, 1.0)), sun((-1.0, -1.0, 0.0), 1e-3, (1.0, 1.0, 9.0))]
     towards = -unit([light.direction for light in lights])
@@ -125,8 +124,8 @@ def test_disc(device: Device, angle: float, mirrored: bool, integrator: Integrat
 
 @pytest.mark.parametrize("integrator", ["path", "local", "raster"])
 def test_penumbra(device: Device, integrator: Integrator) -> None:
-    """Behind a wall the floor is lit by the part of the disc above the edge: `color`/pi times that, without ambient
-    light.
+    """Behind a wall the floor is lit by the part of the disc above the edge: `color`/pi times
+    that, without ambient light.
     """
     light = sun((-3.0, -4.0, 0.0), 12.0)
     wall = quad([(0.0, 0.0, -99.0), (0.0, 0.0, 99.0), (0.0, 4.0, 99.0), (0.0, 4.0, -99.0)], Diffuse(color=BLACK))

@@ -158,9 +158,9 @@ def image_axes(texture: Texture, along_u: Doubles, along_v: Doubles, normal: Dou
           list(PLACED), strength=2)
 def test_normal_maps_tilt_along_the_picture(device: Device, turn: float, mirrored: bool, shape: str,
                                             placed: str) -> None:
-    """Red tilts the normal to the image's right and green to its top, for any orientation on the surface: light from
-    there has the cosine to the bent normal, with bump shadowing. A mesh's own tangents are those of the transformed
-    image."""
+    """Red tilts the normal to the image's right and green to its top, for any orientation on the
+    surface: light from there has the cosine to the bent normal, with bump shadowing. A mesh's own
+    tangents are those of the transformed image."""
     angle = np.radians(turn)
     right, top = np.array([np.cos(angle), np.sin(angle), 0]), np.array([-np.sin(angle), np.cos(angle), 0])
     right = -right if mirrored else right

@@ -159,8 +159,8 @@ def test_axis_parallel_rays_from_box_planes(device: Device, layout: str) -> None
     for y in range(7):
         origin = np.column_stack([x, np.full(64, float(y)), z])
         found = probe("closest_hit", 4, origin, np.tile([0.0, 1.0, -0.0], (64, 1)))
-        # A ray that starts in a level's plane may intersect that level at 0, which is not a hit, and then the next at
-        # 1.
+        # A ray that starts in a level's plane may intersect that level at 0, which is not a
+        # hit, and then the next at 1.
         assert np.all(found[:, 0] == 1.0)
 
 
