@@ -20,7 +20,7 @@ def camera_rays(camera: Camera, size: tuple[int, int], pixel: Doubles,
     forward = ahead / distance
     right = unit(np.cross(forward, np.array(camera.up, float)))
     up = np.cross(right, forward)
-    x, y = (pixel / size).T[..., None]      # From 0 to 1, down
+    x, y = (pixel / size).T[..., None]      # from 0 to 1, down
     if camera.projection == "equirectangular":
         # As an environment map, for a view along +Z: forward in the middle, backward at the left edge.
         longitude, polar = 2 * np.pi * (x - 0.5), np.pi * y

@@ -78,7 +78,7 @@ def test_directions_are_drawn_by_their_density(kind: type[Material]) -> None:
         uniform = rng.normal(size=wo.shape)
         uniform /= np.linalg.norm(uniform, axis=1, keepdims=True)
         integrand, sample = 4 * np.pi * scattering.evaluate(wo, uniform), scattering.sample(wo, rng)
-        if not integrand.any():      # Specular directions
+        if not integrand.any():      # specular directions
             assert sample.weight.max() <= 1 / 0.25**2
             continue
         for up in (True, False):

@@ -25,7 +25,7 @@ from clrt.threads import beside
 
 SCENES = Path(__file__).parents[2] / "scenes"
 MODEL = SCENES / "models" / "dragon.ply"
-POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # The copy that pip installs
+POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # the copy that pip installs
 
 
 @pytest.mark.parametrize("name", ["dragon", "depth_of_field", "sunlit", "night", "spot", "mirrors", "local", "tree"])
@@ -70,7 +70,7 @@ def test_without_a_temporary_folder_it_is_compiled_here(device: Device, monkeypa
 
 @pytest.mark.parametrize("size, begun", [(16, 1), (2048, 0)])
 def test_large_scenes_are_left_alone(device: Device, monkeypatch: pytest.MonkeyPatch, size: int, begun: int) -> None:
-    """Nothing is compiled ahead for a scene with a large environment map, which would have to be prepared twice."""
+    """Nothing is compiled ahead for a scene with a large environment map, whose cost would be paid twice."""
     asked, waits = list[str](), list[Callable[[], None]]()
     monkeypatch.setattr(ahead, "compile_ahead", lambda device, source: asked.append(source))
     monkeypatch.setattr(ahead, "is_kept", lambda device, source: False)

@@ -81,7 +81,7 @@ def test_places_and_numbers_are_those_of_the_middle_s_ray(at: Any, scale: float)
     np.testing.assert_allclose(found["position"], position, atol=2e-6 * scale + 1e-7 * np.abs(at).max())
     expected = np.where(missed, -1, np.where(on_floor, 0, 1))
     assert np.array_equal(found["object"], expected) and np.array_equal(found["material"], expected)
-    half = met[..., 0] > -met[..., 2]   # Floor triangles: corners 0 1 2, then 0 2 3
+    half = met[..., 0] > -met[..., 2]   # floor triangles: corners 0 1 2, then 0 2 3
     assert np.array_equal(found["primitive"], np.where(missed, -1, on_floor & ~half))
 
 
@@ -116,7 +116,8 @@ def test_albedo_and_normals_are_of_the_first_surface() -> None:
 
 
 def test_textures_and_normal_maps_are_seen() -> None:
-    """Albedo is that of the texels; normal maps bend the normal but not the geometric one; without albedo it works too.
+    """Albedo is that of the texels; normal maps bend the normal but not the geometric one; materials are left out of
+    the program if no AOV needs them.
     """
     def plain(*rgb: int) -> Texture:
         return Texture(picture=Picture(np.full((2, 2, 4), (*rgb, 255), np.uint8)))

@@ -65,7 +65,7 @@ def test_spheres_lie_where_they_are_seen(device: Device, name: str, size: tuple[
     """Eight emissive spheres, smaller than a pixel, lie at pixel centres; with a lens they are in focus."""
     camera, (width, height) = CAMERAS[name], size
     rng = np.random.default_rng(1)
-    pixels = width * (height // 5) + rng.permutation(width * (3 * height // 5))[:8]   # Away from the poles
+    pixels = width * (height // 5) + rng.permutation(width * (3 * height // 5))[:8]   # away from the poles
     columns, rows = pixels % width, pixels // width
     depth = np.full(8, camera.focus_distance) if camera.focus_distance else rng.uniform(5, 50, 8)
     x, y = np.array([columns, rows]) + 0.5
@@ -110,7 +110,7 @@ def test_a_point_out_of_focus_is_an_even_disc(device: Device, depth: float) -> N
     y, x = np.mgrid[:side, :side] + 0.5
     expected = abs(10 - depth) / depth * side / (2 * extent * 10)
     distance = np.hypot(x - 34.0, y - 29.5)
-    blurred = 0.002 * side / (2 * extent)   # The sphere's own radius, in pixels
+    blurred = 0.002 * side / (2 * extent)   # the sphere's own radius, in pixels
     assert light[distance > expected + blurred + 1].max() == 0
     measured = np.sqrt(2 * (np.average(distance**2, weights=light) - 1 / 6 - blurred**2 / 2))
     assert measured == pytest.approx(expected, rel=0.01)

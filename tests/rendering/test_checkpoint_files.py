@@ -93,10 +93,10 @@ def test_damage_is_found(device: Device, kept: Path, caplog: pytest.LogCaptureFi
 
 
 def test_the_whole_generation_outlives_the_damaged_one(device: Device, kept: Path) -> None:
-    """It is not replaced by an unreadable file, and is found if a crash left only it."""
+    """An intact generation is not replaced by an unreadable file, and is found if a crash left only it."""
     whole = older(kept).read_bytes()
     kept.write_bytes(b"damaged")
-    running = renderer(device, checkpoint=kept, resume=True, checkpoint_seconds=60.0)    # So only at its end
+    running = renderer(device, checkpoint=kept, resume=True, checkpoint_seconds=60.0)    # so only at its end
     run(running, spp=24)
     assert older(kept).read_bytes() == whole and same(running, renderer(device, checkpoint=kept, resume=True))
     kept.unlink()

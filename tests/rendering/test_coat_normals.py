@@ -105,7 +105,7 @@ def test_coat_and_base_have_normals_of_their_own(device: Device, base: str | Non
     assert np.all(np.abs(found - expected)[sharp] <= (roundings * np.abs(expected) + 2e-5)[sharp])
     assert not both.value(1, wo, wi * FLIP)[0].any()
     if metallic == 1 and base and base != coat:
-        assert np.count_nonzero((wi @ base_normal < 0) & (found[:, 0] > 0)) > 50     # The film alone
+        assert np.count_nonzero((wi @ base_normal < 0) & (found[:, 0] > 0)) > 50     # the film alone
 
 
 def varied() -> list[MetallicRoughness]:

@@ -1,4 +1,4 @@
-"""The film: sums that do not stall, non-finite samples, and an unbiased noise estimate."""
+"""The film: sums that do not stall, non-finite samples, and an accurate noise estimate."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def place(array: NDArray[Any]) -> int:
 
 
 def test_memory_is_used_again() -> None:
-    """Arrays that others allocate in between do not get this memory."""
+    """It is reused, and arrays that others allocate in between do not get it."""
     memory, others = HostMemory(SHAPE, PIXEL), []
     places = set()
     for _ in range(10):

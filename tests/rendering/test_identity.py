@@ -117,7 +117,7 @@ def test_every_field_of_all_that_is_seen_counts() -> None:
                     object.__setattr__(thing, each.name, [12.34] if isinstance(value, list) else 12.34)
                     try:
                         other = None if is_dataclass(value) else scene_hash(content)
-                    except AttributeError:    # The hash read an attribute of that field, which is missing now
+                    except AttributeError:    # the hash read an attribute of that field, which is missing now
                         other = None
                     object.__setattr__(thing, each.name, value)
                     assert (other != found) == (each.name not in NAMES) or is_dataclass(value), (thing, each.name)

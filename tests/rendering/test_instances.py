@@ -254,9 +254,8 @@ def test_checkpoints_tell_instances_apart() -> None:
 
 @pytest.mark.parametrize("few", [0, *others(1 << 16)])
 def test_numbers_of_objects(device: Device, few: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ids count meshes, then instances, then spheres, in a row from left to right, however each is stored: a mesh that
-    is also drawn itself, one that is not, an emitter, and a single instance. Triangles are numbered within their mesh.
-    """
+    """Ids count meshes, instances, then spheres, from left to right, however each is stored: a mesh that is also drawn
+    itself, one that is not, an emitter, and a single instance. Triangles are numbered within their mesh."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", few)
     wall = quad([(-0.5, -2, 0), (0.5, -2, 0), (0.5, 2, 0), (-0.5, 2, 0)], Diffuse())
     other, once = replace(wall, material=Mirror()), replace(wall, material=Dielectric())

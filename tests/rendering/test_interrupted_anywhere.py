@@ -70,7 +70,8 @@ def test_passes(device: Device, small_launches: None, count: int, adaptive: bool
 
 @pytest.mark.parametrize("lens", [0.0, 0.2])
 def test_look(device: Device, lens: float) -> None:
-    """To the same camera, with and without a lens, which needs another program."""
+    """A renderer interrupted while it changes camera gives the same image there, also if a lens needs another program.
+    """
     scene = room()
     there = replace(scene.camera, position=(0.3, 0.2, 4.0), aperture_radius=lens)
     other = Renderer(replace(scene, camera=there), device=device.info.index, size=SIZE, spp=SPP)

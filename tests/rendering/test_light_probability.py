@@ -21,7 +21,7 @@ LIGHTS: list[Light] = [
     DirectionalLight(direction=(0, -1, -1), irradiance=(1, 1, 1), angle_degrees=10.0),
     PointLight(position=(0, 3, 1), intensity=(4, 3, 2)),
     SpotLight(position=(1, 3, 0), direction=(-1, -3, 0), intensity=(9, 9, 9))]
-LAMP = Sphere(center=(20, -9, 0), radius=0.1, material=Diffuse(emission=(0.01, 0.01, 0.01)))   # Hidden below the floor
+LAMP = Sphere(center=(20, -9, 0), radius=0.1, material=Diffuse(emission=(0.01, 0.01, 0.01)))   # hidden below the floor
 
 
 def lit_floor(device: Device, lights: list[Light], material: Material, others: list[Material]) -> float:

@@ -97,7 +97,7 @@ def test_no_light_that_can_be_seen_is_left_out(device: Device, count: int) -> No
         mass = probabilities(probe, point, normal)
         assert np.all(mass[seen] > 0)
         left += int(np.sum(mass == 0))
-    assert left > 0.1 * count * 50     # About half are below the horizon
+    assert left > 0.1 * count * 50     # about half are below the horizon
 
 
 def test_balls_bring_nothing_to_their_own_surface(device: Device) -> None:
@@ -106,7 +106,7 @@ def test_balls_bring_nothing_to_their_own_surface(device: Device) -> None:
     centers, radii, shining = rng.normal(size=(20, 3)), 10 ** rng.uniform(-2, 0, 20), Diffuse(emission=(1.0, 1.0, 1.0))
     probe = Probe(device, Scene(spheres=[Sphere(center=(x, y, z), radius=radius, material=shining)
                                          for (x, y, z), radius in zip(centers.tolist(), radii.tolist())]))
-    own = np.arange(1, 20).repeat(100)    # Not the first light, which is chosen if none contributes
+    own = np.arange(1, 20).repeat(100)    # not the first light, which is chosen if none contributes
     normals = unit_vectors(rng, len(own))
     points = probe.compiled.frame.points(centers[own] + radii[own, None] * normals)
     aside = normals + 0.1 * np.cross(normals, unit_vectors(rng, len(own)))

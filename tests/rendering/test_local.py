@@ -49,7 +49,7 @@ def test_points_light_a_plane_as_the_books_say(device: Device, kind: type[Phong]
     scene = Scene(meshes=[ground(material)], lights=POINTS, camera=camera, environment=Environment(color=SKY),
                   render=SETTINGS)
     p = pixel_points(camera, SETTINGS.size, 0.0)
-    turned = [0, 2, 1]    # The normal's axis last
+    turned = [0, 2, 1]    # the normal's axis last
 
     def unit(v: Doubles) -> Doubles:
         return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))

@@ -28,8 +28,7 @@ def last(renderer: Renderer) -> State:
 
 @pytest.mark.parametrize(("count", "cameras"), [(1, [ASIDE, LENS, LENS, HERE]), (2, [ASIDE])], ids=["alone", "crew"])
 def test_pictures_are_those_of_new_renderers(device: Device, count: int, cameras: list[Camera]) -> None:
-    """Also after an image that was left unfinished; a lens needs another program, and without
-    it the first is used again.
+    """Also after an image that was left unfinished; adding or removing a lens switches to another program and session.
     """
     given: dict[str, Any] = {"size": (40, 30), "device": [device.info.index] * count, "spp": 6,
                              "aovs": "depth,variance"}

@@ -78,7 +78,7 @@ def test_a_met_lamp_has_the_density_of_its_samples(device: Device, scene: Scene)
     same = (met[:, 4] >= 0) & np.all(met[:, :3] == sample[:, 3:6], axis=1) & sample[:, 3:6].any(axis=1)
     same &= sample[:, 10] == 0
     assert np.mean(same) > 0.1
-    np.testing.assert_allclose(met[same, 3], sample[same, 6], rtol=2e-3)    # Less precise near a sphere's edge
+    np.testing.assert_allclose(met[same, 3], sample[same, 6], rtol=2e-3)    # less precise near a sphere's edge
 
 
 def test_a_met_sky_has_the_density_of_its_samples(device: Device) -> None:

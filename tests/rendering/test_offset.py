@@ -99,7 +99,7 @@ def test_far_away_a_fixed_distance_is_not_enough(device: Device, offset: str, sh
         assert met > 0.1
         return
     assert met == 0
-    if shift == 0:   # With coordinates small enough to tell, origins are on the side that rays leave to
+    if shift == 0:   # with coordinates small enough to tell, origins are on the side that rays leave to
         assert np.all(np.sum((out[:, 10:13] - out[:, 1:4]) * side, axis=1)[hit] > 0)
 
 

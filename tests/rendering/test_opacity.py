@@ -60,7 +60,7 @@ def test_layers_show_what_is_behind_as_far_as_they_are_clear(device: Device) -> 
     for channel in range(3):
         assert found[..., channel].mean() == pytest.approx(16 * chances[channel] + bottom, rel=0.02)
     seen_layers = [found[..., channel].sum() * SPP / 16 for channel in range(3)]
-    whole = (sum(seen_layers) - count) / 2                      # Samples of the bottom count in all three channels
+    whole = (sum(seen_layers) - count) / 2                      # samples of the bottom count in all three channels
     counts = [*(layer - whole for layer in seen_layers), whole]
     assert np.abs(np.array(counts) - np.round(counts)).max() < 0.05
     # Low-discrepancy samples scatter less than the test expects: only too much scatter would be wrong.
@@ -121,7 +121,7 @@ def test_shadows_of_veils(device: Device, lanes: int) -> None:
         assert found == pytest.approx(expected * passes, rel=1e-5)
     ball = Sphere(center=(-50, 0, 50), radius=5, material=Diffuse(opacity=0.5))
     found = seen(device, ground, lanes=lanes, lights=[sun], spheres=[ball])
-    assert found == pytest.approx(expected * 0.25, rel=1e-5)    # In and out
+    assert found == pytest.approx(expected * 0.25, rel=1e-5)    # in and out
 
 
 def test_a_clear_lamp_gives_less_light(device: Device) -> None:

@@ -80,7 +80,7 @@ def test_albedo_is_the_materials_own(device: Device) -> None:
     camera = Camera(position=(0.0, 0.0, 3.0), fov_degrees=20)
     materials = {RED: (0.7, 0.2, 0.1), Mirror(color=(0.5, 0.6, 0.7)): (0.5, 0.6, 0.7)}
     for (material, color), other in zip(materials.items(), reversed(materials)):
-        walls = [quad([(-9, -9, z), (-9, 9, z), (9, 9, z), (9, -9, z)], each)   # Seen from behind
+        walls = [quad([(-9, -9, z), (-9, 9, z), (9, 9, z), (9, -9, z)], each)   # seen from behind
                  for z, each in ((0, material), (-1, other))]
         for integrator, expected in (("albedo", color), ("normals", (0.0, 0.0, 1.0)), ("depth", (3.0, 3.0, 3.0))):
             settings = RenderSettings(size=(5, 3), spp=2, integrator=integrator)  # type: ignore[arg-type]

@@ -94,7 +94,7 @@ def test_sine_and_cosine_of_turns(probe: Probe) -> None:
     u = np.concatenate([np.arange(0, 1 << 24, 16), np.arange(1, 16), (1 << 24) - np.arange(1, 16)]) / (1 << 24)
     sine, cosine = probe("warps", 12, u, np.zeros((len(u), 2)))[:, 10:].T
     exact = np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)
-    assert np.abs(sine - exact[0]).max() < 2.0**-23     # One unit in the last place of 1
+    assert np.abs(sine - exact[0]).max() < 2.0**-23     # one unit in the last place of 1
     assert np.abs(cosine - exact[1]).max() < 2.0**-23
     small = (u > 0) & (u < 0.125)
     assert np.abs(sine[small] / exact[0][small] - 1).max() < 3e-7

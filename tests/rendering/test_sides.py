@@ -73,7 +73,7 @@ def test_a_furnace_of_the_inner_side(device: Device, as_mesh: bool) -> None:
                   render=RenderSettings(size=(8, 8), spp=256, max_depth=2))
     found = film(device, scene)
     samples, mean = found.samples, found.mean.mean(axis=(0, 1))
-    variance = found.variance.mean(axis=(0, 1)) * 256 + samples * (1e-6 * 0.4)**2    # Including rounding
+    variance = found.variance.mean(axis=(0, 1)) * 256 + samples * (1e-6 * 0.4)**2    # including rounding
     assert mean_test(mean, variance, samples, 0.4).min() > sidak(FAMILY, 3), mean
 
 

@@ -91,7 +91,7 @@ def test_radiance_follows_the_convention(probe: Probe, name: str) -> None:
     # Near the poles the azimuth's uncertainty is the direction's last digits over its sine.
     blur = 4e-7 * np.maximum(1, 0.1 / np.maximum(np.hypot(w[:, 0], w[:, 2]), 1e-30))
     tolerance = blur * max(steps) * 2 * WIDTH + 1e-6 * image.max()
-    smooth = np.hypot(w[:, 0], w[:, 2]) > 1e-5   # At a pole any azimuth is right
+    smooth = np.hypot(w[:, 0], w[:, 2]) > 1e-5   # at a pole any azimuth is right
     error = np.abs(found - skies.lookup(image, w, rotation)).max(axis=1)
     assert np.all(error[smooth] <= tolerance[smooth])
     assert np.isfinite(found).all()
@@ -122,7 +122,7 @@ def test_samples_follow_the_density(probe: Probe, name: str) -> None:
     cell = np.minimum((v * height).astype(int), height - 1) * width + np.minimum((u * width).astype(int), width - 1)
     density = probe.compiled.buffers["sky_texels"][1]["density"].astype(np.float64)
     found = np.bincount(cell, minlength=density.size)
-    edges = np.bincount(cell[density[cell] == 0], minlength=density.size)    # Rounded to the other side of an edge
+    edges = np.bincount(cell[density[cell] == 0], minlength=density.size)    # rounded to the other side of an edge
     assert edges.sum() < 1e-5 * COUNT
     assert chi2_test(found - edges, density / density.sum() * (COUNT - edges.sum())) > 1e-4
 
@@ -160,7 +160,7 @@ def test_irradiance(probe: Probe, name: str) -> None:
         sample = sampled(probe, normal, seed)
         values = sample[:, 3:6] * (np.maximum(sample[:, :3] @ normal, 0) / sample[:, 6])[:, None]
         expected = skies.irradiance(image, normal, rotation, where=where)
-        variance = values.var(axis=0) + COUNT * (3e-5 * expected)**2   # Including the quadrature's own error
+        variance = values.var(axis=0) + COUNT * (3e-5 * expected)**2   # including the quadrature's own error
         p_values.append(mean_test(values.mean(axis=0), variance, COUNT, expected))
     assert np.min(p_values) > sidak(FAMILY, np.size(p_values))
 

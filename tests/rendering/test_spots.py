@@ -155,6 +155,6 @@ def test_few_are_chosen_by_what_they_bring(device: Device) -> None:
         PointLight(position=(0.0, 1.0, 0.0), intensity=(2.0, 2.0, 2.0)), miss, hit,
         DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 1.0, 1.0))]
     probe = Probe(device, Scene(lights=lights, environment=Environment(color=(1.0, 1.0, 1.0))))
-    brought = np.array([2.0, 0.0, 2.0, 1.0])   # Numbered by type: point, spots, directional
+    brought = np.array([2.0, 0.0, 2.0, 1.0])   # numbered by type: point, spots, directional
     expected = 0.8 * brought / 5 + 0.2 * (brought > 0) / 3
     np.testing.assert_allclose(probabilities(probe, np.zeros(3), UP), expected, rtol=1e-5)

@@ -35,7 +35,7 @@ def table_of(weights: NDArray[np.float64]) -> tuple[NDArray[np.void], NDArray[np
 
 @pytest.mark.parametrize("weights", WEIGHTS.values(), ids=WEIGHTS)
 def test_probabilities(weights: NDArray[np.float64]) -> None:
-    """Multiples of 1/LEVELS within one of the exact share that sum to 1; zero weights have probability zero."""
+    """Multiples of 1/LEVELS within 1/LEVELS of the exact share that sum to 1; zero weights have probability zero."""
     table, probability = table_of(weights)
     weights = np.atleast_2d(weights)
     assert np.all(probability * LEVELS % 1 == 0) and np.all(probability >= 0) and np.all(probability[weights == 0] == 0)
@@ -49,7 +49,7 @@ def test_searches_start_in_time(weights: NDArray[np.float64]) -> None:
     """At or before the step that contains u, with u·n a float32 product, and on average hardly before it."""
     table, _ = table_of(weights)
     n = table.shape[1]
-    edges = np.round(np.arange(n) / n * LEVELS)[:, None] + np.arange(-2, 3)    # Where that product may be rounded up
+    edges = np.round(np.arange(n) / n * LEVELS)[:, None] + np.arange(-2, 3)    # where that product may be rounded up
     levels = np.concatenate([edges.ravel(), RNG.integers(0, LEVELS, 1 << 16), [0, LEVELS - 1]])
     u = (levels[(levels >= 0) & (levels < LEVELS)] / LEVELS).astype(np.float32)
     cell = (u * np.float32(n)).astype(int)

@@ -80,11 +80,11 @@ def test_what_is_sampled_is_what_is_seen(device: Device) -> None:
     own = np.argmin(np.abs(out[:, None, 3:6] / radiance - 1).max(axis=-1), axis=1)
     np.testing.assert_allclose(out[:, 3:6], radiance[own], rtol=1e-6)
     cosines, half = out[:, :3] @ towards.T, np.radians([light.angle_degrees for light in lights]) / 2
-    angles = np.linalg.norm(out[:, None, :3] - towards, axis=-1)    # As precise for small angles as the arcs
+    angles = np.linalg.norm(out[:, None, :3] - towards, axis=-1)    # as precise for small angles as the arcs
     margin = 2e-7 / half
     inside = angles < 2 * np.sin(half / 2)
     assert np.all((angles <= 2 * np.sin(half / 2) * (1 + margin))[np.arange(COUNT), own]), cosines.min()
-    densities = np.array([np.mean(out[own == i, 6]) for i in range(4)])    # Each light's: probability over solid angle
+    densities = np.array([np.mean(out[own == i, 6]) for i in range(4)])    # each light's: probability over solid angle
     sure = np.all(np.abs(angles / (2 * np.sin(half / 2)) - 1) > margin, axis=1)
     assert sure.mean() > 0.95
     found = np.random.default_rng(1).uniform(0.1, 3, COUNT) * out[:, 6]
@@ -155,7 +155,7 @@ def test_reflection_of_rough_metal(device: Device, roughness: float) -> None:
     light = sun((-0.6, -0.8, 0.0), 0.53)
     towards = -unit(light.direction)
     wi, solid_angle = disc(towards, 0.53, 1024)
-    turned = [0, 2, 1]    # To a frame whose z is the floor's normal
+    turned = [0, 2, 1]    # to a frame whose z is the floor's normal
     for off in (0.0, 0.2, 1.0):
         a = np.arctan2(0.6, 0.8) + np.radians(off)
         wo = np.array([-np.sin(a), np.cos(a), 0.0])

@@ -118,7 +118,7 @@ def test_second_set_of_coordinates_and_numbers(device: Device) -> None:
     metal.texels[0, 1, 2] = 255
     material = MetallicRoughness(color=Texture(picture=color, filter="nearest"), roughness=1.0, preset=None,
                                  metallic=Texture(picture=metal, channel="blue", uv_set=1, filter="nearest"))
-    # All materials are behind, so that every image runs the same program.
+    # The textured quad is behind each of them, so that every image runs the same program.
     both = quad(material, uv1=UV[:, ::-1], vertices=(QUAD - (0, 0, 1)).astype(np.float32))
     scene, *plain_ones = [Scene(meshes=[quad(each, uv1=UV[:, ::-1]), both], environment=Environment(color=(1, 1, 1)))
                           for each in (material, replace(material, metallic=0.0), replace(material, metallic=1.0))]
@@ -214,9 +214,10 @@ def test_normal_maps_on_spheres(device: Device) -> None:
 
 @pytest.mark.parametrize("lanes", [8, *others(1)])
 def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: int) -> None:
-    """An emissive texture that is half black: light is that of the other half alone, with light samples and without.
+    """With an emissive texture that is half black, the light is that of the other half alone,
+    by light samples and without.
 
-    The SIMD width of the reference does not matter.
+    The reference is rendered with one SIMD width, as its result does not depend on it.
     """
     half = Picture(np.full((1, 2, 4), 255, np.uint8))
     half.texels[0, 0, :3] = 0

@@ -141,7 +141,7 @@ def test_flat_grid_along_the_axes(device: Device, layout: str) -> None:
         listed = no_tree("closest_hit", 4, origin * [1, side, 1], down)
         lost.append(np.count_nonzero(found[:, 0] != 1.5))
         other.append(np.count_nonzero(found[:, 3] != listed[:, 3]))
-    assert not any(lost + other), (lost, other)   # Of 10 201 each
+    assert not any(lost + other), (lost, other)   # of 10 201 each
     # In the plane itself, along an axis or across: neither a hit nor a hang.
     inside = origin * [1, 0, 1]
     for along in ([1.0, 0.0, 0.0], [0.0, -0.0, -1.0], [0.6, 0.0, 0.8]):

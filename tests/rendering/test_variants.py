@@ -33,7 +33,8 @@ Doubles = NDArray[np.float64]
 
 
 def everything() -> Scene:
-    """Return a scene with all kinds of primitives, materials and lights, of a width that no SIMD width divides."""
+    """Return a scene with all kinds of primitives, materials and lights, of an odd width that leaves SIMD lanes empty.
+    """
     vertices, faces = rays.icosphere(2)
     gold = MetallicRoughness(preset="gold", roughness=0.4, multiple_scattering=True)
     plastic = MetallicRoughness(roughness=0.2, smith="schlick")

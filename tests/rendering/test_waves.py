@@ -20,7 +20,7 @@ from ..covering import others
 from .pictures import session
 from .test_variants import everything, painted, plastic_ball, sights
 
-SPP = 7   # Not a multiple of a wave's samples
+SPP = 7   # not a multiple of a wave's samples
 
 PAINTED = painted(everything())
 #: Most share one program.

@@ -36,7 +36,7 @@ def test_box_fills_the_picture_and_stays_inside(name: str) -> None:
     half = math.tan(math.radians(camera.fov_degrees) / 2)
     extent = np.abs([toward @ right / depth, toward @ np.cross(right, forward) / depth]).max() / half
     assert extent == pytest.approx(FILL, rel=1e-6)
-    assert forward[1] < 0 and forward[2] < 0 and forward[0] < 0  # From above, in front and the right
+    assert forward[1] < 0 and forward[2] < 0 and forward[0] < 0  # from above, in front and the right
 
 
 def test_a_single_point_still_has_a_view() -> None:

@@ -28,7 +28,7 @@ def test_a_mirror_turns_files_inside_out_but_for_their_own_normals(tmp_path: Pat
 
 
 def test_a_mirror_turns_spheres_inside_out(tmp_path: Path) -> None:
-    """Emitters emit inwards, as in Mitsuba 3.9; a shape without emission or medium is unaffected."""
+    """Emitters emit inwards, as in Mitsuba 3.9; a sphere without emission or glass stays a sphere."""
     mirrored = '<shape type="sphere"><transform name="to_world"><scale y="-2" x="2" z="2"/></transform>{}</shape>'
     assert not scene(tmp_path, mirrored.format("")).meshes
     for inside in ('<emitter type="area"/>', '<bsdf type="dielectric"/>'):

@@ -60,7 +60,7 @@ def test_choice() -> None:
     assert choose_normals("file", vertices, faces, None) is None
     smooth = choose_normals("smooth", vertices, faces, stored)
     assert smooth is not None
-    np.testing.assert_allclose(smooth, vertices, atol=4 * EPS)  # An icosahedron's normals are exact by symmetry
+    np.testing.assert_allclose(smooth, vertices, atol=4 * EPS)  # an icosahedron's normals are exact by symmetry
     normals = choose_normals("file", vertices, faces, stored)
     assert normals is not None
     expected = -vertices

@@ -110,7 +110,7 @@ def test_a_sky_is_read_as_its_library_reads_it(tmp_path: Path) -> None:
     found, expected = read_radiance(path), buffer.get_pixels(oiio.FLOAT)
     assert found is not None and expected is not None
     np.testing.assert_array_equal(found, rgbe_rounded(pixels))
-    np.testing.assert_allclose(found, expected, rtol=2e-7)  # The library computes powers in float32
+    np.testing.assert_allclose(found, expected, rtol=2e-7)  # the library computes powers in float32
     whole = path.read_bytes()
     for wrong in (whole[:-1], whole.replace(b"+X 300", b"+X 301"), whole.replace(b"#?RAD", b"#?RAX"),
                   whole.replace(b"FORMAT", b"EXPOSURE=2\nFORMAT"), whole.replace(b"\x02\x02\x01", b"\x02\x03\x01", 1)):
