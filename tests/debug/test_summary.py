@@ -1,4 +1,4 @@
-"""Names, outcomes and the sentence that says why a pixel is black, on scenes where that is known."""
+"""Names, outcomes and the sentence that explains a black pixel, on scenes with known causes."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ SETTINGS = RenderSettings(size=(8, 8), spp=16, max_depth=4)
 
 
 def square(height: float, name: str, material: Diffuse | Mirror = WHITE, turned: bool = False) -> Mesh:
-    """10 units wide, horizontal; its front side is above unless it is turned."""
+    """Return a horizontal square, 10 units wide, that faces up unless it is `turned`."""
     corners: list[tuple[float, float, float]] = [(-5, height, 5), (5, height, 5), (5, height, -5), (-5, height, -5)]
     return replace(quad(corners[::-1] if turned else corners, material), name=name)
 
 
 def above_floor(*meshes: Mesh, material: Diffuse | Mirror = WHITE, **parts: Any) -> Scene:
-    """A floor that fills the picture, seen from a low place, and what is given."""
+    """Return a floor that fills the image, seen from a low position, with the given meshes and parts."""
     return replace(Scene(meshes=[square(0.0, "floor", material), *meshes], render=SETTINGS,
                          camera=Camera(position=(0.0, 1.0, 2.0), look_at=(0.0, 0.0, 0.0), fov_degrees=20.0)), **parts)
 
@@ -72,7 +72,7 @@ REASONS: dict[str, tuple[Scene, str]] = {
 }
 
 
-#: Those whose programs differ from the others'.
+#: Cases whose programs differ from the others'.
 FURTHER = ["roof behind a veil", "wound backwards", "absorbed", "mirror"]
 
 
@@ -84,7 +84,7 @@ def test_why_it_is_black(device: Device, name: str) -> None:
 
 
 def test_where_the_light_comes_from(device: Device) -> None:
-    """Half the light that comes in comes from each of two lights; what is lost is named."""
+    """Half of the incoming light comes from each of two lights; the blocked third is reported."""
     both = [POINT, replace(POINT, position=(0.0, 4.0, 1e-3)), replace(POINT, position=(0.0, -4.0, 0.0))]
     scene = above_floor(lights=both, render=replace(SETTINGS, spp=256))
     found = explained(device, scene)
@@ -100,7 +100,7 @@ def listed(device: Device, scene: Scene, pixel: tuple[int, int] = (4, 4)) -> tup
 
 
 def test_a_veil_is_no_roof(device: Device) -> None:
-    """It lets half of the light through, and the path half of the time: the sum is what the film has."""
+    """A partly opaque surface transmits half of the light, and half of the paths: the sum equals the film's."""
     paths, found = listed(device, above_floor(VEIL, lights=[POINT]))
     floor = [vertex for vertex in found if vertex.object == 'mesh "floor"' and vertex.light_sample]
     assert floor and paths.value.any()
@@ -111,7 +111,7 @@ def test_a_veil_is_no_roof(device: Device) -> None:
 
 
 def test_places_are_the_scenes_own(device: Device) -> None:
-    """Of a scene that is a million times as large and far away: seen in another frame, and told in its own."""
+    """Positions are in scene units for a scene that is scaled by 1e7, far away and traced in another frame."""
     scale, middle = 1e7, np.array([5e8, 0.0, 0.0])
     scene = above_floor(lights=[DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 1.0, 1.0))])
     matrix = np.diag([scale, scale, scale, 1.0])
@@ -129,7 +129,7 @@ def test_places_are_the_scenes_own(device: Device) -> None:
 
 
 def test_names_of_objects_and_lights(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every entry of the light table, where instances come before it, and objects that share a name."""
+    """Names of all entries of the light table, with instances before it, and of objects that share a name."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
     scene = planted(everything())
     scene.materials = {"lamp": scene.meshes[1].material}

@@ -1,4 +1,4 @@
-"""The paths of a pixel are those of the render: what is written of them adds up, vertex by vertex."""
+"""The traced paths of a pixel are those of the render: their records add up, vertex by vertex."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def gallery(name: str) -> Callable[[], Scene]:
 
 
 def biased(scene: Scene) -> Scene:
-    """With clamps that take much away, and back faces that camera rays pass through."""
+    """Return the scene with strong clamps and back-face culling for camera rays."""
     settings = replace(scene.render, clamp_direct=0.5, clamp_indirect=0.05, back_face_culling="camera")
     return replace(scene, render=settings)
 
@@ -61,7 +61,7 @@ def pixels(seed: int, count: int) -> list[tuple[int, int]]:
 
 @pytest.fixture(scope="module", params=[*SUBJECTS, *others(*PARTS_OF_SUBJECTS)])
 def traced(request: pytest.FixtureRequest, device: Device) -> tuple[Doubles, list[PixelPaths]]:
-    """The mean of a render of a subject, and the paths of some of its pixels."""
+    """Return the mean of a render of a subject, and the paths of some of its pixels."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(instancing, "FEW_TRIANGLES", 0)
         scene = (SUBJECTS | PARTS_OF_SUBJECTS)[request.param]()
@@ -72,7 +72,8 @@ def traced(request: pytest.FixtureRequest, device: Device) -> tuple[Doubles, lis
 
 
 def test_contributions_add_up_to_the_pixel(traced: tuple[Doubles, list[PixelPaths]]) -> None:
-    """To float rounding, but where one turned a decision: of some 100 samples of 100 decisions each that may be one."""
+    """To float rounding, unless it flipped a decision: of about 100 samples of 100 decisions each, one may be flipped.
+    """
     mean, paths = traced
     assert any(each.value.any() for each in paths)
     differs = [np.abs(each.value - mean[each.pixel[::-1]]).max() > 1e-5 * (each.value.max() + 0.1) for each in paths]
@@ -80,7 +81,8 @@ def test_contributions_add_up_to_the_pixel(traced: tuple[Doubles, list[PixelPath
 
 
 def test_vertices_follow_from_each_other(traced: tuple[Doubles, list[PixelPaths]]) -> None:
-    """Where a path goes on, the next surface lies in the direction drawn; weights are weights, and no sum lies."""
+    """The next surface lies in the sampled direction; MIS weights and probabilities are in range, and sums consistent.
+    """
     for paths in traced[1]:
         rows = {name: paths.rows[name].astype(np.float64) for name in paths.rows.dtype.names or ()}
         assert all(np.isfinite(rows[name]).all() for name in rows if name != "distance")
@@ -98,7 +100,7 @@ def test_vertices_follow_from_each_other(traced: tuple[Doubles, list[PixelPaths]
 
 
 def test_light_samples_are_their_factors(device: Device) -> None:
-    """Without media: throughput, BSDF, radiance and weight over the density, as Veach has it (1997, eq. 9.15)."""
+    """Without media: throughput, BSDF, radiance and MIS weight over the pdf (Veach 1997, eq. 9.15)."""
     scene = everything()
     paths = trace_pixel(replace(scene, render=replace(scene.render, spp=64)), device, (20, 22))
     rows = paths.rows[paths.rows["sent"] != 0]
@@ -136,7 +138,7 @@ def test_integrators_without_paths_are_refused(device: Device) -> None:
 
 
 def test_samples_that_are_not_finite_are_dropped(device: Device) -> None:
-    """As from the film: 1e38·1e38 is beyond float32."""
+    """They are dropped from the film, too: 1e38·1e38 is beyond float32."""
     bright = Sphere(material=Diffuse(emission=(1e38, 0.0, 0.0)))
     scene = Scene(spheres=[bright], render=RenderSettings(size=(3, 3), spp=4))
     paths = trace_pixel(scene, device, (1, 1))
@@ -144,7 +146,7 @@ def test_samples_that_are_not_finite_are_dropped(device: Device) -> None:
 
 
 def test_paths_that_were_ended_are_missed(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Drivers that end loops early (test_loop_limit.py)."""
+    """For drivers that end loops early (test_loop_limit.py)."""
     folder = sabotaged(tmp_path / "kernels", r"!loops_ended\(2 \+ \(launch.width == 0\)\)", "(launch.width == 0)")
     monkeypatch.setattr(program, "kernel_folder", lambda: folder)
     monkeypatch.setattr(checked_loops, "loop_turns", lambda device: 50_000)

@@ -1,6 +1,6 @@
-"""An oracle for pictures: a small path tracer in float64 numpy that shares no code with the kernels.
+"""Reference path tracer (oracle) in float64 numpy that shares no code with the kernels.
 
-Brute force where the renderer is clever: every ray is tested against every primitive, emitters and skies are found by
-BSDF sampling alone, delta lights are summed at every path vertex, nothing is chosen by importance. Materials are
-written from the publications that they name.
+Brute force instead of the renderer's optimizations: every ray is tested against every primitive, emitters and
+environment are found by BSDF sampling alone, delta lights are summed at every path vertex, and there is no light
+selection. Materials are written from the publications that they cite.
 """

@@ -1,4 +1,4 @@
-"""Camera rays, as docs/scene-format.md describes its projections."""
+"""Camera rays, following the projections in docs/scene-format.md."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from .vectors import Doubles, unit
 
 def camera_rays(camera: Camera, size: tuple[int, int], pixel: Doubles,
                 rng: np.random.Generator) -> tuple[Doubles, Doubles]:
-    """Origins and unit directions (n, 3) through places (n, 2) of an image of `size` (width, height), in pixels from
-    its upper left corner."""
+    """Return origins and unit directions (n, 3) through points (n, 2) of an image of `size` (width, height), in
+    pixels from its upper left corner."""
     width, height = size
     position = np.array(camera.position, float)
     ahead = np.array(camera.look_at, float) - position

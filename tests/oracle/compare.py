@@ -1,8 +1,8 @@
-"""Whether the renderer's image of a scene is the oracle's, by block means and Welch's t-test.
+"""Comparison of the renderer's image with the oracle's, by block means and Welch's t-test.
 
-Both render batches of samples, whose means by block and channel are independent, however the errors of pixels go
-together. Scenes that differ more than is likely get more samples, all of them new, until a last round decides: with
-enough of them the t-test holds for a few bright paths, too.
+Both render batches of samples, whose means per block and channel are independent even if pixel errors correlate.
+Scenes with a suspicious difference get more samples, all of them new, until a last round decides: with
+enough samples the t-test holds for a few bright paths, too.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from .paths import Paths
 from .scenes import SIZE
 from .vectors import Doubles
 
-#: Pixels along a block's side.
+#: Side of a block in pixels.
 BLOCK = 4
-#: Relative error that float32 may make in a block's mean.
+#: Relative float32 rounding error allowed in a block's mean.
 ROUNDING = 1e-4
 
 
 class Round(NamedTuple):
-    """Batches of both renderers and their samples per pixel; a p-value below `suspect` asks for the next round."""
+    """Batches of both renderers and their samples per pixel; a p-value below `suspect` leads to the next round."""
 
     batches: int
     oracle_spp: int
@@ -46,11 +46,11 @@ ROUNDS = (Round(16, 128, 256, 0.05), Round(16, 512, 1024, 0.01), Round(32, 1024,
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the last round found.
+    """Result of the last round.
 
-    rounds: how many there were; p: of the least likely block and channel, corrected for their number; difference:
-    there, relative to the oracle; ratio, error: the renderer's mean of all pixels over the oracle's, and its standard
-    error.
+    rounds: number of rounds; p: of the least likely block and channel, corrected for their number;
+    difference: of that one, relative to the oracle; ratio, error: the renderer's mean of all pixels over
+    the oracle's, and its standard error.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Verdict:
     error: float
 
     def is_off(self, scenes: int = 1) -> bool:
-        """Whether the images differ, with an error probability of FAMILY for all of `scenes` scenes."""
+        """Return whether the images differ, with an error probability of FAMILY for all of `scenes` scenes."""
         return self.rounds == len(ROUNDS) and corrected(self.p, scenes) < FAMILY
 
     def __str__(self) -> str:
@@ -70,7 +70,7 @@ class Verdict:
 
 
 def verdict(device: Device, scene: Scene, seed: int = 0) -> Verdict:
-    """The renderer on a device against the oracle, with random numbers of this seed."""
+    """Compare the renderer on a device with the oracle, using random numbers of this seed."""
     paths, session, rng = Paths(scene), _session(device, scene), np.random.default_rng([seed, 31])
     first = 0
     for count, each in enumerate(ROUNDS, start=1):
@@ -85,7 +85,7 @@ def verdict(device: Device, scene: Scene, seed: int = 0) -> Verdict:
 
 
 def _session(device: Device, scene: Scene) -> Session:
-    """Instances stay instances, however few triangles they have."""
+    """Return a session in which instances with few triangles remain instances."""
     with patch.object(instancing, "FEW_TRIANGLES", 0):
         compiled = compile_scene(scene, choices(device), device=device)
     return Session(device, compiled, scene.render.size, scene.render.max_depth, 0)
@@ -102,7 +102,7 @@ def _image(session: Session, scene: Scene, seed: int, spp: int) -> Doubles:
 
 
 def _oracle(paths: Paths, number: Round, rng: np.random.Generator) -> tuple[Doubles, float]:
-    """(batches, n) means, and the brightest sample of all."""
+    """Return the means (batches, n), and the brightest sample of all."""
     means, brightest = [], 0.0
     for _ in range(number.batches):
         samples = paths.samples(number.oracle_spp, rng)
@@ -112,22 +112,22 @@ def _oracle(paths: Paths, number: Round, rng: np.random.Generator) -> tuple[Doub
 
 
 def _means(image: Doubles) -> Doubles:
-    """(n,) of blocks, then of all pixels, by channel."""
+    """Return the means (n,) of blocks, then of all pixels, per channel."""
     return np.append(block_means(image, BLOCK).ravel(), image.mean((0, 1)))
 
 
 def _compared(images: Doubles, oracle: Doubles, resolution: float) -> tuple[float, float, float, float]:
-    """p, difference, ratio and error of a Verdict, of (batches, n) means.
+    """Return p, difference, ratio and error of a Verdict from means (batches, n).
 
-    resolution: what one bright path adds to a pixel of the oracle, which bounds standard errors from below: the spread
-    of batches says nothing of paths that are so rare that none was found.
+    resolution: what one bright path adds to a pixel of the oracle, a lower bound of standard errors: the spread of
+    batches does not include paths so rare that none was found.
     """
     level, difference = oracle.mean(0), images.mean(0) - oracle.mean(0)
     variances = [means.var(0, ddof=1) / len(means) for means in (images, oracle)]
     pixels = np.append(np.full(len(level) - 3, BLOCK**2), np.full(3, SIZE[0] * SIZE[1]))
     error = np.sqrt(variances[0] + variances[1] + (ROUNDING * level)**2 + (resolution / pixels)**2)
     lit = error > 0
-    # Welch and Satterthwaite's degrees of freedom.
+    # Welch–Satterthwaite degrees of freedom.
     freedom = (variances[0] + variances[1])**2 / np.maximum(
         sum(v**2 / (len(images) - 1) for v in variances), 1e-300)
     p = np.array([t_test(t, max(f, 1.0)) for t, f in zip(difference[lit] / error[lit], freedom[lit])])

@@ -1,4 +1,4 @@
-"""What a mesh has at the corners of its triangles, where it stands in the world."""
+"""Vertex attributes of a mesh's triangles in world space."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .vectors import Doubles, unit
 
 @dataclass
 class Corners:
-    """By triangle and corner, counter-clockwise seen from the front.
+    """Attributes per triangle and corner, counter-clockwise seen from the front.
 
     p, normals: (t, 3, 3), normals unit, or 0 for flat shading; uv, uv1: (t, 3, 2); colors: (t, 3, 4).
     """
@@ -27,8 +27,8 @@ class Corners:
 
     @staticmethod
     def placed(mesh: Mesh, to_world: Doubles) -> Corners:
-        """Of a mesh that a matrix (3, 4) moves: one that mirrors would reverse the order of corners. Normals transform
-        by the inverse transpose."""
+        """Return the corners of a mesh transformed by a matrix (3, 4); if it mirrors, the corner order is reversed.
+        Normals transform by the inverse transpose."""
         linear = to_world[:, :3]
         normals = None if mesh.normals is None else unit(mesh.normals.astype(float) @ np.linalg.inv(linear))
         rows = [mesh.vertices.astype(float) @ linear.T + to_world[:, 3], _rows(mesh, normals, 3, 0.0),
@@ -38,12 +38,12 @@ class Corners:
 
     @staticmethod
     def joined(parts: list[Corners]) -> Corners:
-        """All of several, at least one."""
+        """Concatenate several, at least one."""
         return Corners(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Corners)))
 
 
 def _rows(mesh: Mesh, values: ArrayLike | None, size: int, missing: float) -> Doubles:
-    """(vertices, size), with `missing` where the mesh has none."""
+    """Return (vertices, size) values, with `missing` for attributes that the mesh lacks."""
     rows = np.full((len(mesh.vertices), size), missing)
     if values is not None:
         given = np.asarray(values, float)

@@ -1,4 +1,4 @@
-"""Random choices behind small scenes of what the oracle knows, and materials by them."""
+"""Random choices for small scenes that the oracle supports, and random materials."""
 
 from __future__ import annotations
 
@@ -18,39 +18,39 @@ from clrt.scene.materials.textures import Channel, Picture, Texture, Wrap
 Drawn = TypeVar("Drawn")
 Color = tuple[float, float, float]
 
-#: Texels along a side.
+#: Texels per side.
 TEXELS = 4
-#: Smoother lobes than this roughness make single paths so bright that means of thousands say little.
+#: Lobes of lower roughness make single paths so bright that means over thousands of them have little significance.
 SMOOTHEST = 0.3
 
 
 class Draws:
-    """Choices that programs depend on are alike for all scenes of a batch, which thus share programs; numbers are each
-    scene's own."""
+    """Random source whose structural choices are equal for all scenes of a batch, so that they share programs,
+    while numbers differ per scene."""
 
     def __init__(self, seed: int, batch: int, number: int) -> None:
         self._choices = np.random.default_rng([seed, batch])
         self._numbers = np.random.default_rng([seed, batch, number])
 
     def one_of(self, options: Iterable[Drawn], weights: Sequence[float] | None = None) -> Drawn:
-        """A batch's choice, with these probabilities."""
+        """Return a choice of the batch, with these probabilities."""
         listed = list(options)
         return listed[int(self._choices.choice(len(listed), p=weights))]
 
     def chance(self, probability: float) -> bool:
-        """A batch's choice."""
+        """Return true with this probability, for the whole batch."""
         return bool(self._choices.random() < probability)
 
     def between(self, low: float, high: float) -> float:
-        """A scene's own number."""
+        """Return a uniform number of the scene."""
         return float(self._numbers.uniform(low, high))
 
     def vector(self, low: float = -1.0, high: float = 1.0) -> Color:
-        """Three of a scene's own numbers."""
+        """Return three uniform numbers of the scene."""
         return self.between(low, high), self.between(low, high), self.between(low, high)
 
     def texture(self, factor: float | Color, lowest: int = 40) -> Texture:
-        """Random texels, laid out at random."""
+        """Return a texture with random texels and a random transform."""
         texels = self._numbers.integers(lowest, 256, (TEXELS, TEXELS, 4), np.uint8)
         wrap: tuple[Wrap, Wrap] = self.one_of(get_args(Wrap)), self.one_of(get_args(Wrap))
         return Texture(picture=Picture(texels), factor=factor, channel=self.one_of(get_args(Channel)), wrap=wrap,
@@ -59,16 +59,16 @@ class Draws:
                        filter=self.one_of(("linear", "nearest")))
 
     def color(self, low: float = 0.1, high: float = 0.95) -> Color | Texture:
-        """Any, a fifth of them textures."""
+        """Return a random color, or a texture in a fifth of the cases."""
         return self.texture(self.vector(0.5, 1.0)) if self.chance(0.2) else self.vector(low, high)
 
     def number(self, low: float, high: float = 1.0) -> float | Texture:
-        """Any, a fifth of them textures."""
+        """Return a random number, or a texture in a fifth of the cases."""
         return self.texture(high, int(255 * low / high) + 1) if self.chance(0.2) else self.between(low, high)
 
 
 def random_material(draws: Draws, kind: type[Material], opaque: bool = False) -> Material:
-    """One of a kind. opaque: whether it stops all light from both sides."""
+    """Return a random material of a type. opaque: whether it blocks all light from both sides."""
     material = kind(**DRAWERS[kind](draws))
     if draws.chance(0.1):
         material = replace(material, emission=draws.vector(0.0, 0.6))
@@ -110,13 +110,13 @@ def _metallic_roughness(draws: Draws) -> dict[str, Any]:
         given |= {"specular": draws.number(0.0), "specular_color": draws.color(0.2, 2.0)}
     given |= _layers(draws)
     coupling = draws.one_of((None, *get_args(Coupling)))
-    # The oracle knows further bounces of metals below the albedo coupling alone.
+    # The oracle supports multiple scattering of metals only with the albedo coupling.
     given |= {"coupling": coupling, "multiple_scattering": None if coupling in (None, "albedo") else False}
     return given | {"preset": draws.one_of(F0_PRESETS) if draws.chance(0.2) else None}
 
 
 def _layers(draws: Draws) -> dict[str, Any]:
-    """A film, fibres and a sheet, some of them."""
+    """Return a random subset of clearcoat, sheen and transmission."""
     given: dict[str, Any] = {}
     if draws.chance(0.3):
         given |= {"clearcoat": draws.number(0.0), "clearcoat_roughness": draws.number(SMOOTHEST)}

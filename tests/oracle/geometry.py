@@ -1,4 +1,4 @@
-"""All primitives of a scene in the world, and the nearest one on a ray, by testing every one."""
+"""All primitives of a scene in world space, and brute-force intersection of rays with them."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from clrt.scene.model import Scene
 from .corners import Corners
 from .vectors import Bools, Doubles, Whole, dot, unit
 
-#: Nearer hits are the surface that a ray leaves: scenes are about 1 in size, and rounding errors about 1e-15.
+#: Closer hits are the surface that a ray leaves: scenes are about 1 in size, and rounding errors about 1e-15.
 NEAREST = 1e-6
-#: Rays whose tests of all primitives fit a processor's cache.
+#: Number of rays whose tests of all primitives fit in a processor's cache.
 AT_A_TIME = 128
 
 
 @dataclass
 class Hits:
-    """For each ray: t along its unit direction, infinite for a miss; the primitive, triangles first; barycentrics of a
-    triangle's corners, (n, 3)."""
+    """Hits per ray: t along its unit direction, infinite for a miss; the primitive, triangles first; barycentrics
+    of a triangle's corners, (n, 3)."""
 
     t: Doubles
     primitive: Whole
@@ -34,10 +34,10 @@ class Hits:
 
 
 class Geometry:
-    """Triangles of all meshes and instances, of which there is one at least, then spheres.
+    """Triangles of all meshes and instances, at least one, followed by spheres.
 
-    materials: of the whole scene; material: (n,) the number of each primitive's. uv, uv1: (t, 3, 2), colors: (t, 3, 4),
-    shading_normals: (t, 3, 3), of triangles' corners.
+    materials: those of the whole scene; material: (n,) material index per primitive. Per triangle corner: uv, uv1
+    (t, 3, 2), colors (t, 3, 4), shading_normals (t, 3, 3).
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -56,7 +56,7 @@ class Geometry:
         self.normal = unit(cross)
         flat = ~self.shading_normals.any(axis=(1, 2))
         self.shading_normals[flat] = self.normal[flat, None]
-        # Of each edge p→q, opposite corner 0, 1 and 2: the Plücker coordinates p×q and q − p.
+        # Plücker coordinates p×q and q − p of each edge p→q, opposite corner 0, 1 and 2.
         edges = [np.hstack([np.cross(p, q), q - p]) for p, q in ((p1, p2), (p2, p0), (p0, p1))]
         self._edges = [np.ascontiguousarray(each.T) for each in edges]
         self._planes, self._offsets = np.ascontiguousarray(cross.T), dot(cross, p0)
@@ -69,7 +69,7 @@ class Geometry:
         return len(self.materials) - 1
 
     def nearest(self, origin: Doubles, direction: Doubles) -> Hits:
-        """Along unit directions, farther than NEAREST."""
+        """Return the closest hits along unit directions beyond NEAREST."""
         hits = Hits(np.full(len(origin), np.inf), np.zeros(len(origin), int), np.zeros((len(origin), 3)))
         for first in range(0, len(origin), AT_A_TIME):
             rows = slice(first, first + AT_A_TIME)
@@ -92,8 +92,8 @@ class Geometry:
         return Hits(t, primitive, weights)
 
     def _triangles(self, sides: list[Doubles], origin: Doubles) -> Doubles:
-        """A ray passes on the same side of all three edges (Shoemake 1998, "Plücker coordinate tutorial"); their sum is
-        its direction's part along the normal."""
+        """Return t of each triangle: a ray that hits passes on the same side of all three edges (Shoemake 1998,
+        "Plücker coordinate tutorial"); their sum is its direction's component along the normal."""
         a, b, c = sides
         least, most = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""Light from no surface: the environment and suns with a size, which rays that escape find, and delta lights."""
+"""Light that comes from no surface: the environment and angular suns, found by escaping rays, and delta lights."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from clrt.scene.model import Environment, Scene
 from .textures import bilinear
 from .vectors import Doubles, dot, unit
 
-#: Below this angular diameter in degrees a directional light is a delta light.
+#: Directional lights below this angular diameter in degrees are delta lights.
 POINT = 1e-4
 
 
 def escaped(scene: Scene, direction: Doubles) -> Doubles:
-    """(n, 3) radiance that arrives against unit directions from infinitely far away."""
+    """Return the radiance (n, 3) that arrives against unit directions from infinity."""
     radiance = _environment(scene.environment, direction)
     for light in scene.lights:
         if isinstance(light, DirectionalLight) and light.angle_degrees >= POINT:
@@ -26,12 +26,12 @@ def escaped(scene: Scene, direction: Doubles) -> Doubles:
 
 
 def delta_lights(scene: Scene) -> list[Light]:
-    """Those that a direct sum alone finds."""
+    """Return the lights that only direct summation finds."""
     return [light for light in scene.lights if not isinstance(light, DirectionalLight) or light.angle_degrees < POINT]
 
 
 def arriving(light: Light, p: Doubles) -> tuple[Doubles, Doubles, Doubles]:
-    """At points (n, 3): unit directions to a delta light, distances (n,), and irradiance (n, 3) facing it."""
+    """Return unit directions to a delta light from points (n, 3), distances (n,), and irradiance (n, 3) facing it."""
     if isinstance(light, DirectionalLight):
         towards = np.tile(-unit(np.array(light.direction, float)), (len(p), 1))
         return towards, np.full(len(p), np.inf), np.tile(np.array(light.irradiance, float), (len(p), 1))
@@ -46,7 +46,8 @@ def arriving(light: Light, p: Doubles) -> tuple[Doubles, Doubles, Doubles]:
 
 
 def _falloff(light: PointLight | SpotLight, towards: Doubles) -> Doubles:
-    """KHR_lights_punctual: the square of what falls evenly in the cosine from the inner to the outer cone."""
+    """Return KHR_lights_punctual's falloff: the square of a ramp linear in the cosine from the inner to the outer cone.
+    """
     if isinstance(light, PointLight):
         return np.ones(len(towards))
     inner, outer = np.cos(np.radians([light.inner_degrees, light.outer_degrees]))
@@ -57,7 +58,7 @@ def _falloff(light: PointLight | SpotLight, towards: Doubles) -> Doubles:
 def _environment(environment: Environment, direction: Doubles) -> Doubles:
     if environment.image is None:
         return np.tile(environment.strength * np.array(environment.color, float), (len(direction), 1))
-    # Turned counter-clockwise about +Y: a direction is looked up where it was before.
+    # The map rotates counter-clockwise about +Y: directions are rotated back before the look-up.
     angle = np.radians(environment.rotation_degrees)
     x = np.cos(angle) * direction[:, 0] - np.sin(angle) * direction[:, 2]
     z = np.sin(angle) * direction[:, 0] + np.cos(angle) * direction[:, 2]

@@ -1,4 +1,4 @@
-"""Path tracing by BSDF sampling: radiance is what paths find, and what delta lights send to their vertices."""
+"""Path tracing by BSDF sampling: radiance of emitters that paths hit, and of delta lights summed at path vertices."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .vectors import Bools, Doubles, Frame, Whole, dot
 
 @dataclass
 class Rays:
-    """The next segments of some paths: sample is a path's number, throughput (n, 3) what part of radiance from there
+    """Next segments of paths: sample is a path's index, throughput (n, 3) the share of radiance from there that
     reaches the camera, absorption (n, 3) per length along the segment."""
 
     sample: Whole
@@ -29,17 +29,17 @@ class Rays:
     absorption: Doubles
 
     def rows(self, chosen: Bools) -> Rays:
-        """Some of them."""
+        """Return a subset."""
         return Rays(*(getattr(self, each.name)[chosen] for each in fields(self)))
 
     @staticmethod
     def joined(parts: list[Rays]) -> Rays:
-        """All of several."""
+        """Concatenate several."""
         return Rays(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Rays)))
 
 
 class Paths:
-    """Renders a scene by paths of at most `max_depth` segments."""
+    """Path tracer for a scene, with paths of at most `max_depth` segments."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.geometry = scene, Geometry(scene)
@@ -48,7 +48,7 @@ class Paths:
         self._transparent = np.array(transparent, bool)[self.geometry.material]
 
     def samples(self, spp: int, rng: np.random.Generator) -> Doubles:
-        """(h, w, spp, 3), spread evenly over each pixel."""
+        """Return samples (h, w, spp, 3), uniform over each pixel."""
         width, height = self.scene.render.size
         row, column = np.divmod(np.repeat(np.arange(width * height), spp), width)
         places = np.column_stack([column, row]) + rng.random((len(row), 2))
@@ -56,7 +56,7 @@ class Paths:
         return self.radiance(*rays, rng).reshape(height, width, spp, 3)
 
     def radiance(self, origin: Doubles, direction: Doubles, rng: np.random.Generator) -> Doubles:
-        """(n, 3) along camera rays (n, 3), one sample each."""
+        """Return radiance (n, 3) along camera rays (n, 3), one sample each."""
         light = np.zeros_like(origin)
         rays = Rays(np.arange(len(origin)), origin, direction, np.ones_like(origin), np.zeros_like(origin))
         for depth in range(1, self.scene.render.max_depth + 1):
@@ -80,7 +80,8 @@ class Paths:
 
     def _scattered(self, rays: Rays, at: Surface, material: Material,
                    rng: np.random.Generator) -> tuple[Doubles, Rays]:
-        """Of rays that hit one material: (n, 3) radiance from delta lights to the camera, and where paths go on."""
+        """Return radiance (n, 3) from delta lights to the camera, and the next segments, of rays that hit one material.
+        """
         scattering, frame = scattering_of(material, at), Frame(at.shading_normal)
         wo = frame.to_local(-rays.direction)
         inside = rays.absorption if scattering.absorption_beyond is None else scattering.absorption_beyond
@@ -101,7 +102,9 @@ class Paths:
         return direct, Rays(rays.sample, at.p, onward, throughput, absorption(onward)).rows(np.any(throughput, axis=1))
 
     def _first_stop(self, origin: Doubles, direction: Doubles, rng: np.random.Generator) -> tuple[Hits, Surface]:
-        """What stops each ray: surfaces do so with the probability of their opacity. t is from `origin`."""
+        """Return the hit that stops each ray: surfaces stop it with the probability of their
+        opacity. t is from `origin`.
+        """
         hits = self.geometry.nearest(origin, direction)
         surface = surface_at(self.geometry, hits, origin, direction)
         undecided = np.flatnonzero(self._may_pass(hits))
@@ -116,13 +119,13 @@ class Paths:
         return hits, surface
 
     def _may_pass(self, hits: Hits) -> Bools:
-        """Where a ray hit a material that does not stop all of it."""
+        """Return whether each ray hit a material that does not stop all light."""
         if not self._transparent.any():
             return np.zeros(len(hits.t), bool)
         return np.asarray(~hits.missed & self._transparent[hits.primitive])
 
     def _opacity(self, numbers: Whole, at: Surface) -> Doubles:
-        """(n,) of materials by their numbers."""
+        """Return the opacity (n,) of materials by their indices."""
         opacity = np.ones(len(numbers))
         for number in np.unique(numbers):
             mine = numbers == number
@@ -130,7 +133,7 @@ class Paths:
         return opacity
 
     def _visible(self, p: Doubles, wi: Doubles, distance: Doubles, asked: Bools, rng: np.random.Generator) -> Doubles:
-        """(n,) of 1 where nothing stops light on its way from a delta light, 0 elsewhere or where not asked."""
+        """Return 1 where nothing blocks a delta light, 0 elsewhere or where `asked` is false, (n,)."""
         seen = np.zeros(len(p))
         if asked.any():
             hits, _ = self._first_stop(p[asked], wi[asked], rng)
@@ -139,11 +142,11 @@ class Paths:
 
 
 def _same_side(at: Surface, local: Doubles, world: Doubles) -> Doubles:
-    """(n, 1) of 1 where a direction is on the same side by the shading normal and by the geometric one."""
+    """Return 1 if a direction is on the same side by the shading and the geometric normal, else 0, (n, 1)."""
     alike: Bools = (local[:, 2:] > 0) == (dot(world, at.normal)[:, None] > 0)
     return alike.astype(float)
 
 
 def _transmittance(absorption: Doubles, distance: Doubles) -> Doubles:
-    """(n, 3) what is left after a distance (n,), which may be infinite."""
+    """Return the transmittance (n, 3) after a distance (n,), which may be infinite."""
     return np.asarray(np.exp(-absorption * np.where(absorption > 0, distance[:, None], 0)))

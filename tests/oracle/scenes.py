@@ -1,7 +1,7 @@
-"""Small random scenes of what the oracle knows: some objects on a floor below a few lights.
+"""Small random scenes that the oracle supports: some objects on a floor below a few lights.
 
-Emitters are large and lobes wide, since the oracle finds the former by chance. What is in a scene is alike for all of a
-batch (see Draws); where it stands and how strong it is differs.
+Emitters are large and lobes wide, since the oracle finds emitters by chance. The content of a scene is the same for
+all of a batch (see Draws); positions and strengths differ.
 """
 
 from __future__ import annotations
@@ -23,32 +23,32 @@ from ..scene.shapes import icosphere
 from .draws import DRAWERS, Draws, random_material
 from .vectors import Doubles
 
-#: Scenes that share programs.
+#: Scenes per batch, which share programs.
 BATCH = 4
-#: Of an image, in pixels.
+#: Image size in pixels.
 SIZE = (12, 8)
 SHAPES = ("sphere", "solid", "sheet", "instances")
 EMITTERS = ("sphere", "solid", "sheet", "instances")
 #: Lights that the oracle finds by chance, then those that it sums.
 LIGHTS = (*EMITTERS, "disc", "point", "spot", "directional")
 SKIES = (None, "constant", "image")
-#: Places around the middle of the floor.
+#: Positions around the middle of the floor.
 PLACES = ((-1.0, 0.0), (0.9, 0.4), (-0.1, -1.1), (0.1, 1.2))
 
 
 def todays_seed() -> int:
-    """The date as a number, such as 20251231."""
+    """Return the date as a number, such as 20251231."""
     return int(f"{date.today():%Y%m%d}")
 
 
 def random_scene(seed: int, number: int) -> Scene:
-    """Scene `number` of a seed."""
+    """Return scene `number` of a seed."""
     return _Stage(Draws(seed, number // BATCH, number)).scene(f"oracle-{seed}-{number}")
 
 
 @dataclass
 class _Stage:
-    """A scene in the making."""
+    """Scene under construction."""
 
     draws: Draws
     meshes: list[Mesh] = field(default_factory=list)
@@ -74,7 +74,7 @@ class _Stage:
                      name=name)
 
     def _add_light(self, kind: str, kinds: list[type[Material]]) -> None:
-        """Above the objects, a flat one with its front down."""
+        """Add a light above the objects; a flat one faces down."""
         draws = self.draws
         x, y, z = draws.between(-1.5, 1.5), draws.between(2.2, 3.2), draws.between(-1.5, 1.5)
         direction = draws.between(-0.8, 0.8) - x, -y, draws.between(-0.8, 0.8) - z
@@ -101,7 +101,7 @@ class _Stage:
                                          inner_degrees=draws.between(0.0, 0.9) * outer, outer_degrees=outer))
 
     def _add(self, shape: str, material: Material, middle: Vector, size: float, turn: Doubles) -> None:
-        """turn: how a flat one is turned before it is tilted a little."""
+        """Add an object; turn: the rotation of a flat one before a small random tilt."""
         draws = self.draws
         if shape == "sphere":
             self.spheres.append(Sphere(center=middle, radius=size, material=material))
@@ -111,7 +111,7 @@ class _Stage:
             self._sheet(material, *placed)
             return
         vertices, faces = icosphere(0)
-        # What becomes of gloss around bent normals is a matter of taste: they are for Lambert's law alone.
+        # Shading of gloss around bent normals is not standardized: only Lambertian meshes have them.
         normals = vertices.copy() if type(material) is Diffuse and draws.chance(0.5) else None
         solid = self._with_attributes(Mesh(vertices, faces, material, normals=normals))
         if shape == "solid":
@@ -123,13 +123,13 @@ class _Stage:
                            Instance(solid, _product(*mirrored), other)]
 
     def _sheet(self, material: Material, *placed: Doubles) -> None:
-        """A square with its front up, two units wide."""
+        """Add a square that faces up, two units wide."""
         corners = np.array([(-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)], np.float32)
         mesh = self._with_attributes(Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), material))
         self.meshes.append(transform_mesh(mesh, _product(*placed)))
 
     def _with_attributes(self, mesh: Mesh) -> Mesh:
-        """With texture coordinates, and maybe colors, a third of them with an alpha."""
+        """Return the mesh with texture coordinates, and possibly colors, a third of them with alpha."""
         draws, flat = self.draws, mesh.vertices[:, [0, 2]] + mesh.vertices[:, [1, 1]] * np.float32(0.7)
         uv, uv1 = flat * np.float32(draws.between(0.5, 2)), flat[:, ::-1] * np.float32(draws.between(0.5, 2))
         colors = None
@@ -162,7 +162,7 @@ class _Stage:
 
 
 def _product(*matrices: Doubles) -> Doubles:
-    """Of transforms, the first of which acts first."""
+    """Return the product of transforms, the first of which acts first."""
     result = np.eye(4)
     for matrix in matrices:
         result = matrix @ result

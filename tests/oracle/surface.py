@@ -1,4 +1,4 @@
-"""What rays hit: positions, normals, and parameters of materials there."""
+"""Ray hits: positions, normals, and material parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .vectors import Bools, Doubles, Whole, dot, unit
 
 @dataclass
 class Surface:
-    """Places on primitives, by row.
+    """Points on primitives, by row.
 
     normal, shading_normal: unit, on the side that the ray came from; front: whether that is the front; uv: (n, 2, 2) of
     both sets of texture coordinates; tint: (n, 4) vertex colors.
@@ -30,32 +30,34 @@ class Surface:
     tint: Doubles
 
     def rows(self, chosen: Bools | Whole) -> Surface:
-        """Of some of the rays."""
+        """Return a subset of the rows."""
         return Surface(*(getattr(self, each.name)[chosen] for each in fields(self)))
 
     def put(self, rows: Whole, other: Surface) -> None:
-        """Another surface in place of these rows."""
+        """Replace these rows by another surface."""
         for each in fields(self):
             getattr(self, each.name)[rows] = getattr(other, each.name)
 
     def number(self, value: float | Texture) -> Doubles:
-        """(n,) of a parameter that is a number."""
+        """Return the value (n,) of a scalar parameter."""
         if isinstance(value, Texture):
             return number_at(value, self.uv[:, value.uv_set])
         return np.full(len(self.p), float(value))
 
     def color(self, value: tuple[float, ...] | Texture) -> Doubles:
-        """(n, 3) of a parameter that is a colour."""
+        """Return the value (n, 3) of a colour parameter."""
         if isinstance(value, Texture):
             return color_at(value, self.uv[:, value.uv_set])
         return np.tile(np.array(value, float), (len(self.p), 1))
 
     def tinted(self, value: tuple[float, ...] | Texture) -> Doubles:
-        """(n, 3) of the parameter `color`, which vertex colours multiply."""
+        """Return the value (n, 3) of the parameter `color`, times vertex colours."""
         return self.color(value) * self.tint[:, :3]
 
     def opacity(self, material: Material) -> Doubles:
-        """(n,) the part of light that a material stops. The alpha of vertex colours is of materials with an opacity."""
+        """Return the share of light that a material stops, (n,). Vertex alpha applies to
+        materials with an opacity below 1.
+        """
         alpha = self.tint[:, 3] if material.opacity != 1 else np.ones(len(self.p))
         opacity = self.number(material.opacity) * alpha
         if material.alpha_cutoff is not None:
@@ -63,12 +65,12 @@ class Surface:
         return np.where(self.front | (not material.one_sided), opacity, 0.0)
 
     def emitted(self, material: Material) -> Doubles:
-        """(n, 3) radiance towards where the ray came from: of the front alone."""
+        """Return the radiance (n, 3) towards the ray's origin, from the front only."""
         return self.color(material.emission) * self.front[:, None]
 
 
 def surface_at(geometry: Geometry, hits: Hits, origin: Doubles, direction: Doubles) -> Surface:
-    """Of each ray; anything where it hit nothing."""
+    """Return the surface at each hit; rows of misses are arbitrary."""
     n, triangles = len(origin), len(geometry.corners)
     p = origin + np.where(hits.missed, 0, hits.t)[:, None] * direction
     normal, uv, tint = np.tile([0.0, 0.0, 1.0], (n, 1)), np.zeros((n, 2, 2)), np.ones((n, 4))
@@ -87,11 +89,11 @@ def surface_at(geometry: Geometry, hits: Hits, origin: Doubles, direction: Doubl
     tint[of_mesh] = interpolated(geometry.colors)
     outward = unit(p[of_sphere] - geometry.center[hits.primitive[of_sphere] - triangles])
     normal[of_sphere] = shading_normal[of_sphere] = outward
-    # An image lies once around a sphere, its middle towards +Z, its top towards +Y, upright seen from outside.
+    # An image covers a sphere once, its middle towards +Z, its top towards +Y, upright seen from outside.
     around = 0.5 + np.arctan2(outward[:, 0], outward[:, 2]) / (2 * np.pi)
     uv[of_sphere] = np.column_stack([around, np.arccos(np.clip(outward[:, 1], -1, 1)) / np.pi])[:, None]
     front = dot(normal, direction) < 0
     side = np.where(front, 1, -1)[:, None]
-    # A shading normal that faces away from the ray gives way to the geometric one.
+    # A shading normal that faces away from the ray is replaced by the geometric one.
     towards = dot(shading_normal, direction) * side[:, 0] < 0
     return Surface(p, side * normal, side * np.where(towards[:, None], shading_normal, normal), front, uv, tint)

@@ -28,13 +28,13 @@ from .vectors import Doubles
 
 FILM: dict[str, Any] = {"clearcoat": 1.0, "clearcoat_roughness": 0.3}
 FIBRES: dict[str, Any] = {"sheen_color": (0.9, 0.9, 0.9), "sheen_roughness": 0.35}
-#: In the suite, from batches of their own.
+#: Scenes of the test suite, each from another batch.
 SCENES = range(0, 3 * BATCH, BATCH)
 
 
 @pytest.mark.parametrize("number", SCENES)
 def test_images_of_random_scenes_agree(device: Device, number: int) -> None:
-    """`python -m tests.oracle` compares hundreds."""
+    """`python -m tests.oracle` compares hundreds of them."""
     seed = todays_seed()
     print(f"seed {seed}")
     found = verdict(device, random_scene(seed, number), seed)
@@ -43,7 +43,7 @@ def test_images_of_random_scenes_agree(device: Device, number: int) -> None:
 
 
 def lamp_over_floor(emission: float) -> Scene:
-    """A sphere light above a grey square."""
+    """Return a sphere light above a grey square."""
     corners = np.array([(-3, 0, 3), (3, 0, 3), (3, 0, -3), (-3, 0, -3)], np.float32)
     floor = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), Diffuse(color=(0.6, 0.6, 0.6)))
     lamp = Sphere(center=(0.0, 2.0, 0.0), radius=0.8, material=Diffuse(emission=(emission,) * 3))
@@ -63,13 +63,13 @@ def test_five_percent_too_much_light_is_found(device: Device, monkeypatch: pytes
 
 
 def test_all_materials_are_drawn() -> None:
-    """A new one needs a form in the oracle, from where it was published."""
+    """A new material needs an implementation in the oracle, from its publication."""
     assert set(MATERIALS) == set(DRAWERS) == set(SCATTERINGS)
 
 
 @pytest.mark.parametrize("kind", DRAWERS)
 def test_directions_are_drawn_by_their_density(kind: type[Material]) -> None:
-    """The mean weight of drawn directions, of those upwards and of those downwards, is the integral of f·|cos|."""
+    """The mean weight of sampled directions, above and below the surface, is the integral of f·|cos|."""
     rng = np.random.default_rng(7)
     for number in range(6):
         material = random_material(Draws(3, number, 0), kind)
@@ -78,7 +78,7 @@ def test_directions_are_drawn_by_their_density(kind: type[Material]) -> None:
         uniform = rng.normal(size=wo.shape)
         uniform /= np.linalg.norm(uniform, axis=1, keepdims=True)
         integrand, sample = 4 * np.pi * scattering.evaluate(wo, uniform), scattering.sample(wo, rng)
-        if not integrand.any():      # single directions
+        if not integrand.any():      # specular directions
             assert sample.weight.max() <= 1 / 0.25**2
             continue
         for up in (True, False):
@@ -91,7 +91,7 @@ def test_directions_are_drawn_by_their_density(kind: type[Material]) -> None:
 @pytest.mark.parametrize("roughness", [0.3, 1.0])
 @pytest.mark.parametrize("metallic", [0.0, 0.5, 1.0])
 def test_white_keeps_energy(roughness: float, metallic: float) -> None:
-    """By default, under the tables of directional albedos."""
+    """With the default options, within the precision of the tables of directional albedos."""
     white = MetallicRoughness(color=(1.0, 1.0, 1.0), roughness=roughness, metallic=metallic)
     wo, at = view(0.4, 200_000)
     weight = scattering_of(white, at).sample(wo, np.random.default_rng(1)).weight[:, 0]
@@ -102,7 +102,8 @@ def test_white_keeps_energy(roughness: float, metallic: float) -> None:
 @pytest.mark.parametrize("roughness", [0.3, 0.8])
 @pytest.mark.parametrize("metallic", [0.0, 0.6, 1.0])
 def test_white_under_layers_keeps_energy(roughness: float, metallic: float, layers: dict[str, Any]) -> None:
-    """All that leaves, by quadrature in √cos and the root of the azimuth from where wo is mirrored."""
+    """Total reflection and transmission is 1, by quadrature in √cos and the root of the azimuth from the mirrored wo.
+    """
     white = MetallicRoughness(color=(1.0, 1.0, 1.0), roughness=roughness, metallic=metallic, **layers)
     x, weights = np.polynomial.legendre.leggauss(64)
     u = (x + 1) / 2
@@ -122,7 +123,7 @@ def test_white_under_layers_keeps_energy(roughness: float, metallic: float, laye
 @pytest.mark.parametrize("front", [False, True])
 @pytest.mark.parametrize("thin", [False, True])
 def test_clear_glass_keeps_energy(roughness: float, ior: float, front: bool, thin: bool) -> None:
-    """In radiance over the square of the index."""
+    """Radiance over the square of the index is conserved."""
     glass = Dielectric(color=(1.0, 1.0, 1.0), ior=ior, roughness=roughness, thin=thin)
     wo, at = view(0.4, 200_000)
     sample = scattering_of(glass, replace(at, front=np.full(len(wo), front))).sample(wo, np.random.default_rng(1))
@@ -132,7 +133,7 @@ def test_clear_glass_keeps_energy(roughness: float, ior: float, front: bool, thi
 
 
 def view(cosine: float, n: int) -> tuple[Doubles, Surface]:
-    """A direction, n times, and a surface that it leaves."""
+    """Return a direction, n times, and a surface that it leaves."""
     wo, up = np.array([np.sqrt(1 - cosine**2), 0.0, cosine]), np.array([0.0, 0.0, 1.0])
     rows = np.tile(up, (n, 1))
     return np.tile(wo, (n, 1)), Surface(np.zeros((n, 3)), rows, rows.copy(), np.ones(n, bool), np.full((n, 2, 2), 0.3),
@@ -148,7 +149,7 @@ def test_scenes_are_valid_and_share_programs(device: Device) -> None:
 
 
 def test_mirrored_instances_keep_what_their_corners_have() -> None:
-    """Each corner of a triangle brings its own texture coordinates, whichever way round the triangle is."""
+    """Each corner keeps its own texture coordinates under mirroring, for either winding."""
     scene = next(scene for number in range(0, 99 * BATCH, BATCH) if (scene := random_scene(1, number)).instances)
     mesh, mirrored = scene.instances[0].mesh, replace(scene.instances[0], to_world=np.diag([-1.0, 1.0, 1.0, 1.0])[:3])
     geometry = Geometry(replace(scene, meshes=[], spheres=[], instances=[mirrored]))

@@ -1,4 +1,4 @@
-"""What a texture says at texture coordinates, as docs/scene-format.md has it."""
+"""Texture look-up, following docs/scene-format.md."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ CHANNELS = ("red", "green", "blue", "alpha")
 
 
 def color_at(texture: Texture, uv: Doubles) -> Doubles:
-    """(n, 3) linear colours times the factor at coordinates (n, 2) of the surface."""
+    """Return linear colours times the factor (n, 3) at texture coordinates (n, 2)."""
     return _looked_up(texture, _linear(texture.picture.texels[..., :3] / 255.0), uv) * texture.factor
 
 
 def number_at(texture: Texture, uv: Doubles) -> Doubles:
-    """(n,) values of its channel times the factor."""
+    """Return values of its channel times the factor, (n,)."""
     values = texture.picture.texels[..., CHANNELS.index(texture.channel)] / 255.0
     factor: Doubles = np.asarray(texture.factor, float)
     return _looked_up(texture, values[..., None], uv)[:, 0] * factor
 
 
 def bilinear(grid: Doubles, x: Doubles, y: Doubles, wrap_x: str, wrap_y: str) -> Doubles:
-    """(n, c) of a grid (h, w, c) whose cells' middles are at whole numbers."""
+    """Interpolate a grid (h, w, c) whose cell centres are at integers; return (n, c)."""
     left, top = np.floor(x), np.floor(y)
     right_part, lower_part = (x - left)[:, None], (y - top)[:, None]
     height, width = grid.shape[:2]
@@ -38,7 +38,7 @@ def _looked_up(texture: Texture, grid: Doubles, uv: Doubles) -> Doubles:
     height, width = grid.shape[:2]
     angle = np.radians(texture.rotation_degrees)
     scaled = uv * texture.scale
-    # KHR_texture_transform: scaled, turned counter-clockwise in a frame whose v points down, moved.
+    # KHR_texture_transform: scaled, rotated counter-clockwise in a frame whose v points down, translated.
     u = np.cos(angle) * scaled[:, 0] + np.sin(angle) * scaled[:, 1] + texture.offset[0]
     v = -np.sin(angle) * scaled[:, 0] + np.cos(angle) * scaled[:, 1] + texture.offset[1]
     wrap_u, wrap_v = texture.wrap
@@ -58,5 +58,5 @@ def _wrapped(cell: Whole, size: int, wrap: str) -> Whole:
 
 
 def _linear(srgb: Doubles) -> Doubles:
-    """IEC 61966-2-1."""
+    """Decode sRGB by IEC 61966-2-1."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055)**2.4)

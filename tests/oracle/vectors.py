@@ -1,4 +1,4 @@
-"""Rows of 3-vectors, (n, 3) float64."""
+"""Operations on rows of 3-vectors, (n, 3) float64."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ Whole = NDArray[np.int64]
 
 
 def dot(a: Doubles, b: Doubles) -> Doubles:
-    """(n,) scalar products of rows."""
+    """Return the scalar products of rows, (n,)."""
     return np.asarray(np.einsum("...i,...i->...", a, b))
 
 
 def unit(a: Doubles) -> Doubles:
-    """Rows divided by their lengths."""
+    """Return rows divided by their lengths."""
     return np.asarray(a / np.linalg.norm(a, axis=-1, keepdims=True))
 
 

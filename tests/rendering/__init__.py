@@ -1,1 +1,1 @@
-"""Tests of the rendering room and of the kernels."""
+"""Tests of the rendering package and of the kernels."""

@@ -1,4 +1,4 @@
-"""Renders with checkpoints, and whether two are the same."""
+"""Helpers that render with checkpoints and compare two renders."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ SIZE = (61, 44)
 
 
 def renderer(device: Device, scene: Scene | None = None, **options: Any) -> Renderer:
-    """At SIZE, with checkpoints as often as their cost allows, if there are any."""
+    """Return a renderer at SIZE that, if given a checkpoint, writes it as often as the cost limit allows."""
     given = {"size": SIZE, "seed": 1, "spp": 24, "checkpoint_seconds": 0.0, **options}
     return Renderer(scene or room(), device=device.info.index, **given)
 
 
 def run(running: Renderer, **stops: float) -> State:
-    """Where it ends with these stop conditions."""
+    """Render until these stop conditions hold and return the last state."""
     return list(running.passes(**stops))[-1]  # type: ignore[arg-type]
 
 
 def same(a: Renderer, b: Renderer) -> bool:
-    """Whether film, samples, estimate and what the history says of powers of two are the same bit for bit."""
+    """Return whether film, sample counts, estimate and the history at powers of two are equal bit for bit."""
     histories = [{entry["spp"]: entry["noise"] for entry in r.history if entry["spp"] & (entry["spp"] - 1) == 0}
                  for r in (a, b)]
     films = [(r.session.film().pixels, r.session.tile_samples, *r._convergence.noise.arrays()) for r in (a, b)]

@@ -1,4 +1,4 @@
-"""Cook–Torrance with GGX in float64: the formulas as printed, and the albedo of its microfacets by quadrature."""
+"""Cook–Torrance with GGX in float64: the published formulas, and the microfacet albedo by quadrature."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Doubles = NDArray[np.float64]
 
 
 def cook_torrance(material: MetallicRoughness, wo: Doubles, wi: Doubles) -> Doubles:
-    """(n, 3) f = F·G·D/(4 cos cos) + coupling·(1 − metallic)·color/pi.
+    """Return f = F·G·D/(4 cos cos) + coupling·(1 − metallic)·color/pi, (n, 3).
 
-    F of Schlick, D of Walter 2007 (eq. 33); the coupling by its name.
+    F is Schlick's, D that of Walter 2007 (eq. 33); the coupling is the one that the material names.
     """
     color, f0 = np.array(untextured(material.color)), np.full(3, ((material.ior - 1) / (material.ior + 1))**2)
     metallic, roughness = untextured(material.metallic), untextured(material.roughness)
@@ -40,7 +40,8 @@ def cook_torrance(material: MetallicRoughness, wo: Doubles, wi: Doubles) -> Doub
 
 
 def coupling_by_albedo(f0: float, alpha: float, smith: str, cos_o: Doubles, cos_i: Doubles) -> Doubles:
-    """(1 − E(wi))(1 − E(wo))/(1 − mean E), E = f0·(first − second) + second of `albedos`: interpolated in √cos."""
+    """Return (1 − E(wi))(1 − E(wo))/(1 − mean E), E = f0·(first − second) + second of `albedos`, interpolated in √cos.
+    """
     nodes = np.linspace(0.01, 1, 60)
     left = [1 - f0 * (whole - part) - part for whole, part in (albedos(alpha, c * c, smith, 300) for c in nodes)]
     spline = CubicSpline(nodes, left)
@@ -51,7 +52,8 @@ def coupling_by_albedo(f0: float, alpha: float, smith: str, cos_o: Doubles, cos_
 
 
 def masking(smith: str, alpha: float, cos_o: Doubles, cos_i: Doubles) -> Doubles:
-    """G in its four forms: Heitz 2014 (eq. 99 and 72), Walter 2007 (eq. 34), Karis 2013 with its two k."""
+    """Return G in one of its four forms: Heitz 2014 (eq. 99 and 72), Walter 2007 (eq. 34), Karis 2013 with its two k.
+    """
     if smith.startswith("schlick"):
         k = (np.sqrt(alpha) + 1)**2 / 8 if smith == "schlick" else alpha / 2
         return np.asarray(cos_o / (cos_o * (1 - k) + k) * cos_i / (cos_i * (1 - k) + k))
@@ -62,18 +64,18 @@ def masking(smith: str, alpha: float, cos_o: Doubles, cos_i: Doubles) -> Doubles
 
 
 def bump_shadowing(unbent: Doubles, bent: Doubles, w: Doubles) -> float:
-    """What bumps leave of matte light from w: listing 12-1 of Estevez, Lecocq and Stein 2019."""
+    """Return the bump shadowing factor of diffuse light from w: listing 12-1 of Estevez, Lecocq and Stein 2019."""
     slope, angle = (1 / float(v @ unbent / np.linalg.norm(v))**2 - 1 for v in (bent, w))
     return 2 / (1 + np.sqrt(1 + min(slope / 8, 1) * angle)) if w @ unbent > 0 else 0.0
 
 
 def albedo(alpha: float, cosine: float, smith: str, steps: int = 500) -> float:
-    """What microfacets with F = 1 reflect of a white furnace in one bounce."""
+    """Return the single-scattering albedo of microfacets with F = 1 in a white furnace."""
     return albedos(alpha, cosine, smith, steps)[0]
 
 
 def albedos(alpha: float, cosine: float, smith: str, steps: int = 500) -> tuple[float, float]:
-    """What microfacets reflect of a white furnace in one bounce, with F = 1 and with F = (1 − wo·h)^5.
+    """Return the single-scattering albedos of microfacets in a white furnace, with F = 1 and with F = (1 − wo·h)^5.
 
     ∫ f·cos wi dωi over half vectors, dωi = 4 (wo·h) dωh, with s from D·cos θh dωh = ds dphi/(2·pi),
     tan²θh = alpha²·s/(1 − s): the midpoint rule in phi and x, where 1 − s = (1 − x)³ to reach steep half vectors.

@@ -1,4 +1,4 @@
-"""What layers leave to what lies below them, and how that reflects it, in float64."""
+"""Transmittance of material layers and the reflection of the base below them, in float64."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ ROOTS = np.linspace(1e-3, 1, 1000)
 
 
 def under_coat(strength: float, roughness: float) -> Left:
-    """1 − strength·E, E of a single bounce with F0 = 0.04."""
+    """Return 1 − strength·E, with E the single-scattering albedo for F0 = 0.04."""
     return lambda cosines: 1 - strength * gloss_albedo(cosines, roughness, 0.04)
 
 
 def under_fibres(strength: float, roughness: float) -> Left:
-    """1 − strength·E, E of fibres as they are bounded."""
+    """Return 1 − strength·E, with E the bounded sheen albedo."""
     left = 1 - strength * sheen.bounded_albedo(ROOTS**2, max(roughness, 0.1)**-2)
     return lambda cosines: np.interp(np.sqrt(cosines), ROOTS, left)
 
 
 def gloss_albedo(cosines: Doubles, roughness: float, f0: float) -> Doubles:
-    """(n,) what GGX reflects of light from there in a single bounce."""
+    """Return the single-scattering directional albedo of GGX, (n,)."""
     whole, grazing = single(cosines, roughness)
     return np.asarray(f0 * (whole - grazing) + grazing)
 
 
 def lost(cosines: Doubles, roughness: float) -> Doubles:
-    """(n,) what a single bounce with F = 1 loses."""
+    """Return the energy lost by a single bounce with F = 1, (n,)."""
     return np.asarray(1 - single(cosines, roughness)[0])
 
 
 def single(cosines: Doubles, roughness: float) -> tuple[Doubles, Doubles]:
-    """(n,) `microfacets.albedos`, interpolated in √cos."""
+    """Return `microfacets.albedos`, interpolated in √cos, (n,) each."""
     whole, grazing = tables(roughness)
     roots = np.sqrt(cosines)
     return np.interp(roots, ROOTS, whole), np.interp(roots, ROOTS, grazing)
@@ -53,15 +53,15 @@ def tables(roughness: float) -> tuple[Doubles, Doubles]:
 
 
 def mean(f: Left) -> Doubles:
-    """Over the hemisphere, weighted by the cosine, of f with values (n, ...)."""
+    """Return the cosine-weighted hemispherical mean of f, whose values are (n, ...)."""
     t, weight = np.polynomial.legendre.leggauss(60)
     root = (t + 1) / 2
     return np.asarray(np.tensordot(weight * 2 * root**3, f(root**2), 1))
 
 
 class Below:
-    """What a body of index 1.5 with further bounces reflects below layers: gloss·min(T, T) + R(wo)·R(wi)/(pi·mean R),
-    R = T·r + what min takes from the gloss (bsdf/layers.cl). left: T."""
+    """Base of index 1.5 with multiple scattering below layers: gloss·min(T, T) + R(wo)·R(wi)/(pi·mean R),
+    R = T·r + what min takes from the gloss (bsdf/layers.cl). `left` is T."""
 
     def __init__(self, color: tuple[float, float, float], metallic: float, roughness: float, left: Left) -> None:
         self.roughness, self.metallic, self.colors = roughness, metallic, np.array(color)
@@ -72,18 +72,19 @@ class Below:
         self.mean = mean(lambda cosines: left(cosines)[:, None] * self.r(cosines) + self.taken(cosines))
 
     def r(self, cosines: Doubles) -> Doubles:
-        """(n, 3)"""
+        """Return the base's albedo without the single-scattering gloss, (n, 3)."""
         fresnel, mean_lost = (1 + 20 * self.colors) / 21, mean(lambda c: lost(c, self.roughness))
         multiple = self.metallic * fresnel**2 * (1 - mean_lost) / (1 - fresnel * mean_lost)
         body = (1 - self.metallic) * self.colors * (1 - gloss_albedo(cosines, self.roughness, 0.04))[:, None]
         return np.asarray(body + multiple * lost(cosines, self.roughness)[:, None])
 
     def taken(self, cosines: Doubles) -> Doubles:
-        """(n, 3)"""
+        """Return what min takes from the gloss, interpolated in √cos, (n, 3)."""
         return np.column_stack([np.interp(np.sqrt(cosines), self.steps, each) for each in self.taken_at.T])
 
     def value(self, gloss: Doubles, cos_o: Doubles, cos_i: Doubles, left_o: Doubles, left_i: Doubles) -> Doubles:
-        """(n, 3) f·cos wi, with the gloss without layers (n, 3), and of wo and wi the cosines and T there (n,)."""
+        """Return f·cos wi (n, 3), given the gloss without layers (n, 3) and the cosines and T of wo and wi, (n,) each.
+        """
         each = [left[:, None] * self.r(cosines) + self.taken(cosines)
                 for left, cosines in ((left_o, cos_o), (left_i, cos_i))]
         diffuse = each[0] * each[1] * cos_i[:, None] / (np.pi * self.mean)
@@ -91,9 +92,9 @@ class Below:
 
 
 def taken_from_gloss(left: Left, cosine: float, alpha: float, f0: float) -> float:
-    """∫ (left(cos wo) − min(left(cos wo), left(cos wi))) f·cos wi dwi of GGX with a Schlick term.
+    """Return ∫ (left(cos wo) − min(left(cos wo), left(cos wi))) f·cos wi dwi of GGX with a Schlick term.
 
-    Over half vectors, tan θ = alpha·tan psi, by Gauss and Legendre's rule in the azimuth and psi.
+    Over half vectors, tan θ = alpha·tan psi, by Gauss–Legendre quadrature in the azimuth and psi.
     """
     t, weight = np.polynomial.legendre.leggauss(200)
     phi, psi = np.pi * (t + 1)[:, None] / 2, np.pi * (t + 1) / 4

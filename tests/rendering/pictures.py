@@ -1,4 +1,4 @@
-"""Renders small scenes on a device, and what the camera sees in float64."""
+"""Helpers that render small scenes on a device, and the camera's view rays in float64."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ Doubles = NDArray[np.float64]
 
 
 def session(device: Device, scene: Scene, sampler: Sampler = "independent", **chosen: Any) -> Session:
-    """The scene with its own settings but for the sampler: statistics are those of independent samples.
+    """Return a session of the scene with its own settings except for the sampler: the tests assume independent samples.
 
-    `chosen`: see Choices. Programs stay in memory from one to the next.
+    `chosen`: see Choices. Compiled programs are shared between sessions.
     """
     settings = replace(scene.render, sampler=sampler)
     return Session(device, compile_scene(replace(scene, render=settings), choices(device, **chosen)), settings.size,
@@ -32,7 +32,7 @@ def session(device: Device, scene: Scene, sampler: Sampler = "independent", **ch
 
 
 def film(device: Device, scene: Scene, spp: int | None = None, **chosen: Any) -> Film:
-    """The scene's film after spp samples a pixel, or as many as its settings say; see `session`."""
+    """Return the scene's film after spp samples per pixel (default: its settings' spp); see `session`."""
     running = session(device, scene, **chosen)
     for _ in running.render(spp or scene.render.spp):
         pass
@@ -40,7 +40,8 @@ def film(device: Device, scene: Scene, spp: int | None = None, **chosen: Any) ->
 
 
 def pixel_p_values(film: Film, expected: Doubles) -> Doubles:
-    """(h, w, 3) p-values of the pixels' means, a dozen float32 roundings aside, against expected (h, w, 3)."""
+    """Return the p-values (h, w, 3) of the pixel means against expected (h, w, 3), allowing a dozen float32 roundings.
+    """
     count = film.pixels["count"].astype(np.float64)[..., None]
     squares = (film.pixels["square"].astype(np.float64) + film.pixels["square_error"]) / count
     variance = np.maximum(squares - film.mean**2, 0) * count / (count - 1)
@@ -48,9 +49,9 @@ def pixel_p_values(film: Film, expected: Doubles) -> Doubles:
 
 
 def view_rays(camera: Camera, size: tuple[int, int], x: Doubles, y: Doubles) -> Doubles:
-    """(n, 3) directions, not of unit length, through picture points (x, y) in pixels from the upper left corner.
+    """Return directions (n, 3), not normalized, through image points (x, y) in pixels from the upper left corner.
 
-    The picture's right is cross(forward, up), and `fov_degrees` the full vertical angle.
+    The image's right is cross(forward, up), and `fov_degrees` the full vertical angle.
     """
     forward, right, up, extent = frame(camera)
     a, b = (2 * x / size[0] - 1) * size[0] / size[1] * extent, (1 - 2 * y / size[1]) * extent
@@ -58,7 +59,7 @@ def view_rays(camera: Camera, size: tuple[int, int], x: Doubles, y: Doubles) -> 
 
 
 def frame(camera: Camera) -> tuple[Doubles, Doubles, Doubles, float]:
-    """Unit forward, right and up, and the tangent of half the vertical angle."""
+    """Return unit forward, right and up, and the tangent of half the vertical angle."""
     forward = np.subtract(camera.look_at, camera.position)
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, camera.up)
@@ -67,7 +68,9 @@ def frame(camera: Camera) -> tuple[Doubles, Doubles, Doubles, float]:
 
 
 def pixel_points(camera: Camera, size: tuple[int, int], height: float, steps: int = 4) -> Doubles:
-    """(h, w, steps², 3): the plane y = height seen at Gauss–Legendre points of each pixel (see pixel_means)."""
+    """Return the points (h, w, steps², 3) of the plane y = height at Gauss–Legendre nodes of
+    each pixel (see pixel_means).
+    """
     nodes = (np.polynomial.legendre.leggauss(steps)[0] + 1) / 2
     x, y = np.meshgrid(np.add.outer(np.arange(size[0]), nodes).ravel(), np.add.outer(np.arange(size[1]), nodes).ravel())
     w = view_rays(camera, size, x, y)
@@ -76,18 +79,18 @@ def pixel_points(camera: Camera, size: tuple[int, int], height: float, steps: in
 
 
 def pixel_means(values: Doubles) -> Doubles:
-    """(h, w, k): means over each pixel of values (h, w, steps², k) at pixel_points."""
+    """Return the means (h, w, k) over each pixel of values (h, w, steps², k) at pixel_points."""
     weights = np.polynomial.legendre.leggauss(int(np.sqrt(values.shape[2])))[1] / 2
     return np.asarray(np.einsum("hwsk,s->hwk", values, np.outer(weights, weights).ravel()))
 
 
 def quad(corners: list[tuple[float, float, float]], material: Material) -> Mesh:
-    """Four corners, counter-clockwise seen from the front."""
+    """Return a quad of four corners, counter-clockwise seen from the front."""
     return Mesh(np.array(corners, np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.int32), material)
 
 
 def box(half: float, material: Material) -> Mesh:
-    """The cube [−half, half]³ whose front sides face inwards."""
+    """Return the cube [−half, half]³ with its front faces inwards."""
     corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float32) * np.float32(half)
     sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = np.array([side for a, b, c, d in sides for side in ((a, b, c), (a, c, d))], np.int32)

@@ -1,4 +1,4 @@
-"""Rays against triangles and spheres in float64, one against all, and shapes to shoot at."""
+"""Brute-force ray–triangle and ray–sphere intersection in float64, and test shapes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GOLDEN = (1 + 5**0.5) / 2
 
 
 def icosphere(subdivisions: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Vertices (n, 3) and faces (20·4^subdivisions, 3) of the unit sphere, closed: neighbours share their vertices."""
+    """Return vertices (n, 3) and faces (20·4^subdivisions, 3) of a closed unit icosphere with shared vertices."""
     vertices = np.array([p for a in (-1, 1) for b in (-GOLDEN, GOLDEN) for p in ((0, a, b), (a, b, 0), (b, 0, a))])
     i, j, k = np.array([(i, j, k) for i in range(12) for j in range(i) for k in range(j)]).T
     edges = [np.linalg.norm(vertices[a] - vertices[b], axis=1) for a, b in ((i, j), (j, k), (k, i))]
@@ -30,7 +30,7 @@ def icosphere(subdivisions: int) -> tuple[NDArray[np.float32], NDArray[np.int32]
 
 
 def grid(side: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """2·side² triangles that fill the square [0, side]² of the plane y = 0, at whole numbers."""
+    """Return 2·side² triangles that fill the square [0, side]² of the plane y = 0, with integer coordinates."""
     z, x = np.divmod(np.arange((side + 1)**2), side + 1)
     corner = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()[:, None]
     faces = np.concatenate([corner + [0, side + 1, side + 2], corner + [0, side + 2, 1]])
@@ -38,9 +38,9 @@ def grid(side: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
 
 
 def hit_triangles(corners: Doubles, origin: Doubles, direction: Doubles) -> tuple[Doubles, Integers, Doubles]:
-    """(n,) t of the closest of triangles (m, 3, 3), inf for none; which; and how near a decision was.
+    """Return (n,) t of the closest hit among triangles (m, 3, 3), inf for a miss; its index; and the decision's margin.
 
-    Möller–Trumbore. The margin of a ray is the least relative distance, over all triangles that matter, of a
+    Möller–Trumbore. A ray's margin is the least relative distance, over all relevant triangles, of a
     barycentric coordinate from an edge, and of the next t from the closest.
     """
     p0, e1, e2 = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -59,7 +59,9 @@ def hit_triangles(corners: Doubles, origin: Doubles, direction: Doubles) -> tupl
 
 
 def hit_spheres(spheres: Doubles, origin: Doubles, direction: Doubles) -> tuple[Doubles, Integers, Doubles]:
-    """The same for spheres (m, 4), centre and radius; the margin is the discriminant's distance from 0."""
+    """Intersect spheres (m, 4), centre and radius, like `hit_triangles`; the margin is the
+    discriminant's distance from 0.
+    """
     f = origin[:, None] - spheres[:, :3]
     a, b = np.sum(direction**2, axis=1)[:, None], np.sum(f * direction[:, None], axis=2)
     beside = f - (b / a)[..., None] * direction[:, None]
@@ -71,6 +73,6 @@ def hit_spheres(spheres: Doubles, origin: Doubles, direction: Doubles) -> tuple[
 
 
 def _gap(t_hit: Doubles) -> Doubles:
-    """How much farther the second hit is than the first, relatively; inf where there are not two."""
+    """Return the relative distance from the first to the second hit; inf if there are fewer than two."""
     first, second = np.sort(t_hit, axis=1)[:, :2].T
     return np.asarray(np.divide(second, first, out=np.full(len(first), np.inf), where=np.isfinite(second)) - 1)

@@ -1,4 +1,4 @@
-"""Latitude–longitude pictures in float64, by the convention of the scene file: look-up, directions, irradiance."""
+"""Equirectangular environment maps in float64, in the scene file's convention: look-up, directions, irradiance."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ Doubles = NDArray[np.float64]
 
 
 def lookup(image: NDArray[np.float32], w: Doubles, rotation_degrees: float = 0.0) -> Doubles:
-    """(n, 3) radiance from unit directions w (n, 3).
+    """Return the radiance (n, 3) from unit directions w (n, 3).
 
     u = atan2(x, −z)/2·pi mod 1, v = acos(y)/pi; texel centres at ((column + ½)/width, (row + ½)/height); bilinear, u
-    wraps, v clamps. The sky turns counter-clockwise seen from above, +Y, so a direction is turned back first.
+    wraps, v clamps. The map rotates counter-clockwise seen from above, +Y, so directions are rotated back first.
     """
     u, v = to_uv(turned(w, -rotation_degrees))
     height, width = image.shape[:2]
@@ -37,14 +37,16 @@ def from_uv(u: Doubles, v: Doubles) -> Doubles:
 
 
 def turned(w: Doubles, degrees: float) -> Doubles:
-    """Turned about +Y, counter-clockwise seen from above: +Z goes towards +X."""
+    """Rotate about +Y, counter-clockwise seen from above: +Z goes towards +X."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.asarray(w @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T)
 
 
 def irradiance(image: NDArray[np.float32], normal: Doubles, rotation_degrees: float = 0.0, steps: int = 24,
                where: NDArray[np.bool_] | None = None) -> Doubles:
-    """(3,) ∫ L max(w·normal, 0) dω by the midpoint rule, steps by steps points a texel; of some texels (h, w) alone."""
+    """Return ∫ L max(w·normal, 0) dω (3,), by the midpoint rule with steps² points per texel,
+    over the texels in `where`.
+    """
     height, width = image.shape[:2]
     u = (np.arange(width * steps) + 0.5) / (width * steps)
     v = (np.arange(height * steps) + 0.5) / (height * steps)

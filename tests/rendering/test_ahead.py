@@ -1,4 +1,4 @@
-"""Programs that are compiled beside a tree's builder: the ones that the scene will need, and once."""
+"""Compiling ahead while the BVH is built: the programs are those that the scene needs, each compiled once."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from clrt.threads import beside
 
 SCENES = Path(__file__).parents[2] / "scenes"
 MODEL = SCENES / "models" / "dragon.ply"
-POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # which pip brings
+POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # the copy that pip installs
 
 
 @pytest.mark.parametrize("name", ["dragon", "depth_of_field", "sunlit", "night", "spot", "mirrors", "local", "tree"])
 def test_an_outline_has_the_scene_s_program(device: Device, name: str) -> None:
-    """Also with lamps, textures, lenses, and spheres."""
+    """The outline compiles to the scene's program, also with lights, textures, lenses and spheres."""
     scene = clrt.load(SCENES / f"{name}.toml")
     choices = Choices(device.lanes, layout="bvh8", builder="ploc")
     whole, outlined = (compile_scene(each, choices, device=device) for each in (scene, outline(scene)))
@@ -39,7 +39,7 @@ def test_an_outline_has_the_scene_s_program(device: Device, name: str) -> None:
 
 
 def test_each_program_is_compiled_once(tmp_path: Path) -> None:
-    """The tree's builder and the scene's, that is."""
+    """A render compiles two programs, the BVH builder's and the scene's, and a second render none."""
     places = {"PATH": os.environ["PATH"], "HOME": str(tmp_path), "CLRT_CACHE_DIR": str(tmp_path / "cache"),
               "POCL_CACHE_DIR": str(tmp_path / "kept"), "OCL_ICD_VENDORS": str(POCL)}
     for picture in ("cold.exr", "warm.exr"):
@@ -50,7 +50,7 @@ def test_each_program_is_compiled_once(tmp_path: Path) -> None:
 
 
 def test_what_is_refused_is_refused_as_without(device: Device) -> None:
-    """A scene of two triangles needs no tree, but one with instances does."""
+    """Errors are the same as without compiling ahead: two triangles need no BVH, but a scene with instances does."""
     one = clrt.Mesh(np.eye(4, 3, dtype=np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.int32))
     scene = clrt.Scene(meshes=[one], instances=[clrt.Instance(one, np.eye(3, 4) * (2 + i)) for i in range(40)])
     compiled = compile_scene(scene, Choices(device.lanes, builder="ploc"), device=device, ahead=True)
@@ -70,7 +70,7 @@ def test_without_a_temporary_folder_it_is_compiled_here(device: Device, monkeypa
 
 @pytest.mark.parametrize("size, begun", [(16, 1), (2048, 0)])
 def test_large_scenes_are_left_alone(device: Device, monkeypatch: pytest.MonkeyPatch, size: int, begun: int) -> None:
-    """Here one with a large sky: what it takes would be taken twice."""
+    """Nothing is compiled ahead for a scene with a large environment map, whose cost would be paid twice."""
     asked, waits = list[str](), list[Callable[[], None]]()
     monkeypatch.setattr(ahead, "compile_ahead", lambda device, source: asked.append(source))
     monkeypatch.setattr(ahead, "is_kept", lambda device, source: False)

@@ -1,4 +1,4 @@
-"""Pictures beside the picture: what each is, against float64 and against the picture itself."""
+"""AOVs against float64 references and against the image itself."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ CENTER, RADIUS = np.array([0.2, -0.1, 0.0]), 0.9
 
 
 def rendered(scene: Scene, names: str = ",".join(AOVS), spp: int = 4, **options: Any) -> tuple[Doubles, Pictures]:
-    """The picture's pixels, float32, and its AOVs."""
+    """Return the image's pixels, float32, and its AOVs."""
     image = clrt.render(scene, spp=spp, aovs=names, **options)
     return image.pixels, image.aovs  # type: ignore[return-value]
 
 
 def ball_on_floor(at: Doubles = np.zeros(3), scale: float = 1.0) -> Scene:
-    """A red sphere above a white floor of 2 triangles, under an empty sky, moved and scaled."""
+    """Return a red sphere above a white floor of 2 triangles, in a constant environment, translated and scaled."""
     def place(p: Any) -> Any:
         return tuple((scale * np.array(p, np.float64) + at).tolist())
 
@@ -52,7 +52,7 @@ def ball_on_floor(at: Doubles = np.zeros(3), scale: float = 1.0) -> Scene:
 
 
 def middles(size: tuple[int, int] = SIZE) -> tuple[Doubles, Doubles]:
-    """(h, w, 3) unit directions of the rays through the pixels' middles, and their distances to the sphere, or inf."""
+    """Return unit directions (h, w, 3) of the rays through pixel centres, and their distances to the sphere, or inf."""
     w = view_rays(CAMERA, size, *np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5))
     w /= np.linalg.norm(w, axis=-1, keepdims=True)
     to_center = CENTER - CAMERA.position
@@ -64,7 +64,7 @@ def middles(size: tuple[int, int] = SIZE) -> tuple[Doubles, Doubles]:
 @pytest.mark.parametrize("at, scale", [
     ((4e3, -3e3, 0), 1.0), ((0, 0, 0), 2.0**-40), *others(((0, 0, 0), 1.0), ((0, 0, 0), 2.0**30))], ids=str)
 def test_places_and_numbers_are_those_of_the_middle_s_ray(at: Any, scale: float) -> None:
-    """Whatever the filter, wherever the scene stands, in its own units."""
+    """Depth, position and ids are those of the pixel centre's ray for any filter, scene position and scale."""
     _, found = rendered(ball_on_floor(np.array(at), scale), "depth,position,primitive,object,material",
                         filter="blackman_harris")
     w, ball = middles()
@@ -81,12 +81,12 @@ def test_places_and_numbers_are_those_of_the_middle_s_ray(at: Any, scale: float)
     np.testing.assert_allclose(found["position"], position, atol=2e-6 * scale + 1e-7 * np.abs(at).max())
     expected = np.where(missed, -1, np.where(on_floor, 0, 1))
     assert np.array_equal(found["object"], expected) and np.array_equal(found["material"], expected)
-    half = met[..., 0] > -met[..., 2]   # of the floor: corners 0 1 2, then 0 2 3
+    half = met[..., 0] > -met[..., 2]   # floor triangles: corners 0 1 2, then 0 2 3
     assert np.array_equal(found["primitive"], np.where(missed, -1, on_floor & ~half))
 
 
 def test_numbers_count_by_objects_and_by_materials() -> None:
-    """Triangles in their mesh; meshes, then spheres; materials that are alike are one."""
+    """Primitive ids count triangles within their mesh, object ids meshes then spheres; equal materials share an id."""
     def wall(x: float, material: Any) -> Mesh:
         return quad([(x - 0.5, -2, 0), (x + 0.5, -2, 0), (x + 0.5, 2, 0), (x - 0.5, 2, 0)], material)
 
@@ -102,7 +102,7 @@ def test_numbers_count_by_objects_and_by_materials() -> None:
 
 
 def test_albedo_and_normals_are_of_the_first_surface() -> None:
-    """A mirror has its own, and a sky none. Where a normal leans, the geometric one does not."""
+    """A mirror has its own albedo, and a sky no normal. Shading normals do not change the geometric normal."""
     wall = quad([(-2, -2, -1), (2, -2, -1), (2, 2, -1), (-2, 2, -1)], Mirror(color=(0.9, 0.8, 0.5)))
     wall.normals = np.tile(np.array([0.6, 0.0, 0.8], np.float32), (4, 1))
     scene = Scene(meshes=[wall], environment=Environment(color=(2, 2, 2)), render=RenderSettings(size=(3, 2)),
@@ -116,7 +116,9 @@ def test_albedo_and_normals_are_of_the_first_surface() -> None:
 
 
 def test_textures_and_normal_maps_are_seen() -> None:
-    """An albedo is its texels', and a normal bent, but not the geometric one; materials not asked for are left out."""
+    """Albedo is that of the texels; normal maps bend the normal but not the geometric one; materials are left out of
+    the program if no AOV needs them.
+    """
     def plain(*rgb: int) -> Texture:
         return Texture(picture=Picture(np.full((2, 2, 4), (*rgb, 255), np.uint8)))
 
@@ -135,7 +137,7 @@ def test_textures_and_normal_maps_are_seen() -> None:
 
 
 def test_what_is_not_there_is_looked_through() -> None:
-    """A pane of no opacity, and the back of one with one side: what is behind is met, as far off as it is."""
+    """AOVs see through a pane of opacity 0 and a one-sided pane's back, with the depth of the surface behind."""
     def wall(z: float, material: Diffuse) -> Mesh:
         return quad([(-2, -2, z), (2, -2, z), (2, 2, z), (-2, 2, z)], material)
 
@@ -152,7 +154,7 @@ def test_what_is_not_there_is_looked_through() -> None:
 
 
 def test_albedo_is_a_mean_over_the_pixel() -> None:
-    """A wall over half of the middle column."""
+    """The pixel mean of the albedo of a wall that covers half of the middle column."""
     half = quad([(-2, -2, -1), (0, -2, -1), (0, 2, -1), (-2, 2, -1)], Diffuse(color=RED))
     scene = Scene(meshes=[half], environment=Environment(color=(1, 1, 1)), render=RenderSettings(size=(5, 3)),
                   camera=Camera(position=(0, 0, 0.9), look_at=(0, 0, -1), fov_degrees=20))
@@ -165,8 +167,8 @@ def test_albedo_is_a_mean_over_the_pixel() -> None:
 @pytest.mark.parametrize("options", [
     {}, *others({"adaptive": True}, {"lanes": 1, "filter": "blackman_harris"})], ids=str)
 def test_direct_and_indirect_light_add_up_to_the_picture(options: dict[str, Any]) -> None:
-    """To the last bit; and the picture is the one that there is without them. Direct light is what paths of two edges
-    bring, so it is the picture of depth 2, of the same samples."""
+    """Direct and indirect light sum to the image exactly, and the image is the same without these AOVs. Direct light is
+    that of paths of depth 2, so it equals the image of max_depth 2 from the same samples."""
     pixels, found = rendered(everything(), "indirect,direct", 32, **options)
     assert list(found) == ["indirect", "direct"]
     assert np.array_equal(found["direct"] + found["indirect"], pixels)
@@ -181,7 +183,9 @@ def test_direct_and_indirect_light_add_up_to_the_picture(options: dict[str, Any]
     {"aperture_radius": 0.3, "focus_distance": 2.0},
     *others({"projection": "orthographic"}, {"projection": "equirectangular"})], ids=str)
 def test_depth_is_what_the_integrator_of_it_shows(camera: dict[str, Any]) -> None:
-    """For every camera; of a lens the ray through its middle."""
+    """The depth AOV equals the depth integrator's image for every camera; with a lens it uses
+    the ray through its centre.
+    """
     scene = ball_on_floor()
     scene.camera = replace(scene.camera, **camera)
     pixels, found = rendered(scene, "depth", 1, integrator="depth")
@@ -204,13 +208,13 @@ def test_light_of_two_edges_is_all_direct() -> None:
 
 @pytest.mark.statistics
 def test_variance_is_that_of_the_mean() -> None:
-    """Among pictures of other seeds, of independent samples: their sample variance has 199 degrees of freedom."""
+    """It matches the variance among renders with other seeds and independent samples (199 degrees of freedom)."""
     scene = ball_on_floor()
     scene.render = replace(scene.render, sampler="independent", size=(8, 6))
     runs = [rendered(scene, "variance,samples", 16, seed=seed) for seed in range(200)]
     measured = np.var([pixels for pixels, _ in runs], axis=0, ddof=1, dtype=np.float64)
     told = np.mean([found["variance"] for _, found in runs], axis=0, dtype=np.float64)
-    assert told.mean() == pytest.approx(measured.mean(), rel=0.05)   # 0.1 each of 48 pixels, and channels alike
+    assert told.mean() == pytest.approx(measured.mean(), rel=0.05)   # 0.1 for each of 48 pixels; channels are alike
     assert all(np.all(found["samples"] == 16) for _, found in runs)
     assert np.all(np.isnan(rendered(scene, "variance", 1)[1]["variance"]))
 
@@ -223,7 +227,7 @@ def test_samples_are_counted_where_they_went() -> None:
 
 
 def test_only_what_is_asked_for_is_compiled() -> None:
-    """Nothing of the picture's program knows of AOVs, but with direct or indirect light."""
+    """The image's program has no code for AOVs, except for direct or indirect light."""
     plain, light = (compile_scene(everything(), Choices(direct_light=apart)) for apart in (False, True))
     assert set(light.features) - set(plain.features) == {"DIRECT_LIGHT"} and light.files == plain.files
     assert "first_hit.cl" not in plain.files
@@ -235,7 +239,7 @@ def test_only_what_is_asked_for_is_compiled() -> None:
 
 
 def test_a_checkpoint_keeps_direct_light(tmp_path: Any) -> None:
-    """And one without it is another render's."""
+    """A checkpoint without direct light is rejected as another render's."""
     path = tmp_path / "a.ck"
     for _ in Renderer(everything(), spp=24, aovs="direct", checkpoint=path).passes(spp=8):
         pass

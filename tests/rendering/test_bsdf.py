@@ -1,4 +1,4 @@
-"""Every material of the registry: samples, density and value fit, it is reciprocal, and it makes no light."""
+"""Every registered material: samples match the pdf and value, f is reciprocal, and no energy is gained."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from .ggx import cook_torrance
 pytestmark = pytest.mark.statistics
 
 SAMPLES = 1 << 15
-#: Features of materials that have another formula.
+#: Features of materials with another formula.
 OTHERWISE = {"MULTIPLE_SCATTERING", "LAYERS", "SPECULAR"}
-#: Text of the kernels and what makes it wrong by little: densities, the directions drawn, and a value.
+#: Kernel text and replacements that make it slightly wrong: densities, sampled directions, and a value.
 WRONG = {
     "density of the microfacets": ("facets / (1.0f + ggx_lambda(wo, m->alpha))",
                                    "facets / (1.05f + ggx_lambda(wo, m->alpha))"),
@@ -40,8 +40,8 @@ def every(device: Device) -> Bsdfs:
 
 
 def taken() -> list[tuple[Material, float]]:
-    """Every material from every angle; but what light goes through, which takes ten times as long, from every third, or
-    second of two, another for each next material. The study has them all."""
+    """Return every material at every angle, but transmissive ones, which take ten times as long, at every third angle
+    (every second of two), with an offset that changes per material. The study covers all of them."""
     through: dict[Material, list[float]] = {}
     for material, cosine in cases():
         if "TRANSMISSION" in material.features():
@@ -57,7 +57,7 @@ def found(every: Bsdfs) -> list[Scattered]:
 
 
 def test_samples_follow_the_density(found: list[Scattered]) -> None:
-    """Chi-square over cells of the sphere, and one for the failed samples: what the pdf's integral leaves out."""
+    """Chi-square over cells of the sphere, with one cell for failed samples: what the pdf's integral leaves out."""
     assert not rejected({case.name: case.density for case in found if not case.specular})
 
 
@@ -67,19 +67,21 @@ def test_no_light_is_made(found: list[Scattered]) -> None:
 
 
 def test_rows_of_the_study(found: list[Scattered]) -> None:
-    """The same, and densities that integrate to 1 at most, weights that are value over density, unit vectors, and
-    failures exactly below the horizon."""
+    """The study's rows: the tests above, densities that integrate to at most 1, weights equal to value over density,
+    unit vectors, and failures exactly below the horizon."""
     rows = list(scattering_rows(found, SAMPLES))
     assert len(rows) == 5 and not [row for row in rows if row.wrong]
 
 
 def test_specular_is_a_single_direction_on_each_side(found: list[Scattered]) -> None:
-    """And the only one among the materials: others have a density, which eval and pdf agree on."""
+    """Only specular materials report specular samples; the others have a density, on which eval and pdf agree."""
     assert [case.specular for case in found] == [material.is_specular for material, _ in taken()]
 
 
 def test_densities_are_one_over_the_area_of_the_map(every: Bsdfs) -> None:
-    """Known of most samples of every material from most angles; all single lobes are among them."""
+    """The density is 1 over the Jacobian determinant, known for most samples of every material at most angles; all
+    single-lobe materials are included.
+    """
     some = [(material, cosine) for material, cosine in cases() if not material.is_specular]
     checked = {f"{cosine:.2g} {material}": check_density(every, every.materials.index(material), cosine)
                for material, cosine in some}
@@ -95,7 +97,7 @@ def test_reciprocity(every: Bsdfs) -> None:
 
 
 def test_below_the_horizon_nothing_is_reflected(every: Bsdfs) -> None:
-    """But by what spreads light beyond the surface; and nothing is seen from below without being turned."""
+    """Only transmissive materials scatter below the horizon, and nothing is seen from below without being flipped."""
     wo, wi = above(1000, 3), above(1000, 4) * [1, 1, -1]
     for which, material in enumerate(every.materials):
         assert not every.value(which, wi, wo)[0].any(), material
@@ -107,7 +109,7 @@ def test_below_the_horizon_nothing_is_reflected(every: Bsdfs) -> None:
 
 
 def test_the_others_of_a_scene_change_nothing(device: Device) -> None:
-    """A few materials share a program with less in it than that of many."""
+    """Values of a few materials are the same as in a program compiled for many."""
     seed, (wo, wi) = todays_seed(), (above(300, 7), above(300, 8))
     print(f"seed {seed}")
     kinds: list[type[Material]] = [MetallicRoughness, MetallicRoughness, *DRAWERS]
@@ -123,24 +125,24 @@ def test_the_others_of_a_scene_change_nothing(device: Device) -> None:
 
 
 def test_cook_torrance(every: Bsdfs) -> None:
-    """eval against the formula of the theses, in float64, in all its forms."""
+    """eval against the published formula in float64, in all its forms."""
     wo, wi = above(20_000, 5), above(20_000, 6)
     for which, material in enumerate(every.materials):
         if not isinstance(material, MetallicRoughness) or material.features() & OTHERWISE:
             continue
         if material.lobes.alpha > 0.05**2:
             expected = cook_torrance(material, wo, wi) * wi[:, 2:]
-            # A half vector of float32 turns D by some roundings over alpha², and by more where wi is nearly −wo.
+            # A float32 half vector changes D by some roundings over alpha², and by more where wi is close to −wo.
             roundings = 3e-6 / material.lobes.alpha / np.linalg.norm(wo + wi, axis=1, keepdims=True)
             off = np.abs(every.value(which, wo, wi)[0] - expected)
-            # (1 − E(wi))(1 − E(wo))/(1 − mean E): of each factor
+            # (1 − E(wi))(1 − E(wo))/(1 − mean E): the error of each factor
             fitted = 3 * FITTED * wi[:, 2:] / np.pi if material.coupled_by == "albedo" else 0
             assert np.all(off <= roundings * expected + fitted + 2 * 2**-24 / np.pi), material
 
 
 @pytest.mark.parametrize("what", WRONG)
 def test_what_is_wrong_by_little_is_rejected(device: Device, what: str) -> None:
-    """The tests above can fail: each of these few per cent is seen at one material or another."""
+    """The tests above can fail: each of these errors of a few per cent is detected for at least one material."""
     materials: list[Material] = [MetallicRoughness(roughness=0.9, metallic=metallic, color=(1.0, 0.5, 0.2),
                                                    multiple_scattering=True) for metallic in (0.0, 1.0)]
     wrong = bsdfs(device, materials, dict([WRONG[what]]))
@@ -149,13 +151,13 @@ def test_what_is_wrong_by_little_is_rejected(device: Device, what: str) -> None:
 
 
 def test_a_wrong_area_is_rejected(device: Device) -> None:
-    """A density wrong by a twentieth, of one lobe."""
+    """A density of one lobe that is wrong by 5%."""
     wrong = bsdfs(device, [MetallicRoughness(roughness=0.3, metallic=1.0)], dict([WRONG["density of the microfacets"]]))
     assert check_density(wrong, 0, 0.6).error > 0.04 > AREA
 
 
 def test_too_much_light_is_rejected(device: Device) -> None:
-    """Lambert under a gloss weighed by 1 − F at wi·h, as in the sources and in glTF, makes light at grazing wo."""
+    """Lambert below a gloss weighted by 1 − F at wi·h, as published and as in glTF, gains energy at grazing wo."""
     wrong = bsdfs(device, [MetallicRoughness(color=(1.0, 1.0, 1.0), roughness=0.1, coupling="half_vector")])
     assert rejected({"": scatter(wrong, 0, 0.1, SAMPLES, 1).energy}, 1e-9)
 
@@ -167,7 +169,9 @@ def test_one_way_light_is_rejected(device: Device) -> None:
 
 
 def test_registry_is_covered() -> None:
-    """Each material with both ends of its numbers, each flag, each word; and each angle, also through surfaces."""
+    """The cases contain each material with both ends of its ranges, each flag and option; and
+    each angle, also transmitted.
+    """
     materials = [material for material, _ in taken()]
     assert set(materials) == {material for material, _ in cases()}
     angles = [{cosine for material, cosine in some if "TRANSMISSION" in material.features()}

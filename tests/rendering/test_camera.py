@@ -1,4 +1,4 @@
-"""What lies somewhere in the world lies where float64 says in the picture, through every camera."""
+"""Points are projected where a float64 reference projects them, for every camera."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ CAMERAS = {
 
 
 def seen_at(camera: Camera, size: tuple[int, int], x: Doubles, y: Doubles, depth: Doubles) -> tuple[Doubles, Doubles]:
-    """(n, 3) points that the camera sees at (x, y) in pixels, at a depth, and how wide a pixel is there, (n,)."""
+    """Return points (n, 3) that the camera sees at pixel (x, y) and a depth, and the width of a pixel there, (n,)."""
     forward, right, up, extent = frame(camera)
     width, height = size
     a, b = 2 * x / width - 1, 1 - 2 * y / height
@@ -54,7 +54,7 @@ def seen_at(camera: Camera, size: tuple[int, int], x: Doubles, y: Doubles, depth
 
 
 def glowing(centers: Doubles, radii: Doubles) -> list[Sphere]:
-    """Their ratio of green and red tells which is which: 1, 2, ..."""
+    """Return emissive spheres identified by their green to red ratio: 1, 2, ..."""
     return [Sphere(center=tuple(center), radius=radius, material=Diffuse(emission=(1.0, float(i + 1), 0.0)))
             for i, (center, radius) in enumerate(zip(centers.tolist(), radii.tolist()))]
 
@@ -62,10 +62,10 @@ def glowing(centers: Doubles, radii: Doubles) -> list[Sphere]:
 @pytest.mark.parametrize("name", CAMERAS)
 @pytest.mark.parametrize("size", [(40, 30), (21, 55)], ids=str)
 def test_spheres_lie_where_they_are_seen(device: Device, name: str, size: tuple[int, int]) -> None:
-    """Eight glowing spheres, smaller than a pixel, in the middles of pixels; before a lens they are in focus."""
+    """Eight emissive spheres, smaller than a pixel, lie at pixel centres; with a lens they are in focus."""
     camera, (width, height) = CAMERAS[name], size
     rng = np.random.default_rng(1)
-    pixels = width * (height // 5) + rng.permutation(width * (3 * height // 5))[:8]   # poles are far
+    pixels = width * (height // 5) + rng.permutation(width * (3 * height // 5))[:8]   # away from the poles
     columns, rows = pixels % width, pixels // width
     depth = np.full(8, camera.focus_distance) if camera.focus_distance else rng.uniform(5, 50, 8)
     x, y = np.array([columns, rows]) + 0.5
@@ -78,7 +78,7 @@ def test_spheres_lie_where_they_are_seen(device: Device, name: str, size: tuple[
 
 
 def test_right_is_cross_of_forward_and_up(device: Device) -> None:
-    """Looking along −Z with +Y up, +X is on the right and +Y on top; the sky's seam is in the middle."""
+    """Looking along −Z with +Y up, +X is on the right and +Y on top; the environment map's seam is in the middle."""
     image = np.random.default_rng(3).random((4, 8, 3)).astype(np.float32)
     for target in ((0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.3, 0.9, 0.2)):
         looking = Camera(position=(0.0, 0.0, 0.0), look_at=target, fov_degrees=1e-3)
@@ -96,10 +96,10 @@ def test_right_is_cross_of_forward_and_up(device: Device) -> None:
 
 @pytest.mark.parametrize("depth", [6.0, *others(12.0, 40.0)])
 def test_a_point_out_of_focus_is_an_even_disc(device: Device, depth: float) -> None:
-    """Of the radius R·|s − d|/d on the plane of focus, at s, for a lens of radius R and a point at d.
+    """It has the radius R·|s − d|/d on the plane of focus, at s, for a lens of radius R and a point at d.
 
-    Its second moment about its middle is half the radius squared, and a sixth of a pixel's side squared as pixels are
-    squares; the inner half of it has as much of the light as of its area.
+    Its second moment about its centre is half the radius squared, plus a sixth of the squared pixel side, as pixels are
+    squares; its inner part has as large a share of the light as of the area.
     """
     lens = Camera(position=(0.0, 0.0, 10.0), look_at=(0.0, 0.0, 0.0), fov_degrees=10, aperture_radius=1.0)
     extent, side = frame(lens)[3], 64
@@ -121,7 +121,9 @@ def test_a_point_out_of_focus_is_an_even_disc(device: Device, depth: float) -> N
 
 
 def test_all_around_is_the_environments_own_picture(device: Device) -> None:
-    """Along +Z as it is stored, but for its turn and strength; turned like the camera. Pixels are means over it."""
+    """Along +Z it is the environment map as stored, except for rotation and strength, and rotates with the camera.
+    Pixels are means over their area.
+    """
     image = np.random.default_rng(5).random((6, 12, 3)).astype(np.float32)
     size, steps = (24, 12), 16
     v, u = np.meshgrid((np.arange(12 * steps) + 0.5) / (12 * steps), (np.arange(24 * steps) + 0.5) / (24 * steps),
@@ -143,8 +145,8 @@ def test_all_around_is_the_environments_own_picture(device: Device) -> None:
 
 @pytest.mark.parametrize("filter", ["tent", "blackman_harris"])
 def test_all_around_closes_at_its_ends(device: Device, filter: str) -> None:
-    """Filters reach over the seam and the poles to where the picture goes on: a sky of one color stays that color, and
-    one that is even around its axis stays even."""
+    """Filters continue across the seam and the poles: the image stays within the environment map's range, and one that
+    is constant along longitude stays so."""
     image = np.repeat(np.random.default_rng(6).random((4, 1, 3)), 8, axis=1).astype(np.float32)
     camera = Camera(position=(0.0, 0.0, 0.0), look_at=(0.0, 0.0, 1.0), projection="equirectangular")
     settings = RenderSettings(size=(4, 2), spp=4096, filter=filter)  # type: ignore[arg-type]
@@ -156,7 +158,7 @@ def test_all_around_closes_at_its_ends(device: Device, filter: str) -> None:
 
 @pytest.mark.parametrize("name", ["lens", "parallel", "all around"])
 def test_guides_are_seen_by_the_same_rays(device: Device, name: str) -> None:
-    """Spheres that glow in their own color: the picture of what glows is that of albedos, sample by sample."""
+    """With emission equal to albedo, the image of emission equals the albedo guide, sample by sample."""
     rng = np.random.default_rng(2)
     x, y, depth = rng.uniform([[4], [4], [5]], [[20], [14], [12]], (3, 8))
     centers, _ = seen_at(CAMERAS[name], (24, 18), x, y, depth)
@@ -174,7 +176,7 @@ def test_guides_are_seen_by_the_same_rays(device: Device, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["lens", "parallel", "as high as", "all around"])
 def test_pictures_do_not_depend_on_the_unit_of_length(device: Device, name: str) -> None:
-    """Bit for bit, for powers of two."""
+    """Images are equal bit for bit when scaled by powers of two."""
     rng = np.random.default_rng(2)
     x, y, depth = rng.uniform([[4], [4], [3]], [[20], [14], [30]], (3, 8))
     centers, _ = seen_at(CAMERAS[name], (24, 18), x, y, depth)
@@ -193,7 +195,7 @@ def test_pictures_do_not_depend_on_the_unit_of_length(device: Device, name: str)
 
 
 def test_a_camera_compiles_to_its_own_file(device: Device) -> None:
-    """And pinholes draw no numbers for a lens, so the same program has the same picture however its lens is set."""
+    """Pinholes draw no random numbers for a lens, so the image does not depend on the focus distance."""
     files = {name: {file for file in compile_scene(Scene(camera=camera), choices(device)).files
                     if file.startswith("camera/")} for name, camera in CAMERAS.items()}
     kinds: dict[Projection, str] = {"perspective": "pinhole", "orthographic": "orthographic",

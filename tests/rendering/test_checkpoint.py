@@ -1,4 +1,4 @@
-"""Checkpoints: a render that goes on is the one that never stopped."""
+"""Checkpoints: a resumed render equals the uninterrupted one."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
 @covering("stops, adaptive", [{"spp": 40}, {"error": 0.1}], [False, True])
 def test_interrupted_again_and_again(device: Device, tmp_path: Path, small_launches: None, adaptive: bool,
                                      stops: dict[str, float]) -> None:
-    """A new renderer for every few launches, in passes and between them; 40 samples are more than were planned."""
+    """Resume with a new renderer every few launches, inside and between passes; 40 samples are more than planned."""
     at_once = renderer(device, adaptive=adaptive)
     run(at_once, **stops)
     hops, running = 0, at_once
@@ -52,7 +52,7 @@ def _counts() -> Iterator[int]:
 
 
 def interrupt_after(running: Renderer, launches: int) -> None:
-    """Has it interrupted as so much work was cut for launches."""
+    """Interrupt the renderer when work is cut for the given number of launches."""
     cut, left = running.session.work.cut, [launches]
 
     def counted(*arguments: Any, **limits: Any) -> Any:
@@ -118,7 +118,7 @@ def test_a_link_stays_one_and_nothing_else_is_left(device: Device, tmp_path: Pat
 
 
 def test_it_costs_little(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The next one is not due before fifty times what writing the last one took."""
+    """The next checkpoint is due no sooner than fifty times the last one's write time."""
     now = [100.0]
     monkeypatch.setattr("clrt.rendering.checkpoint.checkpoints.time.perf_counter", lambda: now[0])
     running = renderer(device, checkpoint=tmp_path / "a.ck", checkpoint_seconds=30.0)
@@ -148,7 +148,7 @@ def test_left_by_break(device: Device, tmp_path: Path, adaptive: bool) -> None:
 @covering("launches, adaptive", [3, 17, 40, *range(5, 12)], [False, True])
 def test_left_by_a_keyboard_interrupt(device: Device, tmp_path: Path, small_launches: None, adaptive: bool,
                                       launches: int) -> None:
-    """Raised as a launch is waited for, in the middle of a pass or the last of it."""
+    """It is raised while waiting for a launch, in the middle of a pass or at its last launch."""
     left = renderer(device, adaptive=adaptive, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e9)
     raise_after(left, launches)
     with pytest.raises(KeyboardInterrupt):
@@ -157,7 +157,7 @@ def test_left_by_a_keyboard_interrupt(device: Device, tmp_path: Path, small_laun
 
 
 def raise_after(running: Renderer, launches: int) -> None:
-    """KeyboardInterrupt once so many launches were made."""
+    """Raise KeyboardInterrupt after the given number of launches."""
     launch, left = running.session._launches.add, [launches]  # type: ignore[attr-defined]
 
     def interrupted(*arguments: Any) -> None:
@@ -179,7 +179,7 @@ def goes_on_to_the_same(device: Device, path: Path, adaptive: bool) -> None:
 
 
 def test_work_that_was_cut_and_not_launched_is_kept(device: Device, tmp_path: Path, small_launches: None) -> None:
-    """As work in hand: its samples would be missing for ever."""
+    """It is saved as work in progress; otherwise its samples would be missing from the film."""
     at_once = renderer(device)
     run(at_once, spp=24)
     left = renderer(device, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e9)

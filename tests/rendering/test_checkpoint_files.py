@@ -1,4 +1,4 @@
-"""Files of checkpoints: what cannot be gone on with is refused, and whatever is whole is found."""
+"""Checkpoint files: unusable ones are rejected, and the intact generation is found."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .test_noise import room
 
 @pytest.fixture(scope="module")
 def generations(device: Device, tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes]:
-    """A checkpoint of 24 samples a pixel, and the one before it of 16."""
+    """Return a checkpoint of 24 samples per pixel, and the previous one of 16."""
     path = tmp_path_factory.mktemp("kept") / "a.ck"
     running = renderer(device, checkpoint=path, checkpoint_seconds=1e9)
     run(running, spp=16)
@@ -34,7 +34,7 @@ def generations(device: Device, tmp_path_factory: pytest.TempPathFactory) -> tup
 
 @pytest.fixture
 def kept(generations: tuple[bytes, bytes], tmp_path: Path) -> Path:
-    """Where both are."""
+    """Write both generations and return the path."""
     path = tmp_path / "a.ck"
     path.write_bytes(generations[0])
     older(path).write_bytes(generations[1])
@@ -42,7 +42,7 @@ def kept(generations: tuple[bytes, bytes], tmp_path: Path) -> Path:
 
 
 def test_a_render_that_ended_stays_as_it_is(device: Device, kept: Path) -> None:
-    """The same stop conditions add nothing, of whichever kind they are, and it tells its last state."""
+    """The same stop conditions of any kind add no samples and yield the last state."""
     content = kept.read_bytes()
     first = renderer(device, checkpoint=kept, resume=True)
     assert (run(first, spp=24).spp, first.stop_reason) == (24, "spp")
@@ -75,8 +75,7 @@ def _other_version(content: bytes, rng: np.random.Generator) -> bytes:
 
 @pytest.mark.parametrize("damage", [_flipped, _cut, _longer, _noise, _other_version])
 def test_damage_is_found(device: Device, kept: Path, caplog: pytest.LogCaptureFixture, damage: Any) -> None:
-    """200 times: the older generation is used and a warning says so; without one that is whole it is refused, with
-    what to do."""
+    """In 200 trials the older generation is used with a warning; if it is damaged too, the error says what to do."""
     rng, content = np.random.default_rng(4), kept.read_bytes()
     checkpoints = renderer(device, checkpoint=kept, resume=True)._checkpoints
     assert checkpoints is not None
@@ -94,10 +93,10 @@ def test_damage_is_found(device: Device, kept: Path, caplog: pytest.LogCaptureFi
 
 
 def test_the_whole_generation_outlives_the_damaged_one(device: Device, kept: Path) -> None:
-    """It is not replaced by what cannot be read; and it is found where a crash left it alone."""
+    """An intact generation is not replaced by an unreadable file, and is found if a crash left only it."""
     whole = older(kept).read_bytes()
     kept.write_bytes(b"damaged")
-    running = renderer(device, checkpoint=kept, resume=True, checkpoint_seconds=60.0)    # so at its end alone
+    running = renderer(device, checkpoint=kept, resume=True, checkpoint_seconds=60.0)    # so only at its end
     run(running, spp=24)
     assert older(kept).read_bytes() == whole and same(running, renderer(device, checkpoint=kept, resume=True))
     kept.unlink()
@@ -113,7 +112,7 @@ def test_the_whole_generation_outlives_the_damaged_one(device: Device, kept: Pat
     {"noise_mean": np.zeros((0, 0, 3), np.float32)}, {"noise_changes": np.zeros((5, 2, 8, 6))},
     {"history": np.full((1, 4), np.nan)}, {"history": np.zeros((4,))}], ids=lambda changes: next(iter(changes)))
 def test_what_does_not_fit_is_damage(device: Device, kept: Path, changes: dict[str, Any]) -> None:
-    """Whoever wrote it with a right checksum: no size or number is believed."""
+    """Sizes and numbers are validated even if the checksum is right."""
     header, arrays = read_checkpoint(kept, KINDS)
     older(kept).unlink()
     _rewrite(kept, {**header, **{name: value for name, value in changes.items() if name not in arrays}},
@@ -141,7 +140,7 @@ def test_shapes_ask_for_no_more_memory_than_the_file_fills(device: Device, kept:
 
 
 def _rewrite(path: Path, header: dict[str, Any], arrays: dict[str, Any]) -> None:
-    """As the format is described, by other code."""
+    """Write the file by the documented format, with independent code."""
     shapes = {name: list(array.shape) for name, array in arrays.items()}
     content = MAGIC + json.dumps({"header": header, "shapes": shapes}).encode() + b"\n"
     content += b"".join(array.tobytes() for array in arrays.values())
@@ -162,7 +161,7 @@ def test_other_settings_are_refused(device: Device, kept: Path, other: dict[str,
 
 
 def test_a_film_with_or_without_direct_light_is_refused(device: Device, kept: Path, tmp_path: Path) -> None:
-    """In the words of the option that asks for it."""
+    """The message names the option that enables it."""
     with pytest.raises(CheckpointError, match=r"another render \(without --aov direct or indirect\)"):
         renderer(device, checkpoint=kept, resume=True, aovs="indirect")
     run(renderer(device, checkpoint=tmp_path / "b.ck", aovs="direct"), spp=1)
@@ -172,7 +171,7 @@ def test_a_film_with_or_without_direct_light_is_refused(device: Device, kept: Pa
 
 @pytest.mark.parametrize("resume", [False, True])
 def test_a_file_that_is_no_checkpoint_is_kept(device: Device, tmp_path: Path, resume: bool) -> None:
-    """To begin anew would be refused, so that is not what is advised."""
+    """The message does not advise to start afresh, as that would be rejected, too."""
     (tmp_path / "a.ck").write_text("a letter")
     with pytest.raises(CheckpointError, match="is no checkpoint, so it is not replaced; name another file, or remove"):
         renderer(device, checkpoint=tmp_path / "a.ck", resume=resume)
@@ -180,7 +179,7 @@ def test_a_file_that_is_no_checkpoint_is_kept(device: Device, tmp_path: Path, re
 
 
 def test_other_scenes_and_kernels_are_refused(device: Device, kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever of a scene changes is named, and a name is no change."""
+    """Each part of a scene that changed is named in the error; changed names are not."""
     scene = room()
     mesh, *others = scene.meshes
     moved = replace(mesh, vertices=mesh.vertices + np.float32(1e-6))

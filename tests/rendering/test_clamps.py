@@ -1,4 +1,4 @@
-"""Clamped contributions: exact where one is all of a sample, and against the same samples without clamps."""
+"""Clamped contributions: exact where one contribution is the whole sample, and against the same samples unclamped."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def clamped(scene: Scene, direct: float = 0.0, indirect: float = 0.0, **settings
     ([], 1), ([Sphere(material=Diffuse(color=(0, 0, 0), emission=(1, 2, 4)))], 1), ([Sphere(material=Mirror())], 2),
     ([Sphere(material=Dielectric(ior=1.0))], 3)], ids=["sky", "emitter", "mirror", "passage"])
 def test_light_that_is_all_of_a_sample(device: Device, balls: list[Sphere], edges: int, lanes: int) -> None:
-    """Of a white sky seen directly, in a mirror, or through two surfaces: direct up to two edges, then indirect."""
+    """A sky seen directly, in a mirror, or through two surfaces: direct up to depth 2, indirect beyond."""
     scene = Scene(spheres=balls, environment=Environment(color=(1, 2, 4)), camera=Camera(fov_degrees=5),
                   render=RenderSettings(size=(8, 8), spp=2, max_depth=4))
     for direct, indirect in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (3.0, 0.5), (9.0, 9.0)):
@@ -49,7 +49,9 @@ def test_light_that_is_all_of_a_sample(device: Device, balls: list[Sphere], edge
 
 @pytest.mark.parametrize("lanes", [1, 8])
 def test_what_is_left_and_what_was_taken_are_the_picture(device: Device, lanes: int) -> None:
-    """Paths are the same with and without clamps: of every pixel no channel is brighter, and the means add up."""
+    """Paths are the same with and without clamps: no pixel is brighter, and result plus removed
+    light equals the original.
+    """
     def grey(found: Film) -> Any:
         return found.mean.mean(axis=2)
 
@@ -69,7 +71,7 @@ def test_what_is_left_and_what_was_taken_are_the_picture(device: Device, lanes: 
 
 
 def test_the_report_names_the_bias(device: Device) -> None:
-    """What is in force, how much it took, and one line that says so."""
+    """The report has the clamps in force, the removed share of light, and one warning."""
     scene = Scene(spheres=[Sphere(material=Mirror())], environment=Environment(color=(1, 2, 4)))
     chosen: dict[str, Any] = {"size": (8, 8), "spp": 2, "device": device.info.index}
     report = clrt.render(scene, clamp_direct=1.0, **chosen).report

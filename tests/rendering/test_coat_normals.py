@@ -1,4 +1,4 @@
-"""Coats whose normal is another than that of what they cover: formulas in float64, samples, furnaces, and pictures."""
+"""Clearcoats with a normal of their own: float64 formulas, sampling, furnaces and images."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.statistics
 COLOR = (0.8, 0.5, 0.2)
 TEXELS = {"right": (200, 128, 230), "up": (110, 190, 220), "steep": (220, 110, 200)}
 UP = np.array([0.0, 0.0, 1.0])
-#: Cells of the sphere, by z and by azimuth, and points in each, both ways.
+#: Cells of the sphere by z and azimuth, and points per cell in each dimension.
 CELLS, POINTS = 16, 40
 
 
@@ -38,7 +38,7 @@ def texture(name: str | None) -> Texture | None:
 
 
 def normal(name: str | None) -> Doubles:
-    """Where a map bends +z to, on a surface whose picture lies along x and y."""
+    """Return the bent normal of a map on a surface whose image axes are x and y."""
     if name is None:
         return UP
     bent = 2 * np.array(TEXELS[name]) / 255 - 1
@@ -46,7 +46,7 @@ def normal(name: str | None) -> Doubles:
 
 
 def around(n: Doubles) -> Doubles:
-    """(3, 3) rows of a frame whose z is n."""
+    """Return the rows (3, 3) of a frame whose z is n."""
     s = np.cross([0.0, 1.0, 0.0], n)
     s /= np.linalg.norm(s)
     return np.array([s, np.cross(n, s), n])
@@ -57,7 +57,7 @@ def schlick(cosine: Doubles) -> Doubles:
 
 
 def film(wo: Doubles, wi: Doubles, n: Doubles, alpha: float) -> Doubles:
-    """(k,) F·D·G/(4·cos wo) of a film with the normal n, which no direction below it sees."""
+    """Return F·D·G/(4·cos wo) (k,) of a coat with the normal n, 0 for directions below it."""
     h = (wo + wi) / np.linalg.norm(wo + wi, axis=-1, keepdims=True)
     cos_h, cos_o, cos_i = h @ n, np.broadcast_to(wo @ n, len(wi)), wi @ n
     lit = (cos_o > 0) & (cos_i > 0)
@@ -72,10 +72,10 @@ def film(wo: Doubles, wi: Doubles, n: Doubles, alpha: float) -> Doubles:
 @pytest.mark.parametrize("coat", [None, "up", "steep"])
 def test_coat_and_base_have_normals_of_their_own(device: Device, base: str | None, coat: str | None,
                                                  metallic: float) -> None:
-    """coat·film and the base under it, each by the cosines to its own normal, of wi and of its mirror image below the
-    surface; 0 below. Of a base that is not all gloss where nothing is sent to the mirror image.
+    """eval is coat·film plus the attenuated base, each with its own normal's cosines, for wi and its mirror image
+    below the surface; 0 below. A base that is not all gloss is compared only where nothing goes to the mirror image.
 
-    Beside a material of both maps, so that all are of one program.
+    A material with both maps is included, so that all cases run the same program.
     """
     bare = MetallicRoughness(color=COLOR, roughness=0.7, metallic=metallic)
     coats = [replace(bare, clearcoat=0.8, clearcoat_roughness=0.5, normal_map=texture(one),
@@ -109,7 +109,7 @@ def test_coat_and_base_have_normals_of_their_own(device: Device, base: str | Non
 
 
 def varied() -> list[MetallicRoughness]:
-    """Coats and bases bent apart, alone and with all else that a coat can cover."""
+    """Return coats and bases with different normals, alone and with everything else that a coat can cover."""
     layers: dict[str, Any] = {"sheen_color": (0.4, 0.5, 0.6), "sheen_roughness": 0.5, "transmission": 0.6}
     white: dict[str, Any] = {"color": (1.0, 1.0, 1.0), "roughness": 0.6, "clearcoat": 1.0, "clearcoat_roughness": 0.6}
     maps: list[dict[str, Any]] = [{"normal_map": texture("steep")}, {"clearcoat_normal_map": texture("steep")},
@@ -118,7 +118,7 @@ def varied() -> list[MetallicRoughness]:
 
 
 def test_samples_follow_the_density_and_make_no_light(device: Device) -> None:
-    """Chi-square over cells of the sphere by sums of the density over fine points, with one for samples that failed;
+    """Chi-square over cells of the sphere, from density sums over fine points, with one cell for failed samples;
     weights are value over density; the mean weight in a white furnace is at most 1."""
     materials, count = varied(), 1 << 15
     every = bsdfs(device, [*materials])
@@ -140,7 +140,7 @@ def test_samples_follow_the_density_and_make_no_light(device: Device) -> None:
             shares = np.array([*expected, max(1 - expected.sum(), 0)])
             chi2[name] = chi2_test([*found, count - kept.sum()], count * shares + 1e-9)
             there, again = every.value(which, wo, wi[kept])
-            sure = np.abs(again / pdf[kept] - 1) < 1e-4     # a few lie on a horizon
+            sure = np.abs(again / pdf[kept] - 1) < 1e-4     # A few lie on a horizon
             assert sure.mean() > 0.999
             np.testing.assert_allclose((weight[kept] * pdf[kept, None])[sure], there[sure], rtol=2e-4, atol=1e-6)
             assert weight.mean() == pytest.approx(value.mean() * 4 * np.pi, rel=0.03)
@@ -151,8 +151,8 @@ def test_samples_follow_the_density_and_make_no_light(device: Device) -> None:
 
 
 def test_each_lobe_is_reciprocal(device: Device) -> None:
-    """Over the cosine to its own normal: the film over what reflects nothing, and what a mirror-like film leaves, where
-    nothing of it is sent below the surface."""
+    """Each lobe is divided by its own normal's cosine: the film over a black base, and the base below a smooth film,
+    where neither reflects below the surface."""
     maps: dict[str, Any] = {"normal_map": texture("right"), "clearcoat_normal_map": texture("up"), "clearcoat": 1.0}
     black, body = MetallicRoughness(color=(0.0,) * 3, specular=0.0, clearcoat_roughness=0.7, **maps), MetallicRoughness(
         color=COLOR, roughness=0.8, sheen_color=(0.3,) * 3, sheen_roughness=0.6, clearcoat_roughness=0.0, **maps)
@@ -171,7 +171,7 @@ def test_each_lobe_is_reciprocal(device: Device) -> None:
 
 @pytest.mark.parametrize("base, beside", [(None, "glass"), ("right", "nothing")])
 def test_highlights_lie_where_the_coat_is_bent_to(device: Device, base: str | None, beside: str) -> None:
-    """A plate seen from above: light mirrored by the coat's normal is brightest, and the body is lit by its own."""
+    """For a plate seen from above, the highlight follows the coat's normal and the body is lit by its own normal."""
     n, towards_eye, alpha = normal("up"), np.array([[0.0, 0.0, 1.0]]), 0.25**2
     body = replace(MetallicRoughness(color=COLOR, specular=0.0), normal_map=texture(base))
     coated = replace(body, clearcoat=1.0, clearcoat_roughness=0.25, clearcoat_normal_map=texture("up"))
@@ -195,7 +195,7 @@ def test_highlights_lie_where_the_coat_is_bent_to(device: Device, base: str | No
 
 
 def test_a_smooth_coat_has_no_bumps(device: Device) -> None:
-    """Under an even sky the coat mirrors 0.04 of it, however steeply what lies below is bent."""
+    """In a constant environment the coat reflects 0.04 of it, even if the base's normal map is steep."""
     black = MetallicRoughness(color=(0.0,) * 3, specular=0.0, clearcoat=1.0)
     sky = Environment(color=(1, 1, 1))
     smooth, bent = (seen(device, Scene(meshes=[quad(replace(black, normal_map=bumps))], environment=sky), spp=16)

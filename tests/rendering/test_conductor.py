@@ -1,4 +1,4 @@
-"""Metals by their measured indices: Fresnel's equations in complex float64, and what the presets reflect."""
+"""Conductors by measured indices: Fresnel's equations in complex float64, and the presets' reflectance."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.statistics
 
 
 def fresnel(cos_o: Doubles, n: complex) -> Doubles:
-    """Reflectance of unpolarised light by the complex cosine of what is refracted (Born and Wolf, 1.5.2 and 14.2)."""
+    """Return the unpolarized reflectance from the complex cosine of refraction (Born and Wolf, 1.5.2 and 14.2)."""
     cos_t = np.sqrt(1 - (1 - cos_o**2) / n**2)
     r_s = (cos_o - n * cos_t) / (cos_o + n * cos_t)
     r_p = (n * cos_o - cos_t) / (n * cos_o + cos_t)
@@ -31,7 +31,7 @@ EXTREMES = [((0.01, 1.0, 100.0), (5.0, 0.0, 100.0)), ((1.5, 0.01, 0.05), (0.0, 0
 
 @pytest.mark.parametrize("eta, k", [*CONDUCTORS.values(), *EXTREMES])
 def test_it_is_fresnels_with_a_complex_index(device: Device, eta: tuple[float, ...], k: tuple[float, ...]) -> None:
-    """eval = F·G·D/(4 cos wo) against the formulas as printed."""
+    """eval = F·G·D/(4 cos wo) against the published formulas."""
     alpha = 0.6**2
     metal = bsdfs(device, [Conductor(eta=(eta[0], eta[1], eta[2]), k=(k[0], k[1], k[2]), roughness=0.6)])
     wo, wi = above(5000, 5), above(5000, 6)
@@ -47,6 +47,6 @@ def test_it_is_fresnels_with_a_complex_index(device: Device, eta: tuple[float, .
 
 @pytest.mark.parametrize("name", sorted(set(CONDUCTORS) & set(F0_PRESETS)))
 def test_presets_reflect_about_what_the_table_of_f0_says(name: str) -> None:
-    """Suchiński's table 6.1 has what sRGB's primaries make of spectra; one wavelength each comes within 0.12 of it."""
+    """Suchiński's table 6.1 has sRGB values of whole spectra; one wavelength per channel comes within 0.12 of them."""
     found = [float(fresnel(np.array([1.0]), complex(*index))[0]) for index in zip(*CONDUCTORS[name])]
     assert np.abs(np.subtract(found, F0_PRESETS[name][0])).max() < 0.12

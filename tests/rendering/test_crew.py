@@ -1,4 +1,4 @@
-"""Several devices and one picture: it is the one of a device alone, whoever does what, and whoever fails."""
+"""Several devices render one image: it equals that of a single device for any split of work and any failure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .test_noise import room
 
 
 def crew(device: Device, count: int = 2, **options: Any) -> Renderer:
-    """The same device several times, which is several devices to OpenCL: contexts, queues and programs of their own."""
+    """Return a renderer that uses the same device `count` times, each with its own context, queue and programs."""
     given = {"size": SIZE, "seed": 1, "spp": 24, "checkpoint_seconds": 0.0, **options}
     return Renderer(room(), device=[device.info.index] * count, **given)
 
@@ -41,7 +41,7 @@ def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("stops", [{"spp": 40}, {"error": 0.1}], ids=str)
 @pytest.mark.parametrize("count", [2, 3])
 def test_same_picture(device: Device, adaptive: bool, stops: dict[str, float], count: int) -> None:
-    """Bit for bit, with its estimates, and where an error ends it; all of them took part."""
+    """Image, estimates and the stop at an error are equal bit for bit; at least two devices took part."""
     alone, together = renderer(device, adaptive=adaptive), crew(device, count, adaptive=adaptive)
     run(alone, **stops)
     run(together, **stops)
@@ -52,7 +52,7 @@ def test_same_picture(device: Device, adaptive: bool, stops: dict[str, float], c
 @pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
 def test_interrupted_it_goes_on_alone_and_together(device: Device, tmp_path: Path, small_launches: None,
                                                    adaptive: bool) -> None:
-    """Checkpoints of one device, of two and of three: each goes on with the other's, inside a pass, too."""
+    """Checkpoints of one, two and three devices resume from each other, also inside a pass."""
     at_once = renderer(device, adaptive=adaptive)
     run(at_once, spp=24)
     rng, hops, in_hand = np.random.default_rng(5), 0, 0
@@ -69,7 +69,7 @@ def test_interrupted_it_goes_on_alone_and_together(device: Device, tmp_path: Pat
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_passes_left_after_any_launch(device: Device, small_launches: None, count: int) -> None:
-    """The last one, too: whoever goes on adds each sample once."""
+    """Each sample is added once if a pass is left after any launch, including the last."""
     whole = crew(device, count).session
     launches = sum(1 for _ in whole.render(4))
     expected = whole.film().pixels.tobytes()
@@ -88,7 +88,7 @@ def test_passes_left_after_any_launch(device: Device, small_launches: None, coun
 @pytest.mark.parametrize("where", ["begin", "ended"])
 def test_one_that_fails_is_left_out(device: Device, small_launches: None, caplog: pytest.LogCaptureFixture,
                                     monkeypatch: pytest.MonkeyPatch, when: int, where: str) -> None:
-    """At any moment: its shares are done again, also what it had begun."""
+    """If a device fails at any time, its shares are rendered again, including those in flight."""
     at_once = renderer(device)
     run(at_once, spp=24)
     running = crew(device, 3)
@@ -101,7 +101,7 @@ def test_one_that_fails_is_left_out(device: Device, small_launches: None, caplog
 
 
 def test_none_left(device: Device, small_launches: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It ends as the last one did, and the checkpoint leads to the same picture."""
+    """The render ends with the last device's error, and resuming its checkpoint gives the same image."""
     at_once, running = renderer(device), crew(device, 2, checkpoint=tmp_path / "a.ck")
     run(at_once, spp=24)
     assert isinstance(running.session, Crew)
@@ -128,8 +128,8 @@ def _fail_after(worker: Worker, where: str, calls: int, monkeypatch: pytest.Monk
 
 def test_ctrl_c_among_the_notes_of_a_launch(device: Device, small_launches: None,
                                             monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where a launch is off its list and its share is not, or the other way around: nothing waits for what is not
-    there, and nothing is lost or counted twice."""
+    """An interrupt between the updates of the launch list and of the share: nothing waits for a missing launch, and no
+    sample is lost or counted twice."""
     at_once = renderer(device)
     run(at_once, spp=24)
     for method in ("_finish_one", "begin"):

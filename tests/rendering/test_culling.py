@@ -1,4 +1,4 @@
-"""Back faces that camera rays, or all rays, do not meet: exact expectations, for every integrator."""
+"""Back-face culling for camera rays or all rays, with exact expectations, for every integrator."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CULLINGS = get_args(Culling)[::-1]
 
 
 def square(height: float, material: Material, up: bool = True, half: float = 9.0) -> Mesh:
-    """Across the y axis, its front up or down."""
+    """Return a square across the y axis, facing up or down."""
     mesh = quad([(-half, height, half), (half, height, half), (half, height, -half), (-half, height, -half)], material)
     mesh.faces = mesh.faces if up else mesh.faces[:, ::-1].copy()
     return mesh
@@ -38,7 +38,7 @@ def square(height: float, material: Material, up: bool = True, half: float = 9.0
 def seen(device: Device, culling: Culling, *meshes: Mesh, height: float = 10.0, integrator: Integrator = "path",
          spheres: list[Sphere] | None = None, lights: list[DirectionalLight] | None = None,
          lanes: int = 8) -> NDArray[np.float64]:
-    """What a camera at a height sees, straight below."""
+    """Return the image of a camera at `height` that looks straight down."""
     camera = Camera(position=(0, height, 0), look_at=(0, 0, 0), up=(0, 0, 1), fov_degrees=5)
     render = RenderSettings(size=(8, 8), spp=4, max_depth=3, integrator=integrator, back_face_culling=culling)
     return film(device, Scene(meshes=list(meshes), spheres=spheres or [], lights=[*(lights or [])], camera=camera,
@@ -48,7 +48,7 @@ def seen(device: Device, culling: Culling, *meshes: Mesh, height: float = 10.0, 
 @covering("integrator, lanes, culling", ["path", "raster", "local"], [1, 8], CULLINGS)
 def test_the_camera_looks_through_back_faces(device: Device, integrator: Integrator, lanes: int,
                                              culling: Culling) -> None:
-    """A black wall before a lamp, its front or its back to the camera, or of a material with two sides."""
+    """A black wall in front of an emitter, with its front or back to the camera, or double-sided."""
     for wall, culled in ((square(5, WALL, up=True), False), (square(5, WALL, up=False), culling != "none"),
                          (square(5, replace(WALL, double_sided=True), up=False), False)):
         found = seen(device, culling, square(0, LAMP), wall, integrator=integrator, lanes=lanes)
@@ -61,8 +61,8 @@ def test_the_camera_looks_through_back_faces(device: Device, integrator: Integra
                                          ((-1, -1, 1), False), ((-1, 1, -1), True)])
 def test_mirrored_instances(device: Device, monkeypatch: pytest.MonkeyPatch, axes: tuple[int, int, int], keeps: bool,
                             culling: Culling, few_triangles: int) -> None:
-    """A mirrored wall's front is the mirror image of the wall's front, for culling and for emission. Of two walls, as
-    one alone would become a mesh, the second is behind the camera."""
+    """A mirrored wall's front is the mirror image of the wall's front, for culling and for emission. The second
+    instance is behind the camera; a single one would become a mesh."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", few_triangles)
     places = [np.column_stack([np.diag(axes), [0.0, height, 0.0]]) for height in (5.0, 50.0)]
     camera = Camera(position=(0, 10, 0), look_at=(0, 0, 0), up=(0, 0, 1), fov_degrees=5)
@@ -79,7 +79,7 @@ def test_mirrored_instances(device: Device, monkeypatch: pytest.MonkeyPatch, axe
 
 @covering("integrator, culling", ["depth", "albedo", "normals"], CULLINGS)
 def test_pictures_of_what_is_seen_first(device: Device, integrator: Integrator, culling: Culling) -> None:
-    """Of the wall, or of the floor behind it."""
+    """They show the wall, or the floor behind it if the wall is culled."""
     floor, wall = square(0, Diffuse(color=(0.25, 0.5, 0.75))), square(5, Diffuse(color=(0.1, 0.1, 0.1)), up=False)
     culled = culling != "none"
     expected = {"depth": [10.0 if culled else 5.0], "normals": [0.0, 1.0, 0.0],
@@ -100,7 +100,7 @@ def test_aovs_of_what_is_seen_first(device: Device, culling: Culling) -> None:
 @covering("integrator, culling", ["path", "local"], CULLINGS)
 def test_shadow_rays_pass_back_faces_where_all_are_culled(device: Device, integrator: Integrator,
                                                           culling: Culling) -> None:
-    """They come to a wall that faces the sun from behind. Light is E·albedo/pi, exactly."""
+    """A wall faces the sun with its back to the floor's shadow rays. Light is E·albedo/pi, exactly."""
     sun = DirectionalLight(direction=(1, -1, 0), irradiance=(2, 2, 2))
     floor = square(0, Diffuse(color=(0.5, 0.5, 0.5)))
     for up in (True, False):
@@ -114,7 +114,7 @@ def test_shadow_rays_pass_back_faces_where_all_are_culled(device: Device, integr
 
 @covering("integrator, culling", ["local", "path"], CULLINGS)
 def test_mirrors_show_what_the_camera_does_not_see(device: Device, integrator: Integrator, culling: Culling) -> None:
-    """Above the camera is a wall's back, before a lamp: a mirror shows the wall, unless all rays pass it."""
+    """A mirror shows the back of a wall in front of an emitter, unless culling applies to all rays."""
     found = seen(device, culling, square(0, Mirror()), square(20, WALL), square(30, LAMP, up=False),
                  integrator=integrator)
     np.testing.assert_allclose(found, np.broadcast_to(RADIANCE * (culling == "all"), (8, 8, 3)), rtol=1e-6)
@@ -122,7 +122,7 @@ def test_mirrors_show_what_the_camera_does_not_see(device: Device, integrator: I
 
 @pytest.mark.parametrize("culling", ["camera", "all"])
 def test_closed_surfaces_look_the_same(device: Device, culling: Culling) -> None:
-    """From outside fronts are met first; light in glass meets the backs all the same, with nothing more compiled."""
+    """Camera rays hit fronts first; light inside glass still hits the backs, and no extra code is compiled."""
     cube = box(0.9, Dielectric())
     cube.vertices, cube.faces = cube.vertices - np.array([2, 0, 0], np.float32), cube.faces[:, ::-1].copy()
     scene = Scene(meshes=[cube],

@@ -1,4 +1,4 @@
-"""Glass: Fresnel's and Snell's laws in float64, and pictures of glass whose answer is known."""
+"""Glass: Fresnel's and Snell's laws in float64, and scenes with known results."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SKY = Environment(color=(1.0, 1.0, 1.0))
 
 
 def fresnel(cos_o: Doubles, eta: float) -> Doubles:
-    """Reflectance of unpolarised light by the complex cosine of what is refracted (Born and Wolf, 1.5.2)."""
+    """Return the unpolarized reflectance from the complex cosine of refraction (Born and Wolf, 1.5.2)."""
     cos_t = np.sqrt(1 - (1 - cos_o**2) / eta**2 + 0j)
     r_s = (cos_o - eta * cos_t) / (cos_o + eta * cos_t)
     r_p = (eta * cos_o - cos_t) / (eta * cos_o + cos_t)
@@ -31,7 +31,7 @@ def fresnel(cos_o: Doubles, eta: float) -> Doubles:
 @pytest.mark.parametrize("front", [True, False])
 @pytest.mark.parametrize("ior", [0.75, 1.0, 1.33, 1.5, 2.4])
 def test_laws_of_fresnel_and_snell(device: Device, ior: float, front: bool) -> None:
-    """The least number that is refracted is F; directions obey sin θo = eta·sin θt, and lie in one plane."""
+    """The smallest random number that refracts is F; directions obey sin θo = eta·sin θt and lie in one plane."""
     color, eta = (0.9, 0.5, 1.0), ior if front else 1 / ior
     glass = bsdfs(device, [Dielectric(ior=ior, color=color)])
     cosine = np.linspace(1e-3, 1, 64)
@@ -54,7 +54,7 @@ def test_laws_of_fresnel_and_snell(device: Device, ior: float, front: bool) -> N
 
 
 def test_all_is_reflected_beyond_the_critical_angle(device: Device) -> None:
-    """From inside glass of 1.5 nothing leaves below cos θ = √(1 − 1/1.5²)."""
+    """Inside glass of index 1.5, all is reflected for cos θ below √(1 − 1/1.5²)."""
     glass, critical = bsdfs(device, [Dielectric(ior=1.5)]), np.sqrt(1 - 1 / 2.25)
     numbers = np.array([[0.5, 0.5, 1 - 2.0**-24]])
     for cosine, passes in ((critical - 1e-4, False), (critical + 1e-4, True)):
@@ -63,9 +63,9 @@ def test_all_is_reflected_beyond_the_critical_angle(device: Device) -> None:
 
 
 def test_a_white_furnace_does_not_see_glass(device: Device) -> None:
-    """Every path through a clear ball ends in the sky after fewer than 64 edges, nothing is lost: the picture is 1.
+    """Every path through a clear sphere reaches the sky at a depth below 64 without loss: the image is 1.
 
-    Of light that each surface lets c through, F is reflected at once, and what enters leaves again after two surfaces.
+    If each surface transmits the share c, F is reflected at once, and what enters leaves again after two surfaces.
     """
     camera = Camera(position=(0.0, 0.0, 5.0), fov_degrees=26)
 
@@ -80,7 +80,7 @@ def test_a_white_furnace_does_not_see_glass(device: Device) -> None:
 
 
 def test_lamps_in_glass_are_seen_with_its_radiance(device: Device) -> None:
-    """Radiance over eta² stays along rays: of a lamp in glass the eye outside gets (1 − F)/eta² of what glows there."""
+    """Radiance over eta² is constant along rays: outside, an emitter in glass has (1 − F)/eta² of its radiance."""
     glass = quad([(-9, -9, -1), (9, -9, -1), (9, 9, -1), (-9, 9, -1)], Dielectric(ior=1.5))
     lamp = quad([(-99, -99, -2), (99, -99, -2), (99, 99, -2), (-99, 99, -2)],
                 Diffuse(color=(0.0, 0.0, 0.0), emission=(9.0, 9.0, 9.0)))

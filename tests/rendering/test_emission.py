@@ -1,4 +1,4 @@
-"""How bright painted triangles are taken for: dark only where nothing of what they show shines."""
+"""Estimated power of textured emissive triangles: zero only where no visible texel emits."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SIZE = 32
 @pytest.mark.parametrize("wrap_v", get_args(Wrap))
 @pytest.mark.parametrize("wrap_u", get_args(Wrap))
 def test_what_shines_somewhere_is_not_dark(wrap_u: Wrap, wrap_v: Wrap) -> None:
-    """Small triangles anywhere within three pictures around one with a bright corner."""
+    """Small triangles anywhere within three repeats of a texture with one bright corner."""
     rng = np.random.default_rng(4)
     texels = np.zeros((SIZE, SIZE, 4), np.uint8)
     texels[-SIZE // 4:, -SIZE // 4:] = 255
@@ -30,7 +30,7 @@ def test_what_shines_somewhere_is_not_dark(wrap_u: Wrap, wrap_v: Wrap) -> None:
     shines = shown.max(axis=1) > 0
     assert 50 < shines.any(axis=1).sum() < 1950
     assert np.all(mean[shines] > 0)
-    # What is far from the bright corner, and crosses no edge, is known to be dark.
+    # Triangles far from the bright corner that cross no edge are known to be dark.
     assert np.mean(mean[~shines] == 0) > 0.3
 
 

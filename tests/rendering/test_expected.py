@@ -1,4 +1,4 @@
-"""What is expected of a pixel, beside the same pixel by pixel."""
+"""Expected radiance per pixel, against a loop over the pixels."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from clrt.rendering.film.expected_radiance import REACH, SINGLE_MOST, Doubles, e
 pytestmark = pytest.mark.statistics
 
 INNER = (slice(REACH, -REACH),) * 2
-#: Of sums in single precision over a window.
+#: Relative precision of single-precision sums over a window.
 PRECISION = 1e-5
 
 
 def picture(seed: int) -> tuple[Doubles, Doubles]:
-    """Two flat halves with noise, and its variance; some pixels are bright by chance, and say so."""
+    """Return two flat noisy halves and their variance; some pixels are outliers, with the variance of one."""
     rng = np.random.default_rng(seed)
     mean = np.where(np.arange(30)[:, None, None] < 14, 0.2, 3.0) + np.zeros((30, 26, 3))
     variance = np.asarray(0.01 * rng.random(mean.shape))
@@ -55,7 +55,7 @@ def test_what_is_known_is_expected() -> None:
 
 
 def test_a_pixel_bright_by_chance_is_not() -> None:
-    """Nor are those beside it, though a part of it is theirs, too."""
+    """An outlier is not expected to be bright, nor are its neighbours, though a part of it is spread to them."""
     mean, variance = np.full((36, 36, 3), 0.5), np.full((36, 36, 3), 1e-4)
     mean[18, 18], variance[18, 18] = 1000.0, 1e6
     found = expected(mean, variance)
@@ -73,8 +73,8 @@ def test_without_any_variance_known_it_is_what_lies_around() -> None:
 @pytest.mark.parametrize("samples", [2, 4, 64])
 @pytest.mark.parametrize("bright", [1e4, 1e7, 1e9, 1e12, 1e15, 1e3 * SINGLE_MOST])
 def test_single_precision_is_enough_around_a_pixel(bright: float, samples: int) -> None:
-    """Of a pixel that is bright by one of its samples and of those around it, whose light is in no sum that it is taken
-    out of again."""
+    """An outlier from one bright sample, and its neighbours: its light is in no sum from which it is subtracted again.
+    """
     mean, variance = picture(0)
     drawn = np.full(samples, 5.0)
     drawn[0] = bright

@@ -1,4 +1,4 @@
-"""The accumulated picture: sums that never stall, samples that are no numbers, and a noise estimate that is right."""
+"""The film: sums that do not stall, non-finite samples, and an accurate noise estimate."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 from ..covering import others
 from .pictures import box, film, quad
 
-#: Text of film.cl and what makes sums stall: no second float, and one that forgets what it lacked before.
+#: Text of film.cl and replacements that make sums stall: no compensation, and one that drops the previous error.
 STALLING = {"plain": ("    *sum = s + e;\n    *error = e - (*sum - s);", "    *sum = s;\n    *error = 0.0f;"),
             "forgetful": ("real e = *error + (", "real e = (")}
 
@@ -28,7 +28,7 @@ def probe(device: Device) -> Probe:
 
 @pytest.mark.parametrize("before", [1 << 27, *others(0)])
 def test_means_hold_past_2_to_24_samples(probe: Probe, before: int) -> None:
-    """Constants from 3e-38 to 1e30, two values in turn, and rare peaks: all to 1e-7, where 1e-6 is asked for."""
+    """Constants from 3e-38 to 1e30, two alternating values, and rare peaks: all to 1e-7; the requirement is 1e-6."""
     for name, error, miscounted in stream_errors(probe, (1 << 24) + 8, before):
         assert error < 1e-7 and miscounted == 0, name
 
@@ -40,19 +40,19 @@ def test_sums_that_stall_are_noticed(device: Device, what: str) -> None:
 
 
 def constant(probe: Probe, radiance: ArrayLike, samples: int) -> Film:
-    """A row of pixels, each with `samples` times its radiance (n, 3)."""
+    """Return a row of pixels, each with `samples` samples of its radiance (n, 3)."""
     return accumulate(probe, np.asarray(radiance, np.float64), np.asarray(radiance, np.float64), 1, samples).film
 
 
 def test_dark_pixels_beside_bright_ones(probe: Probe) -> None:
-    """Each to itself: 1e-6 beside 1e6 and 1e30, in lanes of one work-item."""
+    """Pixels do not affect each other: 1e-6 next to 1e6 and 1e30, in the SIMD lanes of one work-item."""
     radiance = np.array([[1e-6] * 3, [1e6] * 3, [1e-6] * 3, [1e30] * 3, [1e-6] * 3], np.float32).astype(float)
     picture = constant(probe, radiance, (1 << 20) + 1)
     np.testing.assert_allclose(picture.mean[0], radiance, rtol=1e-7)
 
 
 def test_samples_that_are_no_numbers_are_dropped(probe: Probe) -> None:
-    """Every third of four pixels' samples; the fifth has none but such, and the sixth none at all."""
+    """Every third sample of the first four pixels is non-finite, all of the fifth's, and none of the sixth's."""
     bad = [[np.nan, 1, 1], [1, np.inf, 1], [1, 1, -np.inf], [3e38, 1, 1], [np.nan] * 3, [1, 2, 3]]
     good = [[1, 2, 3]] * 4 + [[np.nan] * 3, [1, 2, 3]]
     picture = accumulate(probe, np.array(good, np.float64), np.array(bad), 3, 15).film
@@ -64,7 +64,7 @@ def test_samples_that_are_no_numbers_are_dropped(probe: Probe) -> None:
 
 
 def test_sums_that_would_overflow(probe: Probe) -> None:
-    """Finite samples whose sum is not: either the mean is right, or they are dropped and counted."""
+    """If finite samples have a non-finite sum, either the mean is right or they are dropped and counted."""
     for value in (1e30, 1e31, 3e38):
         radiance = np.full((1, 3), value, np.float32).astype(float)
         picture = constant(probe, radiance, 1 << 22)
@@ -74,14 +74,14 @@ def test_sums_that_would_overflow(probe: Probe) -> None:
 
 @pytest.mark.parametrize("radiance", [4e15, 1e17, 1e30])
 def test_noise_of_radiance_whose_squares_are_no_floats(probe: Probe, radiance: float) -> None:
-    """What is not known is taken as the most that it can be; it is a number after any number of samples."""
+    """An unknown noise is reported as its maximum, and is finite for any number of samples."""
     for samples in (2, 100, 1 << 20):
         assert constant(probe, [[radiance] * 3], samples).noise == pytest.approx(1)
     assert constant(probe, [[1e15] * 3], 1 << 20).noise == pytest.approx(0, abs=1e-5)
 
 
 def test_overflowing_light_is_dropped_and_counted(device: Device) -> None:
-    """Walls of the largest radiance that light each other: some sums overflow, and the picture stays finite."""
+    """Walls of the largest radiance light each other: some sums overflow, and the image stays finite."""
     lamp = Diffuse(color=(1.0, 1.0, 1.0), emission=(3e38, 3e38, 3e38))
     scene = Scene(meshes=[box(1.0, lamp)], camera=Camera(position=(0.0, 0.0, 0.0), look_at=(0.0, 0.1, 1.0)),
                   render=RenderSettings(size=(8, 8), spp=16, max_depth=3))
@@ -94,7 +94,7 @@ def test_overflowing_light_is_dropped_and_counted(device: Device) -> None:
 
 @pytest.mark.parametrize("spp", [16, 64])
 def test_noise_is_the_error(device: Device, spp: int) -> None:
-    """The estimated √relMSE beside the true one, in a box that shines alike everywhere.
+    """The estimated √relMSE matches the true one in a box of uniform emission.
 
     relMSE averages, over the pixels, squares of errors whose excess kurtosis is k: its relative variance is
     (2 + k)/pixels. That of the estimate, a mean of sample variances, is (2/(spp − 1) + k)/pixels, which is less.
@@ -126,7 +126,7 @@ def test_noise_falls_with_the_root_of_the_samples(device: Device) -> None:
 
 
 def test_counts_and_rays(device: Device) -> None:
-    """A picture of the sky alone: one ray a sample."""
+    """An image of the sky alone takes one ray per sample."""
     scene = Scene(environment=Environment(color=(1.0, 1.0, 1.0)), render=RenderSettings(size=(30, 7), spp=9))
     picture = film(device, scene)
     assert np.all(picture.pixels["count"] == 9)

@@ -1,4 +1,4 @@
-"""Pixel filters: a picture of an edge is the filter's distribution function."""
+"""Pixel filters: the image of an edge is the filter's distribution function."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DENSITIES = {"box": lambda t: float(abs(t) < 0.5), "tent": lambda t: max(0.0, 1 
 
 
 def coverage(name: str, places: np.ndarray) -> np.ndarray:
-    """The part of a filter around 0 left of each place, in pixels."""
+    """Return the share of a filter centred at 0 that lies left of each place, in pixels."""
     def part(end: float) -> float:
         kinks = [p for p in (-1, -0.5, 0, 0.5, 1) if p < end]
         return float(integral(DENSITIES[name], -2, end, points=kinks, limit=200)[0])
@@ -32,14 +32,14 @@ def coverage(name: str, places: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", FILTERS)
 def test_quantiles(name: str) -> None:
-    """Each cell of the table holds as much of the filter as the others."""
+    """Each cell of the table holds the same share of the filter."""
     places = filter_quantiles(name)["quantile"].astype(np.float64) - 0.5
     assert np.allclose(coverage(name, places[::64]), np.arange(0, CELLS + 1, 64) / CELLS, atol=1e-5)
 
 
 @pytest.mark.parametrize("name", DENSITIES)
 def test_an_edge_is_blurred_by_the_filter(device: Device, name: Filter) -> None:
-    """A wall that shines ends at a third of a pixel: around it pixels see as much of it as their filters do."""
+    """An emissive wall ends at a third of a pixel: pixels near it see the share that their filters cover."""
     size, edge = 8, 4 + 1 / 3
     right, lamp = 2 * edge / size - 1, Diffuse(color=(0.0, 0.0, 0.0), emission=(1.0, 1.0, 1.0))
     wall = quad([(-9, -9, -1), (right, -9, -1), (right, 9, -1), (-9, 9, -1)], lamp)

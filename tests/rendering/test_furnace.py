@@ -1,4 +1,4 @@
-"""White furnaces, and the light that multiple scattering between microfacets gives back."""
+"""White furnace tests, and the energy that multiple scattering between microfacets restores."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ WHITE = (1.0, 1.0, 1.0)
 
 @pytest.fixture(scope="module")
 def metals(device: Device) -> list[Reflected]:
-    """Of every roughness from every angle, with each form of shadowing, without and with multiple scattering."""
+    """Return measurements at every roughness and angle, for each shadowing form, without and with multiple scattering.
+    """
     return list(measure_metals(device, SAMPLES))
 
 
@@ -41,14 +42,14 @@ def test_diffuse_and_mirror_reflect_their_color_exactly(device: Device) -> None:
 
 
 def test_one_bounce_reflects_its_albedo(metals: list[Reflected]) -> None:
-    """Sampled on the device against a quadrature; what is sampled converges to 1e-4."""
+    """Device samples against a quadrature; the sampled mean converges to 1e-4."""
     single = [metal for metal in metals if not metal.material.multiple_scattering]
     assert len(single) == 360
     assert max(abs(metal.found - metal.exact) for metal in single) < 3e-4
 
 
 def test_multiple_scattering_reflects_all(metals: list[Reflected]) -> None:
-    """The error of the fitted albedo, and of the sampling."""
+    """The deviation from 1 is that of the fitted albedo and of the sampling."""
     for smith, most in zip(SMITHS, (1e-3, 1e-3, 1.5e-3, 2e-3), strict=True):
         errors = [abs(m.found - 1) for m in metals if m.material.multiple_scattering and m.material.smith == smith]
         assert len(errors) == 90 and max(errors) < most, smith
@@ -72,7 +73,7 @@ def test_what_is_added_is_kulla_and_contys_lobe(device: Device) -> None:
 
 @pytest.mark.parametrize("smith", SMITHS)
 def test_white_reflects_all(device: Device, smith: Smith) -> None:
-    """Whatever its metal, index and speculars: what the gloss does not reflect comes out of the body."""
+    """For any metallic, index and specular: what the gloss does not reflect, the body does."""
     rng = np.random.default_rng(SMITHS.index(smith))
     materials = [MetallicRoughness(color=WHITE, metallic=rng.choice([0, rng.random(), 1]), roughness=rng.random(),
                                    ior=1 + 3 * rng.random()**2, specular=rng.choice([1, rng.random()]), smith=smith,
@@ -88,7 +89,7 @@ def test_white_reflects_all(device: Device, smith: Smith) -> None:
 
 @pytest.mark.parametrize("metallic", [0.0, 0.5, 0.9])
 def test_white_coupled_by_fresnel_makes_no_light(device: Device, metallic: float) -> None:
-    """A white body under a gloss with multiple scattering, which is reflected before light enters the body."""
+    """A white body below a gloss with multiple scattering, whose energy is reflected before light enters the body."""
     materials = [MetallicRoughness(color=WHITE, metallic=metallic, roughness=roughness, coupling="fresnel",
                                    multiple_scattering=True) for roughness in (0.0, 0.1, 0.3, 0.6, 1.0)]
     whites, numbers = bsdfs(device, [*materials]), evenly(SAMPLES)
@@ -99,7 +100,7 @@ def test_white_coupled_by_fresnel_makes_no_light(device: Device, metallic: float
 
 
 def test_samples_weigh_little(device: Device) -> None:
-    """Its own lobe keeps weights bounded: the cosine's would give some of 1e5 at low roughness."""
+    """The lobe's own sampling keeps weights bounded; cosine sampling gives weights of 1e5 at low roughness."""
     metals = [MetallicRoughness(color=WHITE, metallic=1.0, roughness=roughness, multiple_scattering=True)
               for roughness in (0.0, 0.05, 0.2, 0.5, 1.0)]
     whites, numbers = bsdfs(device, [*metals]), evenly(1 << 16)
@@ -110,7 +111,7 @@ def test_samples_weigh_little(device: Device) -> None:
 
 
 def random_glasses(rng: np.random.Generator, count: int) -> list[Dielectric]:
-    """Rough glasses of every index, a third of them near 1; every fourth a thin sheet."""
+    """Return rough glasses of any index, a third of them close to 1; every fourth is a thin sheet."""
     near = 1 + rng.choice([-1, 1], count) * 10**rng.uniform(-2.5, -1, count)
     iors = np.where(rng.random(count) < 1 / 3, near, 4**rng.uniform(-1, 1, count))
     return [Dielectric(ior=float(ior), roughness=float(roughness), thin=i % 4 == 3)
@@ -118,7 +119,7 @@ def random_glasses(rng: np.random.Generator, count: int) -> list[Dielectric]:
 
 
 def test_rough_glass_keeps_all_light(device: Device) -> None:
-    """As much light leaves as arrives, from both sides, every angle; at the most grazing one samples need longest."""
+    """All energy leaves, from both sides, at every angle; sampling converges slowest at the most grazing one."""
     kept = list(measure_glass(device, 2 * SAMPLES, random_glasses(np.random.default_rng(3), 12)))
     assert len(kept) == 240
     assert not [glass for glass in kept if not abs(glass.found - 1) < (2e-3 if glass.cosine > 1e-4 else 5e-3)]
@@ -132,7 +133,7 @@ def test_rough_glass_is_reciprocal(device: Device) -> None:
 
 
 def test_rough_glass_from_inside_is_that_of_the_inverse_index(device: Device) -> None:
-    """Samples, weights and densities, of which the other tests look at those from outside."""
+    """Samples, weights and densities from inside; the other tests cover those from outside."""
     numbers = evenly(1 << 12)
     for ior, roughness in ((1.5, 0.3), (2.0, 1.0), (0.5, 0.6), (1.25, 0.1)):
         glass = bsdfs(device, [Dielectric(ior=ior, roughness=roughness), Dielectric(ior=1 / ior, roughness=roughness)])
@@ -148,7 +149,7 @@ def test_rough_glass_from_inside_is_that_of_the_inverse_index(device: Device) ->
 
 
 def test_a_furnace_does_not_see_rough_glass(device: Device) -> None:
-    """Paths go through a sphere, and the picture is 1; a single bounce between microfacets loses most of it."""
+    """Paths go through a sphere, and the image is 1; single scattering between microfacets loses a large part."""
     for multiple in (True, False):
         ball = Sphere(material=Dielectric(roughness=0.8, multiple_scattering=multiple))
         camera = Camera(position=(0.0, 0.0, 9.0), fov_degrees=8.0)
@@ -158,7 +159,7 @@ def test_a_furnace_does_not_see_rough_glass(device: Device) -> None:
 
 
 def test_textured_rough_glass_keeps_all_light(device: Device) -> None:
-    """Between the rows of its table too, which other glass of the scene does not have."""
+    """Also between the rows of its table, which other glass of the scene does not use."""
     textures = [Texture(picture=Picture(np.full((1, 1, 4), grey, np.uint8))) for grey in (0, 12, 31, 60, 129, 200, 255)]
     glasses = [Dielectric(roughness=0.4), *(Dielectric(roughness=texture) for texture in textures)]
     kept = list(measure_glass(device, 2 * SAMPLES, glasses))
@@ -167,13 +168,13 @@ def test_textured_rough_glass_keeps_all_light(device: Device) -> None:
 
 
 def test_single_scattering_of_rough_glass_loses_light(device: Device) -> None:
-    """What multiple scattering restores, by more than half at most."""
+    """Multiple scattering restores this loss, which exceeds half at its largest."""
     glass = Dielectric(roughness=1.0, multiple_scattering=False)
     assert min(kept.found for kept in measure_glass(device, SAMPLES, [glass])) < 0.5
 
 
 def test_only_those_who_ask_pay(device: Device) -> None:
-    """No code for it in other scenes; beside one that has it, a material without stays as it was."""
+    """Other scenes compile no code for it, and a material without it is unchanged in a scene that has it."""
     plain, full = (MetallicRoughness(roughness=0.7, metallic=0.5, coupling="fresnel", multiple_scattering=multiple)
                    for multiple in (False, True))
     alone, both = (compile_scene(Scene(spheres=[Sphere(material=material) for material in materials]),

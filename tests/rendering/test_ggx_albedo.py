@@ -1,4 +1,4 @@
-"""The tables of directional albedos of GGX in the kernels, against integrals in float64."""
+"""The kernels' tables of directional albedos of GGX, against integrals in float64."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ COSINES = np.geomspace(1e-5, 1, 300)
 
 
 def read_table(smith: Smith) -> Table:
-    """The numbers of a kernel's file."""
+    """Parse the numbers of a kernel file."""
     text = (kernel_folder() / f"bsdf/albedo_{smith}.cl").read_text()
     blocks = re.findall(r"constant float \w+\[.*?\};", text, re.DOTALL)
     arrays = [np.array(re.findall(r"-?\d+\.\d*(?:e[+-]?\d+)?(?=f)", block), float) for block in blocks]
@@ -34,7 +34,7 @@ def read_table(smith: Smith) -> Table:
 @pytest.mark.parametrize("smith", SMITHS)
 @pytest.mark.parametrize("roughness", [0.05, 0.3, 1.0])
 def test_albedo(roughness: float, smith: Smith) -> None:
-    """The quadrature against another one, in other coordinates, by brute force: with F = 1, and Schlick's 5th power."""
+    """The quadrature against a brute-force one in other coordinates: with F = 1, and with Schlick's 5th power."""
     alpha, cosines = roughness**2, np.array([1.0, 0.6, 0.2, 0.05])
     expected = np.transpose([ggx.albedos(alpha, cosine, smith, steps=1500) for cosine in cosines])
     np.testing.assert_allclose(microfacets.albedos(cosines, alpha, smith), expected, atol=2e-4)
@@ -42,7 +42,7 @@ def test_albedo(roughness: float, smith: Smith) -> None:
 
 @pytest.mark.parametrize("smith, most", list(zip(SMITHS, (6e-4, 8e-4, 1e-3, 1.2e-3), strict=True)))
 def test_albedos_are_fitted(smith: Smith, most: float) -> None:
-    """What one bounce loses with F = 1, and what it reflects with F = (1 − wo·h)^5: at every angle and roughness."""
+    """The loss of one bounce with F = 1, and the albedo with F = (1 − wo·h)^5, at every angle and roughness."""
     table = read_table(smith)
     for roughness in ROUGHNESSES:
         whole, grazing = microfacets.albedos(COSINES, roughness**2, smith)
@@ -53,7 +53,7 @@ def test_albedos_are_fitted(smith: Smith, most: float) -> None:
 
 @pytest.mark.parametrize("smith, most", list(zip(SMITHS, (2e-4, 2e-4, 2e-4, 1.3e-3), strict=True)))
 def test_means_are_those_of_the_fits(smith: Smith, most: float) -> None:
-    """Over the hemisphere, weighted by 2·cos: energy is kept if they are those of what is fitted, right or not."""
+    """Hemispherical means weighted by 2·cos: energy is conserved if they match the fits, whatever the fits' error."""
     table = read_table(smith)
     t, weight = np.polynomial.legendre.leggauss(400)
     log_cosines = 8 * (t - 1)
@@ -63,6 +63,6 @@ def test_means_are_those_of_the_fits(smith: Smith, most: float) -> None:
         loss, fresnel = evaluate(table, cosines, alpha, smith)
         exact = 8 * np.array([loss, fresnel]) @ (weight * 2 * cosines**2)
         lost = mean_scale(np.array(alpha), smith) * np.polynomial.polynomial.polyval(y, table.mean_loss)
-        # Of the light lost at an angle, lost/exact comes back.
+        # Of the energy lost at an angle, lost/exact is restored.
         assert abs(lost / exact[0] - 1) * loss.max() < most, roughness
         assert np.polynomial.polynomial.polyval(y, table.mean_fresnel) == pytest.approx(exact[1], abs=4e-4), roughness

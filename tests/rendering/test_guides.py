@@ -1,4 +1,4 @@
-"""What guides a denoiser: albedo and normals of what is seen, through mirrors, too."""
+"""Denoiser guides: albedo and normals of visible surfaces, also through mirrors."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from .test_variants import everything
 Doubles = NDArray[np.float64]
 Floats = NDArray[np.float32]
 RED, GREY = (0.7, 0.2, 0.1), (0.5, 0.5, 0.5)
-#: Looks at the back of a box of 2 units around the origin, and nothing else.
+#: Camera that sees only the back of a box of 2 units around the origin.
 INSIDE = Camera(position=(0.0, 0.0, 0.9), look_at=(0.0, 0.0, -1.0), fov_degrees=20)
 FLAT = RenderSettings(size=(6, 4), spp=1)
-#: Materials, and how far from their albedo a furnace of a million samples may show them: what GGX of alpha 0.01 loses
-#: between microfacets, and noise. A rough metal reflects as much only where it is white and scatters several times.
+#: Materials, and how far their albedo may be from a furnace of a million samples: the energy that GGX of alpha 0.01
+#: loses between microfacets, and noise. A rough metal matches only if it is white and has multiple scattering.
 FURNACE: dict[Material, float] = {
     Diffuse(color=RED): 1e-5,
     MetallicRoughness(color=RED, metallic=1.0, roughness=0.1): 5e-4,
@@ -35,8 +35,8 @@ FURNACE: dict[Material, float] = {
 
 
 def with_specks(scene: Scene) -> Scene:
-    """The scene with specks far off, too small to be seen, of all materials, and one that is smooth: so that all scenes
-    are shown by one program."""
+    """Return the scene with specks of all materials, and a smooth one, too small and far away to be seen,
+    so that all scenes use one program."""
     specks = [Sphere(center=(30.0, 30.0, 30.0 + i), radius=1e-3, material=material)
               for i, material in enumerate([*FURNACE, Mirror(), Dielectric()])]
     smooth = quad([(30, 30, 29), (30.001, 30, 29), (30.001, 30.001, 29), (30, 30.001, 29)], Diffuse())
@@ -50,23 +50,23 @@ def guides(device: Device, scene: Scene, samples: int = 4, lanes: int | None = N
 
 
 def back(material: Material, z: float = -1.0) -> Mesh:
-    """A wall of 4 by 4 units across the z axis, whose front side is that of +z."""
+    """Return a wall of 4 by 4 units across the z axis that faces +z."""
     return quad([(-2, -2, z), (2, -2, z), (2, 2, z), (-2, 2, z)], material)
 
 
 def front(material: Material, z: float = 1.0) -> Mesh:
-    """The like, facing −z."""
+    """Return the same wall, facing −z."""
     return quad([(-2, -2, z), (-2, 2, z), (2, 2, z), (2, -2, z)], material)
 
 
 def everywhere(picture: Floats, expected: tuple[float, ...]) -> None:
-    """Each pixel is `expected`, to the roundings of a mean."""
+    """Assert that each pixel is `expected`, to the roundings of a mean."""
     np.testing.assert_allclose(picture, np.broadcast_to(expected, picture.shape), rtol=1e-6, atol=1e-7)
 
 
 @pytest.mark.parametrize("material, tolerance", FURNACE.items(), ids=range(len(FURNACE)))
 def test_albedo_is_what_a_furnace_shows(device: Device, material: Material, tolerance: float) -> None:
-    """Head on, under a white sky, a surface that sees nothing but sky is as bright as its albedo."""
+    """Seen head on under a white sky, an unoccluded surface is as bright as its albedo."""
     scene = Scene(meshes=[back(material)], environment=Environment(color=(1.0, 1.0, 1.0)),
                   camera=replace(INSIDE, fov_degrees=1e-2), render=RenderSettings(size=(16, 16), max_depth=2))
     shown = film(device, with_specks(scene), 4096, sampler="sobol").mean.mean(axis=(0, 1))
@@ -74,7 +74,7 @@ def test_albedo_is_what_a_furnace_shows(device: Device, material: Material, tole
 
 
 def test_normals_of_a_sphere(device: Device) -> None:
-    """Where all of a pixel is sphere: the mean over the pixel, by quadrature in float64."""
+    """In pixels that the sphere covers: the mean over the pixel, by quadrature in float64."""
     camera, size, center, radius = Camera(position=(3.0, 2.0, 4.0)), (20, 15), np.array([0.2, -0.1, 0.0]), 1.3
     scene = Scene(spheres=[Sphere(center=tuple(center.tolist()), radius=radius, material=Diffuse(color=RED))],
                   camera=camera, render=RenderSettings(size=size))
@@ -98,7 +98,7 @@ def test_normals_of_a_sphere(device: Device) -> None:
 
 
 def test_normals_face_the_camera(device: Device) -> None:
-    """Also those of a wall that is seen from behind, and of one whose shading normals lean."""
+    """Also those of a wall that is seen from behind, and of one with tilted shading normals."""
     everywhere(guides(device, Scene(meshes=[back(Diffuse())], camera=INSIDE, render=FLAT))["normal"], (0, 0, 1))
     behind = replace(INSIDE, position=(0.0, 0.0, -3.0))
     everywhere(guides(device, Scene(meshes=[back(Diffuse())], camera=behind, render=FLAT))["normal"], (0, 0, -1))
@@ -116,7 +116,7 @@ def test_sky_is_its_radiance_up_to_one_without_a_normal(device: Device) -> None:
 
 
 def test_mirrors_are_followed(device: Device) -> None:
-    """To the wall behind the camera, tinted, and to the sky; one after the other; and no further than paths go."""
+    """To the wall behind the camera, tinted, and to the sky; through two mirrors; and no deeper than `max_depth`."""
     tinted, behind = Mirror(color=(0.9, 0.8, 0.5)), front(Diffuse(color=RED))
     wall = Scene(meshes=[back(tinted), behind], environment=Environment(color=(0.5, 1.0, 4.0)), camera=INSIDE,
                  render=replace(FLAT, max_depth=4))
@@ -135,7 +135,7 @@ def test_mirrors_are_followed(device: Device) -> None:
 
 
 def test_glass_is_looked_through(device: Device) -> None:
-    """Tinted at both its faces; but where more is reflected than refracted, the reflection is seen."""
+    """Tinted at both faces; if more is reflected than refracted, the reflection is used."""
     glass, wall = Dielectric(color=(0.9, 0.8, 0.5)), back(Diffuse(color=RED))
     side = quad([(1.9, -2, 0.5), (1.9, -2, 2), (1.9, 2, 2), (1.9, 2, 0.5)], Diffuse(color=GREY))
     pane = Scene(meshes=[front(glass, -0.5), back(glass, 0.5), wall, side], camera=INSIDE, render=FLAT)
@@ -149,7 +149,7 @@ def test_glass_is_looked_through(device: Device) -> None:
 
 
 def test_edges_are_shares_of_the_pixel(device: Device) -> None:
-    """A wall over half of the middle column: half its albedo, half its normal."""
+    """A wall that covers half of the middle column: half its albedo, half its normal."""
     half = quad([(-2, -2, -1), (0, -2, -1), (0, 2, -1), (-2, 2, -1)], Diffuse(color=RED))
     found = guides(device, Scene(meshes=[half], camera=INSIDE, render=RenderSettings(size=(5, 3))), 64)
     np.testing.assert_allclose(found["albedo"][:, 2], np.tile(np.multiply(RED, 0.5), (3, 1)), rtol=0.04)
@@ -159,14 +159,14 @@ def test_edges_are_shares_of_the_pixel(device: Device) -> None:
 
 @pytest.mark.combinations
 def test_lanes_agree(device: Device) -> None:
-    """To float rounding, but for samples on an edge, which a rounding may turn."""
+    """Results agree to float rounding, except for samples on an edge, which rounding may flip."""
     pictures = [guides(device, everything(), lanes=lanes) for lanes in (8, 1)]
     for name, picture in pictures[1].items():
         assert np.mean(np.abs(picture - pictures[0][name]).max(axis=2) > 1e-5) < 1e-3, name
 
 
 def test_launches_agree(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bit for bit, however it is cut."""
+    """They are equal bit for bit however the work is split into launches."""
     scene = Scene(meshes=[back(Mirror()), front(Diffuse(color=RED))], camera=INSIDE,
                   render=RenderSettings(size=(60, 40)))
     whole = guides(device, scene)
@@ -178,7 +178,7 @@ def test_launches_agree(device: Device, monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.combinations
 def test_they_are_in_range(device: Device) -> None:
-    """Of all kinds of surfaces, lights and materials. What the camera looks at turns to it."""
+    """For all kinds of surfaces, lights and materials. Normals face the camera."""
     found = guides(device, everything(), 16)
     assert all(picture.dtype == np.float32 and picture.shape == (33, 45, 3) for picture in found.values())
     assert found["albedo"].min() >= 0 and found["albedo"].max() <= 1

@@ -1,4 +1,4 @@
-"""Shading normals that are not the surface's: gloss is folded at the horizon, and what is matte ends softly there."""
+"""Shading normals that differ from the geometric ones: gloss is folded at the horizon, diffuse light fades there."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ GLOSSY: list[Material] = [
 MATTE: list[Material] = [Diffuse(color=COLOR), Phong(color=(0.5, 0.4, 0.3), specular=(0.3, 0.4, 0.5), shininess=9.0),
                          MetallicRoughness(color=COLOR, metallic=0.5, roughness=0.5)]
 SPECULAR: list[Material] = [Mirror(color=COLOR), Dielectric(color=COLOR)]
-#: Cells of the sphere, by z and by azimuth, and points in each, both ways.
+#: Cells of the sphere by z and azimuth, and points per cell in each dimension.
 CELLS, POINTS = 12, 60
 
 
@@ -51,11 +51,11 @@ class Tilted:
     codes: Doubles
 
     def sample(self, which: int, frame: Doubles, numbers: Doubles) -> Doubles:
-        """(n, 9) wi (3), weight (3), pdf, specular, spread; frame (3, 3): ng, ns, wo."""
+        """Return wi (3), weight (3), pdf, specular, spread as (n, 9); frame (3, 3): ng, ns, wo."""
         return self.probe("shading_sample", 9, *self._fixed(which, frame, len(numbers)), numbers)
 
     def value(self, which: int, frame: Doubles, wi: Doubles) -> tuple[Doubles, Doubles]:
-        """f·|cos| (n, 3) and pdf (n,) of wi (n, 3)."""
+        """Return f·|cos| (n, 3) and pdf (n,) of wi (n, 3)."""
         out = self.probe("shading_value", 4, *self._fixed(which, frame, len(wi)), wi)
         return out[:, :3], out[:, 3]
 
@@ -78,7 +78,7 @@ def unit(v: Doubles) -> Doubles:
 
 
 def frames(count: int, seed: int) -> list[Doubles]:
-    """(3, 3) each: ng, ns up to 75 degrees from it, and wo above both, of components that float32 holds."""
+    """Return frames (3, 3): ng, ns up to 75 degrees from it, and wo above both, with components exact in float32."""
     rng = np.random.default_rng(seed)
     found: list[Doubles] = []
     while len(found) < count:
@@ -91,7 +91,7 @@ def frames(count: int, seed: int) -> list[Doubles]:
 
 
 def local(frame: Doubles, w: Doubles) -> Doubles:
-    """In a frame whose z is ns."""
+    """Transform w to a frame whose z is ns."""
     ns = unit(frame[1])
     s = unit(np.cross(ns, np.eye(3)[np.argmin(np.abs(ns))]))
     return np.asarray(w @ np.array([s, np.cross(ns, s), ns]).T)
@@ -103,7 +103,7 @@ def mirrored(frame: Doubles, w: Doubles) -> Doubles:
 
 
 def matte(material: Material, cosine: Doubles) -> Doubles | float:
-    """(n, 3) f·cos of what is matte."""
+    """Return f·cos (n, 3) of the diffuse part."""
     if isinstance(material, Diffuse | Phong):
         return np.outer(np.maximum(cosine, 0), np.array(material.color)) / np.pi
     return 0.0
@@ -111,7 +111,7 @@ def matte(material: Material, cosine: Doubles) -> Doubles | float:
 
 @pytest.mark.parametrize("which", range(len(GLOSSY) + 2))
 def test_gloss_is_mirrored_at_the_surface(tilted: Tilted, which: int) -> None:
-    """f(wi) + gloss(mirrored wi) of those two that lie on the side of ns that wi is on of ng; the density of both."""
+    """The value is f(wi) + gloss(mirrored wi), of those on the same side of ns as wi is of ng; so is the density."""
     material = tilted.materials[which]
     for seed, frame in enumerate(frames(6, which)):
         wi = unit(np.random.default_rng(seed).normal(size=(4000, 3))).astype(np.float32).astype(np.float64)
@@ -131,8 +131,8 @@ def test_gloss_is_mirrored_at_the_surface(tilted: Tilted, which: int) -> None:
 
 
 def test_samples_follow_the_density(tilted: Tilted) -> None:
-    """Chi-square over cells of the sphere, and one for samples that failed; the weight is value over density, and a
-    sample is on the side that light is reflected or transmitted to."""
+    """Chi-square over cells of the sphere, with one cell for failed samples; weights are value over density, and a
+    sample is on the side to which light is reflected or transmitted."""
     count, chi2 = 1 << 15, {}
     fine = (np.arange(CELLS * POINTS) + 0.5) / (CELLS * POINTS)
     z, phi = np.meshgrid(2 * fine - 1, 2 * np.pi * fine, indexing="ij")
@@ -149,7 +149,7 @@ def test_samples_follow_the_density(tilted: Tilted) -> None:
             shares = np.array([*expected, max(1 - expected.sum(), 0)])
             chi2[f"{i} {tilted.materials[which]}"] = chi2_test([*found, count - kept.sum()], count * shares + 1e-9)
             value, again = tilted.value(which, frame, wi)
-            sure = np.abs(again / sample[kept, 6] - 1) < 1e-3     # a few lie on a horizon
+            sure = np.abs(again / sample[kept, 6] - 1) < 1e-3     # A few lie on a horizon
             assert sure.mean() > 0.998
             carried = sample[kept, 3:6] * sample[kept, 6:7] * np.where(wi @ frame[0] < 0, sample[kept, 8], 1)[:, None]
             np.testing.assert_allclose(carried[sure], value[sure], rtol=2e-3, atol=1e-5)
@@ -158,7 +158,7 @@ def test_samples_follow_the_density(tilted: Tilted) -> None:
 
 @pytest.mark.parametrize("which", range(len(GLOSSY)))
 def test_no_energy_of_gloss_is_lost(tilted: Tilted, which: int) -> None:
-    """The mean weight is that of the same samples around the shading normal alone, wherever the surface lies."""
+    """The mean weight is that of the same samples around the shading normal alone, for any geometric normal."""
     count, numbers = 1 << 15, uniform(1 << 15, which)
     p: dict[str, float] = {}
     for i, frame in enumerate(frames(8, 200 + which)):
@@ -176,7 +176,7 @@ def test_no_energy_of_gloss_is_lost(tilted: Tilted, which: int) -> None:
 
 @pytest.mark.parametrize("which", range(-len(SPECULAR), 0))
 def test_mirrored_views_stay_above(tilted: Tilted, which: int) -> None:
-    """A single direction on each side, with the weight that it has without a surface."""
+    """There is a single direction on each side, with the weight that it has without folding."""
     for frame in frames(20, 300):
         numbers = uniform(1 << 8, 1)
         sample = tilted.sample(which, frame, numbers)
@@ -194,7 +194,7 @@ def test_mirrored_views_stay_above(tilted: Tilted, which: int) -> None:
 
 
 def bumps(seed: int) -> Texture:
-    """Normals of all directions of the upper half, from texel to texel."""
+    """Return a normal map whose texels are random directions of the upper hemisphere."""
     normals = unit(np.random.default_rng(seed).normal(size=(8, 8, 3)))
     normals[..., 2] = np.abs(normals[..., 2])
     texels = np.full((8, 8, 4), 255, np.uint8)
@@ -203,7 +203,7 @@ def bumps(seed: int) -> Texture:
 
 
 def furnace(material: Material, seed: int) -> Scene:
-    """A sheet with a normal map, or a convex mesh with normals that are off at random, in white light."""
+    """Return a sheet with a normal map, or a convex mesh with random normals, in a white furnace."""
     if getattr(material, "normal_map", None) is not None:
         mesh = quad([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], material)
         mesh = replace(mesh, uv=np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32))
@@ -219,8 +219,8 @@ def furnace(material: Material, seed: int) -> Scene:
 @pytest.mark.parametrize("mapped", [False, True])
 @pytest.mark.parametrize("seed", range(3))
 def test_white_gloss_in_a_white_furnace_is_white(device: Device, mapped: bool, seed: int) -> None:
-    """A mirror exactly, rough metals with multiple scattering by their mean, within five standard errors and the error
-    of what they are fitted to: over random normals."""
+    """With random normals a mirror is white exactly; rough metals with multiple scattering are white in the mean,
+    within five standard errors and the error of the fits."""
     normal_map = bumps(seed) if mapped else None
     assert np.abs(film(device, furnace(Mirror(color=WHITE, normal_map=normal_map), seed)).mean - 1).max() < 1e-5
     for roughness in (0.2, 0.6, 1.0):
@@ -239,13 +239,13 @@ def test_white_gloss_in_a_white_furnace_is_white(device: Device, mapped: bool, s
                                       Phong(color=COLOR, specular=(0.1, 0.2, 0.3), shininess=20.0)],
                          ids=["metal", "plastic", "diffuse", "phong"])
 def test_light_samples_and_bsdf_samples_agree(device: Device, material: Material) -> None:
-    """Of a lamp at the horizon of a sheet with bumps: by light samples alone, and with MIS, in each integrator."""
+    """For an emitter at the horizon of a bumpy sheet: light samples alone and MIS agree in each integrator."""
     sheet = furnace(replace(material, normal_map=bumps(5)), 5).meshes[0]
     lamp = Sphere(center=(2.5, 0.5, 0.7), radius=0.8, material=Diffuse(color=(0.0,) * 3, emission=(1.0, 2.0, 3.0)))
     scene = Scene(meshes=[sheet], spheres=[lamp], camera=Camera(position=(0, -2, 2.5), up=(0, 0, 1), fov_degrees=40))
     means = {}
     integrators: tuple[Integrator, ...] = ("path", "direct", "local", "raster")
-    for integrator in integrators[:2] if isinstance(material, Phong) else integrators:    # the books' form there
+    for integrator in integrators[:2] if isinstance(material, Phong) else integrators:    # Phong: textbook form there
         settings = RenderSettings(size=(24, 24), spp=512, max_depth=2, integrator=integrator)
         means[integrator] = film(device, replace(scene, render=settings)).mean.mean(axis=(0, 1))
     assert min(means["path"]) > 0.005
@@ -257,7 +257,7 @@ def test_light_samples_and_bsdf_samples_agree(device: Device, material: Material
                                       MetallicRoughness(color=COLOR, specular=0.0, clearcoat=1e-6)],
                          ids=["diffuse", "matte", "coated"])
 def test_matte_bumps_shadow_themselves(device: Device, material: Material) -> None:
-    """Lambert's law around a bent normal, times a shadowing that ends it softly at the horizon."""
+    """Diffuse light is Lambert's law for a bent normal times a shadowing factor that fades at the horizon."""
     rng, up = np.random.default_rng(7), np.array([0.0, 0.0, 1.0])
     for bend in rng.random(8) * 60:
         turn, wi = rng.random() * 2 * np.pi, unit(rng.normal(size=3) * [1, 1, 0.3])

@@ -1,4 +1,4 @@
-"""Memory for a film's copies is used again when nobody can see it any more, and never before."""
+"""Memory of film copies is reused once no view of it is alive, and never before."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from clrt.rendering.compile.records import PIXEL
 from clrt.rendering.film.host_memory import KEPT, HostMemory
 
 SHAPE = (3, 5)
-#: How others look at a film: its fields, some of its rows, several fields, its bytes as a checkpoint's writer does.
+#: Views of a film: a field, some rows, several fields, and its bytes, as the checkpoint writer takes them.
 VIEWS: dict[str, Callable[[NDArray[Any]], Any]] = {
     "field": lambda film: film["count"],
     "rows": lambda film: film[1:][:, 2],
@@ -26,7 +26,7 @@ def place(array: NDArray[Any]) -> int:
 
 
 def test_memory_is_used_again() -> None:
-    """And is not what the system gives out again: others get theirs in between."""
+    """It is reused, and arrays that others allocate in between do not get it."""
     memory, others = HostMemory(SHAPE, PIXEL), []
     places = set()
     for _ in range(10):

@@ -1,4 +1,4 @@
-"""Which picture a checkpoint, a frame, a band and a report are of: whatever is not exempted by name counts."""
+"""Identity of the image of a checkpoint, frame, band or report: every setting counts unless it is exempted by name."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from clrt.scene.model import RenderSettings, Scene
 
 from ..covering import others
 
-#: Of each setting and choice a value that is not the default.
+#: A value other than the default for each setting and choice.
 OTHER: dict[str, Any] = {
     "size": (24, 16), "spp": 3, "max_depth": 3, "seed": 7, "integrator": "direct", "shadows": False,
     "sampler": "independent", "filter": "tent", "adaptive": True, "back_face_culling": "all", "clamp_direct": 1.5,
@@ -44,7 +44,7 @@ CHOICES = [each.name for each in fields(Choices) if each.name != "tests"]
 WHITE, DOWN = (1.0, 1.0, 1.0), (0.0, -1.0, 0.0)
 LIGHTS = [PointLight(position=(0.0, 3.0, 0.0), intensity=WHITE), DirectionalLight(direction=DOWN, irradiance=WHITE),
           SpotLight(position=(0.0, 3.0, 0.0), direction=DOWN, intensity=WHITE)]
-#: These alone a user does not name.
+#: The only ones that users cannot set directly.
 BY_AOVS = {"direct_light"}
 
 
@@ -56,7 +56,7 @@ def scene(**given: Any) -> Scene:
 
 
 def changed(settings: RenderSettings, choices: Choices, name: str) -> tuple[RenderSettings, Choices]:
-    """With another value of one of them."""
+    """Return both with another value for one field."""
     if name in SETTINGS:
         return replace(settings, **{name: OTHER[name]}), choices
     if name in TESTS:
@@ -65,7 +65,7 @@ def changed(settings: RenderSettings, choices: Choices, name: str) -> tuple[Rend
 
 
 def test_no_name_is_without_an_example() -> None:
-    """So that a field that is added is tested by what follows."""
+    """OTHER covers every field, so that added fields are tested below."""
     assert {*SETTINGS, *CHOICES, *TESTS} == OTHER.keys()
 
 
@@ -79,7 +79,7 @@ def test_every_setting_and_choice_counts_but_for_those_named(name: str) -> None:
 
 
 def test_what_is_added_counts_by_itself() -> None:
-    """A setting, a choice, a part of a scene and a parameter of a material that nobody has heard of."""
+    """An added setting, choice, part of a scene or material parameter changes the identity without further code."""
     def more(kind: type, value: object) -> Any:
         return make_dataclass(f"More{kind.__name__}", [("novel", object, field(default=value, kw_only=True))],
                               bases=(kind,), frozen=getattr(kind, "__dataclass_params__").frozen, eq=False)
@@ -94,7 +94,7 @@ def test_what_is_added_counts_by_itself() -> None:
 
 
 def things(value: Any) -> Iterator[Any]:
-    """All dataclasses within a part of a scene."""
+    """Yield all dataclasses within a part of a scene."""
     if isinstance(value, list | tuple):
         for each in value:
             yield from things(each)
@@ -105,7 +105,7 @@ def things(value: Any) -> Iterator[Any]:
 
 
 def test_every_field_of_all_that_is_seen_counts() -> None:
-    """A number in the place of any field of any thing makes another scene, unless it is a name."""
+    """Replacing any field of any object by a number changes the scene's hash, unless the field is a name."""
     parts = [each.name for each in fields(Scene) if each.name not in UNSEEN]
     for material in MATERIALS:
         content = scene(spheres=[clrt.Sphere(material=material())])
@@ -117,7 +117,7 @@ def test_every_field_of_all_that_is_seen_counts() -> None:
                     object.__setattr__(thing, each.name, [12.34] if isinstance(value, list) else 12.34)
                     try:
                         other = None if is_dataclass(value) else scene_hash(content)
-                    except AttributeError:    # what was read of that field is not there now
+                    except AttributeError:    # the hash read an attribute of that field, which is missing now
                         other = None
                     object.__setattr__(thing, each.name, value)
                     assert (other != found) == (each.name not in NAMES) or is_dataclass(value), (thing, each.name)
@@ -125,7 +125,7 @@ def test_every_field_of_all_that_is_seen_counts() -> None:
 
 
 def test_unknown_content_is_refused() -> None:
-    """What cannot be told from another is no part of a scene."""
+    """Values that cannot be hashed are rejected."""
     content = scene(environment=clrt.Environment(color=object()))    # type: ignore[arg-type]
     with pytest.raises(TypeError):
         scene_hash(content)
@@ -133,7 +133,7 @@ def test_unknown_content_is_refused() -> None:
 
 @pytest.mark.parametrize("name", [*SETTINGS, *others(*CHOICES, *TESTS)])
 def test_renderer_farm_and_report_take_every_one(device: Device, name: str) -> None:
-    """A renderer has each as an option, the farm's orders choose the same by it, and the report tells what counts."""
+    """Renderer options include every one, the farm's orders map it to the same choices, and the report lists it."""
     options: dict[str, Any] = {"size": (8, 8), "device": device.info.index}
     options |= {"aovs": ("direct",)} if name in BY_AOVS else {name: OTHER[name]}
     assert options.keys() <= inspect.signature(clrt.Renderer).parameters.keys()
@@ -151,7 +151,7 @@ def test_renderer_farm_and_report_take_every_one(device: Device, name: str) -> N
 @pytest.mark.parametrize("change", [{"spp": 5}, {"time": 1.0}, {"error": 0.5}, {"denoise": True}, {"seed": 3},
                                     {"error_percentile": 90.0}, {"offset": "ulp"}, {"novel": 1}], ids=str)
 def test_bands_are_of_one_order(change: dict[str, Any]) -> None:
-    """Also with options that nobody has heard of."""
+    """Bands of orders that differ in any option, known or not, are not mixed; the device may differ."""
     order = PictureOrder(scene(), {"seed": 1, "error_percentile": 95.0, "device": 0}, spp=4)
     in_order = {each.name for each in fields(order)}
     other = replace(order, **{name: value for name, value in change.items() if name in in_order},
@@ -163,7 +163,7 @@ def test_bands_are_of_one_order(change: dict[str, Any]) -> None:
 
 
 def test_frames_are_of_one_goal_and_one_view(tmp_path: Path) -> None:
-    """Their hash depends on every field of Goal and of Outputs that is not a file."""
+    """The frame hash depends on every field of Goal and of Outputs that is not a file."""
     outputs = Outputs((), (tmp_path / "#.png",), (), False, "srgb", 0.0, None, None)
     goal, content = Goal(4, None, 0.5, 95.0), scene()
 
@@ -183,7 +183,7 @@ def test_frames_are_of_one_goal_and_one_view(tmp_path: Path) -> None:
 
 
 def test_live_settings_are_given_to_the_renderer() -> None:
-    """What is added is, too."""
+    """Added settings are passed on, too."""
     @dataclass(frozen=True, kw_only=True)
     class More(Settings):
         box: str = "plain"

@@ -1,4 +1,4 @@
-"""Where rays leave instances: beyond what the way to the mesh's frame and back has rounded."""
+"""Offsets of rays that leave instances: larger than the rounding of the transform to the mesh's frame and back."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from .test_instances import SETTINGS, by_hand
 
 @pytest.fixture(autouse=True)
 def keep_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also of small meshes, instances stay instances."""
+    """Keep instances of small meshes as instances."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
 
 
 @pytest.mark.statistics
 def test_planes_do_not_shadow_themselves(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor are they met by any of the rays that leave them, but were, if the bound of their points left out the rounding
-    of the way to the mesh's frame, and rays left from there."""
+    """Rays that leave a plane never hit it again, but do if the error bound of their points leaves out the rounding
+    of the transform to the mesh's frame, and rays start at the bound."""
     scene = replace(lit_plane(transforms_of_kinds()["turned"][0]), render=replace(SETTINGS, integrator="direct"))
     assert Subject(device.info.index).picture(scene).all()
     assert not np.any(met_again(Probe(device, scene), scene))
@@ -38,7 +38,7 @@ def test_planes_do_not_shadow_themselves(device: Device, monkeypatch: pytest.Mon
 
 
 def met_again(probe: Probe, scene: Scene) -> NDArray[np.bool_]:
-    """(n,), of rays that leave the first instance, a plane, on its camera's side: whether they meet anything."""
+    """Return whether rays that leave the first instance, a plane, on its camera's side hit anything, (n,)."""
     rng, count = np.random.default_rng(5), 1 << 17
     corners, eye = by_hand(scene.instances[0]).vertices.astype(np.float64), np.array(scene.camera.position)
     centre = corners.mean(axis=0)

@@ -1,4 +1,4 @@
-"""Instances in pictures: what the same meshes show that were transformed in float64, in the memory of one."""
+"""Instances render like meshes transformed in float64, and use the memory of one mesh."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ KINDS = ("turned", "stretched", "mirrored", "nearly flat")
 
 @pytest.fixture(autouse=True)
 def keep_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also of small meshes, instances stay instances."""
+    """Keep instances of small meshes as instances."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
 
 
@@ -44,8 +44,8 @@ def ball(smooth: bool = True, material: Material = Diffuse()) -> Mesh:
 
 
 def by_hand(instance: Instance) -> Mesh:
-    """The mesh in the world: points by the matrix, normals by its inverse transposed, corners so that they still run
-    counter-clockwise round the front; tangents by the matrix, with the bitangent where the mirror puts it."""
+    """Return the mesh in world space: points by the matrix, normals by its inverse transpose, faces that stay
+    counter-clockwise on the front, and tangents by the matrix, with the bitangent of the mirrored frame."""
     linear, mesh = instance.to_world[:, :3], instance.mesh
     side = np.sign(np.linalg.det(linear))
     points = mesh.vertices.astype(np.float64) @ linear.T + instance.to_world[:, 3]
@@ -64,7 +64,7 @@ def by_hand(instance: Instance) -> Mesh:
 
 
 def matrices(kind: str, scale: float = 1.0) -> Doubles:
-    """Twelve that put a ball of radius 1 into a block of 6x4x3."""
+    """Return twelve matrices that put a ball of radius 1 into a block of 6x4x3."""
     transforms = transforms_of_kinds()[kind].copy()
     transforms[:, :, :3] *= scale * 0.6 / np.linalg.norm(transforms[:, :, :3], axis=1).max(axis=1)[:, None, None]
     transforms[:, :, 3] *= np.array([3, 2, 1.5]) / 8
@@ -72,7 +72,7 @@ def matrices(kind: str, scale: float = 1.0) -> Doubles:
 
 
 def crowd(kind: str, spheres: int = 2, smooth: bool = True) -> Scene:
-    """Instances of two meshes, some in materials of their own, beside a floor and spheres, under a sun and a sky."""
+    """Return instances of two meshes, some with their own material, with a floor and spheres, a sun and a sky."""
     glass, gold = Dielectric(), MetallicRoughness(preset="gold", roughness=0.4)
     mesh, other = ball(smooth), ball(False, Mirror())
     rng, to_world = np.random.default_rng(0), matrices(kind)
@@ -90,7 +90,7 @@ def as_meshes(scene: Scene) -> Scene:
 
 
 def seen(device: Device, scene: Scene) -> tuple[Doubles, Doubles]:
-    """The picture, and its normals, (h, w, 3) each."""
+    """Return the image and its normals, (h, w, 3) each."""
     running = session(device, scene)
     for _ in running.render(scene.render.spp):
         pass
@@ -100,8 +100,8 @@ def seen(device: Device, scene: Scene) -> tuple[Doubles, Doubles]:
 @pytest.mark.combinations
 @pytest.mark.parametrize("kind", KINDS)
 def test_instances_look_like_meshes(device: Device, kind: str) -> None:
-    """Nearly all pixels to float rounding: at edges a sample may fall on the other side. Thin things have more edges,
-    and of a thickness of a thousandth the normals' rounding grows a thousandfold."""
+    """Nearly all pixels agree to float rounding; at edges a sample may fall on the other side. Flat shapes have more
+    edges, and with a thickness of a thousandth the rounding error of normals grows a thousandfold."""
     scene = crowd(kind)
     compiled = compile_scene(scene, choices(device))
     assert {"INSTANCES", "SMOOTH_NORMALS"} <= set(compiled.features) and compiled.instances == 12
@@ -109,12 +109,12 @@ def test_instances_look_like_meshes(device: Device, kind: str) -> None:
     flat = kind == "nearly flat"
     assert (np.abs(picture - expected).max(axis=2) > (1e-2 if flat else 1e-4)).mean() < 0.005
     assert (np.abs(normals - expected_normals).max(axis=2) > (1e-2 if flat else 1e-4)).mean() < 0.005
-    assert 0.1 < (np.abs(expected - expected[0, 0]).max(axis=2) > 0.01).mean()  # much is in view
+    assert 0.1 < (np.abs(expected - expected[0, 0]).max(axis=2) > 0.01).mean()  # A large part of the image is covered
 
 
 @pytest.mark.parametrize("kind", ["turned", "stretched", "mirrored"])
 def test_textures_normal_maps_and_colours_go_along(device: Device, kind: str) -> None:
-    """Also with normal maps that some instances bring, or bring for other coordinates, and veils."""
+    """Also with normal maps that only some instances have, or have for another UV set, and partial opacity."""
     rng, mesh = np.random.default_rng(2), ball()
     count = len(mesh.vertices)
     around = np.cross(mesh.vertices, [0.2, 1, 0.3])
@@ -139,7 +139,7 @@ def test_textures_normal_maps_and_colours_go_along(device: Device, kind: str) ->
 
 @pytest.mark.statistics
 def test_instances_look_like_meshes_after_many_bounces(device: Device) -> None:
-    """Each channel's mean, of random numbers of their own."""
+    """The channel means agree, from independent random numbers."""
     scene = replace(crowd("stretched"), render=replace(SETTINGS, max_depth=8))
     films = [film(device, replace(each, render=replace(each.render, seed=seed)), 64)
              for seed, each in enumerate((scene, as_meshes(scene)))]
@@ -151,8 +151,8 @@ def test_instances_look_like_meshes_after_many_bounces(device: Device) -> None:
 
 @covering("layout, lanes, spheres", ["bvh2", "cwbvh"], [8, 1], [40, 2])
 def test_lanes_and_layouts_agree(device: Device, layout: str, lanes: int, spheres: int) -> None:
-    """Layouts and traversals see the same rays and so the same picture, to the last bit; lanes to float rounding.
-    Spheres are met before the tree, or in it."""
+    """Layouts trace the same rays and give bit-identical images; SIMD widths agree to float rounding.
+    Spheres are tested before the BVH or stored in it."""
     scene = crowd("stretched", spheres)
     expected = film(device, scene, lanes=8, layout="bvh8").mean
     picture = film(device, scene, lanes=lanes, layout=layout).mean
@@ -169,7 +169,7 @@ def test_whatever_else_is_in_the_scene(device: Device, rest: str) -> None:
 
 @pytest.mark.parametrize("mesh_size, world_size", [(2.0**-66, 1.0), (2.0**50, 1.0), (1.0, 2.0**-66), (1.0, 2.0**50)])
 def test_sizes_do_not_matter(device: Device, mesh_size: float, world_size: float) -> None:
-    """Neither of meshes nor of the world, where they are powers of two: not a bit changes."""
+    """Scaling meshes or the world by powers of two leaves the image bit-identical."""
     scene = replace(crowd("stretched", 0), meshes=[])
     meshes = {id(each.mesh): replace(each.mesh, vertices=each.mesh.vertices * np.float32(mesh_size))
               for each in scene.instances}
@@ -195,7 +195,7 @@ def test_a_mesh_that_is_drawn_itself_is_stored_once(device: Device) -> None:
 
 @pytest.mark.combinations
 def test_lamps_become_meshes(device: Device) -> None:
-    """Whether the mesh glows or only the instance; one that is mirrored shines from where its front is then."""
+    """Emission of the mesh or of the instance's material; a mirrored emitter emits from its mirrored front."""
     lamp = quad([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], Diffuse(emission=(6, 5, 4)))
     hang = [np.column_stack([np.diag([1.0, side, 1.0]), (x, 3, 0)]) for x, side in ((-2, 1), (2, -1), (0, -1))]
     scene = replace(crowd("mirrored"), lights=[], environment=Environment())
@@ -209,7 +209,7 @@ def test_lamps_become_meshes(device: Device) -> None:
 
 
 def test_ten_thousand_instances_need_the_memory_of_one(device: Device) -> None:
-    """A mesh's triangles and tree are stored once; an instance adds its two records and its part of the upper tree."""
+    """A mesh's triangles and BVH are stored once; an instance adds two records and its part of the top-level BVH."""
     mesh = ball()
     grid = np.stack(np.unravel_index(np.arange(10_000), (100, 100)), axis=1) - 50.0
     moved = [Instance(mesh, np.column_stack([0.4 * np.eye(3), (x, 0, z)])) for x, z in grid]
@@ -227,7 +227,7 @@ def test_ten_thousand_instances_need_the_memory_of_one(device: Device) -> None:
 
 
 def test_only_what_saves_memory_becomes_instances(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few triangles and what is shown once are baked, and then the program knows nothing of instances."""
+    """Meshes of few triangles or with a single instance are baked, and the program has no code for instances."""
     monkeypatch.undo()
     few = crowd("turned")
     compiled, baked = (compile_scene(each, choices(device)) for each in (few, as_meshes(few)))
@@ -254,8 +254,8 @@ def test_checkpoints_tell_instances_apart() -> None:
 
 @pytest.mark.parametrize("few", [0, *others(1 << 16)])
 def test_numbers_of_objects(device: Device, few: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Meshes, then instances, then spheres, in a row from left to right, whatever became of them: a mesh that is drawn
-    itself, one that is not, a lamp, and one that is shown once. Triangles count in their mesh."""
+    """Ids count meshes, instances, then spheres, from left to right, however each is stored: a mesh that is also drawn
+    itself, one that is not, an emitter, and a single instance. Triangles are numbered within their mesh."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", few)
     wall = quad([(-0.5, -2, 0), (0.5, -2, 0), (0.5, 2, 0), (-0.5, 2, 0)], Diffuse())
     other, once = replace(wall, material=Mirror()), replace(wall, material=Dielectric())

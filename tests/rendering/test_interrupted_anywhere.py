@@ -1,4 +1,4 @@
-"""An exception out of a signal's handler may come at any line: whoever goes on gets what there would have been."""
+"""An exception from a signal handler at any line: a resumed render gives the same result."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from .test_noise import room
 pytestmark = pytest.mark.processes
 
 SIZE, SPP = (40, 24), 12
-#: Places that are tried of each call, spread at random over all lines that it runs.
+#: Random lines at which each call is interrupted.
 PLACES = 40
 #: Of the package, where there is state between two lines; not in callbacks of the garbage collector.
 FOLDERS = tuple(str(Path(clrt.__file__).parent / name) for name in ("rendering", "queries", "accel"))
 
 
 def run(call: Callable[[], object], last: int = -1) -> int:
-    """See `interrupted.run`, of FOLDERS."""
+    """Run `interrupted.run` on FOLDERS."""
     return interrupted.run(call, FOLDERS, last)
 
 
 def places(lines: int) -> Iterator[int]:
-    """Numbers of lines, the last ones among them."""
+    """Yield random line numbers up to `lines`."""
     yield from np.random.default_rng(lines).integers(1, lines + 1, PLACES).tolist()
 
 
@@ -45,12 +45,12 @@ def small_launches(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def renderer(device: Device, count: int, adaptive: bool) -> Renderer:
-    """Of the same device once, or several times, which is a crew."""
+    """Return a renderer that uses the same device once, or several times as a crew."""
     return Renderer(room(), device=[device.info.index] * count, size=SIZE, spp=SPP, adaptive=adaptive)
 
 
 def finish(running: Renderer) -> Any:
-    """The picture's mean, and each pixel's samples."""
+    """Return the image's mean and each pixel's sample count."""
     *_, state = running.passes(spp=SPP)
     return np.concatenate([state.film.mean, state.film.pixels["count"][..., None]], axis=-1)
 
@@ -58,7 +58,7 @@ def finish(running: Renderer) -> Any:
 @pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
 @pytest.mark.parametrize("count", [1, 2])
 def test_passes(device: Device, small_launches: None, count: int, adaptive: bool) -> None:
-    """Twice, as what mends the first may be interrupted, too; with the floor of an adaptive render behind it."""
+    """Interrupt twice, since recovery may be interrupted, too; past the uniform phase of an adaptive render."""
     expected = finish(renderer(device, count, adaptive))
     lines = run(lambda: finish(renderer(device, count, adaptive)))
     for place in places(lines):
@@ -70,7 +70,8 @@ def test_passes(device: Device, small_launches: None, count: int, adaptive: bool
 
 @pytest.mark.parametrize("lens", [0.0, 0.2])
 def test_look(device: Device, lens: float) -> None:
-    """To the same place, by another program with a lens."""
+    """A renderer interrupted while it changes camera gives the same image there, also if a lens needs another program.
+    """
     scene = room()
     there = replace(scene.camera, position=(0.3, 0.2, 4.0), aperture_radius=lens)
     other = Renderer(replace(scene, camera=there), device=device.info.index, size=SIZE, spp=SPP)
@@ -86,7 +87,7 @@ def test_look(device: Device, lens: float) -> None:
 
 
 def test_refit(device: Device) -> None:
-    """The tree is of the old vertices or of the new ones."""
+    """After an interrupted refit the BVH is that of the old or of the new vertices."""
     rng = np.random.default_rng(2)
     vertices, faces = rng.random((900, 3)), np.arange(900).reshape(-1, 3)
     rays = rng.random((2000, 3)), rng.normal(size=(2000, 3))

@@ -1,4 +1,4 @@
-"""White furnaces of what lies under coats and fibres, and of what lets light pass."""
+"""White furnace tests of layered and transmissive materials."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WHITE: Any = (1.0, 1.0, 1.0)
 
 
 def found(device: Device, materials: list[MetallicRoughness], cosines: Doubles) -> Doubles:
-    """(materials, cosines): of the light from everywhere, what leaves at these angles."""
+    """Return the reflectance in a white furnace, (materials, cosines)."""
     whites, numbers = bsdfs(device, [*materials]), evenly(SAMPLES)
     views = [np.array([np.sqrt(1 - c * c), 0, c]) for c in cosines]
     return np.array([[whites.sample(which, wo, numbers)[1][:, 0].mean() for wo in views]
@@ -33,7 +33,7 @@ def found(device: Device, materials: list[MetallicRoughness], cosines: Doubles) 
 
 
 def drawn(rng: np.random.Generator, **fields: Any) -> MetallicRoughness:
-    """A white one under a film, fibres, or both."""
+    """Return a random white material below a coat, sheen, or both."""
     covers = [{"clearcoat": rng.choice([1, rng.random()]), "clearcoat_roughness": rng.random()},
               {"sheen_color": (rng.choice([1, rng.random()]),) * 3, "sheen_roughness": rng.random()}]
     kind = rng.integers(3)
@@ -43,7 +43,7 @@ def drawn(rng: np.random.Generator, **fields: Any) -> MetallicRoughness:
 
 
 def test_white_under_layers_keeps_all(device: Device) -> None:
-    """Whatever the index, the metal, what passes, the form of masking, and all roughnesses."""
+    """For any index, metallic, transmission, masking form and roughness."""
     seed = todays_seed()
     print(f"seed {seed}")
     rng = np.random.default_rng(seed)
@@ -54,7 +54,7 @@ def test_white_under_layers_keeps_all(device: Device) -> None:
 
 
 def test_roughnesses_of_textures_lose_little(device: Device) -> None:
-    """Of which the tables have rows: linear between them."""
+    """Textured roughness is interpolated linearly between table rows."""
     rng = np.random.default_rng(5)
 
     def textured(roughness: float | Texture) -> Texture:
@@ -69,7 +69,7 @@ def test_roughnesses_of_textures_lose_little(device: Device) -> None:
 
 
 def test_what_passes_light_keeps_all(device: Device) -> None:
-    """By single bounces or more, whatever part of it is metal, by each form of masking."""
+    """With one or more bounces, any metallic and each masking form."""
     rng = np.random.default_rng(3)
     sheets = [MetallicRoughness(color=WHITE, transmission=rng.choice([1, rng.random()]), roughness=rng.random(),
                                 metallic=rng.choice([0, rng.random()]), ior=1 + 2 * rng.random(), smith=smith,

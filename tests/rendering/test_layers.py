@@ -1,4 +1,4 @@
-"""glTF's extensions of metallic_roughness: formulas in float64, furnaces, and that others do not pay for them."""
+"""glTF's extensions of metallic_roughness: float64 formulas, furnaces, and no cost for other materials."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ COS_H, COS_O, COS_I = np.sum(WO * H, axis=1), WO[:, 2], WI[:, 2]
 
 
 def shown(device: Device, *materials: MetallicRoughness) -> Bsdfs:
-    """They, and one that has all layers, so that all are of one program."""
+    """Return the materials and one with all layers, so that all run the same program."""
     full = MetallicRoughness(clearcoat=0.5, sheen_color=(0.5,) * 3, transmission=0.5, specular=0.5,
                              specular_color=(0.2,) * 3)
     return bsdfs(device, [*materials, full])
@@ -38,20 +38,20 @@ def schlick(f0: float, cosine: Doubles, f90: float = 1.0) -> Doubles:
 
 
 def ggx(alpha: float) -> Doubles:
-    """(n,) D·G/(4·cos wo)."""
+    """Return D·G/(4·cos wo), (n,)."""
     tan2 = (1 - H[:, 2]**2) / H[:, 2]**2
     d = alpha**2 / (np.pi * H[:, 2]**4 * (alpha**2 + tan2)**2)
     return np.asarray(d * masking("height_correlated", alpha, COS_O, COS_I) / (4 * COS_O))
 
 
 def check(found: Doubles, expected: Doubles) -> None:
-    """Equal but for what float32 half vectors leave."""
+    """Assert equality up to the rounding error of float32 half vectors."""
     roundings = 2e-5 / np.linalg.norm(WO + WI, axis=1, keepdims=True)
     assert np.all(np.abs(found - expected) <= roundings * np.abs(expected) + 2e-5)
 
 
 def beneath(left: Left, metallic: float, roughness: float, some: slice = slice(None)) -> Doubles:
-    """(n, 3) what lies below layers reflects."""
+    """Return the value of the base below layers, (n, 3)."""
     body = Below(COLOR, metallic, roughness, left)
     cos_o, cos_i = COS_O[some], COS_I[some]
     gloss = (body.f0 + (1 - body.f0) * (1 - COS_H[some, None])**5) * ggx(roughness**2)[some, None]
@@ -60,7 +60,7 @@ def beneath(left: Left, metallic: float, roughness: float, some: slice = slice(N
 
 @pytest.mark.parametrize("metallic", [0.0, 0.5, 1.0])
 def test_coat_lies_over_what_was_there(device: Device, metallic: float) -> None:
-    """coat·F·D·G/(4 cos wo), and of the rest what the coat's albedo leaves."""
+    """coat·F·D·G/(4 cos wo), plus the base attenuated by the coat's albedo."""
     coated = shown(device, MetallicRoughness(color=COLOR, roughness=0.7, metallic=metallic, clearcoat=0.8,
                                              clearcoat_roughness=0.5))
     film = (0.8 * schlick(0.04, COS_H) * ggx(0.25))[:, None]
@@ -70,7 +70,8 @@ def test_coat_lies_over_what_was_there(device: Device, metallic: float) -> None:
 
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
 def test_sheen_is_charlies(device: Device, roughness: float) -> None:
-    """color·(2 + n)·sin^n/(2 pi)·cos wi/(4 (o + i − o·i)), over the larger E if it exceeds 1, over what that leaves."""
+    """color·(2 + n)·sin^n/(2 pi)·cos wi/(4 (o + i − o·i)), over the larger E if it exceeds 1, plus the attenuated base.
+    """
     woolly = MetallicRoughness(color=COLOR, sheen_color=(0.9, 0.6, 0.3), sheen_roughness=roughness)
     found, n, some = shown(device, woolly), roughness**-2, slice(1000)
     wo, wi, cos_o, cos_i = WO[some], WI[some], COS_O[some], COS_I[some]
@@ -99,7 +100,7 @@ def test_fibres_reflect_what_was_fitted(device: Device, roughness: float) -> Non
 
 
 def test_transmission_passes_the_bodys_part_straight_on(device: Device) -> None:
-    """(1 − F(wo·h))·color·transmission·D·G/(4 cos wo) below, and what that loses; above the body has the rest."""
+    """Below: (1 − F(wo·h))·color·transmission·D·G/(4 cos wo) and multiple scattering; above, the base has the rest."""
     solid, sheet = MetallicRoughness(color=COLOR, roughness=0.6), MetallicRoughness(
         color=COLOR, roughness=0.6, transmission=0.7)
     both = shown(device, solid, sheet, MetallicRoughness(color=(0.0,) * 3, roughness=0.6))
@@ -112,7 +113,7 @@ def test_transmission_passes_the_bodys_part_straight_on(device: Device) -> None:
 
 
 def test_metal_passes_no_light_and_takes_none_from_what_does(device: Device) -> None:
-    """Half metal is half of each: light passes by the Fresnel term of the dielectric part."""
+    """At metallic 0.5 half as much is transmitted, by the Fresnel term of the dielectric part."""
     sheet, half = MetallicRoughness(color=COLOR, roughness=0.6, transmission=0.7), MetallicRoughness(
         color=COLOR, roughness=0.6, transmission=0.7, metallic=0.5)
     both = shown(device, sheet, half)
@@ -120,7 +121,7 @@ def test_metal_passes_no_light_and_takes_none_from_what_does(device: Device) -> 
 
 
 def test_specular_scales_f0_and_where_it_ends(device: Device) -> None:
-    """F from min(f0·specular_color, 1)·specular to specular; f0 by ior. Metal keeps its own."""
+    """F goes from min(f0·specular_color, 1)·specular to specular; f0 by ior. Metals are unaffected."""
     f0, f90 = (np.array([0.6, 1.0, 2.0]) / 9).clip(0, 1) * 0.4, 0.4    # ((2 − 1)/(2 + 1))² = 1/9
     black = shown(device, MetallicRoughness(color=(0.0,) * 3, roughness=0.6, ior=2.0, specular=0.4,
                                             specular_color=(0.6, 1.0, 2.0)))
@@ -132,7 +133,7 @@ def test_specular_scales_f0_and_where_it_ends(device: Device) -> None:
 
 
 def test_beside_others_a_material_stays_as_it_was(device: Device) -> None:
-    """What it lacks is neutral for it, where others of its type have it."""
+    """Layers that a material lacks have no effect on it if other materials of its type have them."""
     plain = MetallicRoughness(color=COLOR, roughness=0.6)
     others = [MetallicRoughness(specular=0.1, specular_color=(0.2,) * 3), MetallicRoughness(
         clearcoat=1.0, sheen_color=(0.5,) * 3, transmission=0.5)]

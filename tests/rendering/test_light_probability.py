@@ -1,4 +1,4 @@
-"""Light sampling loses no light, whatever materials a scene has: a probability is 0 only where the contribution is."""
+"""Light sampling is unbiased for any materials in a scene: a light's probability is 0 only if its contribution is."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LAMP = Sphere(center=(20, -9, 0), radius=0.1, material=Diffuse(emission=(0.01, 0
 
 
 def lit_floor(device: Device, lights: list[Light], material: Material, others: list[Material]) -> float:
-    """The mean radiance of a floor beside other materials, which the camera does not see."""
+    """Return the mean radiance of a floor, with spheres of other materials outside the camera's view."""
     floor: Mesh = quad([(-2, 0, 2), (2, 0, 2), (2, 0, -2), (-2, 0, -2)], material)
     shelf = [Sphere(center=(50 + 3 * i, -9, 0), material=other) for i, other in enumerate(others)]
     scene = Scene(meshes=[floor], spheres=[LAMP, *shelf], lights=lights,
@@ -37,7 +37,7 @@ def lit_floor(device: Device, lights: list[Light], material: Material, others: l
 def assert_light_adds_up(device: Device, material: Material, others: list[Material]) -> None:
     each = [lit_floor(device, [light], material, others) for light in LIGHTS]
     assert min(each) > 1e-4
-    # Of 262 144 samples, each of which chooses one light of five: a standard error of 0.4 %.
+    # 262 144 samples, each of which chooses one light of five: a standard error of 0.4 %.
     assert lit_floor(device, LIGHTS, material, others) == pytest.approx(sum(each), rel=0.02)
 
 

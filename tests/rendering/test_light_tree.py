@@ -1,4 +1,4 @@
-"""The choice of one light among few, many, and infinite ones (what comes of it: test_many_lights.py)."""
+"""Light selection among few, many and infinite lights (the resulting images: test_many_lights.py)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SCENES = {"two": lamps(2), "few": lamps(32), "a tree": lamps(33), "many": lamps(
 
 
 def probabilities(probe: Probe, point: Doubles, normal: Doubles) -> Doubles:
-    """Of all lights at a point."""
+    """Return the selection probability of each light at a point."""
     count = int(probe.compiled.counts["lights"][0])
     return probe("light_probability", 1, np.tile(np.append(point, normal), (count, 1)), np.arange(count))[:, 0]
 
@@ -48,7 +48,7 @@ def probe(device: Device, request: pytest.FixtureRequest) -> Probe:
 
 
 def test_probabilities_add_up(probe: Probe) -> None:
-    """To 1 at any point, most of them inside the tree's boxes, however it is turned; at a light's very place, too."""
+    """They sum to 1 at any point and normal, mostly inside the light BVH's bounds, also at a light's position."""
     points, normals = points_and_normals(30)
     points[0], points[1], points[2] = 0.0, 1e6, 0.25
     sums = [probabilities(probe, point, normal).sum() for point, normal in zip(points, normals)]
@@ -71,7 +71,7 @@ def test_choices_follow_the_probabilities(probe: Probe) -> None:
 
 @pytest.mark.parametrize("lanes", [1, 16])
 def test_choices_do_not_depend_on_lanes(device: Device, lanes: int) -> None:
-    """But for roundings: those turn one of some 2^15 choices."""
+    """SIMD widths agree except for rounding, which changes one of about 2^15 choices."""
     points, normals = points_and_normals(1 << 14)
     scene = SCENES["many and infinite"]
     found, expected = (Probe(device, scene, lanes=n)("pick_light", 3, points, normals, seed=1) for n in (lanes, 8))
@@ -82,7 +82,7 @@ def test_choices_do_not_depend_on_lanes(device: Device, lanes: int) -> None:
 
 @pytest.mark.parametrize("count", [20, 500])
 def test_no_light_that_can_be_seen_is_left_out(device: Device, count: int) -> None:
-    """Whatever can bring light may be chosen: its middle is above the horizon, and sees the point."""
+    """Every light whose centre is above the horizon, and that faces the point, has a positive probability."""
     scene = lamps(count)
     probe = Probe(device, scene)
     corners = np.array([mesh.vertices for mesh in scene.meshes]).reshape(-1, 3, 3).astype(np.float64)
@@ -101,12 +101,12 @@ def test_no_light_that_can_be_seen_is_left_out(device: Device, count: int) -> No
 
 
 def test_balls_bring_nothing_to_their_own_surface(device: Device) -> None:
-    """However the point is rounded; where the normal is turned by a tenth, some of the ball is above the horizon."""
+    """For any rounding of the point; if the normal is tilted by a tenth, a part of the sphere is above the horizon."""
     rng = np.random.default_rng(5)
     centers, radii, shining = rng.normal(size=(20, 3)), 10 ** rng.uniform(-2, 0, 20), Diffuse(emission=(1.0, 1.0, 1.0))
     probe = Probe(device, Scene(spheres=[Sphere(center=(x, y, z), radius=radius, material=shining)
                                          for (x, y, z), radius in zip(centers.tolist(), radii.tolist())]))
-    own = np.arange(1, 20).repeat(100)    # not the first, which is chosen where none brings anything
+    own = np.arange(1, 20).repeat(100)    # not the first light, which is chosen if none contributes
     normals = unit_vectors(rng, len(own))
     points = probe.compiled.frame.points(centers[own] + radii[own, None] * normals)
     aside = normals + 0.1 * np.cross(normals, unit_vectors(rng, len(own)))
@@ -116,7 +116,7 @@ def test_balls_bring_nothing_to_their_own_surface(device: Device) -> None:
 
 
 def test_few_lights_are_chosen_by_what_they_bring(device: Device) -> None:
-    """Point lights: 4/5 by intensity·cos θ/d², 1/5 alike by all above the horizon."""
+    """Point lights: 4/5 of the probability by intensity·cos θ/d², 1/5 uniform over those above the horizon."""
     rng = np.random.default_rng(1)
     places, powers = rng.normal(size=(30, 3)), 10 ** rng.uniform(-1, 1, 30)
     probe = Probe(device, Scene(lights=[light for p, i in zip(places, powers) for light in point_lights(p[None], i)]))
@@ -128,8 +128,8 @@ def test_few_lights_are_chosen_by_what_they_bring(device: Device) -> None:
 
 
 def test_a_tree_is_nearly_as_good(device: Device) -> None:
-    """Choosing among 2000 equal point lights by what each brings would have no variance; that of the tree's choice is
-    below the mean squared, and that of an even choice far above it.
+    """Choosing among 2000 equal point lights by exact contribution has zero variance; the light BVH's relative
+    variance is below 1, and that of a uniform choice is above 10.
     """
     places = np.random.default_rng(2).uniform((-10, 0.1, -10), (10, 2, 10), (2000, 3))
     probe = Probe(device, Scene(lights=point_lights(places)))
@@ -144,7 +144,7 @@ def test_a_tree_is_nearly_as_good(device: Device) -> None:
 
 
 def test_black_lights_are_left_out(device: Device) -> None:
-    """Those without power or area are none, and change nothing for the others."""
+    """Lights without power or area are dropped and do not affect the others."""
     lit, dark = lamps(50), Diffuse(emission=(0.0, 0.0, 0.0))
     flat = Mesh(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.int32), Diffuse(emission=(9.0, 9.0, 9.0)))
     zeros = replace(lit, meshes=[flat, *lit.meshes, flat], spheres=[Sphere(radius=0.1, material=dark), *lit.spheres],
@@ -167,7 +167,8 @@ def test_powers_of_any_unit(device: Device, power: float) -> None:
 
 
 def test_a_hundred_thousand_triangles(device: Device) -> None:
-    """A closed lamp of so many: each that faces the point has its chance, the others get little, and all add up."""
+    """A closed emitter of 10^5 triangles: those facing the point have positive probability, the others little; sum 1.
+    """
     side = 224
     v, u = np.meshgrid(np.linspace(0, np.pi, side + 1), np.linspace(0, 2 * np.pi, side + 1), indexing="ij")
     sphere = np.stack([np.sin(v) * np.sin(u), np.cos(v), np.sin(v) * np.cos(u)], axis=-1).reshape(-1, 3)
@@ -187,7 +188,7 @@ def test_a_hundred_thousand_triangles(device: Device) -> None:
 
 
 def test_only_what_is_needed_is_compiled(device: Device) -> None:
-    """One light: nothing that chooses, and no table; a few: no tree."""
+    """One light compiles no selection code and no table; a few compile no light BVH."""
     files = {count: compile_scene(lamps(count), choices(device)) for count in (1, 2, 32, 33)}
     for count, compiled in files.items():
         assert ("light/choice.cl" in compiled.files) == ("light_groups" in compiled.buffers) == (count > 1)

@@ -1,4 +1,4 @@
-"""Lights with a place: what arrives by sampling them has the mean of closed forms, and both densities agree.
+"""Sampling of lights at a position: means match closed forms, and both densities agree.
 
 Irradiance E at a point with normal n is the mean of radiance·cos/pdf over the samples.
 """
@@ -28,7 +28,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 def irradiances(probe: Probe, points: Doubles, normal: Doubles = UP) -> tuple[Doubles, Doubles]:
-    """Mean and variance, (m, 3) each, of COUNT samples' radiance·cos/pdf at points (m, 3)."""
+    """Return mean and variance, (m, 3) each, of COUNT samples' radiance·cos/pdf at points (m, 3)."""
     parts = []
     for seed, point in enumerate(probe.compiled.frame.points(points)):
         out = probe("light_sample", 12, np.tile(np.concatenate([point, normal]), (COUNT, 1)), seed=seed)
@@ -38,20 +38,21 @@ def irradiances(probe: Probe, points: Doubles, normal: Doubles = UP) -> tuple[Do
 
 def assert_mean(probe: Probe, points: Doubles, expected: Doubles) -> None:
     mean, variance = irradiances(probe, points)
-    # Beside the noise there are a dozen roundings of float32, 1e-6 of the mean, which do not average out.
+    # In addition to the noise there are a dozen roundings of float32, 1e-6 of the mean, which do not average out.
     p = mean_test(mean, variance + COUNT * (1e-6 * expected)**2, COUNT, expected)
     assert p.min() > sidak(FAMILY, p.size), (mean, expected)
 
 
 def sphere_irradiance(center: Doubles, radius: float, points: Doubles) -> Doubles:
-    """E = pi L (r/d)² cos θ of a sphere that is wholly above the horizon."""
+    """Return E = pi L (r/d)² cos θ of a sphere that is entirely above the horizon."""
     d = center - points
     distance2 = np.sum(d * d, axis=1)
     return np.outer(np.pi * radius**2 * d[:, 1] / distance2**1.5, RADIANCE)
 
 
 def rectangle_irradiance(x0: float, x1: float, z0: float, z1: float, height: float, points: Doubles) -> Doubles:
-    """E = pi L F, F the form factor of a rectangle parallel to the receiver, corner by corner (Howell, B-3)."""
+    """Return E = pi L F, F the form factor of a rectangle parallel to the receiver, summed over corners (Howell, B-3).
+    """
 
     def corner(x: Doubles, z: Doubles) -> Doubles:
         h = height - points[:, 1]
@@ -66,7 +67,7 @@ def rectangle_irradiance(x0: float, x1: float, z0: float, z1: float, height: flo
 
 
 def rectangle(x0: float, x1: float, z0: float, z1: float, height: float) -> Mesh:
-    """Faces down."""
+    """Return a rectangle that faces down."""
     corners = [[x, height, z] for x, z in ((x0, z0), (x1, z0), (x1, z1), (x0, z1))]
     return Mesh(np.array(corners, np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.int32), LAMP)
 
@@ -108,7 +109,7 @@ def test_point(device: Device) -> None:
 
 
 def test_directional(device: Device) -> None:
-    """E = irradiance·cos θ; samples say that it is infinitely far and a single direction."""
+    """E = irradiance·cos θ; samples are flagged as infinitely distant and as a single direction."""
     probe = Probe(device, Scene(lights=[DirectionalLight(direction=(1.0, -2.0, 0.5), irradiance=(3.0, 2.0, 1.0))]))
     cosine = 2 / np.sqrt(1 + 4 + 0.25)
     mean, _ = irradiances(probe, POINTS)
@@ -117,7 +118,7 @@ def test_directional(device: Device) -> None:
 
 
 def test_all_together(device: Device) -> None:
-    """The sum of all lights, each chosen with its probability."""
+    """E is the sum over all lights, each chosen with its probability."""
     side = (1.0, 2.0, -2.0, -1.0)
     scene = Scene(meshes=[rectangle(*side, 3.0)], spheres=[Sphere(center=(-1.0, 4.0, 1.0), radius=0.5, material=LAMP)],
                   lights=[PointLight(position=(0.0, 5.0, 0.0), intensity=(5.0, 50.0, 10.0)),
@@ -129,12 +130,12 @@ def test_all_together(device: Device) -> None:
 
 
 def test_a_met_lamp_has_the_density_of_its_samples(device: Device) -> None:
-    """A ray along a sample's direction meets the lamp, and finds the density and radiance that the sample reported."""
+    """A ray along a sample's direction hits the emitter and finds the density and radiance that the sample reported."""
     probe = Probe(device, scattered_lamps())
     points, normals = points_and_normals(1 << 16)
     sample = probe("light_sample", 12, points, normals, seed=1)
     met = probe("emitter", 5, points, normals, sample[:, :3])
-    # A sample at a lamp's very edge may round past it.
+    # A sample at an emitter's edge may round past it.
     hit = met[:, 4] >= 0
     assert np.mean(~hit) < 1e-4
     np.testing.assert_allclose(met[hit, 3], sample[hit, 6], rtol=1e-4)
@@ -142,7 +143,7 @@ def test_a_met_lamp_has_the_density_of_its_samples(device: Device) -> None:
 
 
 def test_shadow_rays_end_before_their_lamp(device: Device) -> None:
-    """Nothing lies between a point and the target of its light sample, nor does the lamp shade itself."""
+    """Nothing lies between a point and the target of its light sample, and the emitter does not shadow itself."""
     probe = Probe(device, scattered_lamps())
     points, normals = points_and_normals(1 << 18)
     sample = probe("light_sample", 12, points, normals, seed=2)
@@ -152,13 +153,13 @@ def test_shadow_rays_end_before_their_lamp(device: Device) -> None:
 
 @pytest.mark.parametrize("kind", ["sphere", "quad", "triangle"])
 def test_shadow_rays_end_before_a_lamp_near_by(device: Device, kind: str) -> None:
-    """Of 1e-4 to 10 times its size away, wherever the lamp and the points are: that q is near 0 says nothing of its
-    rounding."""
+    """At distances of 1e-4 to 10 times its size, for any position of emitter and points: a q close to 0
+    does not bound its rounding error."""
     rng = np.random.default_rng(3)
     for _ in range(20):
         size, turn = 10.0 ** rng.uniform(-2, 3), np.linalg.qr(rng.normal(size=(3, 3)))[0]
         normal, gaps = turn[:, 2], size * 10.0 ** rng.uniform(-4, 1, (1 << 14, 1))
-        place = size * 10.0 ** rng.uniform(-8, 0) * rng.uniform(-1, 1, 3)    # of the lamp's foremost point, or middle
+        place = size * 10.0 ** rng.uniform(-8, 0) * rng.uniform(-1, 1, 3)    # of its frontmost point or centre
         corners = (np.array([[-1, -1], [-1, 1], [1, 1], [1, -1]]) @ turn[:, :2].T * size + place).astype(np.float32)
         faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)[:2 if kind == "quad" else 1]
         if np.cross(corners[1] - corners[0], corners[2] - corners[0]) @ normal < 0:
@@ -175,14 +176,14 @@ def test_shadow_rays_end_before_a_lamp_near_by(device: Device, kind: str) -> Non
 
 
 def points_and_normals(count: int) -> tuple[Doubles, Doubles]:
-    """(count, 3) each: in the unit cube, as float32 has them, and every direction."""
+    """Return points in the unit cube, exact in float32, and random unit normals, (count, 3) each."""
     rng = np.random.default_rng(0)
     points, normals = rng.uniform(-1, 1, (count, 3)).astype(np.float32).astype(np.float64), rng.normal(size=(count, 3))
     return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def scattered_lamps() -> Scene:
-    """Seen from the unit cube, none hides another."""
+    """Return emitters that do not occlude each other seen from the unit cube."""
     return Scene(meshes=[rectangle(3.0, 5.0, -1.0, 1.0, 3.0)],
                  spheres=[Sphere(center=(-4.0, 2.0, 1.0), radius=0.5, material=LAMP),
                           Sphere(center=(0.0, 5000.0, 2000.0), radius=20.0, material=LAMP),

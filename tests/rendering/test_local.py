@@ -1,4 +1,4 @@
-"""The local integrator and Phong's models: the formulas of the books in float64, shadows, mirrors and their depth."""
+"""The local integrator and the Phong models: textbook formulas in float64, shadows, mirrors and their depth."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def ground(material: Material, height: float = 0.0, half: float = 50.0) -> Mesh:
 
 
 def glossy(material: Phong, wo: Doubles, wi: Doubles) -> Doubles:
-    """(n,) cos^n of the two models, for directions (n, 3) around +y or +z given with their normal's axis last."""
+    """Return cos^n of the two models (n,), for directions (n, 3) given with the normal's axis last."""
     if isinstance(material, BlinnPhong):
         half = (wo + wi) / np.linalg.norm(wo + wi, axis=-1, keepdims=True)
         return np.asarray(half[..., 2] ** material.shininess)
@@ -43,7 +43,7 @@ def glossy(material: Phong, wo: Doubles, wi: Doubles) -> Doubles:
 
 @pytest.mark.parametrize("kind", [Phong, BlinnPhong])
 def test_points_light_a_plane_as_the_books_say(device: Device, kind: type[Phong]) -> None:
-    """ambient·color·sky + Σ I/(pi·d²)·(color·cos + specular·cos^n), times pi over pi."""
+    """ambient·color·sky + Σ I/(pi·d²)·(color·cos + specular·cos^n), where pi cancels."""
     material = kind(color=RED, specular=GLOSS, shininess=20.0, ambient=0.6)
     camera = Camera(position=EYE, fov_degrees=30)
     scene = Scene(meshes=[ground(material)], lights=POINTS, camera=camera, environment=Environment(color=SKY),
@@ -79,7 +79,7 @@ def test_on_paths_they_are_normalised(device: Device, kind: type[Phong], norm: o
 
 
 def test_shadows_are_hard_and_only_ambient_is_left(device: Device) -> None:
-    """A ball between a sun overhead and the ground: in its shadow color·sky to the last bit, outside sun and sky."""
+    """A sphere between a sun overhead and the ground: in its shadow color·sky, outside sun and sky."""
     sun = DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(np.pi,) * 3)
     ball = Sphere(center=(0.0, 3.0, 0.0), radius=1.0)
     camera = Camera(position=(0.0, 1.0, 0.0), up=(0.0, 0.0, -1.0), fov_degrees=120)
@@ -94,10 +94,10 @@ def test_shadows_are_hard_and_only_ambient_is_left(device: Device) -> None:
 
 @pytest.mark.parametrize("depth", [2, 4, 7])
 def test_mirrors_are_followed_to_the_depth(device: Device, depth: int) -> None:
-    """Between two mirrors that face each other under a lid that glows: slanted rays count their reflections.
+    """Two mirrors face each other below an emissive lid; slanted rays count their reflections.
 
-    A view with slope 1 from the middle of a gap of 1 meets 0.5, 1.5, 2.5 … along the way, each leaving 0.8, until
-    it ends on the lid at 3 after three mirrors: seen from depth 4 on.
+    A ray with slope 1 from the middle of a gap of 1 hits mirrors after 0.5, 1.5 and 2.5, each with reflectance 0.8, and
+    reaches the lid at 3 after three mirrors: visible from depth 4 on.
     """
     sheets = [quad([(x, -9, 9), (x, -9, -9), (x, 3, -9), (x, 3, 9)], Mirror(color=(0.8,) * 3)) for x in (-0.5, 0.5)]
     lid = quad([(-9, 3, 9), (-9, 3, -9), (9, 3, -9), (9, 3, 9)], Diffuse(color=(0.0,) * 3, emission=(2.0,) * 3))
@@ -108,7 +108,7 @@ def test_mirrors_are_followed_to_the_depth(device: Device, depth: int) -> None:
 
 
 def test_glass_is_followed_both_ways(device: Device) -> None:
-    """A sheet over the ground: F of what is above, 1 − F of the ground's light; it keeps the point's from that."""
+    """A sheet over the ground: F of what is above, 1 − F of the ground; it blocks the point light."""
     glass = ground(Dielectric(ior=1.5, thin=True), 1.0)
     camera = Camera(position=(0.0, 3.0, 0.0), up=(0.0, 0.0, -1.0), fov_degrees=0.1)
     scene = Scene(meshes=[glass, ground(Phong(color=RED))], lights=POINTS[:1], camera=camera,

@@ -1,4 +1,4 @@
-"""One renderer, many cameras: each picture is the one of a new renderer, bit for bit, with the same tree."""
+"""One renderer, many cameras: each image equals that of a new renderer, bit for bit, with the same BVH."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def last(renderer: Renderer) -> State:
 
 @pytest.mark.parametrize(("count", "cameras"), [(1, [ASIDE, LENS, LENS, HERE]), (2, [ASIDE])], ids=["alone", "crew"])
 def test_pictures_are_those_of_new_renderers(device: Device, count: int, cameras: list[Camera]) -> None:
-    """Also after a picture that was left in the middle; a lens compiles another program, and goes again."""
+    """Also after an image that was left unfinished; adding or removing a lens switches to another program and session.
+    """
     given: dict[str, Any] = {"size": (40, 30), "device": [device.info.index] * count, "spp": 6,
                              "aovs": "depth,variance"}
     renderer = Renderer(room(), **given)
@@ -48,7 +49,7 @@ def test_pictures_are_those_of_new_renderers(device: Device, count: int, cameras
 
 
 def test_far_scenes_have_cameras_in_their_frame(device: Device) -> None:
-    """A scene of another unit, around another point: what is seen is where it was."""
+    """A scene with another unit and origin: the camera is transformed into its frame."""
     scene = room()
     moved = replace(scene, spheres=[], camera=Camera(position=(0.0, 2e9, 3.9e9), look_at=(0.0, 1e9, 0.0)),
                     meshes=[replace(mesh, vertices=mesh.vertices * np.float32(1e9)) for mesh in scene.meshes])

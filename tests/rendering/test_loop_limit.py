@@ -1,4 +1,4 @@
-"""Drivers that end loops early: nothing they ended passes for a picture or a hit."""
+"""Drivers that end loops early: results of ended loops are never accepted as an image or a hit."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SIZE, SPP = (16, 24), 8
 
 
 def shining_ball(rows: int) -> Mesh:
-    """Seen from inside; from everywhere 0.01 comes, and all is reflected."""
+    """Return a closed emissive sphere seen from inside, with radiance 0.01 everywhere and albedo 1."""
     theta, phi = np.meshgrid(np.linspace(0, np.pi, rows + 1), np.linspace(0, 2 * np.pi, 2 * rows + 1), indexing="ij")
     points = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
@@ -43,7 +43,7 @@ def shining_ball(rows: int) -> Mesh:
 
 
 def scene(rows: int = 3) -> Scene:
-    """What the camera sees after d edges is 0.01 d."""
+    """Return a scene whose image at depth d is 0.01 d."""
     return Scene(meshes=[shining_ball(rows)],
                  camera=Camera(position=(0.1, 0.2, 0.3), look_at=(0.0, -0.1, -1.0), fov_degrees=70))
 
@@ -78,7 +78,7 @@ def test_short_launches_change_nothing(device: Device, turns: int, monkeypatch: 
     monkeypatch.setattr(Work, "cut", cut)
     assert np.array_equal(picture(device), whole)
     most = max(part.more for part in launched)
-    # An edge has two rays, which a list's triangles take a turn each: 6 rows of 6 quads, less a triangle at the poles.
+    # A path vertex traces two rays, each testing the whole list: 6 rows of 6 quads, less a triangle at the poles.
     assert most == 1 or 2 * 6 * 30 * most < turns
 
 
@@ -95,7 +95,7 @@ def test_work_is_shortened_in_order() -> None:
 
 
 def test_samples_that_were_ended_are_missed(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As if loops of every fifth pixel had been ended."""
+    """Kernels are changed as if the loops of every fifth pixel had been ended."""
     limit(monkeypatch, 50_000)
     folder = sabotaged(tmp_path / "kernels", r"return a != 31;", "return a != 31 || get_global_id(0) % 5 == 0;")
     monkeypatch.setattr(program, "kernel_folder", lambda: folder)
@@ -104,7 +104,7 @@ def test_samples_that_were_ended_are_missed(device: Device, tmp_path: Path, monk
 
 
 def test_too_many_turns_are_refused(device: Device) -> None:
-    """Of a path with 1024 edges and a long list; where there is no limit, all of its light arrives."""
+    """A path of depth 1024 with a long list; without a limit, all of its light arrives."""
     if loop_turns(device) is None:
         assert abs(picture(device, 1024, 12, spp=1).mean() / 10.24 - 1) < 0.01
     else:

@@ -1,4 +1,4 @@
-"""Light by many lamps, one of which is chosen for each sample: closed forms, and pictures that add up."""
+"""Lighting by many lights with one chosen per sample: closed forms, and images that add up."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 def triangle_irradiance(corners: Doubles) -> float:
-    """∫ cos θ dω at the origin, facing +Y, over a triangle above the horizon (Lambert 1760), 0 seen from its back."""
+    """Return ∫ cos θ dω at the origin, facing +Y, over a triangle above the horizon (Lambert 1760), 0 from its back."""
     w = corners / np.linalg.norm(corners, axis=1, keepdims=True)
     total = 0.0
     for a, b in zip(w, np.roll(w, -1, axis=0)):
@@ -37,7 +37,7 @@ def triangle_irradiance(corners: Doubles) -> float:
 
 
 def light_irradiance(scene: Scene, point: Doubles) -> Doubles:
-    """(3,): on a plane that faces up, by all lamps of a scene, each of them wholly above it and none behind another."""
+    """Return the irradiance (3,) on a plane that faces up, from all lights, each entirely above it and unoccluded."""
     total = np.zeros(3)
     for mesh in scene.meshes:
         for face in mesh.vertices[mesh.faces].astype(np.float64):
@@ -54,7 +54,7 @@ def light_irradiance(scene: Scene, point: Doubles) -> Doubles:
 
 @pytest.mark.parametrize("count", [9, 400])
 def test_irradiance_by_many_lights(device: Device, count: int) -> None:
-    """The samples' mean of radiance·cos/pdf is the sum of the closed forms of all lamps."""
+    """The samples' mean of radiance·cos/pdf is the sum of the closed forms of all lights."""
     scene = lamps(count, seed=4, low=0.05)
     probe = Probe(device, scene)
     p_values = []
@@ -70,7 +70,7 @@ def test_irradiance_by_many_lights(device: Device, count: int) -> None:
 
 @pytest.mark.parametrize("scene", [lamps(10), lamps(200), with_infinite(lamps(100))], ids=["few", "many", "infinite"])
 def test_a_met_lamp_has_the_density_of_its_samples(device: Device, scene: Scene) -> None:
-    """A ray along a sample's direction meets its lamp, or one before it; where it is its lamp, both densities agree."""
+    """A ray along a sample's direction hits its emitter or one in front; if it is the same, both densities agree."""
     probe = Probe(device, scene)
     points, normals = points_and_normals(1 << 14)
     sample = probe("light_sample", 12, points, normals, seed=1)
@@ -78,7 +78,7 @@ def test_a_met_lamp_has_the_density_of_its_samples(device: Device, scene: Scene)
     same = (met[:, 4] >= 0) & np.all(met[:, :3] == sample[:, 3:6], axis=1) & sample[:, 3:6].any(axis=1)
     same &= sample[:, 10] == 0
     assert np.mean(same) > 0.1
-    np.testing.assert_allclose(met[same, 3], sample[same, 6], rtol=2e-3)    # near a sphere's edge its directions are
+    np.testing.assert_allclose(met[same, 3], sample[same, 6], rtol=2e-3)    # less precise near a sphere's edge
 
 
 def test_a_met_sky_has_the_density_of_its_samples(device: Device) -> None:
@@ -88,12 +88,12 @@ def test_a_met_sky_has_the_density_of_its_samples(device: Device) -> None:
     sky = (sample[:, 10] == 1) & (sample[:, 11] == 0)
     met = probe("sky", 4, points[sky], normals[sky], sample[sky, :3])
     assert np.mean(sky) > 0.01
-    # But for those at a texel's edge, which are rounded to the other side.
+    # Except for directions at a texel's edge, which are rounded to the other side.
     assert np.mean(np.abs(met[:, 3] / sample[sky, 6] - 1) < 1e-4) > 0.999
 
 
 def test_pictures_of_parts_add_up(device: Device) -> None:
-    """A floor under 90 lamps, of which a tree chooses, against the sum of pictures of the triangles and the others."""
+    """The image of a floor under 90 lights with a light BVH equals the sum of images with subsets of them."""
     scene = lamps(90, seed=8, low=0.1)
     floor = quad([(-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)], Diffuse(color=(0.5, 0.5, 0.5)))
     scene = replace(scene, meshes=[floor, *scene.meshes], camera=Camera(position=(0.0, 0.5, 3.0), fov_degrees=30),
@@ -109,7 +109,7 @@ def test_pictures_of_parts_add_up(device: Device) -> None:
 
 
 def picture_mean(device: Device, scene: Scene) -> tuple[Doubles, Doubles]:
-    """Mean over a picture of independent samples and its variance, (3,) each."""
+    """Return the mean over an image of independent samples and its variance, (3,) each."""
     pixels, count = film(device, scene).pixels.ravel(), scene.render.spp
     sums, squares = (pixels[name].astype(np.float64) + pixels[f"{name}_error"] for name in ("sum", "square"))
     mean = sums / count

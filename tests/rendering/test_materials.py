@@ -1,4 +1,4 @@
-"""Materials of a type are packed into one array of records, whatever each of them reads from textures."""
+"""Materials of a type are packed into one array of records, whichever fields of each are textured."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from clrt.scene.materials.textures import Picture, Texture
 
 from ..covering import covering
 
-#: Random materials of a type.
+#: Random materials per type.
 COUNT = 40
 
 
 def textured(kind: type[Material], rng: np.random.Generator) -> Material:
-    """A random variant of the type with random textures on some of the fields that may be one."""
+    """Return a random variant of the type with random textures on some of the fields that can be textured."""
     chosen, hints = variants(kind), get_type_hints(kind)
     while True:
         names = [field.name for field in fields(kind) if Texture in get_args(hints[field.name]) and rng.random() < 0.5]
@@ -34,13 +34,13 @@ def textured(kind: type[Material], rng: np.random.Generator) -> Material:
 
 
 def names_of(records: NDArray[Any]) -> set[str]:
-    """The record's fields without its padding."""
+    """Return the record's fields without its padding."""
     return {name for name in records.dtype.names or () if not name.startswith(("pad", "rest"))}
 
 
 @covering("kind, seed", MATERIALS, range(5))
 def test_materials_are_packed_together_as_alone(kind: type[Material], seed: int) -> None:
-    """A record holds what it holds when packed alone, and no texture that its material does not read."""
+    """A record equals that of the material packed alone, and refers to no texture that the material does not use."""
     rng = np.random.default_rng(seed)
     users = [textured(kind, rng) for _ in range(COUNT)]
     textures, tables = Textures(), Tables()
@@ -49,7 +49,7 @@ def test_materials_are_packed_together_as_alone(kind: type[Material], seed: int)
     for code, user in zip(together.codes, users):
         record, (_, (alone,)) = records[code >> 4], pack_materials([user], textures, tables,
                                                                    "none").buffers[kind.kernel]
-        # Arrays are as long as the longest of the type, and end in zeros.
+        # Arrays are as long as the longest of the type, padded with zeros.
         assert all(np.array_equal(np.ravel(record[name])[:alone[name].size], np.ravel(alone[name]))
                    for name in names_of(alone))
         others = names_of(records) - names_of(alone)

@@ -1,4 +1,4 @@
-"""The mean emission of textured triangles, by which lights are chosen: it may be 0 only where they emit nothing."""
+"""Mean emission of textured triangles, used for light selection: 0 only for triangles that emit nothing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ WRAPS: tuple[Wrap, ...] = ("repeat", "mirror", "clamp")
 
 
 def wrapped(i: NDArray[np.int64], size: int, wrap: Wrap) -> NDArray[np.int64]:
-    """The texel that stands for each index of an endless row."""
+    """Return the texel index for each index of an infinite row."""
     if wrap == "clamp":
         return np.clip(i, 0, size - 1)
     around = i % (2 * size)
@@ -25,7 +25,7 @@ def wrapped(i: NDArray[np.int64], size: int, wrap: Wrap) -> NDArray[np.int64]:
 
 
 def seen(texture: Texture, uv: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Bilinear values of the red channel (0 or 1 in each texel) at texture coordinates (n, 2)."""
+    """Return bilinear values of the red channel (0 or 1 in each texel) at texture coordinates (n, 2)."""
     texels = texture.picture.texels[..., 0] / 255.0
     height, width = texels.shape
     at = (uv @ texture.to_picture[:, :2].T + texture.to_picture[:, 2]) * (width, height) - 0.5
@@ -41,7 +41,7 @@ def seen(texture: Texture, uv: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @given(seed=st.integers(0, 2**32 - 1), wrap=st.tuples(st.sampled_from(WRAPS), st.sampled_from(WRAPS)))
 def test_what_emits_has_a_mean_above_0(seed: int, wrap: tuple[Wrap, Wrap]) -> None:
-    """Wherever the triangle's coordinates lie, how small it is, and how few texels are bright."""
+    """For any texture coordinates, triangle size, and number of bright texels."""
     rng = np.random.default_rng(seed)
     texels = np.zeros((*rng.integers(1, 12, 2), 4), np.uint8)
     texels[..., :3] = 255 * (rng.random(texels.shape[:2]) < rng.choice([0.1, 0.5, 1]))[..., None]
@@ -58,7 +58,7 @@ def test_what_emits_has_a_mean_above_0(seed: int, wrap: tuple[Wrap, Wrap]) -> No
     (1.125, "repeat", 0), (1.125, "mirror", 1), (1.125, "clamp", 1), (1.625, "repeat", 1), (1.625, "mirror", 0),
     (-0.875, "repeat", 0), (-0.875, "mirror", 1), (-0.875, "clamp", 0), (-7e9, "clamp", 0), (7e9, "clamp", 1)])
 def test_beyond_the_picture(left: float, wrap: Wrap, expected: float) -> None:
-    """A picture that is black on the left and white on the right, a quarter of it seen beyond its ends."""
+    """A texture that is black on the left and white on the right, sampled a quarter beyond its ends."""
     texels = np.zeros((1, 64, 4), np.uint8)
     texels[:, 32:, :3] = 255
     texture = Texture(picture=Picture(texels), wrap=(wrap, "repeat"))

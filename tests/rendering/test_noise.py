@@ -1,4 +1,4 @@
-"""The noise that a render tells, beside its true error."""
+"""The estimated error of a render, against its true error."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ BALLS = [Sphere(center=(0.0, 1.0, 0.0), material=Diffuse(color=(0.7, 0.2, 0.2)))
 
 
 def room() -> Scene:
-    """A lamp under the ceiling of a closed room with two balls."""
+    """Return a closed room with a light at the ceiling and two spheres."""
     lamp = quad([(-1, 3.9, -1), (1, 3.9, -1), (1, 3.9, 1), (-1, 3.9, 1)], Diffuse(emission=(8.0, 7.0, 5.0)))
     return Scene(meshes=[box(4.0, Diffuse(color=(0.7,) * 3)), FLOOR, lamp], spheres=BALLS,
                  camera=Camera(position=(0.0, 2.0, 3.9), look_at=(0.0, 1.0, 0.0), fov_degrees=60))
 
 
 def outdoors() -> Scene:
-    """The balls under a sky with a small sun."""
+    """Return the spheres below an environment map with a small sun."""
     image = np.full((16, 32, 3), 0.4, np.float32)
     image[4, 5] = 150.0
     return Scene(meshes=[FLOOR], spheres=BALLS, environment=Environment(image=image),
@@ -45,10 +45,10 @@ def outdoors() -> Scene:
 @pytest.mark.parametrize("make, sampler, highest", [(room, "sobol", 1.5), (room, "independent", 1.5),
                                                     (room, "stratified", 2.5), (outdoors, "sobol", 1.5)])
 def test_noise_is_the_error(device: Device, make: Callable[[], Scene], sampler: Sampler, highest: float) -> None:
-    """√relMSE is told within a factor of 1.2 in three of four pictures, as far as 30 can say, and of 1.5 always.
+    """The estimated √relMSE is within a factor of 1.2 for three of four images, tested with 30, and of 1.5 for all.
 
-    The true one of so small a picture is chance, too, and the truth has a 32nd of the variance of the picture with most
-    samples. The halves of a jittered grid are no grids of their own, so what it tells of the whole is too much.
+    The true error of such a small image is random, too, and the reference has a 32nd of the variance of the image with
+    most samples. The halves of a jittered grid are not stratified themselves, so its error is overestimated.
     """
     scene, index, size = make(), device.info.index, (48, 48)
     truth = list(Renderer(scene, device=index, size=size, seed=1, spp=2048).passes(spp=2048))[-1].film.mean
@@ -65,7 +65,7 @@ def test_noise_is_the_error(device: Device, make: Callable[[], Scene], sampler: 
 
 
 def test_a_sample_that_was_dropped_leaves_the_rest_known() -> None:
-    """A pixel that has one sample of the first two has no variance then; no tile is told less for it later."""
+    """A pixel with one of the first two samples has no variance yet; later no tile's error is underestimated for it."""
     samples, estimate = np.random.default_rng(0).random((32, 24, 32, 3)), NoiseEstimate()
     for spp in (1, 2, 4, 8, 16, 32):
         kept = np.ones((spp, 24, 32), bool)
@@ -81,14 +81,14 @@ def test_a_sample_that_was_dropped_leaves_the_rest_known() -> None:
 
 
 def test_noise_of_a_picture_without_any(device: Device) -> None:
-    """A sky that is the same everywhere: no error, and none is told."""
+    """A constant sky has no error, and none is estimated."""
     scene = Scene(environment=Environment(color=(1.0, 1.0, 1.0)), render=RenderSettings(size=(8, 8), spp=4))
     noises = [state.noise for state in Renderer(scene, device=device.info.index).passes()]
     assert noises[0] is None and max(noise for noise in noises if noise is not None) < 1e-6
 
 
 def test_a_percentile_of_tiles_ends_a_render(device: Device) -> None:
-    """The fewer tiles need the wanted error, the sooner; and they have it, by the estimate and by the truth."""
+    """The fewer tiles must reach the requested error, the sooner it stops; they reach it by estimate and in truth."""
     scene, index, size = outdoors(), device.info.index, (64, 64)
     truth = list(Renderer(scene, device=index, size=size, seed=1, spp=1024).passes(spp=1024))[-1].film.mean
     states = {percent: list(Renderer(scene, device=index, size=size, error_percentile=percent).passes(error=0.1))[-1]

@@ -1,4 +1,4 @@
-"""Surfaces that light goes straight through: what is seen behind them, and what light they let pass, in closed form."""
+"""Opacity: what is visible behind partly opaque surfaces and the light they transmit, in closed form."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SPP = 64
 
 
 def quad(material: Material, z: float = 0.0, **corners: Any) -> Mesh:
-    """[-1, 1]² facing +z at a height."""
+    """Return [-1, 1]² at height z, facing +z."""
     return Mesh((QUAD + (0, 0, z)).astype(np.float32), FACES, material, **{"uv": UV, **corners})
 
 
@@ -36,7 +36,7 @@ def lamp(red: float, green: float, blue: float) -> Diffuse:
 
 
 def seen(device: Device, *meshes: Mesh, lanes: int | None = None, spp: int = SPP, **rest: Any) -> NDArray[np.float64]:
-    """(16, 16, 3) of [-1, 1]² from far above."""
+    """Return the image (16, 16, 3) of [-1, 1]² from far above."""
     angle = float(np.degrees(2 * np.arctan(1 / 1000)))
     scene = Scene(meshes=list(meshes), camera=Camera(position=(0, 0, 1000), look_at=(0, 0, 0), fov_degrees=angle),
                   render=RenderSettings(size=(16, 16), max_depth=2), **rest)
@@ -46,7 +46,9 @@ def seen(device: Device, *meshes: Mesh, lanes: int | None = None, spp: int = SPP
 
 
 def test_layers_show_what_is_behind_as_far_as_they_are_clear(device: Device) -> None:
-    """Three veils over a lamp: each channel's light comes through those above it. Every sample sees one of them."""
+    """Three partly opaque emitters over a light: each channel is attenuated by those above it.
+    Each sample sees one layer.
+    """
     opacities = [0.25, 0.5, 0.75]
     veils = [quad(replace(lamp(*(16.0 * row for row in np.eye(3)[i])), opacity=opacity), 3.0 - i)
              for i, opacity in enumerate(opacities)]
@@ -61,7 +63,7 @@ def test_layers_show_what_is_behind_as_far_as_they_are_clear(device: Device) -> 
     whole = (sum(seen_layers) - count) / 2                      # samples of the bottom count in all three channels
     counts = [*(layer - whole for layer in seen_layers), whole]
     assert np.abs(np.array(counts) - np.round(counts)).max() < 0.05
-    # Evenly spread numbers scatter less than the test expects: only too much of it would be wrong.
+    # Low-discrepancy samples scatter less than the test expects: only too much scatter would be wrong.
     assert chi2_test(np.round(counts), count * np.array(chances)) > 1e-3
 
 
@@ -75,7 +77,7 @@ def test_a_cutoff_makes_it_all_or_nothing(device: Device, cutoff: float | None, 
 
 
 def test_a_picture_cuts_holes(device: Device) -> None:
-    """A channel of a texture that has holes, and vertex colours that fade it out."""
+    """A texture's alpha channel with holes, and vertex colours with an alpha gradient."""
     holes = Picture(np.zeros((4, 4, 4), np.uint8))
     holes.texels[..., 3] = np.random.default_rng(1).integers(0, 2, (4, 4)) * 255
     opacity = Texture(picture=holes, channel="alpha", filter="nearest")
@@ -97,7 +99,7 @@ def test_a_picture_cuts_holes(device: Device) -> None:
 @pytest.mark.parametrize("cutoff", [None, 0.5])
 def test_opaque_materials_stop_all_light(device: Device, other: Material, one_sided: bool,
                                          cutoff: float | None) -> None:
-    """Whatever the alpha of vertex colours is, and whatever materials the scene has elsewhere."""
+    """For any alpha of vertex colours, and any other materials in the scene."""
     fading = np.ones((4, 4), np.float32)
     fading[:, 3] = UV[:, 0]
     top = quad(replace(lamp(1, 0, 0), one_sided=one_sided, alpha_cutoff=cutoff), 1, colors=fading)
@@ -107,7 +109,7 @@ def test_opaque_materials_stop_all_light(device: Device, other: Material, one_si
 
 @pytest.mark.parametrize("lanes", [1, 8])
 def test_shadows_of_veils(device: Device, lanes: int) -> None:
-    """What is stopped is missing on the ground, without noise; a one-sided veil stops no ray from behind."""
+    """Shadows have the transmitted light, without noise; a one-sided surface stops no ray from behind."""
     ground = quad(Diffuse(color=(0.5, 0.5, 0.5)))
     sun = DirectionalLight(direction=(1, 0, -1), irradiance=(2, 2, 2))
     expected = 0.5 / np.pi * 2 * np.sqrt(0.5)
@@ -123,7 +125,7 @@ def test_shadows_of_veils(device: Device, lanes: int) -> None:
 
 
 def test_a_clear_lamp_gives_less_light(device: Device) -> None:
-    """A lamp of half the opacity lights as one of half the radiance: by light samples, and where paths find it."""
+    """A light of opacity 0.5 equals one of half the radiance, by light samples and by BSDF samples."""
     down = QUAD[[0, 3, 2, 1]] * (3, 3, 0) + (0, 0, 1)
     ground = quad(Diffuse(color=(0.8, 0.8, 0.8)))
     pictures = []

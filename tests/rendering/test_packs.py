@@ -1,4 +1,4 @@
-"""Few triangles without a tree, in packs that rays pass by: the hits of every triangle tested."""
+"""Few triangles without a BVH, in packs that rays can skip: hits equal those of testing every triangle."""
 
 from __future__ import annotations
 
@@ -17,14 +17,13 @@ from .test_traverse import mesh
 
 Doubles = NDArray[np.float64]
 ROOM = box([-1, 0, -1], [7, 8, 7])
-#: Three boxes that stand on a room's floor, the room, a box that it stands on, and a room that fills a pack: all have
-#: sides at y = 0.
+#: Three boxes on a room's floor, the room, a box below it, and a room that fills a pack: all have sides at y = 0.
 PARTS = (*(box([2 * x, 0, 0], [2 * x + 1, 1, 1]) for x in range(3)), ROOM, box([-1, -1, -1], [7, 0, 7]),
          np.concatenate([ROOM, ROOM[:4]]))
 
 
 def rays_at(seed: int) -> tuple[Doubles, Doubles]:
-    """From in and around the room; a quarter straight down through the boxes, on and between their diagonals."""
+    """Return rays from in and around the room; a quarter go down through the boxes, on and between their diagonals."""
     rng = np.random.default_rng(seed)
     origin, direction = rng.uniform(-3, 9, (40_000, 3)), rng.normal(size=(40_000, 3))
     origin[::4] = rng.integers(0, 40, (10_000, 3)) / 8 * [1, 0.25, 0.25]
@@ -35,7 +34,7 @@ def rays_at(seed: int) -> tuple[Doubles, Doubles]:
 @pytest.mark.parametrize("width", [8, *others(16)])
 @pytest.mark.parametrize("order", [(0, 5), (3, 0), (2, 4, 3, 0, 1), (4, 0, 1, 2, 3)])
 def test_hits_are_those_of_all_triangles(device: Device, order: tuple[int, ...], width: int) -> None:
-    """Of those at the same t the first is taken, though it may be in the last pack, in the lane of the other."""
+    """Of hits at equal t the first triangle wins, even if it is in the last pack, in the other's lane."""
     scene = Scene(meshes=[mesh(np.concatenate([PARTS[k] for k in order]))])
     origin, direction = rays_at(len(order))
     apart, listed = Probe(device, scene, f"#define WIDTH {width}", layout="packs"), Probe(device, scene, layout="list")
@@ -51,7 +50,8 @@ def test_hits_are_those_of_all_triangles(device: Device, order: tuple[int, ...],
 
 @pytest.mark.parametrize("layout", TREES)
 def test_length_of_directions_changes_only_t(device: Device, layout: str) -> None:
-    """Of rays that start on a floor, or a hair beside it, and leave it: by powers of two, so that all digits stay."""
+    """Rays that start on or just above a floor and leave it, scaled by powers of two, so that all digits are preserved.
+    """
     scene = Scene(meshes=[mesh(np.concatenate([PARTS[0], PARTS[3]]))])
     rng = np.random.default_rng(2)
     origin, direction = rng.uniform(0, 7, (40_000, 3)), rng.normal(size=(40_000, 3))

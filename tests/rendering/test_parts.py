@@ -1,4 +1,4 @@
-"""Devices whose buffers are small: arrays in parts, the film on the host, and the same picture."""
+"""Devices with small buffers: arrays in parts, the film on the host, and the same image."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .test_variants import everything, painted
 
 
 def scene() -> Scene:
-    """With textures and so many spheres that they are in the tree."""
+    """Return a scene with textures and enough spheres that they are stored in the BVH."""
     centers = np.random.default_rng(1).uniform(-3, 3, (400, 3))
     more = [Sphere(center=(float(x), float(y), float(z)), radius=0.05) for x, y, z in centers]
     full = painted(everything())
@@ -47,14 +47,14 @@ def whole_depth(device: Device) -> tuple[Renderer, bytes]:
     return film(device, "bvh8", "depth")
 
 
-#: Layouts, and KiB of the largest buffer.
+#: Layouts and the largest buffer in KiB.
 LIMITS = [("bvh8", 24), ("bvh2", 8), ("cwbvh", 8), ("list", 8), ("packs", 12)]
 
 
 @pytest.mark.parametrize(("layout", "limit"), [("bvh8", 8), *others(*LIMITS)])
 def test_in_parts_it_is_the_same_picture(device: Device, whole: tuple[Renderer, bytes],
                                          monkeypatch: pytest.MonkeyPatch, layout: str, limit: int) -> None:
-    """Bit for bit, in every layout; no buffer is larger than allowed, and of 8 KiB most arrays fill several."""
+    """Bit for bit, in every layout; no buffer exceeds the limit, and at 8 KiB most arrays fill several."""
     running = assert_same_in_parts(device, whole, monkeypatch, layout, limit)
     assert len(buffers_of(running)) > len(running.compiled.buffers) + (0 if limit > 8 else 6)
 
@@ -62,7 +62,7 @@ def test_in_parts_it_is_the_same_picture(device: Device, whole: tuple[Renderer, 
 @pytest.mark.parametrize(("layout", "limit"), LIMITS[1:3] + others(LIMITS[0], *LIMITS[3:]))
 def test_in_parts_the_same_is_seen_first(device: Device, whole_depth: tuple[Renderer, bytes],
                                          monkeypatch: pytest.MonkeyPatch, layout: str, limit: int) -> None:
-    """As above, of depths, whose programs are small."""
+    """As above, for the depth integrator, whose programs are small."""
     running = assert_same_in_parts(device, whole_depth, monkeypatch, layout, limit)
     assert len(buffers_of(running)) > len(running.compiled.buffers)
 
@@ -73,7 +73,7 @@ def buffers_of(running: Renderer) -> list[cl.Buffer]:
 
 def assert_same_in_parts(device: Device, whole: tuple[Renderer, bytes], monkeypatch: pytest.MonkeyPatch, layout: str,
                          limit: int) -> Renderer:
-    """The renderer whose largest buffer has `limit` KiB, and whose picture is that of `whole`."""
+    """Return the renderer whose largest buffer has `limit` KiB, after checking that its image is that of `whole`."""
     assert isinstance(whole[0].session, Session) and whole[0].compiled.part_bytes is None
     monkeypatch.setenv(VARIABLE, f"{limit}K")
     running, found = film(device, layout, whole[0].scene.render.integrator)
@@ -84,7 +84,7 @@ def assert_same_in_parts(device: Device, whole: tuple[Renderer, bytes], monkeypa
 
 def test_only_the_film_is_too_large(device: Device, whole: tuple[Renderer, bytes],
                                     monkeypatch: pytest.MonkeyPatch) -> None:
-    """Then the program is the one of large buffers, but for where the film's pixels are."""
+    """The program is the one for large buffers, except for the location of the film's pixels."""
     monkeypatch.setenv(VARIABLE, "80K")
     running, found = film(device, "bvh8")
     assert isinstance(running.session, Crew) and found == whole[1]
@@ -114,7 +114,7 @@ def test_too_small_is_told_with_numbers(device: Device, monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("size", [1, 16, 100, 112, 113, 500])
 def test_parts_hold_all_and_end_with_the_next(size: int) -> None:
-    """16-byte records in parts of 2 KiB: 112 of their own."""
+    """Parts of 2 KiB hold 112 16-byte records of their own, followed by the first records of the next part."""
     values = np.arange(4 * size, dtype=np.int32).view([("x", "i4", 4)])
     found, own = list(parts(values, 2048)), part_records(16, 2048)
     assert own == 112 and len(found) == part_count(values, 2048) and max(part.nbytes for part in found) <= 2048
@@ -138,7 +138,7 @@ def test_what_the_variable_cannot_be(monkeypatch: pytest.MonkeyPatch, text: str)
 
 
 def test_where_there_is_no_room_windows_are_halved(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A driver that gives no buffer of more than 100 KiB, though it promised more."""
+    """The driver cannot allocate more than 100 KiB, although it reported a larger limit."""
     make = cl.Buffer
 
     def stingy(context: cl.Context, flags: int, size: int = 0, hostbuf: Any = None) -> cl.Buffer:

@@ -1,4 +1,4 @@
-"""Progressive rendering: when it stops, what it tells on the way, and what the report says in the end."""
+"""Progressive rendering: stop conditions, intermediate states, and the report."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from clrt.rendering.renderer import Renderer
 from clrt.scene.lights import PointLight
 from clrt.scene.model import Camera, Environment, RenderSettings, Scene, Sphere
 
-#: What other programs read; the command line adds total_seconds.
+#: Fields that other programs read; the command line adds total_seconds.
 REPORT = {"scene", "device", "platform", "driver", "version", "width", "height", "spp", "max_depth", "seed",
           "seconds", "samples", "samples_per_second", "rays", "rays_per_second", "stop_reason", "noise",
           "nonfinite_samples", "bvh", "kernel", "peak_device_bytes", "history"}
@@ -27,7 +27,7 @@ KERNEL = {"build_seconds", "cached", "features"}
 
 @pytest.fixture
 def renderer(device: Device) -> Renderer:
-    """A lamp above a sphere under a sky: noisy, and quick."""
+    """Return a renderer of a point light above a sphere under a sky: noisy and fast."""
     scene = Scene(spheres=[Sphere(), Sphere(center=(0.0, -101.0, 0.0), radius=100.0)], name="ball",
                   lights=[PointLight(position=(2.0, 3.0, 2.0), intensity=(20.0, 20.0, 20.0))],
                   environment=Environment(color=(0.5, 0.5, 0.5)), camera=Camera(position=(0.0, 1.0, 6.0)),
@@ -36,7 +36,7 @@ def renderer(device: Device) -> Renderer:
 
 
 def test_stops_at_spp(renderer: Renderer) -> None:
-    """The scene's own number of samples unless told otherwise; the history has the powers of two and the end."""
+    """It uses the scene's spp by default; the history has the powers of two and the end."""
     states = list(renderer.passes())
     assert renderer.stop_reason == "spp" and states[-1].spp == 12
     assert np.all(states[-1].film.pixels["count"] == 12)
@@ -50,7 +50,7 @@ def test_stops_at_spp(renderer: Renderer) -> None:
 
 
 def test_goes_on_where_it_stopped(renderer: Renderer, device: Device) -> None:
-    """5 samples and then up to 12 are the same picture as 12 at once, bit for bit."""
+    """5 samples and then up to 12 give the same image as 12 at once, bit for bit."""
     first = list(renderer.passes(spp=5))[-1]
     assert first.spp == 5
     last = list(renderer.passes(spp=12))[-1]
@@ -66,7 +66,7 @@ def test_stops_after_a_time(renderer: Renderer) -> None:
 
 
 def test_stops_at_an_error(renderer: Renderer) -> None:
-    """At the first state whose noise is low enough."""
+    """It stops at the first state whose estimated error is low enough."""
     states = list(renderer.passes(error=0.02))
     assert renderer.stop_reason == "error"
     *before, last = [state.noise for state in states]
@@ -106,7 +106,7 @@ def test_what_was_planned_is_where_it_ends(renderer: Renderer, device: Device) -
 
 
 def test_launches_run_while_a_state_is_made(renderer: Renderer) -> None:
-    """But after the last one, and where an error is looked at."""
+    """Except after the last one, and if an error is a stop condition."""
     def ahead(state: State) -> bool:
         return bool(renderer.session.work.parts) or renderer.session.samples_done > state.spp
 
@@ -117,7 +117,7 @@ def test_launches_run_while_a_state_is_made(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("left_at", [1, 4, 8])
 def test_left_at_a_state_it_goes_on(renderer: Renderer, device: Device, left_at: int) -> None:
-    """To the same picture, and with each state in the history once."""
+    """The image is the same, and each state is in the history once."""
     for state in renderer.passes():
         if state.spp == left_at:
             break
@@ -129,7 +129,7 @@ def test_left_at_a_state_it_goes_on(renderer: Renderer, device: Device, left_at:
 
 @pytest.mark.parametrize("other, rest", [(2, [8, 12]), (8, [12]), (40, [])])
 def test_two_that_take_turns(renderer: Renderer, other: int, rest: list[int]) -> None:
-    """Each goes on from what is there, which may be ahead of the last state, to its own end."""
+    """Each continues from the current film, which may be ahead of its last state, to its own end."""
     first = renderer.passes(spp=12)
     while next(first).spp < 2:
         pass
@@ -169,7 +169,7 @@ def test_relmse_against_a_reference(renderer: Renderer) -> None:
 
 
 def test_report(renderer: Renderer) -> None:
-    """Every field, and numbers that fit each other; as JSON without NaN."""
+    """Every field is present, numbers are consistent, and the JSON has no NaN."""
     last = list(renderer.passes(spp=8, reference=np.ones((30, 40, 3), np.float32)))[-1]
     report = json.loads(json.dumps(render_report(renderer, last), allow_nan=False))
     assert REPORT <= set(report) and BVH <= set(report["bvh"]) and KERNEL <= set(report["kernel"])

@@ -1,4 +1,4 @@
-"""Files written past the system's cache hold the same bytes, whatever their lengths and whatever the system refuses."""
+"""Files written with direct I/O hold the same bytes, for any lengths and on any system that rejects it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from clrt.rendering.checkpoint.direct_io import CHUNK, write_past_cache
 
 LENGTHS = [[], [0, 1], [CHUNK], [3, CHUNK - 3], [CHUNK + 1], [5, 0, 2 * CHUNK + 7, 100], [4096, 4096, 13]]
-#: The temporary folder's, and one in memory where there is that, whose kernels may not know such writes.
+#: The temporary folder, and one in memory if there is one, which may not support direct I/O.
 FOLDERS = [folder for folder in (Path(tempfile.gettempdir()), Path("/dev/shm")) if os.access(folder, os.W_OK)]
 
 
@@ -38,7 +38,7 @@ def test_the_file_holds_the_pieces(folder: Path, lengths: list[int]) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "O_DIRECT"), reason="this system has no such writes")
 def test_systems_that_refuse_only_when_written(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """They take the wish, and then refuse to write by it; some refuse the wish."""
+    """Some systems accept O_DIRECT and then fail to write; some reject the flag."""
     import fcntl
 
     write, direct = os.write, list[bool]()

@@ -1,4 +1,4 @@
-"""Pictures without light: what they hold of the surface that is seen first."""
+"""Integrators without light: depth, normals and albedo of the first hit."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ SIZE = (20, 14)
 
 
 def ball(integrator: Integrator, camera: Camera, spp: int = 4, unit: float = 1.0) -> Scene:
-    """Of the radius 1.3 around BALL."""
+    """Return a scene with a sphere of radius 1.3 at BALL."""
     center = tuple((unit * np.array(BALL)).tolist())
     return Scene(spheres=[Sphere(center=center, radius=1.3 * unit, material=RED)], camera=camera,
                  render=RenderSettings(size=SIZE, spp=spp, integrator=integrator))
 
 
 def met(origin: Doubles, w: Doubles) -> Doubles:
-    """(n,): how far along unit directions (n, 3) the ball is, NaN where it is not met."""
+    """Return the distance to the sphere along unit directions (n, 3), NaN for a miss, (n,)."""
     d = np.array(BALL) - origin
     along = np.sum(d * w, axis=-1)
     with np.errstate(invalid="ignore"):
@@ -47,7 +47,7 @@ def met(origin: Doubles, w: Doubles) -> Doubles:
 @pytest.mark.parametrize("name", ["rolled", "lens", "parallel", "all around"])
 @pytest.mark.parametrize("unit", [1.0, 2.0**-30])
 def test_depth_of_a_ball(device: Device, name: str, unit: float) -> None:
-    """Along the view for the ray through the pixel's middle, that of a lens's middle; the distance for all around."""
+    """Depth along the view for the ray through the pixel's and the lens's centre; the distance if equirectangular."""
     camera = replace(CAMERAS[name], look_at=BALL, position=(-2.0, 1.0, 2.0))
     x, y = (grid.ravel() for grid in np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5))
     near, far = (seen_at(camera, SIZE, x, y, np.full(len(x), depth))[0] for depth in (1.0, 2.0))
@@ -64,7 +64,7 @@ def test_depth_of_a_ball(device: Device, name: str, unit: float) -> None:
 
 
 def test_normals_of_a_ball(device: Device) -> None:
-    """Means over pixels, against the middles of 64 x 64 parts of each."""
+    """Means over pixels equal those over the centres of 64 x 64 cells of each."""
     camera = Camera(position=(3.0, 2.0, 4.0), look_at=BALL, fov_degrees=30)
     x, y = np.meshgrid((np.arange(64 * SIZE[0]) + 0.5) / 64, (np.arange(64 * SIZE[1]) + 0.5) / 64)
     w = view_rays(camera, SIZE, x, y)
@@ -76,11 +76,11 @@ def test_normals_of_a_ball(device: Device) -> None:
 
 
 def test_albedo_is_the_materials_own(device: Device) -> None:
-    """Of mirrors, too; the normal is that of the side that is seen. Behind is the like of the other material."""
+    """Also for mirrors; normals are those of the visible side. A wall of the other material is behind."""
     camera = Camera(position=(0.0, 0.0, 3.0), fov_degrees=20)
     materials = {RED: (0.7, 0.2, 0.1), Mirror(color=(0.5, 0.6, 0.7)): (0.5, 0.6, 0.7)}
     for (material, color), other in zip(materials.items(), reversed(materials)):
-        walls = [quad([(-9, -9, z), (-9, 9, z), (9, 9, z), (9, -9, z)], each)   # their backs
+        walls = [quad([(-9, -9, z), (-9, 9, z), (9, 9, z), (9, -9, z)], each)   # seen from behind
                  for z, each in ((0, material), (-1, other))]
         for integrator, expected in (("albedo", color), ("normals", (0.0, 0.0, 1.0)), ("depth", (3.0, 3.0, 3.0))):
             settings = RenderSettings(size=(5, 3), spp=2, integrator=integrator)  # type: ignore[arg-type]
@@ -89,7 +89,7 @@ def test_albedo_is_the_materials_own(device: Device) -> None:
 
 
 def test_what_is_clear_is_not_seen(device: Device) -> None:
-    """A one-sided wall from behind, and one of no opacity, before another."""
+    """A one-sided wall from behind and one of opacity 0 are not seen in front of another wall."""
     walls = [quad([(-9, -9, z), (9, -9, z), (9, 9, z), (-9, 9, z)], replace(RED, **clear))
              for z, clear in ((-1.0, {}), (0.0, {"opacity": 0.0}), (1.0, {"one_sided": True}))]
     walls[2] = replace(walls[2], faces=np.ascontiguousarray(walls[2].faces[:, ::-1]))
@@ -102,7 +102,7 @@ def test_what_is_clear_is_not_seen(device: Device) -> None:
 
 @pytest.mark.combinations
 def test_pictures_are_what_guides_are(device: Device) -> None:
-    """Sample by sample, where nothing is followed through mirrors and glass."""
+    """They agree sample by sample if there are no mirrors or glass to follow."""
     scene = replace(everything(), spheres=[Sphere(center=(-1.0, 0.7, 0.5), radius=0.7, material=MetallicRoughness())])
     scene = replace(scene, environment=Scene().environment)
     for integrator, guide in (("normals", "normal"), ("albedo", "albedo")):
@@ -116,7 +116,7 @@ def test_pictures_are_what_guides_are(device: Device) -> None:
 @pytest.mark.parametrize("integrator", ["albedo", *others("normals", "depth")])
 def test_no_light_is_compiled_or_missed(device: Device, integrator: Integrator,
                                         caplog: pytest.LogCaptureFixture) -> None:
-    """Nothing is said of darkness; nothing is 0; lanes agree."""
+    """No warning about darkness, no light code, no black pixels; SIMD widths agree."""
     scene = replace(everything(), render=replace(everything().render, integrator=integrator))
     compiled = session(device, scene).compiled
     assert not [file for file in compiled.files if file.startswith("light") or file == "edge.cl"]
@@ -128,7 +128,7 @@ def test_no_light_is_compiled_or_missed(device: Device, integrator: Integrator,
 
 
 def test_png_files_are_for_eyes_and_exr_files_for_numbers(device: Device, tmp_path: Path) -> None:
-    """½ + ½n; the nearest depth over each; whatever the view. Nothing is black."""
+    """PNG shows normals as ½ + ½n and depth as nearest/depth, for any view. A miss is black."""
     camera = Camera(position=(0.0, 0.0, 3.0), fov_degrees=20)
     half = quad([(-9, -9, 0), (0, -9, 0), (0, 9, 0), (-9, 9, 0)], RED)
     step = quad([(-9, 0, 1.5), (0, 0, 1.5), (0, 9, 1.5), (-9, 9, 1.5)], RED)

@@ -1,4 +1,4 @@
-"""Warnings about pictures that went wrong: each is logged once and listed once in the report. Others have none."""
+"""Warnings about faulty images: each is logged once and listed once in the report; other images have none."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ DROPPED = ("were not finite and were dropped, so the picture may be too dark; lo
 
 
 def said(device: Device, caplog: pytest.LogCaptureFixture, scene: Scene, **options: Any) -> list[str]:
-    """The warnings of a report, which are the log's, after the scene's name."""
+    """Return the warnings of a report, after checking that they are those of the log."""
     caplog.clear()
     with caplog.at_level(logging.WARNING):
         report = clrt.render(scene, device=device.info.index, size=(8, 6), spp=4, **options).report
@@ -54,7 +54,7 @@ def test_a_black_picture_says_why(device: Device, caplog: pytest.LogCaptureFixtu
 
 
 def test_a_lamp_that_is_wound_backwards(device: Device, caplog: pytest.LogCaptureFixture) -> None:
-    """Before the render, and as the reason for its darkness."""
+    """It is reported before the render, and as the cause of the black image."""
     scene = replace(BALL, lights=[], meshes=[UPWARDS])
     found = said(device, caplog, scene)
     assert [text.split(";")[0] for text in found] == [
@@ -71,7 +71,9 @@ def test_only_integrators_that_clrt_debug_follows_point_to_it(device: Device, ca
 
 
 def test_samples_that_are_not_finite(device: Device, caplog: pytest.LogCaptureFixture) -> None:
-    """A texel of the sky beyond what a film can hold: its samples are counted, and where all are lost that is why."""
+    """An environment texel beyond the film's range: dropped samples are counted, and named as
+    the cause if all are lost.
+    """
     sky = np.ones((2, 4, 3), np.float32)
     sky[0, 0] = 1e35
     some = said(device, caplog, Scene(environment=Environment(image=sky), name="sky",

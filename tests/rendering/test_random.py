@@ -1,4 +1,4 @@
-"""Random numbers of the kernels: uniform and unrelated over pixels, samples, dimensions and seeds."""
+"""Random numbers of the kernels: uniform, and independent across pixels, samples, dimensions and seeds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from clrt.device.open import Device
 from clrt.scene.model import RenderSettings, Scene
 
 COUNT = 1 << 15
-#: Text of rng.cl and what weakens it: fewer rounds, indices that can be exchanged, that end early, or are forgotten.
+#: Text of rng.cl and replacements that weaken it: fewer rounds, exchangeable, truncated or ignored indices.
 WEAK = {
     "no second round": ("    x += y * w; y += z * x; z += x * y; w += y * z;\n    return", "    return"),
     "exchangeable": ("hash4(sampler->pixel, sampler->sample,", "hash4(sampler->pixel ^ sampler->sample, (ureal)(0),"),
@@ -30,7 +30,7 @@ def draw(device: Device) -> Draw:
 
 
 def test_numbers_are_uniform(draw: Draw) -> None:
-    """Pairs fill the unit square, along every index and past 2^31 and 2^32, as do fours, and every bit is even."""
+    """Pairs fill the unit square along every index and past 2^31 and 2^32, as do 4-tuples, and every bit is even."""
     p_values = uniformity(draw, COUNT)
     assert len(p_values) > 1000 and not rejected(p_values)
 

@@ -1,4 +1,4 @@
-"""The raster integrator: what is seen first, against float64 and rays; its pictures, against those of `local`."""
+"""The raster integrator: first hits against float64 and against rays, and its images against those of `local`."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ SIZE = (29, 21)
 SETTINGS = RenderSettings(size=SIZE, spp=4, integrator="raster", max_depth=2)
 SCENES = Path(__file__).parents[2] / "scenes"
 GALLERY = sorted(path.stem for path in SCENES.glob("*.toml"))
-#: Relative to a triangle; on the picture 1e-6 or so is what float32 leaves of a place.
+#: Barycentric margin relative to a triangle; in the image, float32 leaves an error of about 1e-6.
 MARGIN = 1e-3
 
 
 def soup(count: int, seed: int) -> Mesh:
-    """Triangles all around the origin, of any size, many through the plane of an eye there."""
+    """Return triangles of any size all around the origin, many of them through the plane of a camera there."""
     rng = np.random.default_rng(seed)
     sizes = 10.0 ** rng.uniform(-2, 0.7, (count, 1, 1))
     corners = rng.uniform(-4, 4, (count, 1, 3)) + sizes * rng.normal(size=(count, 3, 3))
@@ -48,7 +48,7 @@ def ball(subdivisions: int, center: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def with_rubbish(mesh: Mesh) -> Mesh:
-    """And triangles without an area: points, lines, and one that the eye at the origin sees from its edge."""
+    """Add triangles without area: points, lines, and one that the camera at the origin sees edge-on."""
     bad = np.array([[[0, 0, -1]] * 3, [[-1, 0, -1], [1, 0, -1], [0, 0, -1]], [[-1, 0, -1], [1, 0, -1], [0, 0, -2]]])
     faces = np.arange(9, dtype=np.int32).reshape(3, 3) + np.int32(len(mesh.vertices))
     return Mesh(np.concatenate([mesh.vertices, bad.reshape(-1, 3)]).astype(np.float32),
@@ -76,7 +76,7 @@ SIGHTS: dict[str, tuple[Mesh, Camera]] = {
 
 @cache
 def exactly_seen(name: str, *places: bytes) -> tuple[Doubles, NDArray[np.int64], Doubles]:
-    """How far off what is seen is through places of the picture, x and y; which triangle it is; and by what margin."""
+    """Return the distance of first hits at image points x and y, the triangle, and the decision's margin."""
     mesh, camera = SIGHTS[name]
     x, y = ((np.frombuffer(axis, np.float32).astype(np.float64) + 1) * size / 2 for axis, size in zip(places, SIZE))
     directions = view_rays(camera, SIZE, x, y)
@@ -90,7 +90,7 @@ def exactly_seen(name: str, *places: bytes) -> tuple[Doubles, NDArray[np.int64],
 @pytest.mark.parametrize("name, lanes", [*((name, 8) for name in SIGHTS), ("through the eye's plane", 1), *others(
     ("5120 triangles", 1), ("5120 triangles", 16), ("through the eye's plane", 16))])
 def test_what_is_seen_first_is_what_float64_says(device: Device, name: str, lanes: int) -> None:
-    """Wherever the answer is not a matter of rounding."""
+    """First hits agree wherever they do not depend on rounding."""
     mesh, camera = SIGHTS[name]
     seen, _ = seen_both_ways(device, Scene(meshes=[mesh], camera=camera, render=SETTINGS), lanes=lanes)
     lengths, triangle, margin = exactly_seen(name, seen["x"].tobytes(), seen["y"].tobytes())
@@ -112,7 +112,7 @@ def test_closed_meshes_have_no_cracks(device: Device, name: str, sample: int) ->
 
 
 def test_places_on_edges_belong_to_a_triangle_beside_them(device: Device) -> None:
-    """A fan around the view's axis, and an even grid of pixels: many samples on edges would fall between, or twice."""
+    """A fan around the view axis and a regular pixel grid: samples on edges could be missed or hit twice."""
     vertices, faces = grid(8)
     mesh = Mesh(vertices[:, [0, 2, 1]] - np.array([4, 4, 4], np.float32), faces)
     camera = Camera(position=(0.0, 0.0, 0.0), look_at=(0.0, 0.0, -1.0), fov_degrees=90)
@@ -135,7 +135,7 @@ def test_of_equals_the_first_is_seen(device: Device) -> None:
     *others([Sphere(center=(0.3 * i - 3, np.sin(i), -4 - 0.1 * i), radius=0.2) for i in range(40)]),
 ], ids=["few", "around the eye", "ground", "far and beside", "many"])
 def test_spheres_are_seen_as_rays_meet_them(device: Device, spheres: list[Sphere]) -> None:
-    """The same test of the same ray: equal but for the side of a silhouette."""
+    """The same test of the same ray is used: results are equal except for the side of a silhouette."""
     scene = Scene(spheres=spheres, meshes=[soup(20, 4)], camera=AHEAD, render=replace(SETTINGS, size=(128, 96)))
     for each in (scene, replace(scene, meshes=[])):
         seen, traced = seen_both_ways(device, each)
@@ -146,7 +146,7 @@ def test_spheres_are_seen_as_rays_meet_them(device: Device, spheres: list[Sphere
 
 
 def corners_of(device: Device, scene: Scene, seen: NDArray[Any]) -> Doubles:
-    """(n, 3, 3) of the triangles of SEEN records, in the frame of the camera's scene."""
+    """Return the corners (n, 3, 3) of the triangles of SEEN records, in the frame of the camera's scene."""
     scene = replace(scene, render=replace(scene.render, integrator="raster"))
     compiled = compile_scene(scene, Choices(), device=device)
     which, to_world = seen["primitive"].astype(np.int64), np.eye(3, 4)[None]
@@ -159,7 +159,8 @@ def corners_of(device: Device, scene: Scene, seen: NDArray[Any]) -> Doubles:
 
 
 def to_edges(corners: Doubles, camera: Camera, size: tuple[int, int], seen: NDArray[Any]) -> Doubles:
-    """(n,) pixels from the places of SEEN records to the nearest line of an edge of their triangles."""
+    """Return the distance in pixels (n,) from the points of SEEN records to the nearest edge line of their triangles.
+    """
     forward, right, up, extent = frame(camera)
     across, down = extent * size[0] / size[1] * right, -extent * up
     p = corners - camera.position
@@ -170,7 +171,7 @@ def to_edges(corners: Doubles, camera: Camera, size: tuple[int, int], seen: NDAr
 
 
 def bare(scene: Scene) -> Scene:
-    """Its shapes alone, of one material: then most scenes share their program."""
+    """Return only the scene's shapes, with one material, so that most scenes share a program."""
     meshes = {id(mesh): Mesh(mesh.vertices, mesh.faces) for mesh in
               [*scene.meshes, *(instance.mesh for instance in scene.instances)]}
     return Scene(meshes=[meshes[id(mesh)] for mesh in scene.meshes],
@@ -181,7 +182,7 @@ def bare(scene: Scene) -> Scene:
 
 @pytest.mark.parametrize("name", [*(name for name in GALLERY if name != "instances"), *others("instances")])
 def test_the_gallery_is_seen_as_rays_see_it(device: Device, name: str) -> None:
-    """By number of primitive and instance: where they differ one of both triangles has an edge within 0.01 pixels."""
+    """Primitive and instance ids agree, except where an edge of one of both triangles is within 0.01 pixels."""
     scene = bare(load(SCENES / f"{name}.toml"))
     size = 96, 96 * scene.render.size[1] // scene.render.size[0]
     camera = replace(scene.camera, aperture_radius=0.0, focus_distance=None)
@@ -205,7 +206,8 @@ PLANTED = planted(painted(BELL))
 
 @pytest.mark.parametrize("scene, lanes", [(PLANTED, 8), *others((BELL, 1))], ids=["planted, 8", "wide filter, 1"])
 def test_pictures_are_those_of_local(device: Device, scene: Scene, lanes: int) -> None:
-    """Sample by sample, but at edges: mirrors, glass, holes, textures and shadows follow what is seen first."""
+    """They agree sample by sample except at edges; mirrors, glass, alpha masks, textures and shadows use the first hit.
+    """
     one, other = (film(device, replace(scene, render=replace(scene.render, integrator=integrator)), lanes=lanes).mean
                   for integrator in ("raster", "local"))
     assert differing(one, other) < 0.01 and one.std() > 0.1
@@ -213,8 +215,8 @@ def test_pictures_are_those_of_local(device: Device, scene: Scene, lanes: int) -
 
 @pytest.mark.parametrize("integrator", ["raster", "local"])
 def test_without_shadows_all_that_faces_a_light_is_lit(device: Device, integrator: Any) -> None:
-    """A ball between a sun overhead and the ground: color·(sky + sun) everywhere, to the last bit or so; and with them
-    there is a shadow, as local's are elsewhere."""
+    """A sphere between a sun overhead and the ground: without shadows color·(sky + sun) everywhere; with them
+    there is one below the sphere."""
     sun, sky, red = DirectionalLight(direction=(0, -1, 0), irradiance=(np.pi,) * 3), (0.1, 0.2, 0.3), (0.7, 0.3, 0.2)
     shade = Sphere(center=(0.0, 3.0, 0.0), radius=1.0)
     camera = Camera(position=(0.0, 1.0, 0.0), look_at=(0.0, 0.0, 0.0), up=(0.0, 0.0, -1.0), fov_degrees=100)
@@ -230,7 +232,7 @@ def test_without_shadows_all_that_faces_a_light_is_lit(device: Device, integrato
 
 
 def test_mirrors_end_with_the_depth(device: Device) -> None:
-    """At depth 2 a mirror shows the sky and what glows; deeper ones, what it sees."""
+    """At depth 2 a mirror shows the sky and emitters; at higher depths, what it reflects."""
     mirror = quad([(-2, -2, -2), (2, -2, -2), (2, 2, -2), (-2, 2, -2)], Mirror(color=(0.5,) * 3))
     behind = quad([(-9, -9, 3), (9, -9, 3), (9, 9, 3), (-9, 9, 3)], Diffuse(color=(0.7,) * 3))
     scene = Scene(meshes=[mirror, behind], camera=replace(AHEAD, look_at=(0.0, 0.0, -1.0), fov_degrees=20),

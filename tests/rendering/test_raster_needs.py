@@ -1,4 +1,4 @@
-"""What the raster integrator takes: memory for what a camera sees, no tree where no ray is followed, and a pinhole."""
+"""Requirements of the raster integrator: memory for visible triangles, no BVH if no rays are traced, and a pinhole."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .test_variants import everything
 
 
 def test_several_devices_and_tiles_render_the_same_picture(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the film on the host, where buffers are small, it is that of one session bit for bit."""
+    """With small buffers and the film on the host, the image is that of one session, bit for bit."""
     films = []
     for limit in ("1G", "80K"):
         monkeypatch.setenv(VARIABLE, limit)
@@ -44,7 +44,7 @@ def test_what_does_not_fit_is_refused_with_the_size(device: Device, monkeypatch:
 
 
 def test_bins_are_in_the_memory_plan(device: Device) -> None:
-    """What is sorted is compared with the room beside the scene before it takes any."""
+    """The bins' size is checked against the memory that the scene leaves before they are allocated."""
     scene = Scene(meshes=[ball(4, (0.0, 0.0, -3.0))], camera=AHEAD, render=SETTINGS)
     compiled = compile_scene(scene, Choices(), device=device)
     arguments = [*(on_device(device, array) for _, array in compiled.buffers.values()), compiled.counts[0]]
@@ -56,7 +56,7 @@ def test_bins_are_in_the_memory_plan(device: Device) -> None:
 
 
 def test_where_no_ray_is_followed_there_is_no_tree(device: Device) -> None:
-    """The picture is the same bit for bit as with one; what rays meet first can be asked for all the same."""
+    """The image is bit-identical to the one with a BVH; first hits of rays remain available on request."""
     balls = [Sphere(center=(-1.5, 0.0, -4.0), radius=0.7), Sphere(center=(1.5, 0.0, -4.0), radius=0.7)]
     sun = DirectionalLight(direction=(-1, -1, 0), irradiance=(1.0, 1.0, 1.0))
     scene = Scene(meshes=[ball(3, (0.0, 0.0, -3.0)), plain(9.0, 1.0)], spheres=balls, lights=[sun], camera=AHEAD,

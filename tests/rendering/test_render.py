@@ -1,4 +1,4 @@
-"""Pictures whose answer is derived: direct light in closed form, furnaces, interreflection as a geometric series."""
+"""Images with derived results: direct lighting in closed form, furnaces, interreflection as a geometric series."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def settings(width: int, height: int, spp: int, max_depth: int = 2) -> RenderSet
 
 
 def assert_picture(device: Device, scene: Scene, expected: Doubles) -> None:
-    """Every pixel's mean is `expected` within its own noise."""
+    """Assert that every pixel's mean is `expected` within its own noise."""
     picture = film(device, scene)
     everywhere = np.broadcast_to(expected, picture.mean.shape)
     p = pixel_p_values(picture, everywhere)
@@ -40,7 +40,7 @@ def assert_picture(device: Device, scene: Scene, expected: Doubles) -> None:
 
 
 def seen_floor(light: Doubles) -> tuple[Doubles, Doubles]:
-    """Squared distance and cosine from the floor's points, in a 12 by 8 picture, to a place above."""
+    """Return squared distance and cosine from the floor's points, in a 12 by 8 image, to a position above."""
     d = light - pixel_points(ABOVE, (12, 8), 0.0)
     distance2 = np.sum(d * d, axis=-1)
     return distance2, d[..., 1] / np.sqrt(distance2)
@@ -57,7 +57,7 @@ def test_point_light_on_a_plane(device: Device) -> None:
 
 @pytest.mark.parametrize("radius", [0.9, 0.01])
 def test_sphere_light_on_a_plane(device: Device, radius: float) -> None:
-    """L = albedo · Le · (r/d)² · cos θ, wherever the sphere is wholly above the horizon."""
+    """L = albedo · Le · (r/d)² · cos θ, if the sphere is entirely above the horizon."""
     lamp = Sphere(center=(-4.0, 2.0, -1.0), radius=radius, material=Diffuse(color=BLACK, emission=(17.0, 12.0, 4.0)))
     scene = Scene(meshes=[FLOOR], spheres=[lamp], camera=ABOVE, render=settings(12, 8, 1024))
     distance2, cosine = seen_floor(np.array(lamp.center))
@@ -79,22 +79,22 @@ def test_directional_light_on_a_plane(device: Device) -> None:
 
 @pytest.mark.parametrize("material", [Diffuse(color=(1.0, 1.0, 1.0)), PAINT, Mirror(color=(0.8, 0.5, 0.2))], ids=str)
 def test_furnace(device: Device, material: Material) -> None:
-    """A convex body under a white sky has its albedo, in every sample: exactly the float32."""
+    """A convex body under a white sky has its albedo in every sample, exactly in float32."""
     scene = Scene(spheres=[Sphere(material=material)], environment=Environment(color=(1.0, 1.0, 1.0)),
                   camera=Camera(position=(0.0, 0.0, 3.0), fov_degrees=20), render=settings(16, 16, 33, max_depth=8))
     picture = film(device, scene)
     color = np.array(material.parameters()["color"], np.float32)
     assert np.all(picture.mean.astype(np.float32) == color)
-    # Squares are rounded to 2^-24 of themselves, which the variance of 33 equal samples cannot tell from noise.
+    # Squares are rounded to 2^-24 of themselves, which the variance of 33 equal samples cannot distinguish from noise.
     assert picture.noise is not None and picture.noise < np.sqrt(2.0**-24 / 32)
 
 
 @pytest.mark.parametrize("depth", [1, 2, 3, 40])
 def test_emissive_box(device: Device, depth: int) -> None:
-    """Inside closed walls of emission e and albedo a, d edges bring e·(1 + a + … + a^(d−1)) = e·(1 − a^d)/(1 − a).
+    """Closed walls of emission e and albedo a give e·(1 + a + … + a^(d−1)) = e·(1 − a^d)/(1 − a) at depth d.
 
-    The mean over all pixels, whose samples are independent: with 40 edges 0.8^40 = 1e-4 of the whole series is cut off,
-    and Russian roulette, which starts after four, must not show.
+    The mean over all pixels, whose samples are independent: at depth 40, 0.8^40 = 1e-4 of the whole series is cut off,
+    and Russian roulette, which starts after depth four, must not show.
     """
     e = np.array([1.0, 2.0, 0.5])
     walls = box(1.0, Diffuse(color=(0.8, 0.5, 0.2), emission=(1.0, 2.0, 0.5)))
@@ -109,7 +109,7 @@ def test_emissive_box(device: Device, depth: int) -> None:
 @pytest.mark.parametrize("roughness", [0.3, 0.6])
 @pytest.mark.parametrize("smith", ["height_correlated", "separable"])
 def test_microfacets_under_a_lamp(device: Device, roughness: float, smith: Smith) -> None:
-    """GGX of F = 1 amid glowing walls: its single-scatter albedo, by light samples and its own directions together."""
+    """GGX with F = 1 among emissive walls has its single-scattering albedo, with MIS of light and BSDF samples."""
     metal = MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=roughness, smith=smith,
                               multiple_scattering=False)
     tile = quad([(-1, 0, 1), (1, 0, 1), (1, 0, -1), (-1, 0, -1)], metal)
@@ -120,7 +120,7 @@ def test_microfacets_under_a_lamp(device: Device, roughness: float, smith: Smith
 
 
 def test_max_depth_counts_edges(device: Device) -> None:
-    """1: only what glows; 2: and direct light; 3: and one bounce, here in a mirror that shows the lit floor."""
+    """1: emission only; 2: direct light; 3: one bounce, here a mirror that shows the lit floor."""
     lamp = Sphere(center=(0.0, 3.0, 0.0), radius=0.5, material=Diffuse(color=BLACK, emission=(4.0, 4.0, 4.0)))
     mirror = quad([(-5, 0, -2), (5, 0, -2), (5, 5, -2), (-5, 5, -2)], Mirror())
     views = {"lamp": (0.0, 3.0, 0.0), "floor": (0.0, 0.0, 0.0), "floor in the mirror": (0.0, 0.3, -2.0)}
@@ -137,7 +137,7 @@ def test_max_depth_counts_edges(device: Device) -> None:
 
 @pytest.mark.parametrize("scale", [1e-20, 1e-9, 1e9, 1e15])
 def test_size_does_not_matter(device: Device, scale: float) -> None:
-    """The glowing box at all sizes: e·(1 + a), in pixels that see its walls."""
+    """The emissive box at all scales: e·(1 + a), in pixels that see its walls."""
     walls = box(scale, Diffuse(color=(0.8, 0.5, 0.2), emission=(1.0, 2.0, 0.5)))
     camera = Camera(position=(0.1 * scale, 0.2 * scale, 0.3 * scale), look_at=(scale, 0.5 * scale, 0.2 * scale),
                     fov_degrees=90)

@@ -1,4 +1,4 @@
-"""Rough and thin glass, and what glass absorbs: formulas in float64, and pictures whose answer is known."""
+"""Rough and thin glass, and absorption: float64 formulas, and scenes with known results."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ pytestmark = pytest.mark.statistics
 
 COLOR = (0.9, 0.5, 1.0)
 WHITE = Environment(color=(1.0, 1.0, 1.0))
-#: Looks down on the origin, from 4 above.
+#: Camera that looks down on the origin from a height of 4.
 DOWN = Camera(position=(0.0, 0.0, 4.0), fov_degrees=0.02)
 
 
 def walter(eta: float, alpha: float, wo: Doubles, wi: Doubles) -> Doubles:
-    """(n,) f·|cos wi| of eq. 20 and 21 (Walter et al. 2007) for light that comes along wi, from a medium of eta where
-    that is below, and leaves along wo into one of 1; G of both as in eq. 99 of Heitz 2014."""
+    """Return f·|cos wi| (n,) by eq. 20 and 21 (Walter et al. 2007), for light that arrives along wi, from a medium of
+    index eta if that is below, and leaves along wo into one of index 1; G of both as in eq. 99 of Heitz 2014."""
     refracted = wi[:, 2] < 0
     sum_ = np.where(refracted[:, None], -(eta * wi + wo), wi + wo)
     h = sum_ / np.linalg.norm(sum_, axis=1, keepdims=True)
@@ -56,7 +56,7 @@ def test_it_is_walters(device: Device, ior: float, front: bool) -> None:
     wo, wi = above(20_000, 1), above(20_000, 2) * np.where(np.arange(20_000) % 3 == 0, 1, -1)[:, None] ** [0, 0, 1]
     expected = walter(ior if front else 1 / ior, roughness**2, wo, wi)[:, None] * np.where(wi[:, 2:] < 0, COLOR, 1)
     found = glass.value(0, wo, wi, front)[0]
-    # Half vectors are known to some roundings, but where wi nearly goes on as wo came.
+    # Half vectors are known to some roundings, except where wi nearly continues wo.
     known = np.linalg.norm(wo + (ior if front else 1 / ior) * wi, axis=1) > 0.05
     assert np.all(np.abs(found - expected)[known] <= 2e-4 * expected[known] + 2e-6)
     assert (found[wi[:, 2] < 0] > 0).any(axis=1).mean() > 0.05
@@ -78,7 +78,7 @@ def test_the_smoothest_is_smooth(device: Device) -> None:
 
 @pytest.mark.parametrize("front", [True, False])
 def test_energy_is_that_of_a_single_bounce(device: Device, front: bool) -> None:
-    """What samples carry of a white furnace's power, against Walter's formula at directions from the whole sphere."""
+    """The mean sample weight in a white furnace equals Walter's formula over directions of the whole sphere."""
     count, eta = 1 << 20, 1.5 if front else 1 / 1.5
     rng = np.random.default_rng(7)
     z, turn = rng.uniform(-1, 1, count), rng.uniform(0, 2 * np.pi, count)
@@ -95,7 +95,7 @@ def test_energy_is_that_of_a_single_bounce(device: Device, front: bool) -> None:
 
 
 def test_thin_glass_is_the_sum_of_its_bounces(device: Device) -> None:
-    """F + (1 − F)²·Σ c^2k·F^(2k−1), and (1 − F)²·Σ c^(2k+1)·F^2k; straight on; 2F/(1 + F) if c = 1."""
+    """F + (1 − F)²·Σ c^2k·F^(2k−1), and (1 − F)²·Σ c^(2k+1)·F^2k; not refracted; 2F/(1 + F) if c = 1."""
     sheets = bsdfs(device, [Dielectric(ior=1.5, color=COLOR, thin=True), Dielectric(ior=1.5, thin=True)])
     numbers, c, k = uniform(1 << 16, 5), np.array(COLOR), np.arange(1, 200)[:, None]
     for cosine in (1.0, 0.4, 0.1):
@@ -113,12 +113,12 @@ def test_thin_glass_is_the_sum_of_its_bounces(device: Device) -> None:
 
 
 def _plane(z: float, material: Material, half: float = 99.0) -> Mesh:
-    """The square around the z axis at this height, seen from above."""
+    """Return the square around the z axis at this height, facing up."""
     return quad([(-half, -half, z), (half, -half, z), (half, half, z), (-half, half, z)], material)
 
 
 def test_light_behind_ground_glass_is_found(device: Device) -> None:
-    """A small lamp under it, sampled as a light: the eye gets f(wo, wi)·cos·L·Ω, whatever the number of lights."""
+    """A small emitter below it, sampled as a light: radiance is f(wo, wi)·cos·L·Ω, for any number of lights."""
     glass = Dielectric(ior=1.5, roughness=0.5, color=COLOR)
     lamp = Sphere(center=(0.3, 0.4, -1.0), radius=0.01, material=Diffuse(emission=(9e4, 9e4, 9e4)))
     scene = Scene(meshes=[_plane(0.0, glass)], spheres=[lamp], camera=DOWN,
@@ -133,7 +133,7 @@ def test_light_behind_ground_glass_is_found(device: Device) -> None:
 
 
 def test_found_and_sampled_light_through_ground_glass_agree(device: Device) -> None:
-    """A lamp of any size below a rough surface: sampling weighs both ways; its furnace is what passes, over 1.5²."""
+    """A large emitter below a rough surface with MIS: radiance is the transmitted furnace energy over 1.5²."""
     glass = Dielectric(ior=1.5, roughness=0.7)
     lamp = _plane(-0.5, Diffuse(color=(0.0, 0.0, 0.0), emission=(1.0, 1.0, 1.0)), 500.0)
     scene = Scene(meshes=[_plane(0.0, glass), lamp], camera=DOWN,
@@ -144,7 +144,7 @@ def test_found_and_sampled_light_through_ground_glass_agree(device: Device) -> N
 
 
 def test_glass_absorbs_by_the_way_inside(device: Device) -> None:
-    """A slab of d under a white sky: F, and T = color^(d/distance) at every crossing of what bounces inside."""
+    """A slab of thickness d under a white sky: F, and T = color^(d/distance) for every internal crossing."""
     glass = Dielectric(ior=1.5, attenuation_color=COLOR, attenuation_distance=0.5)
     back = quad([(-99, 99, -2), (99, 99, -2), (99, -99, -2), (-99, -99, -2)], glass)
     picture = film(device, Scene(meshes=[_plane(-1.0, glass), back], camera=DOWN, environment=WHITE,
@@ -160,7 +160,7 @@ def test_glass_absorbs_by_the_way_inside(device: Device) -> None:
     (Dielectric(ior=1.0, thin=True), "path"), (Dielectric(ior=1.0, thin=True), "local"),
     (MetallicRoughness(color=(1.0, 1.0, 1.0), ior=1.0, roughness=0.0, transmission=1.0), "path")])
 def test_a_sheet_does_not_end_what_absorbs(device: Device, sheet: Material, integrator: Integrator) -> None:
-    """A slab that bends nothing, 2 thick, with a clear sheet across it: color^(2/distance) of a white sky."""
+    """A non-refracting slab of thickness 2 with a clear sheet across it: color^(2/distance) of a white sky."""
     glass = Dielectric(ior=1.0, attenuation_color=COLOR, attenuation_distance=0.5)
     back = quad([(-99, 99, -2), (99, 99, -2), (99, -99, -2), (-99, -99, -2)], glass)
     picture = film(device, Scene(meshes=[_plane(0.0, glass), back, _plane(-0.7, sheet)], camera=DOWN, environment=WHITE,
@@ -173,7 +173,8 @@ def test_a_sheet_does_not_end_what_absorbs(device: Device, sheet: Material, inte
 @pytest.mark.parametrize("scale", [1.0, 2.0**30])
 def test_light_inside_is_absorbed_on_its_way_too(device: Device, scale: float, placed: bool,
                                                  integrator: Integrator) -> None:
-    """A point in a box that bends nothing lights its floor: albedo·I/(pi·d²)·color^((d + way to the eye)/distance)."""
+    """A point light in a non-refracting box lights its floor: albedo·I/(pi·d²)·color^((d + camera distance)/distance).
+    """
     box = Dielectric(ior=1.0, attenuation_color=COLOR, attenuation_distance=scale)
     floor = _plane(-scale, Diffuse(color=(0.5, 0.5, 0.5)), 2 * scale)
     light = PointLight(position=(0.0, 0.0, -scale / 2), intensity=(7.0 * scale**2,) * 3)
@@ -187,7 +188,7 @@ def test_light_inside_is_absorbed_on_its_way_too(device: Device, scale: float, p
 
 
 def test_only_glass_that_asks_pays(device: Device) -> None:
-    """Smooth glass without absorption compiles to no line about either."""
+    """Smooth glass without absorption compiles no code for either."""
     def compiled(*materials: Dielectric) -> str:
         return compile_scene(Scene(spheres=[Sphere(material=m) for m in materials], environment=WHITE),
                              Choices(device.lanes)).source

@@ -1,4 +1,4 @@
-"""What compilers may round in their own ways sends next to no path another way."""
+"""Rounding that compilers may choose changes almost no path."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from ..check.sabotage import sabotaged
 @pytest.mark.statistics
 def test_products_that_are_rounded_before_they_are_added(device: Device, tmp_path: Path,
                                                          monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compilers for devices with an instruction for it make one operation of a·b + c, others two. Of 10 000 paths some
-    two go elsewhere by that."""
+    """Compilers may contract a·b + c to one fused operation. About two of 10 000 paths diverge by that."""
     scene, subject = everything((48, 48)), Subject(device.info.index)
     contracted = subject.picture(scene, 4)
     folder = sabotaged(tmp_path / "kernels", r"\A", "", head="#pragma OPENCL FP_CONTRACT OFF")

@@ -1,4 +1,4 @@
-"""Samplers: points that fill the square as theory says, pixels and dimensions that know nothing of each other."""
+"""Samplers: points fill the square as theory predicts, and pixels and dimensions are independent."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def probe_of(device: Device, sampler: Sampler, **chosen: Any) -> Probe:
 
 def draw(probe: Probe, pixel: ArrayLike, sample: ArrayLike, dimension: int = 0, seed: int = 0,
          block_bits: int = 32) -> Doubles:
-    """(n, 2) numbers of pixels and samples, which broadcast."""
+    """Return the numbers (n, 2) of pixels and samples, which broadcast."""
     p, s = np.broadcast_arrays(np.asarray(pixel, np.int64), np.asarray(sample, np.int64))
     return probe("random", 2, p.ravel() >> 16, p.ravel() & 0xffff, s.ravel() >> 16, s.ravel() & 0xffff, seed=seed,
                  dimension=dimension, block_bits=block_bits)
@@ -40,7 +40,7 @@ def sobol(device: Device) -> Probe:
 
 
 def fills_all_boxes(points: Doubles) -> bool:
-    """Whether 2^m points are a (0, m, 2)-net: one in each box of area 2^-m with sides that are powers of two."""
+    """Return whether 2^m points are a (0, m, 2)-net: one in each box of area 2^-m with power-of-two sides."""
     bits = len(points).bit_length() - 1
     return all(len(np.unique((points * [1 << a, 1 << (bits - a)]).astype(int) @ [1 << bits, 1])) == len(points)
                for a in range(bits + 1))
@@ -48,7 +48,7 @@ def fills_all_boxes(points: Doubles) -> bool:
 
 @pytest.mark.parametrize("bits", [1, 2, 5, 10])
 def test_sobol_samples_are_nets(sobol: Probe, bits: int) -> None:
-    """2^k samples from any multiple of 2^k on, in every pair of dimensions."""
+    """2^k samples from any multiple of 2^k on are a net, in every pair of dimensions."""
     for pixel, dimension in ((0, 0), (5, 1), (123456789, 7)):
         for start in (0, 3 << bits, (1 << 24) - (1 << bits)):
             assert fills_all_boxes(draw(sobol, pixel, start + np.arange(1 << bits), dimension))
@@ -56,14 +56,14 @@ def test_sobol_samples_are_nets(sobol: Probe, bits: int) -> None:
 
 @pytest.mark.parametrize("block_bits, side_bits", [(0, 3), (2, 2), (4, 3), (6, 1)])
 def test_neighbours_fill_the_square_together(sobol: Probe, block_bits: int, side_bits: int) -> None:
-    """The blocks of an aligned square of pixels are one net, wherever it lies on the Z curve."""
+    """The blocks of an aligned square of pixels form one net, anywhere on the Z curve."""
     pixels = np.arange(1 << 2 * side_bits)[:, None] + (37 << 2 * side_bits)
     assert fills_all_boxes(draw(sobol, pixels, np.arange(1 << block_bits), 2, block_bits=block_bits))
 
 
 def test_errors_of_squares_know_nothing_of_each_other(sobol: Probe) -> None:
-    """How good a sequence is for an integral, ∫∫ xy here, is by chance: over 128 seeds the mean squared errors of two
-    neighbouring squares of 16 pixels, 16 samples each, do not correlate. Within a square they do, even if it is halved.
+    """The error of a sequence for an integral, here ∫∫ xy, is random: over 128 seeds the mean squared errors of two
+    neighbouring squares of 16 pixels, 16 samples each, do not correlate. Within a square they do, even in its halves.
     """
     n, square, seeds = 16, 256, 128
     pixels = np.arange(2 * square)[:, None]
@@ -86,7 +86,7 @@ def test_error_of_a_mean_falls_as_theory_says(device: Device, sampler: Sampler, 
 
 
 def test_sobol_scrambling_is_as_good_as_scipys(sobol: Probe) -> None:
-    """The mean squared error of ∫∫ xy, and of an edge, over 32 points: as of scipy's scrambled Sobol' points."""
+    """The mean squared errors of ∫∫ xy and of an edge over 32 points equal those of scipy's scrambled Sobol' points."""
     n, pixels = 32, 2048
     ours = draw(sobol, np.arange(pixels)[:, None], np.arange(n), 3).reshape(pixels, n, 2)
     theirs = np.stack([qmc.Sobol(2, rng=seed).random(n) for seed in range(pixels)])
@@ -111,8 +111,8 @@ def test_stratified_samples_lie_one_in_each_cell(device: Device, block_bits: int
 
 @pytest.mark.parametrize("sampler", SAMPLERS)
 def test_pixels_dimensions_and_seeds_are_unrelated(device: Device, sampler: Sampler) -> None:
-    """One sample of many pixels: uniform; and independent of another dimension's, seed's, neighbour's, and sample's own
-    number, where samples have no order of their own."""
+    """One sample of many pixels is uniform, and independent of another dimension, seed or neighbouring pixel, and in
+    its two components, for samples without an order of their own."""
     probe, count, p_values = probe_of(device, sampler), 1 << 15, {}
     pixels = 7 * (1 << 20) + np.arange(count)
     for sample in (0, 5):
@@ -131,8 +131,8 @@ def test_pixels_dimensions_and_seeds_are_unrelated(device: Device, sampler: Samp
 @pytest.mark.parametrize("sampler", SAMPLERS)
 @pytest.mark.parametrize("spp", [1, 4, 13])
 def test_pictures_are_unbiased(device: Device, sampler: Sampler, spp: int) -> None:
-    """Light of a sphere on a floor, L = ρ·L·r²·cos θ/d² with cos θ = h/d (no bounce), and pixels that average it: over
-    64 seeds the pictures' means have the mean of a float64 quadrature."""
+    """A sphere light on a floor, L = ρ·L·r²·cos θ/d² with cos θ = h/d (no bounce): over 64 seeds the images' means have
+    the mean of a float64 quadrature."""
     albedo, radiance, radius, height = 0.5, 40.0, 0.1, 2.0
     floor = quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], Diffuse(color=(albedo,) * 3))
     lamp = Sphere(center=(0, height, 0), radius=radius, material=Diffuse(color=(0, 0, 0), emission=(radiance,) * 3))

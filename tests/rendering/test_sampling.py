@@ -1,4 +1,4 @@
-"""Warps and lights against their densities, and the sine and cosine they use against float64."""
+"""Warps and light sampling against their densities, and the sine and cosine they use against float64."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from clrt.device.open import Device
 pytestmark = pytest.mark.statistics
 
 SAMPLES = 1 << 16
-#: Text of the kernels and what makes it wrong by little.
+#: Kernel text and replacements that make it slightly wrong.
 WRONG_WARPS = {
     "cone": ("h = u.x * height;", "h = u.x * height * (0.9f + 0.1f * u.x);"),
     "cosine": ("real s, c, r = sqrt(u.x);", "real s, c, r = sqrt(u.x * (0.9f + 0.1f * u.x));"),
@@ -37,14 +37,14 @@ def probe(device: Device) -> Probe:
 
 
 def test_warps_follow_their_densities(probe: Probe) -> None:
-    """Cosine, triangle, cones to 1e-5 degrees, and normals visible from grazing angles on the smoothest surface."""
+    """Cosine, triangle, cones down to 1e-5 degrees, and visible normals at grazing angles on the smoothest surface."""
     p_values = warp_p_values(probe, SAMPLES, 1)
     assert len(p_values) == 44 and not rejected(p_values)
 
 
 def test_lights_follow_their_densities(device: Device) -> None:
-    """Spheres and triangles of all sizes, skies, and choices among lights. A lamp's density is its closed form, a sky's
-    integrates to 1, and the probabilities of all lights add up to it."""
+    """Spheres and triangles of all sizes, environment maps, and light selection. An emitter's density is its closed
+    form, an environment map's integrates to 1, and the selection probabilities sum to 1."""
     tests = light_tests(device, SAMPLES, 1)
     assert len(tests) == 21 and not rejected({test.name: test.density for test in tests})
     assert max(test.error for test in tests) < DENSITY
@@ -52,7 +52,7 @@ def test_lights_follow_their_densities(device: Device) -> None:
 
 @pytest.mark.parametrize("what", WRONG_WARPS)
 def test_a_wrong_warp_is_rejected(device: Device, what: str) -> None:
-    """By the test of its name; turns that do not close belong to all."""
+    """The test of that warp fails; a wrong sine and cosine fails all."""
     wrong = rejected(warp_p_values(warp_probe(device, dict([WRONG_WARPS[what]])), SAMPLES, 1), 1e-9)
     assert wrong and all(what == "turns" or name.startswith(what) for name in wrong)
 
@@ -69,7 +69,7 @@ def test_densities_are_one_over_the_area_of_the_map(probe: Probe) -> None:
 
 
 def test_warps_report_their_closed_forms(probe: Probe) -> None:
-    """Directions of length 1 with cos θ/pi, or 1/(2·pi·height) inside the cone; triangles inside their edges."""
+    """Unit directions with cos θ/pi, or 1/(2·pi·height) inside the cone; triangle points inside the edges."""
     u = np.random.default_rng(0).integers(1 << 24, size=(SAMPLES, 2)) / (1 << 24)
     for height in HEIGHTS:
         out = probe("warps", 12, u, np.full(SAMPLES, height))
@@ -84,13 +84,13 @@ def test_warps_report_their_closed_forms(probe: Probe) -> None:
 @pytest.mark.parametrize("alpha", [1e-4, 0.3, 1.0])
 @pytest.mark.parametrize("cosine", [1.0, 0.3, 1e-4])
 def test_normals_are_all_visible(alpha: float, cosine: float) -> None:
-    """The probabilities of the cells, exact but for one integral, sum to 1."""
+    """The cells' probabilities, exact except for one integral, sum to 1."""
     cells = visible_normals(alpha, np.array([np.sqrt(1 - cosine**2), 0.0, cosine]))
     assert cells.sum() == pytest.approx(1, abs=1e-12) and cells.min() >= 0
 
 
 def test_sine_and_cosine_of_turns(probe: Probe) -> None:
-    """Every 16th of the 2^24 arguments that a random number has, and all the small ones."""
+    """Every 16th of the 2^24 arguments that a random number takes, and all the small ones."""
     u = np.concatenate([np.arange(0, 1 << 24, 16), np.arange(1, 16), (1 << 24) - np.arange(1, 16)]) / (1 << 24)
     sine, cosine = probe("warps", 12, u, np.zeros((len(u), 2)))[:, 10:].T
     exact = np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)

@@ -1,4 +1,4 @@
-"""Fibres: the table against the integral that it stands for, and their roughness from a texture."""
+"""Sheen: the table against the integral that it approximates, and roughness from a texture."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ BLACK, WHITE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
 
 def table() -> Any:
-    """(12, 8) as the kernel has it."""
+    """Return the kernel's table (12, 8)."""
     rows = re.findall(r"^    \{(.*)\},$", (kernel_folder() / "bsdf" / "sheen.cl").read_text(), re.MULTILINE)
     return np.array([[float(number.rstrip("f")) for number in row.split(",")] for row in rows])
 
 
 def test_the_table_is_the_integrals_interpolation() -> None:
-    """Each coefficient, to the digits that float32 holds."""
+    """Each coefficient agrees to float32 precision."""
     np.testing.assert_allclose(table(), interpolated(*table().shape), rtol=1e-5, atol=1e-6)
 
 
@@ -43,7 +43,7 @@ def test_the_table_is_as_near_as_it_says() -> None:
 
 @pytest.mark.parametrize("factor", [1.0, 0.7])
 def test_roughness_comes_from_the_alpha_channel(device: Device, factor: float) -> None:
-    """Left and right of a picture as two sheets whose roughness is a number."""
+    """The two halves of a texture equal two sheets with constant roughness."""
     texels = np.zeros((1, 2, 4), np.uint8)
     texels[0, :, 3] = 51, 204
     painted = Texture(picture=Picture(texels), channel="alpha", filter="nearest", factor=factor)

@@ -1,4 +1,4 @@
-"""Which sides of a surface emit, in closed form."""
+"""Emission from one or both sides of a surface, in closed form."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ BLACK = (0.0, 0.0, 0.0)
 
 @pytest.mark.parametrize("turned", [False, True], ids=["front", "back"])
 def test_a_double_sided_rectangle_lights_both_sides_alike(device: Device, turned: bool) -> None:
-    """Each as the front of a one-sided one does."""
+    """Each side emits like the front of a one-sided one."""
     lamp = replace(rectangle(*SIDE, 2.0), material=BOTH)
     lamp.faces = lamp.faces[:, ::-1].copy() if turned else lamp.faces
     assert_mean(Probe(device, Scene(meshes=[lamp])), POINTS, rectangle_irradiance(*SIDE, 2.0, POINTS))
 
 
 def test_many_double_sided_lights_are_twice_as_many_one_sided_ones(device: Device) -> None:
-    """Through the tree over the lights, at points and normals from anywhere among them."""
+    """Through the light BVH, at points and normals anywhere among the lights."""
     rng = np.random.default_rng(8)
     corners = rng.uniform(-1, 1, (60, 1, 3)) + 0.1 * directions(rng, 180).reshape(60, 3, 3)
     faces = np.arange(180, dtype=np.int32).reshape(60, 3)
@@ -54,7 +54,7 @@ def test_many_double_sided_lights_are_twice_as_many_one_sided_ones(device: Devic
 @pytest.mark.parametrize("integrator", ["path", "direct", "local", "raster"])
 @pytest.mark.parametrize("double_sided", [False, True])
 def test_a_lamp_seen_from_behind(device: Device, integrator: Integrator, double_sided: bool) -> None:
-    """A camera looks down at the back of a lamp that faces down: its radiance, exactly, or nothing."""
+    """A camera sees the back of an emitter: its radiance exactly if double-sided, otherwise nothing."""
     lamp = replace(rectangle(-1, 1, -1, 1, 0.0), material=replace(LAMP, color=BLACK, double_sided=double_sided))
     scene = Scene(meshes=[lamp], camera=Camera(position=(0, 5, 0), look_at=(0, 0, 0), up=(0, 0, 1), fov_degrees=5),
                   render=RenderSettings(size=(8, 8), spp=2, integrator=integrator))
@@ -63,7 +63,7 @@ def test_a_lamp_seen_from_behind(device: Device, integrator: Integrator, double_
 
 @pytest.mark.parametrize("as_mesh", [False, True], ids=["sphere", "mesh"])
 def test_a_furnace_of_the_inner_side(device: Device, as_mesh: bool) -> None:
-    """What is convex reflects its albedo of the radiance that its surroundings have in all directions."""
+    """A convex body reflects its albedo times the uniform radiance of its surroundings."""
     shell = Diffuse(color=BLACK, emission=(0.5, 1.0, 2.0), double_sided=True)
     vertices, faces = rays.icosphere(1)
     scene = Scene(meshes=[Mesh(3 * vertices, faces, shell)] if as_mesh else [],
@@ -73,12 +73,12 @@ def test_a_furnace_of_the_inner_side(device: Device, as_mesh: bool) -> None:
                   render=RenderSettings(size=(8, 8), spp=256, max_depth=2))
     found = film(device, scene)
     samples, mean = found.samples, found.mean.mean(axis=(0, 1))
-    variance = found.variance.mean(axis=(0, 1)) * 256 + samples * (1e-6 * 0.4)**2    # roundings, too
+    variance = found.variance.mean(axis=(0, 1)) * 256 + samples * (1e-6 * 0.4)**2    # including rounding
     assert mean_test(mean, variance, samples, 0.4).min() > sidak(FAMILY, 3), mean
 
 
 def test_an_inner_side_seen_through_a_transparent_near_side_lights_all_the_same(device: Device) -> None:
-    """Of a ball of opacity a a ray sees L·a on the near side, and (1 − a)·L·a on the far one's inside."""
+    """For a sphere of opacity a a ray sees L·a on the near side, and (1 − a)·L·a on the far side's inside."""
     def lit(opacity: float) -> Film:
         ball = Sphere(center=(0, 1.5, 0), material=Diffuse(color=BLACK, emission=(1, 1, 1), opacity=opacity,
                                                            double_sided=True))

@@ -1,4 +1,4 @@
-"""Skies: looked up by the convention, sampled by their brightness, and bright as a quadrature says."""
+"""Environment maps: look-up by the convention, sampling by luminance, and radiance against a quadrature."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 def gradient() -> NDArray[np.float32]:
-    """Much brighter downwards and around, in each channel differently."""
+    """Return an image that is much brighter downwards and varies around, differently per channel."""
     v, u = np.meshgrid((np.arange(HEIGHT) + 0.5) / HEIGHT, (np.arange(WIDTH) + 0.5) / WIDTH, indexing="ij")
     bright = 0.1 + v**3 * (1.5 + np.sin(2 * np.pi * u))**2
     return np.stack([bright, 2 * bright, bright * (1.2 + np.cos(2 * np.pi * u))], axis=-1).astype(np.float32)
@@ -35,7 +35,7 @@ def smooth() -> NDArray[np.float32]:
 
 
 def sun() -> NDArray[np.float32]:
-    """One texel of 1e5 in uneven haze."""
+    """Return an image with one texel of 1e5 in uneven haze."""
     image = np.random.default_rng(1).uniform(0.5, 1.5, (HEIGHT, WIDTH, 3)).astype(np.float32)
     image[4, 20] = 1e5
     return image
@@ -71,17 +71,17 @@ def probe(device: Device, name: str) -> Probe:
 
 
 def seen(probe: Probe, w: Doubles) -> Doubles:
-    """(n, 4): radiance from directions (n, 3), and the density with which light samples choose them."""
+    """Return radiance from directions (n, 3) and the pdf of light sampling for them, (n, 4)."""
     return probe("sky", 4, np.zeros_like(w), np.tile([0.0, 1.0, 0.0], (len(w), 1)), w)
 
 
 def sampled(probe: Probe, normal: Doubles, seed: int) -> Doubles:
-    """(COUNT, 12): see probe_light_sample."""
+    """Return probe_light_sample's output (COUNT, 12)."""
     return probe("light_sample", 12, np.zeros((COUNT, 3)), np.tile(normal, (COUNT, 1)), seed=seed)
 
 
 def directions(count: int) -> Doubles:
-    """Unit vectors everywhere, both poles, and both sides of the seam and of the axes."""
+    """Return random unit vectors, both poles, and both sides of the seam and of the axes."""
     w = np.random.default_rng(2).normal(size=(count, 3))
     w /= np.linalg.norm(w, axis=1, keepdims=True)
     axes = np.concatenate([np.eye(3), -np.eye(3)])
@@ -90,28 +90,28 @@ def directions(count: int) -> Doubles:
 
 
 def test_radiance_follows_the_convention(probe: Probe, name: str) -> None:
-    """An angle is off by 4e-7 at most (atan2 of OpenCL: 6 ulp); that moves radiance by the image's steepest step."""
+    """Angles are off by 4e-7 at most (atan2 of OpenCL: 6 ulp), which changes radiance by the image's steepest step."""
     image, rotation = SKIES[name]
     w = directions(100_000)
     found = seen(probe, w)[:, :3]
     steps = [np.abs(np.diff(image.astype(np.float64), axis=axis, append=image.take([0], axis=axis))).max(initial=0)
              for axis in (0, 1)]
-    # Near the poles the azimuth is as uncertain as the direction's last digits are large beside its sine.
+    # Near the poles the azimuth's uncertainty is the direction's last digits over its sine.
     blur = 4e-7 * np.maximum(1, 0.1 / np.maximum(np.hypot(w[:, 0], w[:, 2]), 1e-30))
     tolerance = blur * max(steps) * 2 * WIDTH + 1e-6 * image.max()
-    smooth = np.hypot(w[:, 0], w[:, 2]) > 1e-5   # at a pole itself no azimuth is wrong
+    smooth = np.hypot(w[:, 0], w[:, 2]) > 1e-5   # at a pole any azimuth is right
     error = np.abs(found - skies.lookup(image, w, rotation)).max(axis=1)
     assert np.all(error[smooth] <= tolerance[smooth])
     assert np.isfinite(found).all()
 
 
 def test_density_integrates_to_one(probe: Probe, name: str) -> None:
-    """∫ pdf dω by the midpoint rule: 8 by 8 points a texel, inside which pdf·sin θ is constant."""
+    """∫ pdf dω by the midpoint rule with 8 by 8 points per texel, in which pdf·sin θ is constant."""
     v, u = np.meshgrid((np.arange(8 * HEIGHT) + 0.5) / (8 * HEIGHT), (np.arange(8 * WIDTH) + 0.5) / (8 * WIDTH),
                        indexing="ij")
     pdf = seen(probe, skies.from_uv(u.ravel(), v.ravel()))[:, 3]
     integral = np.sum(pdf * np.sin(np.pi * v.ravel())) * 2 * np.pi**2 / v.size
-    # Where it is turned, edges of texels round to either side.
+    # If the image is rotated, points on texel edges round to either side.
     assert abs(integral - (name not in EVEN)) < 2e-6 * WIDTH
 
 
@@ -122,7 +122,7 @@ def test_even_skies_are_not_sampled(probe: Probe, name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(SKIES.keys() - EVEN), indirect=True)
 def test_samples_follow_the_density(probe: Probe, name: str) -> None:
-    """Chi-square over the texels; each sample reports the density and radiance that its direction has."""
+    """Chi-square over the texels; each sample reports the pdf and radiance of its direction."""
     image, rotation = SKIES[name]
     height, width = image.shape[:2]
     sample = sampled(probe, UP, seed=3)
@@ -130,7 +130,7 @@ def test_samples_follow_the_density(probe: Probe, name: str) -> None:
     cell = np.minimum((v * height).astype(int), height - 1) * width + np.minimum((u * width).astype(int), width - 1)
     density = probe.compiled.buffers["sky_texels"][1]["density"].astype(np.float64)
     found = np.bincount(cell, minlength=density.size)
-    edges = np.bincount(cell[density[cell] == 0], minlength=density.size)    # rounded to the other side of one
+    edges = np.bincount(cell[density[cell] == 0], minlength=density.size)    # rounded to the other side of an edge
     assert edges.sum() < 1e-5 * COUNT
     assert chi2_test(found - edges, density / density.sum() * (COUNT - edges.sum())) > 1e-4
 
@@ -143,7 +143,7 @@ def test_samples_follow_the_density(probe: Probe, name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(SKIES.keys() - EVEN), indirect=True)
 def test_what_is_brighter_than_the_mean_is_sampled(probe: Probe, name: str) -> None:
-    """Texels whose mean luminance is below the sky's are not, the others in proportion to what is above it."""
+    """Texels with less than the mean luminance are not sampled, the others in proportion to their excess."""
     image, rotation = SKIES[name]
     height, width = image.shape[:2]
     steps = 24
@@ -159,7 +159,7 @@ def test_what_is_brighter_than_the_mean_is_sampled(probe: Probe, name: str) -> N
 
 @pytest.mark.parametrize("name", sorted(SKIES.keys() - EVEN), indirect=True)
 def test_irradiance(probe: Probe, name: str) -> None:
-    """The samples' mean of radiance·cos/pdf against a quadrature in float64 over the texels that are sampled."""
+    """The samples' mean of radiance·cos/pdf against a float64 quadrature over the sampled texels."""
     image, rotation = SKIES[name]
     normals = np.array([[0.0, 1.0, 0.0], [0.6, 0.0, -0.8], [-0.48, -0.6, 0.64]])
     where = probe.compiled.buffers["sky_texels"][1]["density"].reshape(image.shape[:2]) > 0
@@ -168,13 +168,13 @@ def test_irradiance(probe: Probe, name: str) -> None:
         sample = sampled(probe, normal, seed)
         values = sample[:, 3:6] * (np.maximum(sample[:, :3] @ normal, 0) / sample[:, 6])[:, None]
         expected = skies.irradiance(image, normal, rotation, where=where)
-        variance = values.var(axis=0) + COUNT * (3e-5 * expected)**2   # and the quadrature's own error
+        variance = values.var(axis=0) + COUNT * (3e-5 * expected)**2   # including the quadrature's own error
         p_values.append(mean_test(values.mean(axis=0), variance, COUNT, expected))
     assert np.min(p_values) > sidak(FAMILY, np.size(p_values))
 
 
 def test_constant_sky(device: Device) -> None:
-    """The same from everywhere, and left to the surfaces' own directions."""
+    """It is the same from everywhere, and left to BSDF sampling."""
     probe = Probe(device, Scene(environment=Environment(color=(0.5, 0.25, 2.0), strength=3.0)))
     out = seen(probe, directions(100))
     assert np.all(out == [1.5, 0.75, 6.0, 0.0])

@@ -1,4 +1,4 @@
-"""Sphere lights from near to far: what a receiver reflects is the irradiance by a float64 quadrature."""
+"""Sphere lights from near to far: reflected radiance against the irradiance by a float64 quadrature."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ FACES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 
 
 def irradiance(distance: float, radius: float, cosine: float, n: int = 512) -> float:
-    """E/L of a sphere whose middle is `distance` away in a direction at that cosine to the normal: the mean of the
-    cosines, where above 0, over the cone of directions that it fills (midpoints; 1 − cos of the cone's angle)."""
+    """Return E/L of a sphere whose centre is at `distance` in a direction with that cosine to the normal: the clamped
+    cosine averaged over the cone that it subtends (midpoint rule; in 1 − cos of the cone's angle)."""
     sine2 = (radius / distance) ** 2
     height = sine2 / (1 + np.sqrt(1 - sine2))
     h, phi = np.meshgrid((np.arange(n) + 0.5) / n * height, (np.arange(n) + 0.5) / n * np.pi)
@@ -36,15 +36,15 @@ def irradiance(distance: float, radius: float, cosine: float, n: int = 512) -> f
 
 
 def frame_around(n: Doubles) -> Doubles:
-    """(3, 3), a turn whose last column is n."""
+    """Return a rotation (3, 3) whose last column is n."""
     s = np.cross(n, [1.0, 0, 0] if abs(n[0]) < 0.5 else [0, 1.0, 0])
     s /= np.linalg.norm(s)
     return np.column_stack([s, np.cross(n, s), n])
 
 
 def lit(kind: str, integrator: Integrator, radius: float, gap: float, cosine: float, rng: np.random.Generator) -> Scene:
-    """A receiver seen from half as near as the light, of some radius, comes to it, at `gap` radii; its middle at that
-    cosine to the normal."""
+    """Return a receiver lit by a sphere of some radius at `gap` radii, with its centre at that cosine to the
+    normal, seen from half the gap."""
     n, p = directions(rng, 1)[0], rng.uniform(-3, 3, 3) * radius * 10.0 ** rng.uniform(-8, 0)
     turn, distance = frame_around(n), radius * (1 + gap)
     toward = turn @ [np.sqrt(1 - cosine**2), 0, cosine]
@@ -69,7 +69,7 @@ def lit(kind: str, integrator: Integrator, radius: float, gap: float, cosine: fl
 @pytest.mark.parametrize("integrator", ["path", "local"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_near_and_far(device: Device, kind: str, integrator: Integrator, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of any radius between .01 and 1000, gaps between 1e-4 and 10 radii, some partly below the horizon: to 1 %."""
+    """Radii between .01 and 1000, gaps between 1e-4 and 10 radii, some partly below the horizon: to 1 %."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
     rng = np.random.default_rng(KINDS.index(kind))
     for _ in range(COUNT):
@@ -80,14 +80,14 @@ def test_near_and_far(device: Device, kind: str, integrator: Integrator, monkeyp
         assert found == pytest.approx(expected, rel=0.01), (radius, gap, cosine)
 
 
-#: Of each material type that light passes in many directions, one.
+#: One variant of each material type with transmission lobes.
 PASSED = {kind.__name__: next(each for each in variants(kind) if "TRANSMISSION_LOBES" in each.features())
           for kind in MATERIALS if any("TRANSMISSION_LOBES" in each.features() for each in variants(kind))}
 
 
 @pytest.mark.parametrize("kind", PASSED)
 def test_a_sphere_does_not_light_itself(device: Device, kind: str) -> None:
-    """It shines outwards and is convex: whatever it is made of, it looks as it shines, anywhere and of any size."""
+    """It emits outwards and is convex, so its image is its emission for any material, position and size."""
     material, rng = replace(PASSED[kind], emission=(1.0, 2.0, 3.0)), np.random.default_rng(3)
     for _ in range(COUNT // 2):
         radius = 10.0 ** rng.uniform(-2, 3)
@@ -102,7 +102,7 @@ def test_a_sphere_does_not_light_itself(device: Device, kind: str) -> None:
 
 @pytest.mark.parametrize("integrator", ["path", "local"])
 def test_light_in_part_opaque(device: Device, integrator: Integrator) -> None:
-    """Where it lets light through it sends out none: its light is as much less as it is opaque."""
+    """It emits only where it is opaque: its light is proportional to its opacity."""
     rng = np.random.default_rng(9)
     for _ in range(4):
         opacity, lamp = rng.uniform(0.1, 0.9), Diffuse(color=(0.0, 0.0, 0.0), emission=(1.0, 1.0, 1.0))
@@ -113,5 +113,5 @@ def test_light_in_part_opaque(device: Device, integrator: Integrator) -> None:
 
 
 def with_lamp(scene: Scene, material: Material) -> Scene:
-    """The scene with its last sphere of that material."""
+    """Return the scene with another material for its last sphere."""
     return replace(scene, spheres=[*scene.spheres[:-1], replace(scene.spheres[-1], material=material)])

@@ -1,4 +1,4 @@
-"""Spot lights: the light that they bring is that of glTF's formula, and choosing among many loses none of it."""
+"""Spot lights: intensity follows glTF's formula, and selection among many lights is unbiased."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ UP = np.array([0.0, 1.0, 0.0])
 
 
 def fade(light: SpotLight, points: Doubles) -> Doubles:
-    """(n,): clamp((cos θ − cos outer)/(cos inner − cos outer))², of the sample code of KHR_lights_punctual."""
+    """Return clamp((cos θ − cos outer)/(cos inner − cos outer))², (n,), of KHR_lights_punctual's sample code."""
     away = points - light.position
     cosine = away @ np.array(light.direction) / np.linalg.norm(away, axis=-1) / np.linalg.norm(light.direction)
     inner, outer = np.cos(np.radians([light.inner_degrees, light.outer_degrees]))
@@ -35,14 +35,14 @@ def fade(light: SpotLight, points: Doubles) -> Doubles:
 
 
 def spot_irradiance(light: SpotLight, points: Doubles, normal: Doubles = UP) -> Doubles:
-    """(n, 3): I·fade·cos/d²."""
+    """Return I·fade·cos/d², (n, 3)."""
     d = light.position - points
     cosines = np.maximum(d @ normal, 0) / np.linalg.norm(d, axis=-1) ** 3
     return np.asarray((cosines * fade(light, points))[..., None] * light.intensity)
 
 
 def spots(count: int, seed: int = 0) -> list[SpotLight]:
-    """In the cube [-1, 1]³, of all directions, widths and powers."""
+    """Return spot lights in the cube [-1, 1]³ with random directions, widths and powers."""
     rng = np.random.default_rng(seed)
     outer, powers = rng.uniform(0.5, 89.0, count), 10.0 ** rng.uniform(-2, 2, count)
     places, axes = rng.uniform(-1, 1, (count, 3)).tolist(), directions(rng, count).tolist()
@@ -53,8 +53,8 @@ def spots(count: int, seed: int = 0) -> list[SpotLight]:
 
 @pytest.mark.parametrize(("inner", "outer"), [(0.0, 45.0), (20.0, 30.0), (29.9999, 30.0), (0.0, 90.0), (0.0, 1e-3)])
 def test_irradiance(device: Device, inner: float, outer: float) -> None:
-    """On the axis, off it by parts of the outer angle, and outside; near and far. A narrow cone is held level, so that
-    float32 has the points' angles."""
+    """On the axis, off it by fractions of the outer angle, and outside; near and far. A narrow cone is axis-aligned,
+    so that float32 represents the points' angles."""
     light = SpotLight(position=(0.0, 0.0, 0.0), direction=(3.0, -4.0, 0.0) if outer > 1 else (2.0, 0.0, 0.0),
                       intensity=(60.0, 5.0, 1.0), inner_degrees=inner, outer_degrees=outer)
     axis, aside = np.array(light.direction) / np.linalg.norm(light.direction), np.array([0.0, 0.0, 1.0])
@@ -65,7 +65,7 @@ def test_irradiance(device: Device, inner: float, outer: float) -> None:
     expected = spot_irradiance(light, points, -axis)
     mean, variance = irradiances(probe, points, -axis)
     assert np.all(variance < 1e-12 * expected.max() ** 2)
-    # Of the steep cone's edge nothing can be asked but that it is where it is.
+    # A steep cone's edge is checked only for its position.
     allowed = 1e-3 if outer < 1 else 1e-6 + 1e-6 / (np.cos(np.radians(inner)) - np.cos(np.radians(outer)))
     assert np.all(np.abs(mean - expected) <= (allowed * 60 / np.sum(points**2, axis=1))[:, None]), (mean, expected)
     assert not mean[[5, 11]].any() and mean[[0, 6]] == pytest.approx(expected[[0, 6]], rel=1e-5)
@@ -73,8 +73,8 @@ def test_irradiance(device: Device, inner: float, outer: float) -> None:
 
 @pytest.mark.parametrize("unit", [1.0, 1e4])
 def test_ranges_end_light(device: Device, unit: float) -> None:
-    """I/d²·max(1 − (d/range)⁴, 0), the attenuation that KHR_lights_punctual recommends; beside lights that have none,
-    and in a scene of any size. The integrator asks every light."""
+    """I/d²·max(1 − (d/range)⁴, 0), the attenuation recommended by KHR_lights_punctual; together with a light without
+    range, at two scene scales. This integrator evaluates every light."""
     reach = 2.0 * unit
     lights: list[Light] = [
         PointLight(position=(0.0, 0.0, 0.0), intensity=(3.0, 2.0, 1.0), range=reach),
@@ -97,7 +97,7 @@ def test_ranges_end_light(device: Device, unit: float) -> None:
 
 
 def test_picture_of_a_spot(device: Device) -> None:
-    """A floor in a slanted cone: ρ/pi times the irradiance, pixel by pixel; nothing of it comes through a lid."""
+    """A floor in a slanted cone: ρ/pi times the irradiance, pixel by pixel; a lid blocks all of it."""
     light = SpotLight(position=(1.0, 3.0, 0.5), direction=(-0.3, -1.0, 0.1), intensity=(60.0, 50.0, 40.0),
                       inner_degrees=10.0, outer_degrees=35.0)
     camera, size = Camera(position=(0.0, 6.0, 2.0), fov_degrees=50), (24, 18)
@@ -113,7 +113,7 @@ def test_picture_of_a_spot(device: Device) -> None:
 
 @pytest.mark.parametrize("count", [1, 9, 32, 400])
 def test_irradiance_by_many(device: Device, count: int) -> None:
-    """The samples' mean of radiance·cos/pdf is the sum of all, whether each is looked at or a tree leads to it."""
+    """The samples' mean of radiance·cos/pdf is the sum over all lights, with and without a light BVH."""
     lights = spots(count, seed=3)
     probe = Probe(device, Scene(lights=list(lights)))
     p_values = []
@@ -128,7 +128,7 @@ def test_irradiance_by_many(device: Device, count: int) -> None:
 
 @pytest.mark.parametrize("count", [20, 500])
 def test_cones_tell_which_may_be_chosen(device: Device, count: int) -> None:
-    """All that reach the point from above its horizon, few others; together with lamps without cones, too."""
+    """All spots that reach the point from above its horizon and few others; also mixed with other lights."""
     lights, others = spots(count), lamps(count)
     points, normals = points_and_normals(40)
     spare = Probe(device, Scene(lights=list(lights)))
@@ -140,7 +140,7 @@ def test_cones_tell_which_may_be_chosen(device: Device, count: int) -> None:
         for probe, start in ((spare, 0), (mixed, first)):
             mass = probabilities(probe, point, normal)
             assert mass.sum() == pytest.approx(1, abs=2e-6)
-            # Where none can bring any light, one of them is drawn all the same.
+            # If no light contributes, one of them is drawn nevertheless.
             assert np.all(mass[start:][seen] > 0)
         left_out += int(np.sum(probabilities(spare, point, normal) == 0))
         reached += int(seen.sum())
@@ -148,13 +148,13 @@ def test_cones_tell_which_may_be_chosen(device: Device, count: int) -> None:
 
 
 def test_few_are_chosen_by_what_they_bring(device: Device) -> None:
-    """A narrow cone that misses the point leaves all to the other lights, of all types."""
+    """A narrow cone that misses the point leaves the probability to the other lights, of all types."""
     miss = SpotLight(position=(0.0, 2.0, 0.0), direction=(1.0, -0.5, 0.0), intensity=(1e6, 1e6, 1e6), outer_degrees=20)
     hit = replace(miss, direction=(0.0, -1.0, 0.0), intensity=(8.0, 8.0, 8.0))
     lights: list[Light] = [
         PointLight(position=(0.0, 1.0, 0.0), intensity=(2.0, 2.0, 2.0)), miss, hit,
         DirectionalLight(direction=(0.0, -1.0, 0.0), irradiance=(1.0, 1.0, 1.0))]
     probe = Probe(device, Scene(lights=lights, environment=Environment(color=(1.0, 1.0, 1.0))))
-    brought = np.array([2.0, 0.0, 2.0, 1.0])   # numbered type by type: point, spots, directional
+    brought = np.array([2.0, 0.0, 2.0, 1.0])   # numbered by type: point, spots, directional
     expected = 0.8 * brought / 5 + 0.2 * (brought > 0) / 3
     np.testing.assert_allclose(probabilities(probe, np.zeros(3), UP), expected, rtol=1e-5)

@@ -1,4 +1,4 @@
-"""Tables of steps: probabilities, and searches that start in time."""
+"""Piecewise-constant distribution tables: probabilities, and start indices of searches."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ WEIGHTS = {
 
 
 def table_of(weights: NDArray[np.float64]) -> tuple[NDArray[np.void], NDArray[np.float64]]:
-    """The table for rows of weights, or for a single one, and the probabilities."""
+    """Return the table for rows of weights, or for a single one, and the probabilities."""
     rows = np.atleast_2d(weights)
     table = np.empty(rows.shape, SKY_STEP)
     probabilities = steps(rows, table)
@@ -35,7 +35,7 @@ def table_of(weights: NDArray[np.float64]) -> tuple[NDArray[np.void], NDArray[np
 
 @pytest.mark.parametrize("weights", WEIGHTS.values(), ids=WEIGHTS)
 def test_probabilities(weights: NDArray[np.float64]) -> None:
-    """Whole numbers of levels, each within one of the exact share, that add up to 1; what has no weight has none."""
+    """Multiples of 1/LEVELS within 1/LEVELS of the exact share that sum to 1; zero weights have probability zero."""
     table, probability = table_of(weights)
     weights = np.atleast_2d(weights)
     assert np.all(probability * LEVELS % 1 == 0) and np.all(probability >= 0) and np.all(probability[weights == 0] == 0)
@@ -46,7 +46,7 @@ def test_probabilities(weights: NDArray[np.float64]) -> None:
 
 @pytest.mark.parametrize("weights", WEIGHTS.values(), ids=WEIGHTS)
 def test_searches_start_in_time(weights: NDArray[np.float64]) -> None:
-    """At or before the step that each u falls into, u·n being a float32 product; and hardly before it on average."""
+    """At or before the step that contains u, with u·n a float32 product, and on average hardly before it."""
     table, _ = table_of(weights)
     n = table.shape[1]
     edges = np.round(np.arange(n) / n * LEVELS)[:, None] + np.arange(-2, 3)    # where that product may be rounded up

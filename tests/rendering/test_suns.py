@@ -1,4 +1,4 @@
-"""Suns with a size: their irradiance, disc, penumbrae and reflections are those of quadratures in float64."""
+"""Directional lights with an angular size: irradiance, disc, penumbrae and reflections against float64 quadratures."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def unit(v: object) -> Doubles:
 
 
 def disc(towards: Doubles, angle_degrees: float, steps: int = 64) -> tuple[Doubles, Doubles]:
-    """(n, 3) directions of midpoints of the disc, and the solid angle of each, (n,)."""
+    """Return midpoint directions (n, 3) of the disc and the solid angle of each, (n,)."""
     axes = np.linalg.svd(towards[None])[2]
     height = 2 * np.sin(np.radians(angle_degrees) / 4)**2
     h = height * (np.arange(steps) + 0.5)[:, None] / steps
@@ -52,7 +52,7 @@ def sun(direction: object, angle: float, irradiance: tuple[float, float, float] 
 @pytest.mark.parametrize("tilt", [0.0, 50.0, 89.0, 93.0])
 @pytest.mark.parametrize("angle", [1e-3, 0.53, 20.0, 180.0])
 def test_irradiance(device: Device, angle: float, tilt: float) -> None:
-    """A surface that faces the sun gets its irradiance; another that of a quadrature over what is above its horizon."""
+    """A surface facing the sun receives its irradiance; a tilted one that of a quadrature above its horizon."""
     normal = np.array([0.0, np.cos(np.radians(tilt)), np.sin(np.radians(tilt))])
     towards = np.array([0.0, 1.0, 0.0])
     probe = Probe(device, Scene(lights=[sun(-towards, angle)]))
@@ -68,8 +68,8 @@ def test_irradiance(device: Device, angle: float, tilt: float) -> None:
 
 
 def test_what_is_sampled_is_what_is_seen(device: Device) -> None:
-    """Several discs that overlap: each sample's direction is inside its own; there all those around it are seen, each
-    weighted by the power heuristic against the density with which light samples choose it there."""
+    """Several overlapping discs: each sample's direction is inside its disc; the radiance there is that of all discs
+    around it, each weighted by the power heuristic against its light sampling pdf."""
     lights = [sun((0.3, -1.0, 0.1), 20.0), sun((0.2, -1.0, 0.2), 15.0, (1.0, 7.0, 2.0)),
               sun((0.4, -1.0, 0.0), 0.53, (5.0, 1.0, 1.0)), sun((-1.0, -1.0, 0.0), 1e-3, (1.0, 1.0, 9.0))]
     towards = -unit([light.direction for light in lights])
@@ -80,11 +80,11 @@ def test_what_is_sampled_is_what_is_seen(device: Device) -> None:
     own = np.argmin(np.abs(out[:, None, 3:6] / radiance - 1).max(axis=-1), axis=1)
     np.testing.assert_allclose(out[:, 3:6], radiance[own], rtol=1e-6)
     cosines, half = out[:, :3] @ towards.T, np.radians([light.angle_degrees for light in lights]) / 2
-    angles = np.linalg.norm(out[:, None, :3] - towards, axis=-1)    # of small ones as good as the arcs
+    angles = np.linalg.norm(out[:, None, :3] - towards, axis=-1)    # as precise for small angles as the arcs
     margin = 2e-7 / half
     inside = angles < 2 * np.sin(half / 2)
     assert np.all((angles <= 2 * np.sin(half / 2) * (1 + margin))[np.arange(COUNT), own]), cosines.min()
-    densities = np.array([np.mean(out[own == i, 6]) for i in range(4)])    # each light's: chance over solid angle
+    densities = np.array([np.mean(out[own == i, 6]) for i in range(4)])    # each light's: probability over solid angle
     sure = np.all(np.abs(angles / (2 * np.sin(half / 2)) - 1) > margin, axis=1)
     assert sure.mean() > 0.95
     found = np.random.default_rng(1).uniform(0.1, 3, COUNT) * out[:, 6]
@@ -124,7 +124,9 @@ def test_disc(device: Device, angle: float, mirrored: bool, integrator: Integrat
 
 @pytest.mark.parametrize("integrator", ["path", "local", "raster"])
 def test_penumbra(device: Device, integrator: Integrator) -> None:
-    """Behind a wall a floor gets what of the disc stands above its edge; `color`/pi times that, ambient light aside."""
+    """Behind a wall the floor is lit by the part of the disc above the edge: `color`/pi times
+    that, without ambient light.
+    """
     light = sun((-3.0, -4.0, 0.0), 12.0)
     wall = quad([(0.0, 0.0, -99.0), (0.0, 0.0, 99.0), (0.0, 4.0, 99.0), (0.0, 4.0, -99.0)], Diffuse(color=BLACK))
     camera = Camera(position=(-3.0, 9.0, 0.0), look_at=(-3.0, 0.0, 0.0), up=(0.0, 0.0, -1.0), fov_degrees=3.0)
@@ -132,7 +134,7 @@ def test_penumbra(device: Device, integrator: Integrator) -> None:
                   render=RenderSettings(size=(32, 4), spp=256, max_depth=2, integrator=integrator))
     wi, solid_angle = disc(-unit(light.direction), 12.0, 256)
     points = pixel_points(camera, scene.render.size, 0.0)[0, :, :, 0]
-    # A direction passes over the edge where its slope is more than 4 over the way to the wall.
+    # A direction clears the edge if its slope is more than 4 over the distance to the wall.
     slopes = wi[:, 1] / wi[:, 0]
     order = np.argsort(slopes)
     brought = np.append(np.cumsum((wi[:, 1] * solid_angle)[order][::-1])[::-1], 0)
@@ -140,7 +142,7 @@ def test_penumbra(device: Device, integrator: Integrator) -> None:
     shaded = received[..., None] * np.array(light.radiance) * RED / np.pi
     expected, lit = pixel_means(shaded[None])[0], shaded.max(axis=(0, 1))
     assert np.count_nonzero((expected > 0.02 * lit) & (expected < 0.98 * lit)) > 24
-    # Samples are between 0 and what is lit, but for the cosines within the disc.
+    # Samples are between 0 and `lit`, except for the cosines within the disc.
     variance = (1.01 * lit - expected) * expected + 1e-12
     p = mean_test(film(device, scene).mean.mean(axis=0), variance, 4 * scene.render.spp, expected)
     assert p.min() > sidak(FAMILY, 3 * p.size)
@@ -148,7 +150,7 @@ def test_penumbra(device: Device, integrator: Integrator) -> None:
 
 @pytest.mark.parametrize("roughness", [0.02, 0.05, 0.1, 0.2, 0.5])
 def test_reflection_of_rough_metal(device: Device, roughness: float) -> None:
-    """Seen from near where a mirror would send the sun, a flat metal has the quadrature of its BSDF over the disc."""
+    """Near the mirror direction of the sun, a flat metal has the quadrature of its BSDF over the disc."""
     metal = MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=roughness, multiple_scattering=False)
     light = sun((-0.6, -0.8, 0.0), 0.53)
     towards = -unit(light.direction)
@@ -170,7 +172,7 @@ def test_reflection_of_rough_metal(device: Device, roughness: float) -> None:
 
 
 def test_smooth_metal_has_little_noise(device: Device) -> None:
-    """Sampled both ways, a near mirror's highlight has no more than a few times the noise of a rough one."""
+    """With MIS, the noise of a near mirror's highlight is at most a few times that of a rough one."""
     noise = {}
     for roughness in (0.02, 0.2):
         metal = MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=roughness)

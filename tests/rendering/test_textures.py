@@ -1,4 +1,4 @@
-"""Textures: what kernels read against scipy's interpolation, and pictures whose light follows from what is on them."""
+"""Textures: kernel look-ups against scipy's interpolation, and images that follow from their texels."""
 
 from __future__ import annotations
 
@@ -32,28 +32,28 @@ UV = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
 
 
 def picture(seed: int, height: int, width: int) -> Picture:
-    """Noise."""
+    """Return a noise image."""
     return Picture(np.random.default_rng(seed).integers(0, 256, (height, width, 4), np.uint8))
 
 
 def plain(red: int, green: int, blue: int) -> Picture:
-    """One color, as stored."""
+    """Return an image of one color, as stored."""
     return Picture(np.full((2, 2, 4), (red, green, blue, 255), np.uint8))
 
 
 def decoded(encoded: NDArray[np.uint8]) -> Doubles:
-    """sRGB's curve as IEC 61966-2-1 has it."""
+    """Decode sRGB by IEC 61966-2-1."""
     values = encoded / 255
     return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055)**2.4)
 
 
 def quad(material: Material, **corners: Any) -> Mesh:
-    """[-1, 1]² at z = 0, its front towards +z, a picture upright on it."""
+    """Return [-1, 1]² at z = 0, facing +z, with an upright texture."""
     return Mesh(**{"vertices": QUAD, "faces": FACES, "material": material, "uv": UV, **corners})
 
 
 def seen(device: Device, scene: Scene, size: int = 32, spp: int = 16, **settings: Any) -> Doubles:
-    """The picture (size, size, 3) of [-1, 1]² at z = 0, from far above."""
+    """Return the image (size, size, 3) of [-1, 1]² at z = 0, from far above."""
     scene = replace(scene, camera=Camera(position=(0, 0, 1000), look_at=(0, 0, 0),
                                          fov_degrees=float(np.degrees(2 * np.arctan(1 / 1000)))),
                     render=RenderSettings(size=(size, size), **settings))
@@ -64,7 +64,7 @@ def seen(device: Device, scene: Scene, size: int = 32, spp: int = 16, **settings
 
 @pytest.mark.parametrize("kind", get_args(Wrap))
 def test_texels_are_read_as_scipy_reads_them(device: Device, kind: Wrap) -> None:
-    """Bilinear and nearest, every channel, over the edges, several pictures in one scene."""
+    """Bilinear and nearest, every channel, across the edges, with several images in one scene."""
     pictures = [picture(1, 5, 7), picture(2, 1, 1), picture(3, 16, 2)]
     textures = [Texture(picture=p, wrap=(kind, kind), filter=f, channel=c)
                 for p, f, c in itertools.product(pictures, FILTERS, get_args(Channel))]
@@ -89,7 +89,7 @@ def test_texels_are_read_as_scipy_reads_them(device: Device, kind: Wrap) -> None
 
 
 def test_a_picture_lies_upright_and_each_texel_fills_its_square(device: Device) -> None:
-    """White light from everywhere shows a diffuse surface in its own colors, whatever the samples."""
+    """A diffuse surface under uniform white light shows exactly its own colors."""
     texels = picture(7, 8, 8)
     scene = Scene(meshes=[quad(Diffuse(color=Texture(picture=texels, filter="nearest", factor=(1, 0.5, 0.25))))],
                   environment=Environment(color=(1, 1, 1)))
@@ -99,11 +99,11 @@ def test_a_picture_lies_upright_and_each_texel_fills_its_square(device: Device) 
 
 @pytest.mark.parametrize("degrees, order", [(0, "abcd"), (90, "cadb"), (180, "dcba"), (270, "bdac")])
 def test_pictures_are_moved_scaled_and_turned(device: Device, degrees: float, order: str) -> None:
-    """Coordinates turned counter-clockwise turn the picture clockwise (KHR_texture_transform): a b over c d."""
+    """Rotating coordinates counter-clockwise rotates the image clockwise (KHR_texture_transform): a b over c d."""
     colors = {"a": 0, "b": 80, "c": 160, "d": 240}
     texels = np.full((2, 2, 4), 255, np.uint8)
     texels[..., 0] = np.reshape([colors[name] for name in "abcd"], (2, 2))
-    # Half a turn about the coordinates' origin, (0, 0), ends at −u: repeated, that is the same square.
+    # Half a turn about the coordinates' origin, (0, 0), ends at −u: with repeat, that is the same square.
     texture = Texture(picture=Picture(texels), rotation_degrees=degrees, scale=(2, 2), offset=(3, -4), filter="nearest")
     scene = Scene(meshes=[quad(Diffuse(color=texture))], environment=Environment(color=(1, 1, 1)))
     found = seen(device, scene, spp=4)[..., 0]
@@ -113,12 +113,12 @@ def test_pictures_are_moved_scaled_and_turned(device: Device, degrees: float, or
 
 
 def test_second_set_of_coordinates_and_numbers(device: Device) -> None:
-    """One material with a color by the first set, and a roughness by the second that makes it white metal or not."""
+    """One material with a color from the first UV set and a metallic texture from the second."""
     color, metal = picture(8, 4, 4), Picture(np.zeros((1, 2, 4), np.uint8))
     metal.texels[0, 1, 2] = 255
     material = MetallicRoughness(color=Texture(picture=color, filter="nearest"), roughness=1.0, preset=None,
                                  metallic=Texture(picture=metal, channel="blue", uv_set=1, filter="nearest"))
-    # That of all behind the others, so that all are shown by one program.
+    # The textured quad is behind each of them, so that every image runs the same program.
     both = quad(material, uv1=UV[:, ::-1], vertices=(QUAD - (0, 0, 1)).astype(np.float32))
     scene, *plain_ones = [Scene(meshes=[quad(each, uv1=UV[:, ::-1]), both], environment=Environment(color=(1, 1, 1)))
                           for each in (material, replace(material, metallic=0.0), replace(material, metallic=1.0))]
@@ -128,7 +128,7 @@ def test_second_set_of_coordinates_and_numbers(device: Device) -> None:
 
 
 def test_vertex_colors_multiply(device: Device) -> None:
-    """Linear over each triangle, so that the mean over a pixel is the value at its middle."""
+    """They are linear over each triangle, so a pixel's mean is the value at its centre."""
     colors = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
     scene = Scene(meshes=[quad(Diffuse(color=(0.5, 0.25, 1)), colors=colors), quad(Diffuse())],
                   environment=Environment(color=(1, 1, 1)))
@@ -140,14 +140,14 @@ def test_vertex_colors_multiply(device: Device) -> None:
     assert not found[..., 2].any()
 
 
-#: How a texture places its image: as the coordinates say, turned and stretched, mirrored.
+#: Texture transforms: none, rotated and scaled, mirrored.
 PLACED: dict[str, dict[str, Any]] = {
     "plain": {}, "turned": {"rotation_degrees": 30.0, "scale": (2.0, 0.7)},
     "mirrored": {"rotation_degrees": -75.0, "scale": (-1.3, 0.8), "offset": (0.3, 0.1)}}
 
 
 def image_axes(texture: Texture, along_u: Doubles, along_v: Doubles, normal: Doubles) -> tuple[Doubles, Doubles]:
-    """Unit vectors to the right and up in a texture's image on a surface, from its derivatives by u and by v."""
+    """Return unit vectors to the right and up in a texture's image on a surface, from its derivatives by u and by v."""
     by_x, by_y = np.linalg.inv(texture.to_picture[:, :2]).T @ np.stack([along_u, along_v])
     right = by_x / np.linalg.norm(by_x)
     up = np.cross(normal, right)
@@ -158,9 +158,9 @@ def image_axes(texture: Texture, along_u: Doubles, along_v: Doubles, normal: Dou
           list(PLACED), strength=2)
 def test_normal_maps_tilt_along_the_picture(device: Device, turn: float, mirrored: bool, shape: str,
                                             placed: str) -> None:
-    """Red tilts the normal to the image's right and green to its top, wherever these lie on the surface: light that
-    comes from there falls on it with the cosine of that, and bumps shadow themselves. A mesh's own tangents are those
-    of the image as it is placed."""
+    """Red tilts the normal to the image's right and green to its top, for any orientation on the
+    surface: light from there has the cosine to the bent normal, with bump shadowing. A mesh's own
+    tangents are those of the transformed image."""
     angle = np.radians(turn)
     right, top = np.array([np.cos(angle), np.sin(angle), 0]), np.array([-np.sin(angle), np.cos(angle), 0])
     right = -right if mirrored else right
@@ -187,7 +187,7 @@ def test_normal_maps_tilt_along_the_picture(device: Device, turn: float, mirrore
 
 @pytest.mark.parametrize("placed", PLACED)
 def test_normal_maps_tilt_along_the_picture_on_spheres(device: Device, placed: str) -> None:
-    """At a point of a sphere, seen through a lens that shows nothing else."""
+    """At a point of a sphere, seen by a camera with a tiny field of view."""
     theta, phi, texel = 1.1, 0.4, np.array([200, 60, 210])
     normal = np.array([np.sin(theta) * np.sin(phi), np.cos(theta), np.sin(theta) * np.cos(phi)])
     along_u = 2 * np.pi * np.array([normal[2], 0.0, -normal[0]])
@@ -203,7 +203,7 @@ def test_normal_maps_tilt_along_the_picture_on_spheres(device: Device, placed: s
 
 
 def test_normal_maps_on_spheres(device: Device) -> None:
-    """A map that bends nothing leaves the picture as it is."""
+    """A normal map that bends nothing leaves the image unchanged."""
     flat = Texture(picture=plain(128, 128, 255), factor=0.0)
     ball = Sphere(material=Diffuse(color=(0.7, 0.5, 0.3)))
     scene = Scene(spheres=[ball], lights=[DirectionalLight(direction=(1, -1, -1), irradiance=(3, 3, 3))])
@@ -218,7 +218,7 @@ def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: int, cut:
     """A picture that is half black, as emission or opacity: the light below is that of the other half alone, by light
     samples and without.
 
-    Of the half the lanes do not matter.
+    The reference is rendered with one SIMD width, as its result does not depend on it.
     """
     half = Picture(np.full((1, 2, 4), 255, np.uint8))
     half.texels[0, 0, :3] = 0

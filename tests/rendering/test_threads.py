@@ -1,4 +1,4 @@
-"""One renderer in several threads, one query in several threads: what comes out is what one alone gets."""
+"""A renderer and a query shared by several threads: results equal those of one thread."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .test_crew import crew
 @pytest.mark.parametrize("adaptive", [False, True], ids=["even", "adaptive"])
 @pytest.mark.parametrize("make", [renderer, crew], ids=["one device", "two devices"])
 def test_threads_take_turns(device: Device, make: Any, adaptive: bool) -> None:
-    """Whoever renders how much: the picture is that of one thread bit for bit, and each sees it in its last state."""
+    """For any split of work the image is that of one thread bit for bit, and each thread's last state has it."""
     alone, shared, begin = make(device, adaptive=adaptive), make(device, adaptive=adaptive), Barrier(3)
     run(alone, spp=48)
 
@@ -38,7 +38,7 @@ def test_threads_take_turns(device: Device, make: Any, adaptive: bool) -> None:
 
 
 def test_another_view_comes_between_states(device: Device) -> None:
-    """A thread that looks elsewhere meanwhile: what follows is that view, or ended before."""
+    """If another thread changes the camera, the following states show that view."""
     running, other = renderer(device), renderer(device)
     moved = replace(running.scene.camera, position=(0.3, 1.2, 2.5))
     other.look(moved)
@@ -51,7 +51,7 @@ def test_another_view_comes_between_states(device: Device) -> None:
 
 
 def test_a_query_in_threads(device: Device) -> None:
-    """Answers are those of one thread."""
+    """Results equal those of one thread."""
     rng = np.random.default_rng(3)
     query = clrt.RayQuery(rng.random((50, 3)), rng.integers(0, 50, (100, 3)), device=device.info.index)
     rays = [rng.normal(size=(2, 400, 3)).astype(np.float32) for _ in range(16)]

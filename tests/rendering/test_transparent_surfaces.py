@@ -1,4 +1,4 @@
-"""Stacks of partly transparent surfaces, apart and coincident: n of transmittance T transmit T^n, whatever the tree."""
+"""Stacks of partly transparent surfaces, apart and coincident: n of transmittance T transmit T^n, in any BVH."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ QUAD = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
 FACES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 BLACK = (0.0, 0.0, 0.0)
 SUN = DirectionalLight(direction=(1.0, 0.3, -1.0), irradiance=(2.0, 2.0, 2.0))
-#: Of the ground in the sun, and the transmittance of all stacks.
+#: Radiance of the ground in the sun, and the transmittance of all stacks.
 RADIANCE, STACK = 0.5 / np.pi * 2 / np.sqrt(2.09), 0.5
 UPRIGHT = np.eye(3)
-#: A rotation after which no plane lies along an axis.
+#: A rotation after which no plane is axis-aligned.
 TURNED = np.linalg.qr(np.random.default_rng(7).normal(size=(3, 3)))[0]
 TURNED *= np.linalg.det(TURNED)
 
 
 @pytest.fixture(autouse=True)
 def keep_all(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also of small meshes, instances stay instances."""
+    """Keep instances of small meshes as instances."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
 
 
 def nth(count: int) -> Diffuse:
-    """Black; `count` surfaces of it transmit STACK."""
+    """Return a black material of which `count` surfaces transmit STACK."""
     return Diffuse(color=BLACK, opacity=float(-np.expm1(np.log(STACK) / count)))
 
 
@@ -49,8 +49,8 @@ def quad(half: float, height: float, material: Diffuse) -> Mesh:
 
 
 def stack(kind: str, count: int, apart: float) -> Scene:
-    """Surfaces from a height of 10 up, `apart` from each other, some 100 across: "quads" of a mesh each, "instances"
-    of one, or "triangles" of one mesh, of different sizes."""
+    """Return surfaces from a height of 10 up, `apart` from each other, about 100 across: "quads" of a mesh each,
+    "instances" of one, or "triangles" of one mesh, of different sizes."""
     heights = 10 + apart * np.arange(count)
     if kind == "triangles":
         rng = np.random.default_rng(count)
@@ -66,7 +66,7 @@ def stack(kind: str, count: int, apart: float) -> Scene:
 
 def over_ground(scene: Scene, integrator: Integrator, rotation: Doubles = UPRIGHT,
                 sun: DirectionalLight = SUN) -> Scene:
-    """The scene above a ground in the sun, seen from below the stack; all rotated."""
+    """Return the scene above a sunlit ground, seen from below the stack; everything is rotated."""
     ground = quad(5, 0.0, Diffuse(color=(0.5, 0.5, 0.5)))
     camera = Camera(position=tuple((rotation @ [0, 0, 5.0]).tolist()), look_at=(0.0, 0.0, 0.0),
                     up=tuple((rotation @ [0, 1.0, 0]).tolist()), fov_degrees=30.0)
@@ -82,7 +82,7 @@ def over_ground(scene: Scene, integrator: Integrator, rotation: Doubles = UPRIGH
 @pytest.mark.parametrize("kind", ["quads", "triangles", "instances"])
 @pytest.mark.parametrize("integrator", ["path", "local"])
 def test_shadow_rays(device: Device, integrator: Integrator, kind: str, apart: float) -> None:
-    """Without noise. A coincident stack costs each ray the square of its size."""
+    """Transmittance has no noise. A coincident stack costs each ray the square of its size."""
     for count in (10, 300 if apart == 0 else 1000):
         for rotation in (UPRIGHT, TURNED):
             found = film(device, over_ground(stack(kind, count, apart), integrator, rotation)).mean
@@ -100,7 +100,7 @@ def test_layouts(device: Device, layout: str) -> None:
 @pytest.mark.parametrize("count", [1, 10, 40])
 @pytest.mark.parametrize("integrator", ["path", "local"])
 def test_spheres(device: Device, integrator: Integrator, count: int) -> None:
-    """A ray enters and leaves each, concentric or coincident; up to 16 are not in the tree."""
+    """A ray enters and leaves each, concentric or coincident; up to 16 are not in the BVH."""
     sun = replace(SUN, direction=(-1.0, -0.3, -1.0))
     for step in (0.0, 0.01):
         spheres = [Sphere(center=(100.0, 30.0, 100.0), radius=70 + step * i, material=nth(2 * count))
@@ -112,7 +112,7 @@ def test_spheres(device: Device, integrator: Integrator, count: int) -> None:
 @pytest.mark.parametrize("apart", [0.0, 0.01])
 @pytest.mark.parametrize("integrator", ["path", "direct", "local", "raster"])
 def test_camera_rays(device: Device, integrator: Integrator, apart: float) -> None:
-    """Each sample sees the light behind the whole stack, or a black surface: a binomial number of them."""
+    """Each sample sees the light behind the whole stack or a black surface: their number is binomial."""
     light = quad(300, -100.0, Diffuse(color=BLACK, emission=(1.0, 1.0, 1.0)))
     camera = Camera(position=(3.0, 0.0, 30.0), look_at=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), fov_degrees=20.0)
     settings, samples = RenderSettings(size=(8, 8), spp=32, max_depth=1, integrator=integrator), 2048

@@ -1,4 +1,4 @@
-"""Rays through every tree layout: no cracks, the hits of brute force in float64, and ties broken alike."""
+"""Traversal of every BVH layout: no cracks, the hits of brute force in float64, and consistent tie-breaking."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TREES = tuple(product(("bvh8", "bvh2", "cwbvh"), ("sah", "midpoint")))
 
 
 def mesh(corners: NDArray[np.float32]) -> Mesh:
-    """Triangles (m, 3, 3) that share nothing."""
+    """Return a mesh of triangles (m, 3, 3) without shared vertices."""
     return Mesh(corners.reshape(-1, 3), np.arange(3 * len(corners), dtype=np.int32).reshape(-1, 3))
 
 
@@ -36,7 +36,7 @@ def balls(table: NDArray[np.float32]) -> list[Sphere]:
 
 
 def random_rays(count: int, seed: int) -> tuple[Doubles, Doubles]:
-    """From around and inside the unit cube towards points in it, as float32 holds them; not of unit length."""
+    """Return rays from around and inside the unit cube towards points in it, exact in float32 and not normalized."""
     rng = np.random.default_rng(seed)
     origin, target = rng.uniform(-1, 2, (count, 3)), rng.random((count, 3))
     return (origin.astype(np.float32).astype(np.float64), (target - origin).astype(np.float32).astype(np.float64))
@@ -47,7 +47,7 @@ closed_sphere = cache(lambda: rays.icosphere(6))
 
 @covering("layout, offset", ["bvh8", "bvh2", "cwbvh"], [0.0, 1000.0])
 def test_closed_mesh_has_no_cracks(device: Device, layout: str, offset: float) -> None:
-    """From inside 81 920 triangles towards their vertices, edges and faces: not one of 10^6 rays gets out."""
+    """From inside 81 920 triangles towards their vertices, edges and faces: none of 10^6 rays escapes."""
     vertices, faces = closed_sphere()
     vertices = vertices + np.float32(offset)
     rng = np.random.default_rng(0)
@@ -61,7 +61,7 @@ def test_closed_mesh_has_no_cracks(device: Device, layout: str, offset: float) -
     probe = Probe(device, Scene(meshes=[Mesh(vertices, faces)]), layout=layout)
     found = probe("closest_hit", 4, probe.compiled.frame.points(origin), target - origin)
     assert np.count_nonzero(found[:, 3] < 0) == 0
-    assert np.abs(found[:, 0] - 1).max() < 0.01 + offset * 1e-6   # a facet is a ten-thousandth flatter than the sphere
+    assert np.abs(found[:, 0] - 1).max() < 0.01 + offset * 1e-6   # A facet is flatter than the sphere by 1e-4
 
 
 @pytest.mark.parametrize(("layout", "builder"), [*TREES, ("packs", "sah"), ("list", "sah")])
@@ -96,7 +96,7 @@ def test_spheres_as_in_float64(device: Device, layout: str) -> None:
     np.testing.assert_array_equal(found[clear, 3], np.where(np.isfinite(t), which, -1)[clear])
     hit = clear & np.isfinite(t)
     there = origin[hit] + found[hit, :1] * direction[hit]
-    # Distance from the surface, beside the rounding of origin − centre and of the root, which grazing rays amplify.
+    # Distance from the surface, with the rounding of origin − centre and of the root, which grazing rays amplify.
     off = np.abs(np.linalg.norm(there - table[which[hit], :3], axis=1) - table[which[hit], 3])
     size = np.linalg.norm(origin[hit] - table[which[hit], :3], axis=1) + table[which[hit], 3]
     assert (off / size).max() < 1e-6
@@ -104,7 +104,7 @@ def test_spheres_as_in_float64(device: Device, layout: str) -> None:
 
 @pytest.mark.parametrize("kind", ["edges", "duplicates", "mixed"])
 def test_ties_are_broken_alike(device: Device, kind: str) -> None:
-    """Layouts and builders find the same primitive at the same t; of equal ones the first."""
+    """Layouts and builders find the same primitive at the same t; among equal ones the first."""
     if kind == "edges":
         vertices, faces = rays.icosphere(3)
         scene, target = Scene(meshes=[Mesh(vertices, faces)]), np.repeat(vertices, 30, axis=0).astype(np.float64)
@@ -128,7 +128,7 @@ def test_ties_are_broken_alike(device: Device, kind: str) -> None:
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_flat_grid_along_the_axes(device: Device, layout: str) -> None:
-    """Straight down, with zeros of both signs, onto 1250 triangles of one plane: corners, edges, faces, the border."""
+    """Straight down, with zeros of both signs, onto 1250 coplanar triangles: corners, edges, faces, the border."""
     vertices, faces = rays.grid(25)
     x, z = np.meshgrid(np.arange(0, 25.25, 0.25), np.arange(0, 25.25, 0.25))
     origin = np.column_stack([x.ravel(), np.full(x.size, 3.0), z.ravel()])
@@ -142,7 +142,7 @@ def test_flat_grid_along_the_axes(device: Device, layout: str) -> None:
         lost.append(np.count_nonzero(found[:, 0] != 1.5))
         other.append(np.count_nonzero(found[:, 3] != listed[:, 3]))
     assert not any(lost + other), (lost, other)   # of 10 201 each
-    # In the plane itself, along an axis or across: neither hit nor hang.
+    # In the plane itself, along an axis or across: neither a hit nor a hang.
     inside = origin * [1, 0, 1]
     for along in ([1.0, 0.0, 0.0], [0.0, -0.0, -1.0], [0.6, 0.0, 0.8]):
         assert np.all(probe("closest_hit", 4, inside, np.tile(along, (len(inside), 1)))[:, 3] == -1)
@@ -150,7 +150,7 @@ def test_flat_grid_along_the_axes(device: Device, layout: str) -> None:
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_axis_parallel_rays_from_box_planes(device: Device, layout: str) -> None:
-    """Stacked unit squares whose tree has boxes at whole numbers; rays start on those planes and run along axes."""
+    """Stacked unit squares with BVH bounds at integers; rays start on those planes and run along axes."""
     vertices, faces = rays.grid(8)
     levels = [Mesh(vertices + np.array([0, y, 0], np.float32), faces) for y in range(8)]
     standing = [Mesh(np.roll(vertices, 1, axis=1) + np.array([0, 0, z], np.float32), faces) for z in range(9)]
@@ -159,13 +159,14 @@ def test_axis_parallel_rays_from_box_planes(device: Device, layout: str) -> None
     for y in range(7):
         origin = np.column_stack([x, np.full(64, float(y)), z])
         found = probe("closest_hit", 4, origin, np.tile([0.0, 1.0, -0.0], (64, 1)))
-        # A ray that starts in a level's plane may meet that level at 0, which is no hit, and then the next at 1.
+        # A ray that starts in a level's plane may intersect that level at 0, which is not a
+        # hit, and then the next at 1.
         assert np.all(found[:, 0] == 1.0)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_any_hit_is_a_closest_hit_before_t_max(device: Device, layout: str) -> None:
-    """Also where t_max is the hit's own t, or its neighbour among the floats."""
+    """Also if t_max is the hit's own t, or an adjacent float."""
     scene = Scene(meshes=[mesh(soup(500, 0.2))], spheres=balls(spheres(20)))
     origin, direction = random_rays(50_000, 7)
     probe = Probe(device, scene, layout=layout)
@@ -182,7 +183,7 @@ def test_any_hit_is_a_closest_hit_before_t_max(device: Device, layout: str) -> N
 
 @covering("layout, scale", LAYOUTS, [2.0**-66, 2.0**-30, 2.0**30, 2.0**50])
 def test_scaled_mesh_has_the_same_hits(device: Device, layout: str, scale: float) -> None:
-    """From 1e-20 to 1e15: powers of two change no digit, so nothing may change but t. The device has its own unit."""
+    """From 1e-20 to 1e15: powers of two are exact, so only t may change. The device has its own unit."""
     corners = soup(300, 0.3)
     origin, direction = random_rays(10_000, 9)
     unscaled = Probe(device, Scene(meshes=[mesh(corners)]), layout=layout)("closest_hit", 4, origin, direction)
@@ -196,7 +197,8 @@ def test_scaled_mesh_has_the_same_hits(device: Device, layout: str, scale: float
 
 @covering("layout, length", LAYOUTS, [2.0**-30, 2.0**30, 2.0**-10, 2.0**10])
 def test_length_of_the_direction_does_not_matter(device: Device, layout: str, length: float) -> None:
-    """t counts lengths of the direction; shadow rays have that of the way to their light, whatever the scene's unit."""
+    """t is in multiples of the direction; shadow rays have the vector to their light as direction, in any scene unit.
+    """
     scene = Scene(meshes=[mesh(soup(300, 0.3))], spheres=balls(spheres(20)))
     origin, direction = random_rays(10_000, 10)
     probe = Probe(device, scene, layout=layout)
@@ -206,9 +208,9 @@ def test_length_of_the_direction_does_not_matter(device: Device, layout: str, le
 
 
 def test_a_ray_that_is_no_ray_hits_nothing(device: Device) -> None:
-    """NaN and infinite places and directions, in a process of their own: what runs off the stack ends the process.
+    """NaN and infinite origins and directions, in a process of their own: a stack overflow would end it.
 
-    Its scene needs the programs of the test of any hits, so that PoCL has them."""
+    Its scene needs the same programs as the any-hit test, so that PoCL has them cached."""
     program = f"""
 import numpy as np
 from clrt.device.open import open_device
@@ -233,7 +235,7 @@ for layout in {LAYOUTS}:
     ("bvh8", 2000, "PORTABLE_MASK 1"), ("packs", 60, "WIDTH 8"),
     *others(("packs", 60, "PORTABLE_MASK 1"), ("packs", 60, "WIDTH 16"))])
 def test_other_instructions_give_the_same_hits(device: Device, layout: str, triangles: int, other: str) -> None:
-    """The multiplication that gathers mask bits where there is no instruction for it, and halves of packs."""
+    """Gathering mask bits by multiplication if there is no instruction for it, and packs of another width."""
     scene = Scene(meshes=[mesh(soup(triangles, 0.1))], spheres=balls(spheres(50)))
     origin, direction = random_rays(50_000, 8)
     hits, others = (Probe(device, scene, defines, layout=layout, lanes=8)("closest_hit", 4, origin, direction)

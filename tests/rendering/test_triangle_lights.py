@@ -1,4 +1,4 @@
-"""Lamps of two triangles that make a parallelogram are one light. (What they bring: test_lights.py.)"""
+"""Two emissive triangles that form a parallelogram are one light. (Their irradiance: test_lights.py.)"""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LAMP = Diffuse(emission=(1.0, 1.0, 1.0))
     ([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0.01)], False)])
 def test_two_triangles_of_a_parallelogram_are_one_light(device: Device, corners: list[tuple[float, float, float]],
                                                         joined: bool) -> None:
-    """However its faces are numbered, but not across meshes, nor where one is turned over."""
+    """For any numbering of its faces, but not across meshes, nor if one is flipped."""
     for diagonal in (0, 1):
         for turn in np.ndindex(3, 3):
             quad_corners = np.roll(np.array(corners, np.float32), -diagonal, axis=0)
@@ -55,7 +55,7 @@ def light_count(device: Device, meshes: list[Mesh]) -> int:
 
 
 def test_a_strip_of_squares_makes_pairs(device: Device) -> None:
-    """Each square of two triangles, though neighbours of different squares would make a parallelogram, too."""
+    """Each square of two triangles is a pair, although neighbours of different squares form a parallelogram, too."""
     x, y = np.meshgrid(np.arange(6.0), np.arange(2.0))
     vertices = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1).astype(np.float32)
     faces = np.array([face for i in range(5) for face in ((i, i + 1, i + 6), (i + 1, i + 7, i + 6))], np.int32)

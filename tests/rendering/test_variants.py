@@ -1,4 +1,4 @@
-"""The same picture from every way of computing it, and only the code that the scene needs."""
+"""The same image from every variant of the computation, and only the code that the scene needs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,8 @@ Doubles = NDArray[np.float64]
 
 
 def everything() -> Scene:
-    """All kinds of primitives, materials and lights, with a picture wide enough for uneven lanes."""
+    """Return a scene with all kinds of primitives, materials and lights, of an odd width that leaves SIMD lanes empty.
+    """
     vertices, faces = rays.icosphere(2)
     gold = MetallicRoughness(preset="gold", roughness=0.4, multiple_scattering=True)
     plastic = MetallicRoughness(roughness=0.2, smith="schlick")
@@ -57,7 +58,7 @@ def everything() -> Scene:
 
 
 def painted(scene: Scene) -> Scene:
-    """The same with textures for all that can be one, by both sets of coordinates, vertex colours, and holes."""
+    """Return it with textures on every parameter that allows one, both UV sets, vertex colours, and alpha masks."""
     texels = np.random.default_rng(5).integers(0, 256, (6, 5, 4), np.uint8)
     here = Texture(picture=Picture(texels))
     there = Texture(picture=Picture(texels[1:4]), uv_set=1, wrap=("mirror", "clamp"))
@@ -76,7 +77,7 @@ def painted(scene: Scene) -> Scene:
 
 
 def shelf() -> Scene:
-    """A small sphere of each material in each of its variants, in rows."""
+    """Return a small sphere of each material in each of its variants, in rows."""
     materials = [material for kind in MATERIALS for material in variants(kind)]
     across = int(np.ceil(np.sqrt(len(materials))))
     spheres = [Sphere(center=(i % across - across / 2, i // across - across / 2, 0.0), radius=0.45, material=material)
@@ -86,19 +87,19 @@ def shelf() -> Scene:
 
 
 def planted(scene: Scene) -> Scene:
-    """With two instances of its last mesh beside it."""
+    """Return the scene with two instances of its last mesh."""
     places = np.array([np.column_stack([np.diag(scale), [x, 0, 0]]) for scale, x in (((1, 2, 1), -3), ((-1, 1, 1), 6))])
     return replace(scene, instances=[Instance(scene.meshes[-1], place) for place in places])
 
 
 def plastic_ball() -> Scene:
-    """On a floor under a lamp and a sky: a small program."""
+    """Return a scene with a plastic sphere on a floor below a light and a sky: a small program."""
     floor, lamp, _ = everything().meshes
     return replace(everything(), meshes=[floor, lamp], spheres=everything().spheres[2:3], lights=[])
 
 
 def sights(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """It by each camera and each integrator without light."""
+    """Yield the scene with each camera and each integrator without paths."""
     camera = scene.camera
     yield "lens", replace(scene, camera=replace(camera, aperture_radius=0.1))
     yield "orthographic", replace(scene, camera=replace(camera, projection="orthographic"))
@@ -109,7 +110,7 @@ def sights(scene: Scene) -> Iterator[tuple[str, Scene]]:
             yield integrator, replace(scene, render=replace(scene.render, integrator=integrator))
 
 
-#: Layouts and lanes that are compared with the reference's by default.
+#: Layouts and SIMD widths that are compared with the reference by default.
 WAYS = [("cwbvh", 1), ("packs", 8)]
 
 
@@ -120,10 +121,10 @@ def reference(device: Device) -> Doubles:
 
 @pytest.mark.parametrize("layout, lanes", WAYS + others(*(way for way in product(TREES, LANES) if way not in WAYS)))
 def test_lanes_and_layouts_agree(device: Device, reference: Doubles, layout: str, lanes: int) -> None:
-    """To float rounding: a sample is a chain of some hundred operations, so most pixels agree to 1e-5.
+    """They agree to float rounding: a sample is a chain of some hundred operations, so most pixels agree to 1e-5.
 
-    A rounding can also turn a decision (which lobe, which side of an edge): then one of the 4 samples of a pixel is
-    another. Each sample takes some 50 decisions that a relative 1e-6 may turn: fewer than 1 pixel in 1000.
+    Rounding can also flip a decision (which lobe, which side of an edge): then one of the 4 samples of a pixel is
+    different. Each sample takes some 50 decisions that a relative 1e-6 may flip: fewer than 1 pixel in 1000.
     """
     assert_most_agree(film(device, everything(), lanes=lanes, layout=layout).mean, reference)
 
@@ -131,7 +132,7 @@ def test_lanes_and_layouts_agree(device: Device, reference: Doubles, layout: str
 @pytest.mark.parametrize("chosen", [{"layout": None, "tree": False}, {"layout": "bvh8", "builder": "midpoint"}],
                          ids=str)
 def test_builders_agree(device: Device, reference: Doubles, chosen: dict[str, Any]) -> None:
-    """As above; also without a tree."""
+    """As above; also without a BVH."""
     assert_most_agree(film(device, everything(), lanes=8, **chosen).mean, reference)
 
 
@@ -142,7 +143,7 @@ def assert_most_agree(picture: Doubles, reference: Doubles) -> None:
 
 @pytest.mark.parametrize("lanes, layout", [(1, "bvh8"), *others((16, "cwbvh"))])
 def test_lanes_agree_on_textures_and_holes(device: Device, lanes: int, layout: str) -> None:
-    """As above; textures decide at more edges."""
+    """As above; textures add edges at which samples can differ."""
     scene = painted(everything())
     expected = film(device, scene, lanes=8, layout="bvh8").mean
     picture = film(device, scene, lanes=lanes, layout=layout).mean
@@ -152,7 +153,7 @@ def test_lanes_agree_on_textures_and_holes(device: Device, lanes: int, layout: s
 
 def test_spheres_in_the_tree_and_out_of_it_agree(device: Device, reference: Doubles,
                                                  monkeypatch: pytest.MonkeyPatch) -> None:
-    """As above; few spheres are met before the tree, many in it (test_parts.py has them in every layout)."""
+    """As above; few spheres are tested before the BVH, many in it (test_parts.py has them in every layout)."""
     assert "LONE_SPHERES" in session(device, everything(), layout="bvh8").compiled.features
     monkeypatch.setattr(pack_module, "FEW_SPHERES", 0)
     assert "LEAF_SPHERES" in session(device, everything(), layout="bvh8").compiled.features
@@ -161,13 +162,13 @@ def test_spheres_in_the_tree_and_out_of_it_agree(device: Device, reference: Doub
 
 @pytest.mark.parametrize("sampler, lanes", [("sobol", 16), *others(("stratified", 8))])
 def test_lanes_agree_with_every_sampler(device: Device, sampler: Sampler, lanes: int) -> None:
-    """As above, of less."""
+    """As above, for a smaller scene."""
     reference, picture = (film(device, plastic_ball(), sampler=sampler, lanes=each).mean for each in (1, lanes))
     assert np.mean(np.any(np.abs(picture - reference) > 1e-5 * (reference + 0.1), axis=2)) < 1e-3
 
 
 def test_pictures_do_not_depend_on_passes_and_launches(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bit for bit: eight samples in one pass, or in several, in one launch or in many, twice the same."""
+    """Bit for bit: eight samples in one pass or several, in one launch or many, and the same twice."""
     scene = replace(everything(), render=RenderSettings(size=(64, 48), spp=8, seed=2))
     films = []
     for passes, first_launch in (([8], 1 << 15), ([8], 1), ([1] * 8, 1 << 20), ([3, 5], 1), ([8], 1 << 15)):
@@ -181,7 +182,7 @@ def test_pictures_do_not_depend_on_passes_and_launches(device: Device, monkeypat
 
 
 def test_a_tree_can_be_wanted_or_not() -> None:
-    """Of few triangles as of many; what contradicts itself is refused."""
+    """For few triangles as for many; contradictory choices are rejected."""
     few, many = quad([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], Diffuse()), Mesh(*rays.icosphere(3))
     scenes = [Scene(meshes=[few]), Scene(meshes=[many])]
     for tree, layouts in {None: ["packs", "bvh8"], True: ["bvh8", "bvh8"], False: ["packs", "packs"]}.items():
@@ -194,7 +195,7 @@ def test_a_tree_can_be_wanted_or_not() -> None:
 
 
 def test_seeds_differ(device: Device) -> None:
-    """Another seed gives other noise: two pictures of independent samples, in nearly all pixels that have noise."""
+    """Another seed gives other noise: images of independent samples differ in nearly all pixels with noise."""
     scene = everything()
     pictures = [film(device, replace(scene, render=replace(scene.render, seed=seed))).mean
                 for seed in (0, 1, 2**32 - 1)]
@@ -205,7 +206,7 @@ def test_seeds_differ(device: Device) -> None:
 
 
 def test_empty_scene_is_the_sky(device: Device) -> None:
-    """Every sample finds the same color: exactly that."""
+    """Every sample has exactly the sky's color."""
     sky = Environment(color=(0.3, 0.6, 0.1), strength=2.0)
     picture = film(device, Scene(environment=sky, render=RenderSettings(size=(20, 10), spp=5)))
     assert np.all(picture.mean.astype(np.float32) == np.array([0.6, 1.2, 0.2], np.float32))
@@ -240,7 +241,7 @@ def test_a_scene_compiles_to_what_it_needs(device: Device, layout: str) -> None:
 @pytest.mark.parametrize("kind, known", {
     "triangle": TRIANGLE_TESTS, "box": BOX_TESTS, "sphere": SPHERE_TESTS, "offset": OFFSETS}.items())
 def test_of_each_test_one_is_compiled(device: Device, kind: str, known: dict[str, str]) -> None:
-    """The file that was chosen, and no other; the first of each kind where nothing is chosen."""
+    """Only the chosen file is compiled; by default the first of each kind."""
     default = compile_scene(everything(), choices(device))
     assert set(known.values()) & set(default.files) == {next(iter(known.values()))}
     assert "SCENE_UNIT" not in default.source
@@ -251,7 +252,7 @@ def test_of_each_test_one_is_compiled(device: Device, kind: str, known: dict[str
 
 
 def test_other_tests_make_much_the_same_picture(device: Device, reference: Doubles) -> None:
-    """Rays leave and meet a little elsewhere, so few samples are the same bits; but it is the same scene."""
+    """Ray origins and hits differ slightly, so few samples are bit-identical, but the image is the same."""
     picture = film(device, everything(), triangle="baldwin_weber", box="plain", sphere="textbook", offset="ulp").mean
     same = np.all(np.abs(picture - reference) <= 0.02 * (reference + 0.1), axis=2)
     assert np.mean(same) > 0.9
@@ -259,7 +260,7 @@ def test_other_tests_make_much_the_same_picture(device: Device, reference: Doubl
 
 
 def test_settings_do_not_change_the_program(device: Device) -> None:
-    """Camera, size, samples, depth, seed and every number of the scene are arguments."""
+    """Camera, size, samples, depth, seed and all numbers of the scene are kernel arguments."""
     scene = everything()
     other = replace(scene, camera=Camera(position=(1.0, 1.0, 9.0), fov_degrees=70.0),
                     render=RenderSettings(size=(7, 5), spp=3, max_depth=2, seed=99),

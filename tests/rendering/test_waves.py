@@ -1,4 +1,4 @@
-"""Paths in waves: the film of paths that are followed one by one, but that a tile's rays are counted together."""
+"""Wavefront rendering: the film equals that of the megakernel, except that rays are counted per tile."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from ..covering import others
 from .pictures import session
 from .test_variants import everything, painted, plastic_ball, sights
 
-SPP = 7   # no multiple of a wave's
+SPP = 7   # not a multiple of a wave's samples
 
 PAINTED = painted(everything())
-#: Most have one program.
+#: Most share one program.
 SCENES = {"painted": PAINTED,
           "too bright": replace(PAINTED, environment=replace(PAINTED.environment, strength=1e38)),
           "two edges": replace(PAINTED, render=replace(PAINTED.render, max_depth=2)),
@@ -35,7 +35,7 @@ OTHERS = {"everything": everything(), "lens": dict(sights(everything()))["lens"]
 
 
 def followed(device: Device, paths: str, scene: Scene, *parts: int, **chosen: Any) -> Film:
-    """The film after as many samples a pixel as `parts` have together, one after another."""
+    """Return the film after as many samples per pixel as `parts` sum to, rendered one part after another."""
     running = session(device, scene, lanes=8, paths=paths, **chosen)
     for samples in parts or [SPP]:
         for _ in running.render(samples):
@@ -45,7 +45,7 @@ def followed(device: Device, paths: str, scene: Scene, *parts: int, **chosen: An
 
 
 def assert_same(waves: Film, lanes: Film) -> None:
-    """To rounding, as the lanes in test_variants; on pip's PoCL it is to the last bit."""
+    """Films agree to rounding, like the SIMD widths in test_variants; with pip's PoCL they are bit-identical."""
     for name in {"sum", "square", "direct"} & set(lanes.pixels.dtype.names or ()):
         one, other = (film.pixels[name].astype(np.float64) + film.pixels[f"{name}_error"] for film in (waves, lanes))
         assert np.mean(np.abs(one - other) > 1e-5 * (np.abs(other) + 0.1)) < 4e-3
@@ -73,14 +73,14 @@ def test_waves_with_every_choice(device: Device, chosen: dict[str, Any]) -> None
 
 @pytest.mark.parametrize("max_depth", [1, 2, 3])
 def test_direct_light_of_short_paths(device: Device, max_depth: int) -> None:
-    """What came with two edges at most is all of paths that have no more."""
+    """Direct light is that of paths of depth 2 at most, so it is everything if max_depth is 2 or less."""
     scene = replace(PLASTIC, render=replace(PLASTIC.render, max_depth=max_depth))
     found = followed(device, "waves", scene, sampler="stratified", direct_light=True).pixels
     assert np.array_equal(found["direct"], found["sum"]) == (max_depth <= 2)
 
 
 def test_sums_do_not_depend_on_the_cut(device: Device) -> None:
-    """Samples are added pixel by pixel in their order, to the last bit, however many a wave has."""
+    """Samples are added per pixel in their order, so sums are bit-identical for any number of samples per wave."""
     whole, parts = (followed(device, "waves", everything(), *cut).pixels for cut in ((9,), (1, 2, 6)))
     np.testing.assert_array_equal(whole, parts)
 

@@ -1,4 +1,4 @@
-"""How the work in hand is cut: whoever takes the shares, each tile's samples come once, in their order."""
+"""Scheduling of work: however it is split, each tile's samples are rendered once and in order."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from clrt.rendering.film.tiles import RUN, row_by_row, scattered, tile_by_tile
 
 @pytest.mark.parametrize("seed", range(8))
 def test_samples_come_once_and_in_their_order(seed: int) -> None:
-    """Shares of all sizes are in flight together, end in any order, and some fail and are given back."""
+    """Parts of all sizes are in flight together, finish in any order, and some fail and are given back."""
     rng = np.random.default_rng(seed)
     work, done = Work(np.zeros((5, 7), np.int64)), np.zeros(35, np.int64)
     in_flight: list[Part] = []
@@ -41,7 +41,7 @@ def test_samples_come_once_and_in_their_order(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(8))
 def test_what_was_lost_is_in_hand_again(seed: int) -> None:
-    """Shares of which nobody knows what became, and some were rendered: the samples that are there tell."""
+    """Parts with unknown outcome, some of them rendered: the film's sample counts decide what is left."""
     rng = np.random.default_rng(seed)
     work, done = Work(rng.integers(0, 3, (5, 7))), np.zeros(35, np.int64)
     done[:] = work.samples.ravel()
@@ -60,7 +60,7 @@ def test_what_was_lost_is_in_hand_again(seed: int) -> None:
     (100, 1, Part(0, 10, 3, 8)), (16, 1, Part(0, 2, 3, 8)), (4, 1, Part(0, 1, 3, 4)), (4, 4, Part(0, 4, 3, 1)),
     (0, 5, Part(0, 5, 3, 1)), (40, 10, Part(0, 10, 3, 4))])
 def test_a_share_is_no_larger_than_asked(most: int, least: int, expected: Part) -> None:
-    """Of tiles times samples, down to a sample of the fewest tiles; what few tiles leave comes after other tiles."""
+    """In tiles times samples, down to one sample of the fewest tiles; the remainder is queued after the other tiles."""
     work = Work(np.full((2, 5), 3))
     work.add_to_all(8)
     assert work.cut(most, least) == expected and work.left == 80 - (expected.end - expected.first) * expected.more
@@ -70,7 +70,7 @@ def test_a_share_is_no_larger_than_asked(most: int, least: int, expected: Part) 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 64, 100, 1023, 4096])
 def test_every_stretch_is_spread(count: int) -> None:
-    """Of k runs in a row the gaps are at most (1 + golden ratio) times what they would be at best, and a bit."""
+    """Among k consecutive runs the gaps are at most (1 + golden ratio) times the optimum, plus a constant."""
     order = scattered(count * RUN)
     assert sorted(order) == list(range(count * RUN))
     assert sorted(scattered(count)) == list(range(count))
@@ -85,7 +85,7 @@ def test_every_stretch_is_spread(count: int) -> None:
 
 @pytest.mark.parametrize("size", [(8, 8), (1, 1), (61, 44), (64, 7)])
 def test_tile_by_tile_and_back(size: tuple[int, int]) -> None:
-    """A tile is eight rows of eight."""
+    """A tile is eight rows of eight pixels."""
     values = np.arange(size[0] * size[1]).reshape(size[1], size[0])
     tiles = tile_by_tile(values)
     assert np.array_equal(row_by_row(tiles, size), values)

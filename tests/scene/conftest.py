@@ -1,4 +1,4 @@
-"""Fixtures for the tests of the scene room."""
+"""Fixtures for the tests of the scene package."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Write small glTF files for the tests."""
+"""Writers of small glTF files for the tests."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 
 class Gltf:
-    """A document that grows; `document` may be changed at will before writing."""
+    """glTF document under construction; `document` may be changed freely before writing."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -29,7 +29,7 @@ class Gltf:
                                          "meshes": [], "nodes": [], "scenes": [{"nodes": []}], "scene": 0}
 
     def view(self, content: bytes, **keys: Any) -> int:
-        """A new buffer view of `content`, on a four-byte boundary."""
+        """Add a buffer view of `content`, on a four-byte boundary."""
         self.data += bytes(-len(self.data) % 4)
         self.document["bufferViews"].append(
             {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content), **keys})
@@ -37,7 +37,7 @@ class Gltf:
         return len(self.document["bufferViews"]) - 1
 
     def accessor(self, values: NDArray[Any], dtype: str = "<f4", view: int | None = None, **keys: Any) -> int:
-        """A new accessor of (n, k) or (n,) values, in a view of its own unless `view` says which."""
+        """Add an accessor of (n, k) or (n,) values, in a new view unless `view` is given."""
         values = np.asarray(values).reshape(len(values), -1)
         if view is None:
             view = self.view(values.astype(dtype).tobytes())
@@ -46,7 +46,7 @@ class Gltf:
         return len(self.document["accessors"]) - 1
 
     def mesh(self, **primitive: Any) -> int:
-        """A new mesh of one primitive, shown by a new node at the root of the scene; the mesh's number."""
+        """Add a mesh of one primitive and a root node that shows it; return the mesh's index."""
         self.document["meshes"].append({"primitives": [primitive]})
         self.node(mesh=len(self.document["meshes"]) - 1)
         return len(self.document["meshes"]) - 1
@@ -82,7 +82,7 @@ class Gltf:
 
 
 def ball() -> Gltf:
-    """An icosahedron: accessor 0 its positions, accessor 1 its indices."""
+    """Return an icosahedron: accessor 0 has its positions, accessor 1 its indices."""
     vertices, faces = icosphere(0)
     gltf = Gltf()
     gltf.mesh(attributes={"POSITION": gltf.accessor(vertices)}, indices=gltf.accessor(faces.ravel(), "<u2"))
@@ -90,5 +90,5 @@ def ball() -> Gltf:
 
 
 def read(gltf: Gltf, folder: Path, name: str = "a.glb") -> Model:
-    """What the file is read as."""
+    """Write the file and return the model read from it."""
     return read_gltf(gltf.write(folder / name))

@@ -1,5 +1,5 @@
 """A random walk between the microfacets of rough glass, in float64: the Smith model of Heitz et al. (2016,
-"Multiple-Scattering Microfacet BSDFs with the Smith Model", sections 3 and 4), with heights even between 0 and 1."""
+"Multiple-Scattering Microfacet BSDFs with the Smith Model", sections 3 and 4), with uniform heights between 0 and 1."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ STEPS = 200
 
 
 def reflected_part(alpha: float, eta: float, cosine: float, count: int, rng: np.random.Generator) -> float:
-    """What part of light from this angle leaves on the side that it came from, after all bounces; beyond, the index is
-    eta times as large."""
+    """Return the share of light from this angle that leaves on the side of incidence, after all bounces; the index on
+    the other side is eta times as large."""
     w = np.tile([np.sqrt(1 - cosine**2), 0, -cosine], (count, 1))
     height, outside, going = np.ones(count), np.ones(count, bool), np.arange(count)
     for _ in range(STEPS):
@@ -32,13 +32,13 @@ def reflected_part(alpha: float, eta: float, cosine: float, count: int, rng: np.
 
 
 def _lambda(w: Doubles, alpha: float) -> Doubles:
-    """Smith's Lambda of directions (n, 3), also of those that go down."""
+    """Return Smith's Lambda of directions (n, 3), including downward ones."""
     root = np.sqrt(1 + alpha**2 * (w[:, 0]**2 + w[:, 1]**2) / np.maximum(w[:, 2]**2, 1e-30))
     return np.asarray(np.where(w[:, 2] > 0, root - 1, -root - 1) / 2)
 
 
 def _next_height(w: Doubles, height: Doubles, alpha: float, rng: np.random.Generator) -> Doubles:
-    """Where rays that set out at a height meet the surface, infinite where they leave (algorithm 1)."""
+    """Return the next height at which rays hit the surface, infinite if they leave (algorithm 1)."""
     u, shadow = rng.random(len(w)), _lambda(w, alpha)
     up = w[:, 2] > 0
     leaves = up & (u > 1 - np.maximum(height, 1e-300)**np.where(up, shadow, 1))
@@ -48,7 +48,7 @@ def _next_height(w: Doubles, height: Doubles, alpha: float, rng: np.random.Gener
 
 
 def _scattered(wo: Doubles, alpha: float, eta: Doubles, rng: np.random.Generator) -> tuple[Doubles, Masks]:
-    """(n, 3) where light that goes to −wo is reflected, or else refracted, by a visible normal; wo may look down."""
+    """Reflect or refract light that travels along −wo at a visible normal, (n, 3); wo may point down."""
     stretched = wo * [alpha, alpha, 1]
     stretched /= np.linalg.norm(stretched, axis=1, keepdims=True)
     turn, z = 2 * np.pi * rng.random(len(wo)), 1 - rng.random(len(wo)) * (1 + stretched[:, 2])

@@ -1,4 +1,4 @@
-"""Meshes with known shapes for the tests of the scene room."""
+"""Meshes with known shapes for the tests of the scene package."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ Faces = NDArray[np.int32]
 
 
 def icosphere(subdivisions: int) -> tuple[Vertices, Faces]:
-    """The unit sphere as an icosahedron whose faces are cut in four `subdivisions` times, counter-clockwise outside."""
+    """Return the unit icosphere: an icosahedron subdivided `subdivisions` times, counter-clockwise seen from outside.
+    """
     golden = (1 + 5**0.5) / 2
     points = [np.array(p, float) for a, b in itertools.product((-1, 1), (-golden, golden))
               for p in ((0, a, b), (a, b, 0), (b, 0, a))]
@@ -37,7 +38,7 @@ def _quarters(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.floa
 
 
 def cube() -> tuple[Vertices, Faces]:
-    """The cube [-1, 1]³ as 6 sides with 4 vertices each; every second side is cut along its other diagonal."""
+    """Return the cube [-1, 1]³ as 6 sides of 4 vertices each; every second side is split along its other diagonal."""
     vertices: list[NDArray[np.float64]] = []
     faces: list[list[int]] = []
     for axis, sign in itertools.product(range(3), (-1.0, 1.0)):
@@ -51,6 +52,6 @@ def cube() -> tuple[Vertices, Faces]:
 
 
 def volume(vertices: NDArray[np.floating], faces: Faces) -> float:
-    """The volume that a closed surface encloses, positive if its faces are counter-clockwise seen from outside."""
+    """Return the volume of a closed surface, positive if its faces are counter-clockwise seen from outside."""
     a, b, c = vertices.astype(np.float64)[faces].transpose(1, 0, 2)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)

@@ -1,4 +1,4 @@
-"""Cameras that move: curves against known motions, frames, and what is refused."""
+"""Camera animation: curves against known motions, frames, and rejected input."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_motion_along_a_parabola_is_met_exactly() -> None:
 
 
 def test_even_times_give_catmull_and_roms_spline() -> None:
-    """Whose slope at a value is half the way between its neighbours, in another library's Hermite pieces."""
+    """The slope at a value is half the difference of its neighbours, as in scipy's cubic Hermite spline."""
     values = np.random.default_rng(3).normal(size=(7, 3))
     slopes = (values[2:] - values[:-2]) / 2
     moments = np.linspace(1, 5, 33)
@@ -58,7 +58,7 @@ def test_even_times_give_catmull_and_roms_spline() -> None:
 
 
 def test_curves_go_through_their_values_with_one_speed() -> None:
-    """On both sides of each value the slopes agree; before the first and after the last the curve stands still."""
+    """Slopes agree on both sides of each value; the curve is constant before the first and after the last."""
     rng = np.random.default_rng(5)
     for columns in (1, 3):
         values = rng.normal(size=(5, columns))
@@ -82,7 +82,7 @@ def test_numbers_stay_between_their_neighbours_and_what_rests_rests() -> None:
 
 
 def test_keyframes_move_what_they_name(tmp_path: Path) -> None:
-    """Frames at 4 a second from second 1 to 3; each field between the keyframes that have it."""
+    """4 frames per second from second 1 to 3; each field is interpolated between the keyframes that have it."""
     (tmp_path / "a.toml").write_text(SCENE)
     scene = load(tmp_path / "a.toml")
     stills = dict(frames(scene))
@@ -98,7 +98,8 @@ def test_keyframes_move_what_they_name(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seconds", [2.0, -2.0])
 def test_a_turntable_goes_once_around(seconds: float) -> None:
-    """About the axis through what it looks at: a quarter of the frames is a quarter turn, counter-clockwise above."""
+    """It rotates about the axis through the target: a quarter turn in a quarter of the frames, counter-clockwise above.
+    """
     camera = Camera(position=(3, 2, 4), look_at=(1, 1, 1), up=(0, 5, 0), fov_degrees=20)
     scene = Scene(camera=camera, animation=Animation(fps=8, turntable_seconds=seconds))
     cameras = [still.camera for _, still in frames(scene)]

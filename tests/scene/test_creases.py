@@ -17,7 +17,7 @@ EPS = float(np.finfo(np.float32).eps)
 
 @pytest.mark.parametrize(("degrees", "sharp"), [(0, True), (89.9, True), (90.1, False), (180, False)])
 def test_the_edges_of_a_cube_are_sharp_up_to_a_right_angle(degrees: float, sharp: bool) -> None:
-    """Each face's own normal, or in each corner the mean of the three of them."""
+    """Normals are those of each face, or the mean of the three faces at each corner."""
     mesh = creased(Mesh(*cube()), degrees)
     corners = mesh.vertices[mesh.faces]
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -38,7 +38,7 @@ def test_a_ball_without_creases_is_smooth_and_keeps_what_is_at_its_vertices() ->
 
 
 def test_points_of_many_triangles_take_no_time_of_their_square() -> None:
-    """A fan of 100 000 triangles, whose pairs would be 10¹⁰: its middle is smooth, whatever the angle."""
+    """A fan of 100 000 triangles, with 10¹⁰ pairs: its centre is smooth for any crease angle."""
     count = 100_000
     turn = np.linspace(0, 2 * np.pi, count, endpoint=False)
     rim = np.stack([np.cos(turn), np.full(count, -0.5), np.sin(turn)], axis=1)

@@ -1,4 +1,4 @@
-"""What rough glass loses in a single bounce, by another quadrature; what is given back, beside a random walk."""
+"""Energy loss of a single bounce at rough glass against another quadrature, and compensation against a random walk."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Doubles = NDArray[np.float64]
 
 
 def single_bounce(alpha: float, eta: float, cosine: float, steps: int = 1500) -> float:
-    """What Walter's formula (2007, eq. 20 and 21) reflects and passes, an integral over normals by their slopes: the
-    midpoint rule in the azimuth and in x, tan² θ = alpha²·(1 − r)/r with r = (1 − x)³."""
+    """Return the albedo of Walter's formula (2007, eq. 20 and 21), reflected and transmitted, integrated over normals
+    by slope: the midpoint rule in the azimuth and in x, tan² θ = alpha²·(1 − r)/r with r = (1 − x)³."""
     x, phi = (np.arange(steps) + 0.5)[:, None] / steps, np.pi * (np.arange(steps) + 0.5) / steps
     rest = (1 - x)**3
     tangent = alpha * np.sqrt((1 - rest) / rest)
@@ -60,13 +60,13 @@ def test_a_thin_sheet_loses_what_a_mirror_does() -> None:
 
 
 def test_nothing_is_lost_where_it_is_smooth() -> None:
-    """But at grazing angles of the size of alpha."""
+    """Losses occur only at grazing angles of about alpha."""
     for side in energy.sides(1.5, ALPHA_MIN):
         assert side.mean < 1e-6 and side.loss[energy.angles(ALPHA_MIN) > 0.1].max() < 1e-3
 
 
 def test_the_rest_balances() -> None:
-    """As much of it passes one way as the other, in radiance over n²: its parts are those of n²·∫ rest·2c dc."""
+    """Equal energy passes either way, in radiance over n²: the shares are those of n²·∫ rest·2c dc."""
     for ior in (0.4, 1.1, 1.5, 2.5):
         near = energy.grazing(ior, 0.49)
         row = np.array(energy.tables(ior, 0.7, False)).reshape(2, energy.STEPS + 2, 2)
@@ -90,7 +90,7 @@ def test_rows_are_the_tables_of_their_roughness() -> None:
 @pytest.mark.parametrize(("ior", "roughness", "most"), [
     (1.5, 0.6, 0.03), (2.4, 0.6, 0.03), (1.5, 0.3, 0.02), (2.4, 1.0, 0.06), (1.5, 1.0, 0.18)])
 def test_sides_share_light_as_in_a_random_walk(ior: float, roughness: float, most: float) -> None:
-    """What is reflected of all light, from angles on both sides."""
+    """The reflected share of all light agrees, from angles on both sides."""
     rng, alpha = np.random.default_rng(1), roughness**2
     near, (outside, inside) = energy.grazing(ior, alpha), energy.sides(ior, alpha)
     parts = np.array([outside.mean, inside.mean * ior**2])

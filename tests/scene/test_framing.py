@@ -22,7 +22,7 @@ def box_mesh(low: tuple[float, ...], high: tuple[float, ...]) -> Mesh:
 
 @pytest.mark.parametrize("name", BOXES)
 def test_box_fills_the_picture_and_stays_inside(name: str) -> None:
-    """Project the corners as a pinhole does: the outermost one lies at FILL of the half picture."""
+    """With a pinhole projection, the outermost corner lies at FILL of half the image."""
     mesh = box_mesh(*BOXES[name])
     camera = frame([mesh])
     position, up = np.array(camera.position), np.array(camera.up)
@@ -52,7 +52,8 @@ def test_vertices_without_a_face_do_not_count() -> None:
 
 
 def test_sky() -> None:
-    """Blue above, brightest at the horizon, brown below, the same all round; the sun shines down, from the front."""
+    """It is blue above, brightest at the horizon, brown below, and uniform in azimuth; the sun is in front and above.
+    """
     image = default_sky(32).image
     assert image is not None and image.shape == (32, 64, 3) and image.dtype == np.float32
     assert (image == image[:, :1]).all() and (image > 0).all()

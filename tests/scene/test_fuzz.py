@@ -1,4 +1,4 @@
-"""Damaged files of every format load or are refused in words; `python -m tests.fuzz` does so for any number."""
+"""Damaged files of every format load or raise a clear error; `python -m tests.fuzz` runs any number of them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..fuzz_seeds import write_seeds
 
 
 def test_damaged_files(tmp_path: Path) -> None:
-    """Several hundred, in a process whose memory is bounded; of each format some are still good, and some are not."""
+    """Several hundred cases in a process with limited memory; for each format some still load and some do not."""
     write_seeds(tmp_path / "seeds")
     told: list[str] = []
     results = run(700, tmp_path, told=told.append)
@@ -21,7 +21,7 @@ def test_damaged_files(tmp_path: Path) -> None:
 
 
 def test_what_is_damaged_is_good_before(tmp_path: Path) -> None:
-    """And the files are the same in every run."""
+    """The undamaged seed files render, and cases are the same in every run."""
     write_seeds(tmp_path / "seeds")
     seeds = seeds_in(tmp_path / "seeds")
     assert [outcome(seed, render=False) for seed in seeds] == ["picture"] * len(seeds)

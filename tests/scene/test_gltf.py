@@ -1,4 +1,4 @@
-"""What glTF files become: containers, accessors, nodes, cameras, extensions."""
+"""Reading of glTF files: containers, accessors, nodes, cameras, extensions."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def test_modes(mode: int, expected: list[list[int]], tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("scale", [(1, 2, 3), (-1, 2, 3), (-1, -2, 0.5), (-1, -1, -1)])
 def test_node_hierarchy(scale: tuple[float, float, float], tmp_path: Path) -> None:
-    """A flat-shaded cube under three nodes: corners placed step by step in float64, and normals that agree with the
+    """A flat-shaded cube under three nodes: corners transformed step by step in float64, and normals that match the
     winding of the faces, mirrored or not."""
     vertices, faces = cube()
     split, normals = vertices[faces].reshape(-1, 3), np.repeat(vertices[faces].mean(axis=1).round(), 3, axis=0)
@@ -132,7 +132,7 @@ def test_node_hierarchy(scale: tuple[float, float, float], tmp_path: Path) -> No
 
 
 def test_corners(tmp_path: Path) -> None:
-    """Both sets of coordinates, colours of any form, and tangents; a mirrored node turns their bitangents over."""
+    """Both UV sets, colours in any format, and tangents; a mirrored node flips their bitangents."""
     rng = np.random.default_rng(2)
     uv, uv1 = rng.uniform(0, 1, (2, 3, 2)).astype(np.float32)
     colors = np.array([[255, 0, 0, 51], [0, 255, 0, 102], [0, 0, 255, 255]])
@@ -151,8 +151,8 @@ def test_corners(tmp_path: Path) -> None:
 
 
 def cameras() -> Gltf:
-    """A ball that three cameras see: one of no name, one named by its node, one by itself; one orthographic; and one
-    that shows nothing."""
+    """Return a ball with cameras: one unnamed, one named by its node, one by itself, one
+    orthographic, and an invalid one."""
     gltf = ball()
     gltf.document["cameras"] = [{"type": "orthographic", "name": "nothing"},
                                 {"type": "perspective", "perspective": {"yfov": 0.5}},
@@ -167,24 +167,24 @@ def cameras() -> Gltf:
 
 
 def test_cameras(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """A camera looks along its own −Z with +Y up (specification 3.10), here the first is turned to look along −X."""
+    """A camera looks along its own −Z with +Y up (specification 3.10); the first is rotated to look along −X."""
     with caplog.at_level(logging.WARNING):
         found = read(cameras(), tmp_path).cameras
     assert list(found) == ["camera 1", "side", "side 2", "plan"]
     assert 'left out: camera "nothing", which has neither an angle nor a height' in caplog.text
     plan = found["plan"]
-    assert (plan.projection, plan.view_height, plan.position) == ("orthographic", 3, (0, 0, 4))   # whatever the scale
+    assert (plan.projection, plan.view_height, plan.position) == ("orthographic", 3, (0, 0, 4))   # for any scale
     camera = found["camera 1"]
     view = np.subtract(camera.look_at, camera.position)
     assert camera.position == (10.0, 1.0, 0.0)
     assert camera.fov_degrees == pytest.approx(np.degrees(0.5))
-    np.testing.assert_allclose(view, [-101**0.5, 0, 0], atol=1e-12)  # as deep as the ball's middle is far
+    np.testing.assert_allclose(view, [-101**0.5, 0, 0], atol=1e-12)  # at the distance of the ball
     np.testing.assert_allclose(camera.up, [0, 1, 0], atol=1e-15)
     assert (found["side"].position, found["side 2"].position) == ((0, 0, 5), (0, 0, 9))
 
 
 def test_cameras_by_name(tmp_path: Path) -> None:
-    """Of a bare model, and of a scene file that names one: there it moves with the model."""
+    """Cameras can be selected for a bare model and in a scene file, where they move with the model."""
     model = cameras().write(tmp_path / "a.glb")
     assert load(model).camera == load(model).cameras["camera 1"]
     assert load(model, "side 2").camera.position == (0, 0, 9)
@@ -207,7 +207,7 @@ def test_cameras_by_name(tmp_path: Path) -> None:
 
 
 def compressed() -> Gltf:
-    """A ball compressed with Draco, which keeps positions to 2^-20 of its size; its normals point inward."""
+    """Return a ball compressed with Draco, with positions to 2^-20 of its size; its normals point inward."""
     import DracoPy
     content = DracoPy.encode(VERTICES, FACES.astype(np.uint32), quantization_bits=20, preserve_order=True,
                              normals=-VERTICES.astype(np.float64))
@@ -240,7 +240,7 @@ def test_draco(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
 
 
 def test_draco_without_its_decoder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A message that says what to install; an uncompressed copy, where there is one, serves."""
+    """The error says what to install; an uncompressed copy is used if there is one."""
     gltf = compressed()
     monkeypatch.setitem(sys.modules, "DracoPy", None)
     with pytest.raises(SceneError, match=r"decoder is not installed; pip install DracoPy, or export"):
@@ -252,7 +252,7 @@ def test_draco_without_its_decoder(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 def test_extensions(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """Those that are only used are named in one warning, those that are required refused."""
+    """Unsupported optional extensions are listed in one warning, required ones raise an error."""
     gltf = ball()
     gltf.document["extensionsUsed"] = ["EXT_b", "KHR_mesh_quantization", "EXT_a", "EXT_a"]
     with caplog.at_level(logging.WARNING):

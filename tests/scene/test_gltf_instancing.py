@@ -1,4 +1,4 @@
-"""glTF files that show a mesh many times."""
+"""glTF files that show a mesh several times."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TURNS = RNG.normal(size=(COUNT, 4))
 
 
 def many(rotation: str = "<f4") -> Gltf:
-    """A ball whose node, at (0, 10, 0), has instances."""
+    """Return a ball whose node, at (0, 10, 0), has instances."""
     gltf = ball()
     turns = TURNS / np.linalg.norm(TURNS, axis=1, keepdims=True)
     if rotation == "<i2":
@@ -46,7 +46,7 @@ def triangles(model: Model) -> list[NDArray[np.float32]]:
 @pytest.mark.parametrize("rotation", ["<f4", "<i2"])
 @pytest.mark.parametrize("few", [0, 1 << 16])
 def test_instances_of_a_node(rotation: str, few: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Scaled, turned, moved, and then with the node; few triangles become meshes."""
+    """They are scaled, rotated, translated, and then transformed with the node; meshes of few triangles are baked."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", few)
     model = read_gltf(many(rotation).write(tmp_path / "a.glb"))
     assert (len(model.meshes), len(model.instances)) == ((COUNT, 0) if few else (0, COUNT))
@@ -58,7 +58,7 @@ def test_instances_of_a_node(rotation: str, few: int, tmp_path: Path, monkeypatc
 
 
 def test_nodes_that_share_a_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """But for the one that is hidden by a scale of 0, which is as flat as it was."""
+    """They become instances, except for one hidden by a scale of 0, which remains a flat mesh."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
     gltf = ball()
     gltf.node(mesh=0, translation=[3, 0, 0])
@@ -70,7 +70,7 @@ def test_nodes_that_share_a_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_mesh_table_places_a_files_instances(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And [[instance]] shows all of them again; each by its own matrix first."""
+    """[[instance]] shows all of them again; each one's own matrix is applied first."""
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
     many().write(tmp_path / "a.glb")
     (tmp_path / "s.toml").write_text('[[mesh]]\nname = "crowd"\nfile = "a.glb"\nscale = 2\n'

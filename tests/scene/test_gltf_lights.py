@@ -1,4 +1,4 @@
-"""Lights in glTF files: where their nodes put them, in our units, and what is wrong with them."""
+"""Lights in glTF files: position and units, and errors."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
 from .glb import Gltf
 
 NAME = "KHR_lights_punctual"
-DOWN = [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)]    # a quarter turn about x: −Z becomes −Y
+DOWN = [-math.sqrt(0.5), 0, 0, math.sqrt(0.5)]    # A quarter turn about x: −Z becomes −Y
 
 
 def lit(*lights: dict[str, Any]) -> Gltf:
-    """A triangle, and lights that no node holds yet."""
+    """Return a triangle, and lights that no node uses yet."""
     gltf = Gltf()
     gltf.mesh(attributes={"POSITION": gltf.accessor(np.eye(3, dtype=np.float32))})
     gltf.document |= {"extensionsUsed": [NAME], "extensionsRequired": [NAME], "extensions": {NAME: {"lights": lights}}}
@@ -34,7 +34,8 @@ def held(index: int) -> dict[str, Any]:
 
 
 def test_lights_stand_where_their_nodes_do(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """Position and −Z of a node in the world; scales turn nothing brighter. candela are W/sr, lux W/m²."""
+    """They have the world position and −Z of their nodes; scales do not affect intensity. candela are W/sr, lux W/m².
+    """
     cone = {"innerConeAngle": math.pi / 12, "outerConeAngle": math.pi / 6}
     gltf = lit({"type": "point", "color": [1, 0.5, 0.25], "intensity": 40, "name": "bulb"},
                {"type": "directional", "intensity": 3}, {"type": "spot", "intensity": 100, "spot": cone},
@@ -50,7 +51,7 @@ def test_lights_stand_where_their_nodes_do(tmp_path: Path, caplog: pytest.LogCap
     assert point == PointLight(position=(0, 5, 0), intensity=(40, 20, 10))
     np.testing.assert_allclose(sun.direction, (0, -1, 0), atol=1e-12)
     assert sun.irradiance == (3.0, 3.0, 3.0)
-    np.testing.assert_allclose(spot.position, (1, -2, 3), atol=1e-12)   # −2·2 along the turned z, which is +y
+    np.testing.assert_allclose(spot.position, (1, -2, 3), atol=1e-12)   # −2·2 along the rotated z, which is +y
     np.testing.assert_allclose(spot.direction, (0, 1, 0), atol=1e-12)
     assert spot.intensity == (100.0, 100.0, 100.0)
     assert (spot.inner_degrees, spot.outer_degrees) == pytest.approx((15, 30))
@@ -63,7 +64,7 @@ def test_models_without_lights_have_the_sun(tmp_path: Path) -> None:
 
 
 def test_cones_of_one_width_are_sharp(tmp_path: Path) -> None:
-    """Against the specification, but exporters write them; half a turn is float32's."""
+    """The specification forbids equal angles, but exporters write them; the limit pi/2 is that of float32."""
     wide = float(np.float32(math.pi / 2))
     gltf = lit({"type": "spot", "spot": {"innerConeAngle": wide, "outerConeAngle": wide}})
     gltf.node(extensions=held(0))
@@ -72,7 +73,7 @@ def test_cones_of_one_width_are_sharp(tmp_path: Path) -> None:
 
 
 def test_ranges_are_those_of_the_file(tmp_path: Path) -> None:
-    """Scales do not change them; a sun has none."""
+    """Scales do not change them; directional lights have none."""
     gltf = lit({"type": "point", "range": 4.0}, {"type": "spot", "range": 0.5}, {"type": "directional", "range": 1.0})
     for index in range(3):
         gltf.node(extensions=held(index), scale=[9, 9, 9])
@@ -82,7 +83,7 @@ def test_ranges_are_those_of_the_file(tmp_path: Path) -> None:
 
 
 def test_a_scene_file_asks_for_a_models_lights(tmp_path: Path) -> None:
-    """They go where the mesh goes, and are written once."""
+    """They are transformed with the mesh, and written only once."""
     gltf = lit({"type": "point", "range": 4.0}, {"type": "spot"}, {"type": "directional"})
     for index in range(3):
         gltf.node(translation=[1, 0, 0], extensions=held(index))
@@ -92,7 +93,7 @@ def test_a_scene_file_asks_for_a_models_lights(tmp_path: Path) -> None:
                      'scale = 2\nrotate_degrees = [0, 90, 0]\ntranslate = [0, 5, 0]\n')
     point, spot, sun = load(scene).lights
     assert isinstance(point, PointLight) and isinstance(spot, SpotLight) and isinstance(sun, DirectionalLight)
-    np.testing.assert_allclose(point.position, (0, 5, -2), atol=1e-6)   # a quarter turn about +y takes +x to −z
+    np.testing.assert_allclose(point.position, (0, 5, -2), atol=1e-6)   # A quarter turn about +y takes +x to −z
     np.testing.assert_allclose(spot.position, (0, 5, -2), atol=1e-6)
     for light in (spot, sun):
         np.testing.assert_allclose(light.direction, (-1, 0, 0), atol=1e-6)

@@ -1,4 +1,4 @@
-"""What glTF's materials, with their textures and extensions, become."""
+"""Reading of glTF materials with their textures and extensions."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_material_factors_are_cut_to_their_limits(tmp_path: Path) -> None:
 
 
 def test_textures_of_every_parameter(tmp_path: Path) -> None:
-    """One picture, with its factors, channels, transform and sampler; materials of one file share it."""
+    """One image with its factors, channels, transform and sampler; the materials of a file share it."""
     placed = {"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0.5, 0.25], "rotation": np.pi / 2,
                                                                    "scale": [2, 3]}}}
     factors = {"baseColorTexture": placed, "metallicRoughnessTexture": {"index": 0}, "metallicFactor": 0.5,
@@ -72,7 +72,7 @@ def test_textures_of_every_parameter(tmp_path: Path) -> None:
 
 
 def test_a_cutoff_that_nothing_reaches(tmp_path: Path) -> None:
-    """Above 1 a mask leaves nothing, whatever its opacity."""
+    """Above 1 a mask hides everything, for any opacity."""
     assert textured((255, 255, 255), tmp_path, alphaMode="MASK", alphaCutoff=1.0).alpha_cutoff == 1
     assert textured((255, 255, 255), tmp_path, alphaMode="MASK", alphaCutoff=1.5).opacity == 0
 
@@ -80,7 +80,7 @@ def test_a_cutoff_that_nothing_reaches(tmp_path: Path) -> None:
 @pytest.mark.parametrize("extensions", [{}, {"KHR_materials_transmission": {"transmissionFactor": 1},
                                              "KHR_materials_volume": {"thicknessFactor": 1}}], ids=["opaque", "glass"])
 def test_sides(tmp_path: Path, extensions: dict[str, Any]) -> None:
-    """What is double-sided emits from both; a material that says nothing, and the default material, have one side."""
+    """Double-sided materials emit from both sides; by default, and without a material, only the front emits."""
     found = []
     for sides in ({"doubleSided": True}, {"doubleSided": False}, {}, None):
         gltf = ball()
@@ -92,7 +92,7 @@ def test_sides(tmp_path: Path, extensions: dict[str, Any]) -> None:
 
 
 def test_layers_and_glass(tmp_path: Path) -> None:
-    """Extensions by their names; a volume behind a surface that passes all light is glass."""
+    """Extensions map to parameters; a volume with full transmission becomes glass."""
     texture = {"index": 0}
     layered = textured((255, 255, 255), tmp_path, extensions={
         "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25,
@@ -132,8 +132,8 @@ def test_glass_has_bumps(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("wrap, name", [(10497, "repeat"), (33648, "mirror"), (33071, "clamp")])
 def test_glass_beside_metal_in_one_picture(tmp_path: Path, wrap: int, name: str) -> None:
-    """The picture's left half is metal. Faces on the right one alone are glass, whatever their coordinates outside of
-    the picture come to; the others, and all where the factor makes no metal of it, are as they say."""
+    """The image's left half is metal. Faces on the right half alone become glass, with their wrapped coordinates; the
+    others become metallic_roughness, except that all are glass if the factor removes the metal."""
     import imageio.v3 as imageio
     where = {"repeat": lambda u: u % 1, "mirror": lambda u: abs((u + 1) % 2 - 1), "clamp": lambda u: min(max(u, 0), 1)}
     for middle, factor in [(u, f) for u in (-1.3, -0.7, -0.2, 0.3, 0.7, 1.2, 1.8, 2.4) for f in (1, 0)]:
@@ -153,7 +153,7 @@ def test_glass_beside_metal_in_one_picture(tmp_path: Path, wrap: int, name: str)
 
 @pytest.mark.parametrize("mode, fades, cutoff", [("OPAQUE", False, None), ("BLEND", True, None), ("MASK", True, 1.0)])
 def test_alpha_of_vertex_colors(tmp_path: Path, mode: str, fades: bool, cutoff: float | None) -> None:
-    """It multiplies an opacity of 1 as any other, which opaque materials do not have."""
+    """It multiplies the opacity, also one of 1, but not that of opaque materials."""
     gltf = ball()
     gltf.document["materials"] = [{"alphaMode": mode, "alphaCutoff": 1.0}]
     primitive = gltf.document["meshes"][0]["primitives"][0]

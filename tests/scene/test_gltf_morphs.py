@@ -1,4 +1,4 @@
-"""Morph targets of glTF files, at the weights in the file."""
+"""Morph targets of glTF files, applied with the weights in the file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOVES = RNG.normal(size=(2, 3, 3)).astype(np.float32)
 
 
 def morphed(weights: list[float] | None, node_weights: list[float] | None = None) -> Gltf:
-    """A triangle with normals along +Z and two targets; the second one has no normals."""
+    """Return a triangle with normals along +Z and two targets; the second one has no normals."""
     gltf = Gltf()
     normals = np.tile(np.array([0, 0, 1], np.float32), (3, 1))
     first, second = ({"POSITION": gltf.accessor(moves)} for moves in MOVES)
@@ -36,7 +36,7 @@ def expected(weights: list[float]) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("weights", [None, [0.0, 0.0], [1.0, 0.0], [0.25, -1.5]])
 def test_positions_and_normals(tmp_path: Path, weights: list[float] | None) -> None:
-    """Vertices and normals are displaced by each target's times its weight, 0 where the file has none."""
+    """Vertices and normals are displaced by each target times its weight, 0 if the file has none."""
     (mesh,) = read(morphed(weights), tmp_path).meshes
     weights = weights or [0.0, 0.0]
     assert mesh.vertices == pytest.approx(expected(weights), abs=1e-6) and mesh.normals is not None
@@ -45,7 +45,7 @@ def test_positions_and_normals(tmp_path: Path, weights: list[float] | None) -> N
 
 
 def test_nodes_have_weights_of_their_own(tmp_path: Path) -> None:
-    """They replace the mesh's; the other node of the mesh keeps these."""
+    """They replace the mesh's; another node of the mesh keeps those."""
     one, other = read(morphed([0.5, 0.5], [0.0, 2.0]), tmp_path).meshes
     assert one.vertices == pytest.approx(expected([0.5, 0.5]), abs=1e-6)
     assert other.vertices == pytest.approx(expected([0.0, 2.0]), abs=1e-6)

@@ -1,4 +1,4 @@
-"""The tables of what layers take from gloss, against quadratures of other coordinates."""
+"""Tables of the energy that layers take from gloss, against quadratures in other coordinates."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ COSINES = (np.array(PICKED) / STEPS)**2
 
 
 def entries(base: float, film: float, fibres: float) -> Doubles:
-    """(STEPS + 4, ENTRY) the means, and those of the angles."""
+    """Return the entries (STEPS + 4, ENTRY): the means, and those per angle."""
     return np.array(tables((base,), (film,), (fibres,))).reshape(-1, ENTRY)
 
 
 @pytest.mark.parametrize("base", [0.1, 0.3, 0.7, 1.0])
 @pytest.mark.parametrize("film, fibres", [(0.0, 0.15), (0.3, 0.3), (0.8, 1.0)])
 def test_what_layers_take_from_gloss(base: float, film: float, fibres: float) -> None:
-    """∫ gloss·(T(wo) − min(T(wo), T(wi))) dwi of film, fibres, and both, of f0 and of f90."""
+    """∫ gloss·(T(wo) − min(T(wo), T(wi))) dwi of coat, sheen, and both, for f0 and f90."""
     coat, threads = under_coat(1, film), under_fibres(1, fibres)
     layers: list[Left] = [coat, threads, lambda c: coat(c) + threads(c) - coat(c) * threads(c)]    # 1 − E·E of both
     found = entries(base, film, fibres)[3:][PICKED]
@@ -48,7 +48,7 @@ def test_what_a_film_takes_from_fibres(fibres: float) -> None:
 
 
 def test_means_are_those_of_the_hemisphere() -> None:
-    """Of the entries, and of the albedos of film, fibres, and both, times 1 and what a bounce at the base reflects."""
+    """Means of the entries, and of the albedos of coat, sheen, and both, times 1 and times the base's reflection."""
     table, base = entries(0.4, 0.1, 0.5), 0.4
     roots = np.linspace(1e-3, 1, 2001)
 

@@ -109,7 +109,7 @@ def test_every_format_gives_back_the_ball(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian", "binary_big_endian"])
 def test_a_ply_file_says_the_same_to_both_readers(encoding: str, tmp_path: Path) -> None:
-    """Colours, flags and double precision beside what is drawn; quads, damage and textures are left to trimesh."""
+    """Both readers agree on files with unused colours, flags and double precision; other files are left to trimesh."""
     order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[encoding]
     vertices = np.zeros(3, [("x", f"{order}f8"), ("y", f"{order}f8"), ("z", f"{order}f8"), ("red", "u1"),
                             *((name, f"{order}f4") for name in ("nx", "ny", "nz"))])
@@ -180,7 +180,7 @@ map_Kd wood.png
 
 @pytest.mark.parametrize("library", ["box.mtl", "renamed.mtl"])
 def test_obj_materials(library: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    """One mesh a material, whatever object it is in; a library under the model's own name serves a missing one."""
+    """There is one mesh per material across objects; a library with the model's own name replaces a missing one."""
     (tmp_path / "box.obj").write_text(BOX_OBJ.format(library=library))
     (tmp_path / "box.mtl").write_text(BOX_MTL)
     with caplog.at_level(logging.WARNING):
@@ -261,7 +261,7 @@ def test_stl_is_welded_for_smooth_normals(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("face", ["3 0 1 2", "4 0 1 2 2"])
 def test_colours_of_ply_files(face: str, tmp_path: Path) -> None:
-    """Whoever reads them."""
+    """Vertex colours are read by both PLY readers."""
     corners = "0 0 0 255 0 0\n1 0 0 0 255 0\n0 1 0 0 0 255\n"
     properties = "".join(f"property float {axis}\n" for axis in "xyz") + "".join(
         f"property uchar {color}\n" for color in ("red", "green", "blue"))

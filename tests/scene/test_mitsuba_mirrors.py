@@ -1,4 +1,4 @@
-"""Which side of a shape is its front where Mitsuba's transforms mirror: as Mitsuba 3.9 lets lamps there shine."""
+"""Front sides of mirrored Mitsuba shapes: emission is on the side on which Mitsuba 3.9 emits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .test_mitsuba_xml import scene
                          [(False, False, -1), (False, True, -1), (True, False, 1), (True, True, -1)])
 def test_a_mirror_turns_files_inside_out_but_for_their_own_normals(tmp_path: Path, normals: bool, flat: bool,
                                                                    facing: int) -> None:
-    """A triangle that faces +z, mirrored in x: Mitsuba 3.9 winds it in the world, and lets it shine towards −z."""
+    """A triangle that faces +z, mirrored in x: Mitsuba 3.9 computes winding in world space, so it emits towards −z."""
     own = "vn 0 0 1\n" if normals else ""
     corner = "//1" if normals else ""
     (tmp_path / "one.obj").write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\n{own}f 1{corner} 2{corner} 3{corner}\n")
@@ -28,7 +28,7 @@ def test_a_mirror_turns_files_inside_out_but_for_their_own_normals(tmp_path: Pat
 
 
 def test_a_mirror_turns_spheres_inside_out(tmp_path: Path) -> None:
-    """What shines shines inwards, as in Mitsuba 3.9; of what has no sides nothing shows."""
+    """Emitters emit inwards, as in Mitsuba 3.9; a sphere without emission or glass stays a sphere."""
     mirrored = '<shape type="sphere"><transform name="to_world"><scale y="-2" x="2" z="2"/></transform>{}</shape>'
     assert not scene(tmp_path, mirrored.format("")).meshes
     for inside in ('<emitter type="area"/>', '<bsdf type="dielectric"/>'):

@@ -12,8 +12,8 @@ EPS = float(np.finfo(np.float32).eps)
 @pytest.mark.parametrize("split", [False, True])
 @pytest.mark.parametrize("scale", [1.0, 1e-20, 1e-30, 1e30])
 def test_sphere_normals_are_within_the_cone_of_their_faces(split: bool, scale: float) -> None:
-    """A normal is a sum of its faces' normals with positive weights, so it leaves the radius by at most the largest
-    angle between a face's normal and its corners; with the corners stored apart it is the same."""
+    """A vertex normal is a positive combination of face normals, so it deviates from the radius by at most the largest
+    angle between a face's normal and its corners; unshared corners give the same normals."""
     vertices, faces = icosphere(2)
     a, b, c = vertices.astype(np.float64)[faces].transpose(1, 0, 2)
     face_normals = np.cross(b - a, c - a)
@@ -29,7 +29,7 @@ def test_sphere_normals_are_within_the_cone_of_their_faces(split: bool, scale: f
 
 
 def test_cube_normals_do_not_depend_on_its_diagonals() -> None:
-    """Three right angles meet in each corner, however many triangles share them: the normal is (±1, ±1, ±1)/√3."""
+    """Three right angles meet in each corner, for any number of triangles: the normal is (±1, ±1, ±1)/√3."""
     vertices, faces = cube()
     np.testing.assert_allclose(smooth_normals(vertices, faces), vertices / 3**0.5, atol=4 * EPS)
 

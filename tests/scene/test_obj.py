@@ -1,4 +1,4 @@
-"""OBJ and MTL beyond what all model files have in common."""
+"""OBJ and MTL features beyond those that all model files share."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_mtl(values: str) -> None:
 
 
 def test_maps_and_coordinates(tmp_path: Path) -> None:
-    """v goes upwards in these files, and downwards in ours: what a map shows where is the same."""
+    """v points up in these files and down in clrt: a map shows the same at each point."""
     imageio.imwrite(tmp_path / "a b.png", np.zeros((2, 2, 3), np.uint8))
     (tmp_path / "a.mtl").write_text(
         "newmtl a\nKd 0.5 1 1\nmap_Kd -o 0.25 0.5 0 -s 2 3 1 -clamp on a b.png\nmap_d -imfchan g a b.png\n"
@@ -85,7 +85,7 @@ def test_mtl_tells_what_it_leaves_out(tmp_path: Path, caplog: pytest.LogCaptureF
 
 
 def test_obj_of_many_forms(tmp_path: Path) -> None:
-    """Corners of all forms, quads beside triangles, comments, continued lines, colours, free spacing."""
+    """Corners of all forms, quads and triangles, comments, continued lines, colours, arbitrary spacing."""
     (tmp_path / "a.obj").write_text(
         "# made by hand\n  v 0 0 0 1 0 0 # red\nv\t1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\nvt 0 0\nvt 1 0 0\n"
         "vn 0 0 2\ns off\ng one\nf 1/1/1 2/2/1 3 \\\n4//1\n f 1 3 4 # last\nl 1 2\n")
@@ -100,7 +100,7 @@ def test_obj_of_many_forms(tmp_path: Path) -> None:
 
 
 def test_a_material_of_the_file_s_own_name(tmp_path: Path) -> None:
-    """Faces before it are another mesh, and none is lost."""
+    """Faces before it become a separate mesh, and none is lost."""
     path = tmp_path / "box.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nusemtl box\nf 1 3 2\nf 1 2 3\n")
     assert {name: len(mesh["faces"]) for name, mesh in parse_obj(path).items()} == {"box 2": 1, "box": 2}

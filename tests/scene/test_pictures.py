@@ -1,4 +1,4 @@
-"""Pictures of every kind read as linear RGB, and unusable ones refused."""
+"""Images of every format are read as linear RGB, and unusable ones raise errors."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def noise(*shape: int) -> FloatArray:
 
 
 def stored(path: Path, pixels: FloatArray, **spec_fields: object) -> None:
-    """Write any channels and windows through the library itself."""
+    """Write any channels and windows directly with OpenImageIO."""
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], "float")
     for name, value in spec_fields.items():
         setattr(spec, name, value)
@@ -99,7 +99,7 @@ def test_a_folder_is_no_picture(tmp_path: Path) -> None:
 
 
 def test_a_sky_is_read_as_its_library_reads_it(tmp_path: Path) -> None:
-    """Run-length coded .hdr files are read without the library: runs, literals, zeros and all exponents."""
+    """Run-length encoded .hdr files are read by our own code: runs, literals, zeros and all exponents."""
     rng = np.random.default_rng(1)
     pixels = np.ldexp(rng.random((9, 300, 3), np.float32), rng.integers(-100, 100, (9, 300, 1)))
     pixels[:, 20:200] = pixels[:, 20:21]
@@ -110,7 +110,7 @@ def test_a_sky_is_read_as_its_library_reads_it(tmp_path: Path) -> None:
     found, expected = read_radiance(path), buffer.get_pixels(oiio.FLOAT)
     assert found is not None and expected is not None
     np.testing.assert_array_equal(found, rgbe_rounded(pixels))
-    np.testing.assert_allclose(found, expected, rtol=2e-7)  # which takes powers in float32
+    np.testing.assert_allclose(found, expected, rtol=2e-7)  # the library computes powers in float32
     whole = path.read_bytes()
     for wrong in (whole[:-1], whole.replace(b"+X 300", b"+X 301"), whole.replace(b"#?RAD", b"#?RAX"),
                   whole.replace(b"FORMAT", b"EXPOSURE=2\nFORMAT"), whole.replace(b"\x02\x02\x01", b"\x02\x03\x01", 1)):
@@ -120,7 +120,7 @@ def test_a_sky_is_read_as_its_library_reads_it(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("mode, dtype", [("L", "u1"), ("LA", "u1"), ("RGB", "u1"), ("RGBA", "u1"), ("RGB", "u2")])
 def test_textures_are_read_as_stored(mode: str, dtype: str, tmp_path: Path) -> None:
-    """From files and bytes alike; alpha is kept beside the colours and not multiplied in; 16 bits are rounded to 8."""
+    """From files and bytes alike; alpha is kept and not premultiplied; 16 bits are rounded to 8."""
     path = tmp_path / "a.png"
     stored_pixels = np.random.default_rng(2).integers(0, 256, (5, 7, len(mode))).astype(np.uint8)
     output = oiio.ImageOutput.create(str(path))
@@ -143,7 +143,7 @@ def test_textures_are_read_as_stored(mode: str, dtype: str, tmp_path: Path) -> N
 
 
 def test_a_small_file_may_not_claim_a_huge_picture(tmp_path: Path) -> None:
-    """A PNG of 60 000 by 60 000 pixels, all of whose data are a few bytes, costs neither memory nor time."""
+    """A PNG that declares 60 000 by 60 000 pixels with a few bytes of data costs neither memory nor time."""
     header = struct.pack(">IIBBBBB", 60000, 60000, 8, 2, 0, 0, 0)
     chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(bytes(1000))), (b"IEND", b"")]
     content = b"\x89PNG\r\n\x1a\n" + b"".join(struct.pack(">I", len(data)) + kind + data + struct.pack(
@@ -154,7 +154,7 @@ def test_a_small_file_may_not_claim_a_huge_picture(tmp_path: Path) -> None:
 
 
 def test_a_flat_picture_may_have_a_small_file(tmp_path: Path) -> None:
-    """Two colours in a palette, one bit a pixel, compress to a five-thousandth of their texels."""
+    """Two palette colours at one bit per pixel compress to a five-thousandth of the texels' size."""
     image = Image.new("P", (512, 512), 1)
     image.putpalette([255, 0, 0, 0, 128, 255])
     image.save(tmp_path / "a.png", bits=1)
@@ -163,7 +163,7 @@ def test_a_flat_picture_may_have_a_small_file(tmp_path: Path) -> None:
 
 
 def test_a_decoder_that_hangs_or_crashes_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A pipe that nobody writes to keeps the decoder waiting; one that was killed is replaced by another."""
+    """A pipe without a writer blocks the decoder until its time limit; a killed decoder is replaced."""
     write_image(tmp_path / "a.png", noise(3, 4, 3))
     expected = read_picture(tmp_path / "a.png")
     os.mkfifo(tmp_path / "pipe.png")

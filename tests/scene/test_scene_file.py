@@ -100,8 +100,8 @@ def test_a_whole_scene(folder: Path) -> None:
 
 
 def test_transforms(folder: Path) -> None:
-    """By hand: scaled by (1, 2, 3), y → z under 90° about x, then x → y under 90° about z, then moved. The matrix
-    mirrors, so its faces turn round."""
+    """Computed by hand: scaled by (1, 2, 3), y → z under 90° about x, then x → y under 90° about z, then translated.
+    The matrix mirrors, so faces are reversed."""
     _, floor, mirrored = load(write(folder, GOOD)).meshes
     np.testing.assert_allclose(floor.vertices, [[10, 21, 30], [10, 20, 32], [13, 20, 30]], atol=1e-5)
     assert floor.normals is not None
@@ -117,7 +117,7 @@ def test_one_number_scales_every_axis(folder: Path) -> None:
 
 
 def test_instances_start_from_where_their_mesh_stands(folder: Path) -> None:
-    """Each shows every mesh of its table, which itself may stay hidden; and it may be written in one line."""
+    """Each shows every mesh of its table, which itself may be hidden; an inline table works, too."""
     (folder / "models" / "two.obj").write_text(
         "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nusemtl green\nf 1 3 2\n")
     scene = load(write(folder, """
@@ -145,7 +145,7 @@ file = "models/triangle.obj"
 
 
 def test_environment_picture_keeps_its_orientation(folder: Path) -> None:
-    """Row 0 of the file is row 0 of the image, and the values are not touched."""
+    """Row 0 of the file is row 0 of the image, and values are unchanged."""
     import OpenImageIO as oiio
     pixels = np.arange(2 * 4 * 3, dtype=np.float32).reshape(2, 4, 3) * 100
     picture = oiio.ImageBuf(oiio.ImageSpec(4, 2, 3, oiio.FLOAT))
@@ -158,7 +158,7 @@ def test_environment_picture_keeps_its_orientation(folder: Path) -> None:
 
 @pytest.mark.parametrize("name, material", [("ball.glb", MetallicRoughness), ("ball.off", Diffuse)])
 def test_bare_model(name: str, material: type, tmp_path: Path) -> None:
-    """All of the ball is seen from the camera: its radius is under sin(fov/2) of the distance to its middle."""
+    """The whole ball is visible: its radius is below sin(fov/2) of the distance to its centre."""
     vertices, faces = icosphere(1)
     if name == "ball.off":
         rows = [f"{x} {y} {z}" for x, y, z in vertices.tolist()] + [f"3 {a} {b} {c}" for a, b, c in faces.tolist()]
@@ -211,7 +211,7 @@ def test_materials_of_every_type_load(folder: Path) -> None:
 
 
 def test_whole_numbers_may_be_of_any_length(folder: Path) -> None:
-    """Wherever numbers need not be whole: as the same float."""
+    """Integers are accepted wherever floats are, with the same value."""
     imageio.imwrite(folder / "a.png", np.zeros((2, 2, 3), np.uint8))
     text = """
 instance = [{{ mesh = "a", scale = 1e-20, repeat = [{{ count = 2, scale = {0} }}] }}]
@@ -242,7 +242,7 @@ intensity = [{0}, 0, 0]
 
 
 def test_instances_repeat_by_steps_of_the_world(folder: Path) -> None:
-    """Copy i is where i steps take the first one: here a ring, and rings above it, each twice as large."""
+    """Copy i is the first one transformed by i steps: here a ring, and rings above it, each twice as large."""
     scene = load(write(folder, """
 instance = [{ mesh = "one", translate = [1, 0, 0], repeat = [
     { count = 4, rotate_degrees = [0, 90, 0] }, { count = 3, scale = 2, translate = [0, 1, 0] }] }]

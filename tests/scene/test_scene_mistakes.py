@@ -79,7 +79,7 @@ SENTENCES = [
 
 
 def problems(folder: Path, text: str) -> list[str]:
-    """What load says about a scene file, without the file's name, which must come first in every line."""
+    """Return the problems that load reports, without the file's name, with which every line must start."""
     path = folder / "box.toml"
     path.write_text(text)
     with pytest.raises(SceneError) as caught:

@@ -29,7 +29,7 @@ def test_quaternion(q: tuple[float, float, float, float]) -> None:
 
 @pytest.mark.parametrize("factors", [(2.0, 0.5, 3.0), (-1.0, 1.0, 1.0), (-2.0, -0.5, -3.0), (1e-12, 2e-12, 1e-12)])
 def test_transformed_sphere(factors: tuple[float, float, float]) -> None:
-    """Points go by M, normals by M⁻ᵀ (here inverted in float64), and the surface keeps its outside outside."""
+    """Points are transformed by M, normals by M⁻ᵀ (here inverted in float64), and the outside stays outside."""
     vertices, faces = icosphere(2)
     matrix = translation((1, -2, 3)) @ rotation((10, 20, 30)) @ scaling(factors)
     linear = matrix[:3, :3]
@@ -39,7 +39,7 @@ def test_transformed_sphere(factors: tuple[float, float, float]) -> None:
     expected /= np.linalg.norm(expected, axis=1, keepdims=True)
     assert mesh.normals is not None
     np.testing.assert_allclose(mesh.normals, expected, atol=4 * EPS)
-    # Mirrored or not, the faces enclose a positive volume; det M says how large it is.
+    # Mirrored or not, the faces enclose a positive volume of size |det M|.
     enclosed = volume(vertices @ linear.T, mesh.faces)
     assert enclosed == pytest.approx(abs(np.linalg.det(linear)) * volume(vertices, faces), rel=1e-12)
 

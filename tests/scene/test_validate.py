@@ -142,7 +142,7 @@ def test_each_mistake_is_the_one_problem(name: str) -> None:
 
 
 def test_all_mistakes_come_at_once() -> None:
-    """Changes of different parts of the scene, all applied: all of their sentences."""
+    """Errors in different parts of the scene are all reported together."""
     names = ["vertex", "index below", "normal", "radius", "light nan", "up", "size", "sky nan"]
     scene = good_scene()
     for name in names:
@@ -163,7 +163,7 @@ def test_a_shared_material_is_named_once() -> None:
 
 @pytest.mark.parametrize("dtype", [np.int64, np.uint8, np.uint32])
 def test_meshes_of_numpy_s_own_dtypes(dtype: type) -> None:
-    """float64 and any integers become float32 and int32, which are taken as they are."""
+    """float64 and any integers are converted to float32 and int32; those dtypes are not copied."""
     mesh = Mesh(np.eye(3), np.array([[0, 1, 2]], dtype))  # type: ignore[arg-type]
     validate(Scene(meshes=[mesh]))
     assert mesh.vertices.dtype == np.float32 and mesh.faces.dtype == np.int32 and mesh.faces.tolist() == [[0, 1, 2]]

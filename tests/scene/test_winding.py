@@ -1,4 +1,4 @@
-"""Which emissive meshes are wound backwards, and which are not."""
+"""Detection of emissive meshes with reversed winding."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ def turned(mesh: Mesh) -> Mesh:
 
 
 def panel(height: float) -> Mesh:
-    """Faces down."""
+    """Return a panel that faces down."""
     corners = np.array([(-1, height, -1), (1, height, -1), (1, height, 1), (-1, height, 1)], np.float32)
     return Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), LAMP, name="panel")
 
 
 def cube(half: float, center: tuple[float, float, float], material: Diffuse) -> Mesh:
-    """Its fronts face outwards."""
+    """Return a cube whose faces point outwards."""
     return Mesh((half * CUBE + np.array(center)).astype(np.float32), OUTWARD, material, name="bulb")
 
 
 def room(*meshes: Mesh) -> Scene:
-    """3 high, and wound as rooms are."""
+    """Return a room 3 high with inward faces, a sphere and a camera."""
     return Scene(meshes=[turned(cube(1.5, (0, 1.5, 0), Diffuse())), *meshes],
                  spheres=[Sphere(center=(0, 0.5, 0), radius=0.5)],
                  camera=Camera(position=(0, 1.5, 1.4), look_at=(0, 1, 0)))
@@ -48,7 +48,7 @@ def test_the_cube_is_wound_outwards() -> None:
 
 @pytest.mark.parametrize("height", [2.999, 3.0, 2.98])
 def test_a_panel_at_the_ceiling(height: float) -> None:
-    """Wound the wrong way it lights the ceiling, from nearby, or nothing."""
+    """With reversed winding it lights only the ceiling close to it, or nothing."""
     assert backward_emitters(room(panel(height))) == []
     assert backward_emitters(room(turned(panel(height)))) == ["panel"]
     double = replace(turned(panel(height)), material=replace(LAMP, double_sided=True))
@@ -67,7 +67,7 @@ def test_a_lamp_that_faces_the_camera_alone() -> None:
 
 
 def test_a_bulb_that_lights_itself_from_inside() -> None:
-    """A closed mesh wound inwards, unless something is in it: a dome around the scene."""
+    """A closed mesh wound inwards is reported, unless something is inside it, such as the scene inside a dome."""
     bulb = cube(0.1, (0.5, 2.0, 0.5), LAMP)
     assert backward_emitters(room(bulb)) == [] and backward_emitters(room(turned(bulb))) == ["bulb"]
     dome = turned(cube(9.0, (0, 0, 0), LAMP))
@@ -79,7 +79,7 @@ def test_a_bulb_that_lights_itself_from_inside() -> None:
 
 
 def test_instances_count_as_what_they_show() -> None:
-    """Mirrored ones as the mesh is then wound: placing keeps fronts in front."""
+    """Mirrored instances have the winding of the mesh: the transform keeps fronts in front."""
     up = np.column_stack([np.eye(3), [0, 3.0, 0]])
     scene = room()
     for lamp, expected in ((panel(0.0), []), (turned(panel(0.0)), ["lamp"])):
@@ -91,7 +91,7 @@ def test_instances_count_as_what_they_show() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_bulbs_anywhere_among_things_are_found_by_their_winding(seed: int) -> None:
-    """Outward bulbs never count; inward ones do as nothing else is in them, wherever they are and however turned."""
+    """Outward bulbs are never reported; inward ones are, if nothing is inside, at any position and rotation."""
     rng = np.random.default_rng(seed)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))

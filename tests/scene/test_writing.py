@@ -1,4 +1,4 @@
-"""A scene file written for a model shows what the model shows."""
+"""A scene file written for a model renders like the model."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Ke 1e-7 12 1e20
 
 
 def shaded() -> Gltf:
-    """Four balls: of two materials that share a name, of none, and of one whose texture differs with its vertices."""
+    """Return four balls: two materials with one name, one without a material, and one without a material name."""
     gltf = ball()
     gltf.document["materials"] = [{"name": "twin", "pbrMetallicRoughness": {"metallicFactor": 0.1}}, {"name": "twin"},
                                   {"pbrMetallicRoughness": {"roughnessFactor": 1 / 3}, "emissiveFactor": [1, 0, 0]}]
@@ -53,7 +53,7 @@ def shaded() -> Gltf:
 
 @pytest.mark.parametrize("kind", ["obj", "glb", "cameras", "off"])
 def test_round_trip(kind: str, tmp_path: Path) -> None:
-    """The scene that is read back shares with the model's all that makes a picture."""
+    """The scene read back equals the model's in everything that affects the image."""
     model = tmp_path / "my models é" / f"a.{'glb' if kind == 'cameras' else kind}"
     model.parent.mkdir()
     (model.parent / "a.mtl").write_text(MTL)
@@ -101,7 +101,7 @@ def test_some_of_a_file_s_materials_are_replaced(tmp_path: Path) -> None:
 
 
 def edited(scene: Scene) -> Scene:
-    """With other values of what there is, a view more, and a ball of a material that has no name."""
+    """Return the scene with changed values, another camera, and a ball with an unnamed material."""
     materials = list(materials_of(scene).values())
     for material in materials[:2]:
         scene = with_material(scene, material, replace(material, emission=(0.125, 1 / 3, 2.0)))
@@ -121,7 +121,7 @@ def again(scene: Scene, path: Path) -> Scene:
 
 
 def check_same(scene: Scene, other: Scene) -> None:
-    """In all that makes a picture, and by the same names."""
+    """Assert that scenes are equal in everything that affects the image, and in names."""
     assert facts_of(other, Choices()) == facts_of(scene, Choices())
     assert other.cameras == scene.cameras and other.render == scene.render and other.animation == scene.animation
     plain = {name: material for name, material in scene.materials.items() if not material.textures()}
@@ -133,7 +133,7 @@ def check_same(scene: Scene, other: Scene) -> None:
 
 @pytest.mark.parametrize("name", [path.stem for path in sorted(SCENES.glob("*.toml"))])
 def test_scene_files_are_written_again(name: str, tmp_path: Path) -> None:
-    """All that ship, as they are and edited, in another folder; files that they refer to stay where they are."""
+    """All scenes of the repository, unchanged and edited, in another folder; files that they refer to stay in place."""
     scene = load(SCENES / f"{name}.toml")
     for number, each in enumerate((scene, edited(scene), edited(edited(scene)))):
         check_same(each, again(each, tmp_path / f"{number}.toml"))
@@ -143,7 +143,7 @@ def test_scene_files_are_written_again(name: str, tmp_path: Path) -> None:
 
 
 def test_changed_models_are_written(tmp_path: Path) -> None:
-    """Materials are assigned by the file's names; where these do not tell them apart, by meshes beside."""
+    """Materials are assigned by the file's names; if these are ambiguous, meshes are written next to the scene."""
     (tmp_path / "a.mtl").write_text(MTL)
     (tmp_path / "a.obj").write_text(OBJ)
     twins = ball()
@@ -161,7 +161,7 @@ def test_changed_models_are_written(tmp_path: Path) -> None:
 
 
 def test_what_no_scene_file_can_say_is_written_beside_it(tmp_path: Path) -> None:
-    """A mesh with all its arrays, instances of one that is not seen itself, a sky and a texture, made in Python."""
+    """A mesh with all attributes, instances of a hidden mesh, an environment map and a texture, made in Python."""
     rng = np.random.default_rng(0)
     directions = np.array([[0, 0, 1], [0, 1, 0], [1, 0, 0]], np.float32)
     faces = np.array([[0, 1, 2]], np.int32)
@@ -185,7 +185,7 @@ def test_what_no_scene_file_can_say_is_written_beside_it(tmp_path: Path) -> None
 
 
 def test_files_that_are_still_shown_stay(tmp_path: Path) -> None:
-    """New things of the names of old ones get files of their own; a scene saved over itself is all there."""
+    """New objects with existing names get files of their own; a scene saved over itself stays complete."""
     dark, light = (Picture(np.full((2, 2, 4), value, np.uint8), "wood") for value in (10, 200))
     triangle = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32)
     faces, uv = np.array([[0, 1, 2]], np.int32), np.zeros((3, 2), np.float32)
@@ -214,7 +214,7 @@ def test_numbers_of_numpy_are_written(tmp_path: Path) -> None:
 
 
 def test_many_materials_are_named_at_once() -> None:
-    """Each its own name, in a time that goes with their number: the second thousand as fast as the first."""
+    """Each gets a name of its own, in linear time."""
     scene = Scene(spheres=[Sphere(material=Diffuse()) for _ in range(30_000)])
     named = materials_of(scene)
     assert len(named) == 30_000 and list(named)[:3] == ["sphere", "sphere 2", "sphere 3"]

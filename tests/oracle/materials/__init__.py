@@ -1,4 +1,4 @@
-"""The materials that the oracle knows, a file each."""
+"""The materials that the oracle supports, one file each."""
 
 from __future__ import annotations
 
@@ -24,5 +24,5 @@ SCATTERINGS: dict[type[Material], Callable[[Any, Surface], Scattering]] = {
 
 
 def scattering_of(material: Material, at: Surface) -> Scattering:
-    """Of a material where rays hit it."""
+    """Return the scattering of a material at hits."""
     return SCATTERINGS[type(material)](material, at)

@@ -1,4 +1,4 @@
-"""Directional albedos of GGX's single bounce with Schlick's F, f0·by_f0 + f90·by_f90, by quadrature."""
+"""Directional albedos of a single GGX bounce with Schlick's F, f0·by_f0 + f90·by_f90, by quadrature."""
 
 from __future__ import annotations
 
@@ -11,34 +11,35 @@ from ..vectors import Doubles, dot
 from .ggx import alpha_of, shadowing, smith_lambda, visible_nodes
 from .scattering import reflected
 
-#: Nodes of roughness from ROUGHNESS to 1, of the root of the cosine from 0 to 1, and of each of a direction's numbers.
+#: Nodes of roughness from ROUGHNESS to 1 and of the cosine's root from 0 to 1, and of each
+#: random number of a direction.
 NODES, DIRECTIONS = 49, 40
-#: Smoother surfaces are not in the tables.
+#: Lower roughness is not in the tables.
 ROUGHNESS = 0.25
 
 
 class Albedos:
-    """Of one form of masking and shadowing at roughnesses (n,)."""
+    """Albedos for one form of masking and shadowing at roughnesses (n,)."""
 
     def __init__(self, smith: str, roughness: Doubles) -> None:
         assert roughness.min(initial=1.0) >= ROUGHNESS
         self._table, self._row = _table(smith), (roughness - ROUGHNESS) / (1 - ROUGHNESS) * (NODES - 1)
 
     def at(self, cosine: Doubles) -> tuple[Doubles, Doubles]:
-        """(n, 1) by_f0 and by_f90 of cosines (n,)."""
+        """Return by_f0 and by_f90, (n, 1) each, at cosines (n,)."""
         column = np.sqrt(np.clip(cosine, 0, 1)) * (NODES - 1)
         found = bilinear(self._table[:, :NODES], column, self._row, "clamp", "clamp")
         return found[:, :1], found[:, 1:]
 
     def mean(self) -> tuple[Doubles, Doubles]:
-        """(n, 1) of both over the hemisphere, weighted by the cosine."""
+        """Return the cosine-weighted hemispherical means of both, (n, 1) each."""
         found = bilinear(self._table[:, NODES:], np.zeros_like(self._row), self._row, "clamp", "clamp")
         return found[:, :1], found[:, 1:]
 
 
 @cache
 def _table(smith: str) -> Doubles:
-    """(roughnesses, cosines, 2) of by_f0 and by_f90, in the last column the means."""
+    """Return the table (roughnesses, cosines, 2) of by_f0 and by_f90, with the means in the last columns."""
     x, weights = np.polynomial.legendre.leggauss(NODES)
     roots = np.append(np.maximum(np.linspace(0, 1, NODES), 1e-3), (x + 1) / 2)
     rows = []
@@ -51,7 +52,9 @@ def _table(smith: str) -> Doubles:
 
 
 def bounces(cosine: float, alpha: float, smith: str) -> tuple[Doubles, Doubles]:
-    """Of light from an angle, as a quadrature: cosines (m,) of where it goes, and how much, (m, 2) by f0 and f90."""
+    """Return the reflection of light from an angle as a quadrature: outgoing cosines (m,) and
+    weights (m, 2) by f0 and f90.
+    """
     wo, h, share = visible_nodes(cosine, alpha, DIRECTIONS)
     alphas, cos_i = np.full(len(wo), alpha), reflected(wo, h)[:, 2]
     up = cos_i > 0

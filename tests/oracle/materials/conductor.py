@@ -1,4 +1,4 @@
-"""A metal by its complex index of refraction, with GGX's microfacets: F·D·G/(4·cos·cos), one bounce."""
+"""Conductor with a complex index of refraction and GGX microfacets: F·D·G/(4·cos·cos), one bounce."""
 
 from __future__ import annotations
 

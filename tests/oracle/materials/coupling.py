@@ -1,10 +1,10 @@
-"""The diffuse lobes of metallic_roughness below layers that leave T of light from an angle.
+"""The diffuse lobes of metallic_roughness below layers of directional transmittance T.
 
 The coupling is 1 − F(wi·h) (glTF), (1 − F(cos wi))(1 − F(cos wo)), or that of Kelemen and Szirmay-Kalos 2001, "A
 Microfacet Based Coupled Specular-Matte BRDF Model", (1 − E(wi))(1 − E(wo))/(1 − mean E) with the directional albedo E
-of the dielectric's gloss. That one has further bounces between microfacets of the metal (Kulla and Conty 2017,
-"Revisiting Physically Based Shading at Imageworks") in the same lobe, r(wi)·r(wo)/(π·mean r) with
-r = body·(1 − E) + metallic·multiple·lost. Layers make that R(wi)·R(wo)/(π·mean R), R = T·r + what min(T(wi), T(wo))
+of the dielectric's gloss. The last one includes multiple scattering between microfacets of the metal (Kulla and Conty
+2017, "Revisiting Physically Based Shading at Imageworks") in the same lobe, r(wi)·r(wo)/(π·mean r) with
+r = body·(1 − E) + metallic·multiple·lost. With layers it is R(wi)·R(wo)/(π·mean R), R = T·r + what min(T(wi), T(wo))
 takes from single bounces beyond 1 − T.
 """
 
@@ -24,7 +24,7 @@ from .scattering import halfway
 from .substance import Substance
 from .taken import Taken
 
-#: Gauss and Legendre's rule for the root of the cosine.
+#: Gauss–Legendre rule for the root of the cosine.
 X, WEIGHTS = np.polynomial.legendre.leggauss(16)
 ROOTS = (X + 1) / 2
 
@@ -32,7 +32,7 @@ OfCosine = Callable[[Doubles], Doubles]
 
 
 class Lobe:
-    """f(wo)·f(wi)/mean f, the mean over the hemisphere weighted by the cosine. rows: n."""
+    """f(wo)·f(wi)/mean f, with the cosine-weighted hemispherical mean. rows: n."""
 
     def __init__(self, f: OfCosine, rows: int) -> None:
         self._f = f
@@ -40,24 +40,24 @@ class Lobe:
                                              for root, weight in zip(ROOTS, WEIGHTS)))
 
     def __call__(self, wo: Doubles, wi: Doubles) -> Doubles:
-        """(n, c) of f (n, c)."""
+        """Return the lobe (n, c) for f (n, c)."""
         product = self._f(wo[:, 2]) * self._f(wi[:, 2])
         return np.asarray(np.divide(product, self._mean, out=np.zeros_like(product), where=self._mean > 0))
 
 
 def by_half_vector(substance: Substance, wo: Doubles, wi: Doubles) -> Doubles:
-    """(n, 3) of f·π without layers."""
+    """Return f·π without layers, (n, 3)."""
     return np.asarray((1 - substance.gloss.at(np.abs(dot(wo, halfway(wo, wi))))) * substance.body)
 
 
 def by_fresnel(substance: Substance, wo: Doubles, wi: Doubles) -> Doubles:
-    """(n, 3) of f·π without layers."""
+    """Return f·π without layers, (n, 3)."""
     return np.asarray((1 - substance.gloss.at(wo[:, 2])) * (1 - substance.gloss.at(np.maximum(wi[:, 2], 0)))
                       * substance.body)
 
 
 class ByAlbedo:
-    """R, and what single bounces with F = 1 lose."""
+    """R, and the energy that single bounces with F = 1 lose."""
 
     def __init__(self, material: MetallicRoughness, at: Surface, substance: Substance, layers: Layers) -> None:
         self._substance, self._layers = substance, layers
@@ -69,11 +69,11 @@ class ByAlbedo:
             self._multiple = substance.metallic * mean_f**2 * (1 - lost) / (1 - mean_f * lost)
 
     def lost(self, cosine: Doubles) -> Doubles:
-        """(n, 1) of cosines (n,)."""
+        """Return the lost energy (n, 1) at cosines (n,)."""
         return np.asarray(1 - sum(self._albedos.at(cosine)))
 
     def reflected(self, cosine: Doubles) -> Doubles:
-        """(n, 3) of cosines (n,): R."""
+        """Return R (n, 3) at cosines (n,)."""
         inside = 1 - self._substance.dielectric.reflected(self._albedos.at(cosine))
         r = self._substance.body * inside + self._multiple * self.lost(cosine)
         return np.asarray(self._layers.left(cosine)[:, None] * r + self._given_back(cosine))

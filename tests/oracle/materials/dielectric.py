@@ -1,7 +1,7 @@
-"""Glass: Fresnel's equations and Snell's law at a smooth surface, at GGX's microfacets (Walter et al. 2007, with the
-height-correlated G2 of Heitz 2014), and at both faces of a thin sheet; what a single bounce loses, see glass_energy.
+"""Glass: Fresnel's equations and Snell's law at a smooth surface, at GGX microfacets (Walter et al. 2007, with the
+height-correlated G2 of Heitz 2014), and at both faces of a thin sheet; for lost energy see glass_energy.
 
-Radiance is bundled where it enters a denser medium, by the square of the relative index (Walter 2007, sec. 4.1).
+Radiance increases on entering a denser medium by the square of the relative index (Walter 2007, sec. 4.1).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .scattering import Cosine, Sample, Scattering, halfway, mirrored_below, ref
 
 
 class Glass(Scattering):
-    """eta: (n,) index beyond the surface over that on wo's side; rough: (n,) where there are microfacets."""
+    """eta: (n,) index beyond the surface over that on wo's side; rough: (n,) whether there are microfacets."""
 
     def __init__(self, material: Dielectric, at: Surface) -> None:
         roughness = at.number(material.roughness)
@@ -35,7 +35,7 @@ class Glass(Scattering):
             self.absorption_beyond = np.where(at.front[:, None], _absorption(material), 0.0)
 
     def parts(self, f: Doubles) -> tuple[Doubles, Doubles]:
-        """(n, 3) what microfacets of a Fresnel term F reflect and what they pass."""
+        """Return what microfacets with Fresnel term F reflect and transmit, (n, 3) each."""
         f, c = f[:, None], self.color
         if not self.thin:
             return np.tile(f, (1, 3)), (1 - f) * c
@@ -55,14 +55,14 @@ class Glass(Scattering):
         return np.asarray(once * self._raised(wo, wi) + self._later(wo, wi))
 
     def _raised(self, wo: Doubles, wi: Doubles) -> Doubles | float:
-        """What later bounces like the first make of that, (n, 1)."""
+        """Return the factor by which later bounces scale the first one, (n, 1)."""
         if self.energy is None:
             return 1.0
         losses = [self.energy.at(np.abs(w[:, 2]), self._side_of(w))[0] for w in (wo, wi)]
         return np.asarray(1 / (1 - np.minimum(*losses)))[:, None]
 
     def _later(self, wo: Doubles, wi: Doubles) -> Doubles | float:
-        """f·|cos wi| of the other later bounces, (n, 3)."""
+        """Return f·|cos wi| of the remaining later bounces, (n, 3)."""
         if self.energy is None:
             return 0.0
         rest = [self.energy.at(np.abs(w[:, 2]), self._side_of(w))[1] for w in (wo, wi)]
@@ -75,11 +75,11 @@ class Glass(Scattering):
         return np.asarray(f[:, None] * np.where(wi[:, 2:] > 0, back, on))
 
     def _side_of(self, w: Doubles) -> Bools:
-        """Whether it is outside; that of a sheet is like its inside."""
+        """Return whether w is outside; a sheet's outside is like its inside."""
         return np.asarray(self.outside if self.thin else self.outside ^ (w[:, 2] < 0))
 
     def _refracted(self, wo: Doubles, wi: Doubles) -> Doubles:
-        """f·|cos wi| (Walter 2007, eq. 16 and 21)."""
+        """Return f·|cos wi| (Walter 2007, eq. 16 and 21)."""
         h = -(wo + self.eta[:, None] * wi)
         length = np.linalg.norm(h, axis=1, keepdims=True)
         h = h / np.where(length > 0, length, 1)
@@ -103,7 +103,7 @@ class Glass(Scattering):
         return Sample(np.where(later, spread, once.wi), 2 * weight)
 
     def _sample_once(self, wo: Doubles, rng: np.random.Generator) -> Sample:
-        """By a single bounce."""
+        """Sample a single bounce."""
         h = np.where(self.rough[:, None], visible_normals(wo, self.alpha, rng.random((len(wo), 2))), [0.0, 0.0, 1.0])
         cos_o = dot(wo, h)
         f, cos_t = fresnel.dielectric(cos_o, self.eta)
@@ -121,14 +121,14 @@ class Glass(Scattering):
         return Sample(wi, weight * self._seen(wo, wi, returns[:, 0])[:, None])
 
     def _seen(self, wo: Doubles, wi: Doubles, returns: Doubles) -> Doubles:
-        """G2/G1 of microfacets; 0 where light ends up on the wrong side."""
+        """Return G2/G1 of microfacets, 0 if light ends up on the wrong side."""
         height = np.where(returns, wi[:, 2], -wi[:, 2])
         own, other = smith_lambda(wo[:, 2], self.alpha), smith_lambda(height, self.alpha)
         return np.where(height > 0, np.where(self.rough, (1 + own) / (1 + own + other), 1), 0)
 
 
 def _absorption(material: Dielectric) -> Doubles:
-    """(3,) per length: Beer and Lambert's law (KHR_materials_volume)."""
+    """Return the absorption per length (3,) by Beer and Lambert's law (KHR_materials_volume)."""
     if material.attenuation_distance is None:
         return np.zeros(3)
     color = np.maximum(np.array(material.attenuation_color, float), 1e-300)
@@ -136,7 +136,7 @@ def _absorption(material: Dielectric) -> Doubles:
 
 
 def _mean_fresnel(eta: float) -> float:
-    """F of diffuse light."""
+    """Return F of diffuse light."""
     x, weights = np.polynomial.legendre.leggauss(200)
     cosine = (x + 1) / 2
     return float(fresnel.dielectric(cosine, np.full_like(cosine, eta))[0] @ (weights * cosine))

@@ -1,6 +1,6 @@
-"""A clear film, KHR_materials_clearcoat: Cook–Torrance by Schlick's F from 0.04 to 1, times its strength.
+"""Clearcoat, KHR_materials_clearcoat: Cook–Torrance with Schlick's F from 0.04 to 1, times its strength.
 
-It leaves 1 − strength·E of light from an angle, E the directional albedo of its single bounce.
+Its transmittance is 1 − strength·E, with E the directional albedo of its single bounce.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ F0 = 0.04
 
 
 class Film:
-    """Films of strengths and roughnesses (n,)."""
+    """Clearcoats of strengths and roughnesses (n,)."""
 
     def __init__(self, strength: Doubles, roughness: Doubles) -> None:
         self._strength, self._alpha = strength, alpha_of(roughness)
@@ -25,12 +25,12 @@ class Film:
         self.strategy = VisibleNormals(self._alpha)
 
     def left(self, cosine: Doubles) -> Doubles:
-        """(n,) of cosines (n,)."""
+        """Return the transmittance (n,) at cosines (n,)."""
         by_f0, by_f90 = self._albedos.at(cosine)
         return 1 - self._strength * (F0 * by_f0 + by_f90)[:, 0]
 
     def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
-        """(n, 1) of f·cos wi."""
+        """Return f·cos wi, (n, 1)."""
         f0, f90 = np.full((len(wo), 1), F0), np.ones((len(wo), 1))
         fresnel = schlick(np.abs(dot(wo, halfway(wo, wi))), f0, f90)[:, 0]
         return np.asarray(self._strength * fresnel * reflection(wo, wi, self._alpha))[:, None]

@@ -1,4 +1,4 @@
-"""Fresnel's equations for unpolarised light (Born and Wolf, 1.5 and 14.2), and Schlick's approximation."""
+"""Fresnel's equations for unpolarized light (Born and Wolf, 1.5 and 14.2), and Schlick's approximation."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..vectors import Doubles
 
 
 def dielectric(cos_o: Doubles, eta: Doubles) -> tuple[Doubles, Doubles]:
-    """F at a medium eta times as dense as the one of cos_o, and the cosine of what is refracted, 0 if nothing is."""
+    """Return F at an interface of relative index eta, and the cosine of refraction, 0 for total internal reflection."""
     cos2_t = 1 - (1 - cos_o**2) / eta**2
     cos_t = np.sqrt(np.maximum(cos2_t, 0))
     perpendicular = (cos_o - eta * cos_t) / (cos_o + eta * cos_t)
@@ -17,7 +17,7 @@ def dielectric(cos_o: Doubles, eta: Doubles) -> tuple[Doubles, Doubles]:
 
 
 def conductor(cosine: Doubles, eta: Doubles, k: Doubles) -> Doubles:
-    """(n, 3) of a complex index eta + i·k, (n, 3) or (3,): the amplitudes' squares, in complex numbers."""
+    """Return F (n, 3) of a complex index eta + i·k, (n, 3) or (3,): squared amplitudes, in complex numbers."""
     index = eta + 1j * k
     c = cosine[:, None].astype(complex)
     cos_t = np.sqrt(1 - (1 - c**2) / index**2)
@@ -27,5 +27,5 @@ def conductor(cosine: Doubles, eta: Doubles, k: Doubles) -> Doubles:
 
 
 def schlick(cosine: Doubles, f0: Doubles, f90: Doubles) -> Doubles:
-    """(n, 3) of f0 (n, 3) at normal incidence and f90 (n, 3) at grazing angles (Schlick 1994)."""
+    """Return F (n, 3) from f0 (n, 3) at normal incidence and f90 (n, 3) at grazing angles (Schlick 1994)."""
     return np.asarray(f0 + (f90 - f0) * (1 - np.clip(cosine, 0, 1)[:, None])**5)

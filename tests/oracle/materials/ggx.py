@@ -9,29 +9,29 @@ import numpy as np
 from ..vectors import Doubles, dot, unit
 from .scattering import halfway, reflected
 
-#: The least alpha, as documented.
+#: The smallest alpha, as documented.
 LEAST = 1e-4
 
 
 def alpha_of(roughness: Doubles) -> Doubles:
-    """(n,) of roughnesses (n,)."""
+    """Return alpha (n,) of roughnesses (n,)."""
     return np.maximum(roughness**2, LEAST)
 
 
 def distribution(h: Doubles, alpha: Doubles) -> Doubles:
-    """D (Walter 2007, eq. 33)."""
+    """Return D (Walter 2007, eq. 33)."""
     z2 = h[:, 2]**2
     return np.where(h[:, 2] > 0, alpha**2 / (np.pi * (1 - z2 + alpha**2 * z2)**2), 0)
 
 
 def smith_lambda(cosine: Doubles, alpha: Doubles) -> Doubles:
-    """Λ (Heitz 2014, eq. 72), of |cosine|."""
+    """Return Λ of |cosine| (Heitz 2014, eq. 72)."""
     c2 = np.maximum(cosine**2, 1e-300)
     return np.asarray((np.sqrt(1 + alpha**2 * (1 - c2) / c2) - 1) / 2)
 
 
 def shadowing(cos_o: Doubles, cos_i: Doubles, alpha: Doubles, smith: str = "height_correlated") -> Doubles:
-    """G2 on one side: Heitz 2014, eq. 99 (height-correlated) and 98 (separable); Schlick's form with k of
+    """Return G2 on one side: Heitz 2014, eq. 99 (height-correlated) and 98 (separable); Schlick's form with k of
     (roughness + 1)²/8 or alpha/2 (Karis 2013, "Real Shading in Unreal Engine 4")."""
     if smith.startswith("schlick"):
         k = alpha / 2 if smith == "schlick_ibl" else (np.sqrt(alpha) + 1)**2 / 8
@@ -43,7 +43,7 @@ def shadowing(cos_o: Doubles, cos_i: Doubles, alpha: Doubles, smith: str = "heig
 
 
 def reflection(wo: Doubles, wi: Doubles, alpha: Doubles, smith: str = "height_correlated") -> Doubles:
-    """(n,) of D·G/(4·cos wo), so f·cos wi for F = 1 (Walter 2007, eq. 20); 0 below the horizon."""
+    """Return D·G/(4·cos wo) (n,), so f·cos wi for F = 1 (Walter 2007, eq. 20); 0 below the horizon."""
     up = (wo[:, 2] > 0) & (wi[:, 2] > 0)
     o, i = np.where(up, wo[:, 2], 1), np.where(up, wi[:, 2], 1)
     h = halfway(wo, np.where(up[:, None], wi, wo))
@@ -51,7 +51,7 @@ def reflection(wo: Doubles, wi: Doubles, alpha: Doubles, smith: str = "height_co
 
 
 class VisibleNormals:
-    """Reflection at normals drawn among those visible from wo."""
+    """Reflection at sampled normals that are visible from wo."""
 
     def __init__(self, alpha: Doubles) -> None:
         self._alpha = alpha
@@ -68,13 +68,13 @@ class VisibleNormals:
 
 
 def visible_density(wo: Doubles, h: Doubles, alpha: Doubles) -> Doubles:
-    """Of the normals (Heitz 2018, eq. 3)."""
+    """Return the pdf of visible normals (Heitz 2018, eq. 3)."""
     g1 = 1 / (1 + smith_lambda(wo[:, 2], alpha))
     return np.asarray(g1 * np.maximum(dot(wo, h), 0) * distribution(h, alpha) / np.maximum(wo[:, 2], 1e-300))
 
 
 def visible_normals(wo: Doubles, alpha: Doubles, u: Doubles) -> Doubles:
-    """(n, 3) by numbers (n, 2) in [0, 1) (Heitz 2018, listing 1)."""
+    """Return normals (n, 3) from numbers (n, 2) in [0, 1) (Heitz 2018, listing 1)."""
     v = unit(wo * np.column_stack([alpha, alpha, np.ones_like(alpha)]))
     across = np.hypot(v[:, 0], v[:, 1])
     steep = across < 1e-12
@@ -89,9 +89,9 @@ def visible_normals(wo: Doubles, alpha: Doubles, u: Doubles) -> Doubles:
 
 
 def visible_nodes(cosine: float, alpha: float, count: int) -> tuple[Doubles, Doubles, Doubles]:
-    """Of a quadrature over the normals visible from an angle: wo (n, 3), h (n, 3), and weights (n,), of 1 in all.
+    """Return a quadrature over the normals visible from an angle: wo (n, 3), h (n, 3), and weights (n,) that sum to 1.
 
-    A normal's first number is sin² of an angle, in which it is smooth; count: of nodes for each number.
+    A normal's first number is sin² of an angle, in which it is smooth; count: nodes for each number.
     """
     x, weights = np.polynomial.legendre.leggauss(count)
     angle, turn = np.meshgrid((x + 1) * np.pi / 4, (np.arange(count) + 0.5) / count, indexing="ij")

@@ -1,7 +1,7 @@
-"""What a single bounce at rough glass loses, by quadrature, and where later bounces leave.
+"""Energy lost by a single bounce at rough glass, by quadrature, and the distribution of later bounces.
 
 The single bounce is divided by 1 − min(loss(wo), loss(wi)), the larger of both directional albedos, in the manner of
-Turquin 2019, "Practical Multiple Scattering Compensation for Microfacet Models"; what is still missing leaves by the
+Turquin 2019, "Practical Multiple Scattering Compensation for Microfacet Models"; the remaining energy leaves by the
 lobe of Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks", rest(wo)·rest(wi)/(π·m).
 """
 
@@ -17,34 +17,35 @@ from . import fresnel
 from .ggx import alpha_of, smith_lambda, visible_nodes
 from .scattering import reflected
 
-#: Nodes of roughness from ROUGHNESS to 1, of the root of the cosine from 0 to 1, and of each of a normal's numbers.
+#: Nodes of roughness from ROUGHNESS to 1 and of the cosine's root from 0 to 1, and of each random number of a normal.
 NODES, NORMALS = 33, 48
-#: Smoother surfaces are not in the tables.
+#: Lower roughness is not in the tables.
 ROUGHNESS = 0.25
 
 
 class Energy:
-    """Of glass of one index at roughnesses (n,); a thin sheet spreads both ways what a mirror reflects."""
+    """Glass of one index at roughnesses (n,); a thin sheet spreads to both sides what a mirror reflects."""
 
     def __init__(self, ior: float, thin: bool, roughness: Doubles) -> None:
         assert roughness.min(initial=1.0) >= ROUGHNESS
         self._table, self._row = _table(ior, thin), (roughness - ROUGHNESS) / (1 - ROUGHNESS) * (NODES - 1)
 
     def at(self, cosine: Doubles, outside: Bools) -> tuple[Doubles, Doubles]:
-        """(n,) loss and rest from these angles on this side."""
+        """Return loss and rest (n,) at these angles on this side."""
         column = np.sqrt(np.clip(cosine, 0, 1)) * (NODES - 1)
         found = bilinear(self._table[:, :NODES], column, self._row, "clamp", "clamp")
         return np.where(outside, found[:, 0], found[:, 2]), np.where(outside, found[:, 1], found[:, 3])
 
     def mean_rest(self, outside: Bools) -> tuple[Doubles, Doubles]:
-        """(n,) ∫ rest·2c dc on this side and on the other."""
+        """Return ∫ rest·2c dc (n,) on this side and on the other."""
         found = bilinear(self._table[:, NODES:], np.zeros_like(self._row), self._row, "clamp", "clamp")
         return np.where(outside, found[:, 1], found[:, 3]), np.where(outside, found[:, 3], found[:, 1])
 
 
 @cache
 def _table(ior: float, thin: bool) -> Doubles:
-    """(roughnesses, cosines, 4) of loss and rest outside, then inside; in the last column their means."""
+    """Return the table (roughnesses, cosines, 4) of loss and rest outside, then inside, with means in the last column.
+    """
     x, weights = np.polynomial.legendre.leggauss(4 * NODES)
     between = (x + 1) / 2
     nodes, rows = np.linspace(0, 1, NODES), []
@@ -56,7 +57,7 @@ def _table(ior: float, thin: bool) -> Doubles:
 
 
 def _sides(ior: float, thin: bool, alpha: float) -> Doubles:
-    """(cosines, 4) of one roughness."""
+    """Return loss and rest (cosines, 4) of one roughness."""
     roots, etas = np.linspace(0, 1, NODES), [np.inf] if thin else [ior, 1 / ior]
     bounces = [[_bounce(max(root, 1e-3)**2, alpha, eta) for root in roots] for eta in etas]
     losses = [np.array([1 - back.sum() - on.sum() for back, on, _, _ in side]) for side in bounces]
@@ -70,7 +71,7 @@ def _sides(ior: float, thin: bool, alpha: float) -> Doubles:
 
 
 def _bounce(cosine: float, alpha: float, eta: float) -> tuple[Doubles, Doubles, Doubles, Doubles]:
-    """What is reflected and what passes at each visible normal, of 1 in all, and the cosines of where it goes."""
+    """Return the reflected and transmitted shares per visible normal, of 1 in total, and the outgoing cosines."""
     wo, h, share = visible_nodes(cosine, alpha, NORMALS)
     cos_o = np.clip(dot(wo, h), 1e-12, 1)
     if eta == np.inf:
@@ -83,6 +84,6 @@ def _bounce(cosine: float, alpha: float, eta: float) -> tuple[Doubles, Doubles, 
 
 
 def _seen(cosine: float, leaving: Doubles, alpha: float) -> Doubles:
-    """G2/G1, 0 on the wrong side."""
+    """Return G2/G1, 0 on the wrong side."""
     own, other = smith_lambda(np.array(cosine), np.array(alpha)), smith_lambda(leaving, np.array(alpha))
     return np.where(leaving > 0, (1 + own) / (1 + own + other), 0)

@@ -1,4 +1,4 @@
-"""A film over fibres over a surface, and what they leave to what lies below: T, the product of what each leaves."""
+"""A clearcoat over sheen over a surface, and their transmittance T, the product of both layers'."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .scattering import Strategy, Uniform
 
 
 class Layers:
-    """A film, fibres, both, or neither."""
+    """A clearcoat, sheen, both, or neither."""
 
     def __init__(self, film: Film | None, fibres: Fibres | None) -> None:
         self._film, self.fibres = film, fibres
@@ -24,15 +24,15 @@ class Layers:
         return bool(self._film or self.fibres)
 
     def film_left(self, cosine: Doubles) -> Doubles:
-        """(n,) of cosines (n,)."""
+        """Return the clearcoat's transmittance (n,) at cosines (n,)."""
         return self._film.left(cosine) if self._film else np.ones_like(cosine)
 
     def left(self, cosine: Doubles) -> Doubles:
-        """(n,) T of cosines (n,)."""
+        """Return T (n,) at cosines (n,)."""
         return self.film_left(cosine) * (self.fibres.left(cosine) if self.fibres else 1.0)
 
     def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
-        """(n, 3) of f·cos wi."""
+        """Return f·cos wi, (n, 3)."""
         value = np.zeros_like(wo)
         if self.fibres:
             value += np.minimum(*(self.film_left(w[:, 2]) for w in (wo, wi)))[:, None] * self.fibres.evaluate(wo, wi)
@@ -40,7 +40,7 @@ class Layers:
 
 
 def layers_of(material: MetallicRoughness, at: Surface) -> Layers:
-    """Of a material where rays hit it."""
+    """Return the layers of a material at hits."""
     has_film, has_fibres = material.clearcoat != 0, material.sheen_color != (0, 0, 0)
     return Layers(
         Film(at.number(material.clearcoat), at.number(material.clearcoat_roughness)) if has_film else None,

@@ -1,15 +1,15 @@
 """glTF 2.0's metallic-roughness material (its specification, appendix B), with KHR_materials_ior, _specular, and
-_transmission, under a film and fibres (see layers).
+_transmission, below a clearcoat and sheen (see layers).
 
     f = F(wi·h)·D·G/(4·cos·cos) + coupling·body/π,  body = (1 − metallic)·(1 − transmission)·color
 
-F is Schlick's, between F0 (of a dielectric and of `color`, mixed by `metallic`) and F90; for the coupling see there.
-With passing = (1 − metallic)·transmission·color a sheet passes passing·(1 − F(wi·h))·D·G/(4·cos·cos), F of the
-dielectric, and wi mirrored to wo's side; under the albedo coupling also passing·lost(wi)·lost(wo)/(π·mean lost), what
-single bounces lose.
+F is Schlick's, between F0 (of the dielectric and `color`, mixed by `metallic`) and F90; for the coupling see there.
+With passing = (1 − metallic)·transmission·color a sheet transmits passing·(1 − F(wi·h))·D·G/(4·cos·cos), with F of the
+dielectric and wi mirrored to wo's side; with the albedo coupling also passing·lost(wi)·lost(wo)/(π·mean lost), the
+energy that single bounces lose.
 
-Below layers, which leave T of light from an angle, single bounces are weighed by min(T(wi), T(wo)), and a diffuse lobe
-f(wi)·f(wo)/mean f is that of f·T.
+Below layers of transmittance T, single bounces are weighted by min(T(wi), T(wo)), and a diffuse lobe
+f(wi)·f(wo)/mean f becomes that of f·T.
 """
 
 from __future__ import annotations
@@ -60,10 +60,10 @@ class CookTorrance(Mixed):
         return self._of.passing * (once + again)
 
     def _facets(self, wo: Doubles, wi: Doubles) -> Doubles:
-        """(n, 1) of D·G/(4·cos) below layers."""
+        """Return D·G/(4·cos) below layers, (n, 1)."""
         left = np.minimum(self._left(wo[:, 2]), self._left(wi[:, 2]))
         return np.asarray(left * reflection(wo, wi, self._of.alpha, self._of.smith)[:, None])
 
     def _left(self, cosine: Doubles) -> Doubles:
-        """(n, 1) T."""
+        """Return T, (n, 1)."""
         return self._layers.left(cosine)[:, None]

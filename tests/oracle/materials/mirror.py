@@ -1,4 +1,4 @@
-"""A perfect mirror."""
+"""Perfect mirror."""
 
 from __future__ import annotations
 

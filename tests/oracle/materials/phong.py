@@ -1,4 +1,4 @@
-"""Phong's and Blinn's models in the forms that keep energy: Lafortune and Willems 1994, "Using the modified Phong
+"""Energy-conserving forms of Phong's and Blinn's models: Lafortune and Willems 1994, "Using the modified Phong
 reflectance model for physically based rendering"; Giesen 2009, "Phong and Blinn-Phong Normalization Factors".
 
 f = body/π + specular·N·cosⁿ with the body at most 1 − specular.
@@ -16,14 +16,14 @@ from .scattering import Cosine, Mixed, halfway, power_directions, reflected
 
 
 class Glossy(Mixed):
-    """What both share."""
+    """Base class of both models."""
 
     def __init__(self, material: Phong, at: Surface) -> None:
         self._specular, self._n = at.color(material.specular), material.shininess
         self._body = np.minimum(at.tinted(material.color), 1 - self._specular)
 
     def lobe(self, wo: Doubles, wi: Doubles) -> Doubles:
-        """(n,) of N·cosⁿ."""
+        """Return N·cosⁿ, (n,)."""
         raise NotImplementedError
 
     def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
@@ -32,7 +32,7 @@ class Glossy(Mixed):
 
 
 class PhongGloss(Glossy):
-    """By the cosine between wi and the mirrored wo."""
+    """Phong's lobe, of the cosine between wi and the mirrored wo."""
 
     def __init__(self, material: Phong, at: Surface) -> None:
         super().__init__(material, at)
@@ -44,7 +44,7 @@ class PhongGloss(Glossy):
 
 
 class BlinnGloss(Glossy):
-    """By the cosine between the normal and the half vector."""
+    """Blinn's lobe, of the cosine between the normal and the half vector."""
 
     def __init__(self, material: BlinnPhong, at: Surface) -> None:
         super().__init__(material, at)
@@ -56,7 +56,7 @@ class BlinnGloss(Glossy):
 
 
 class AroundMirrored:
-    """By a power of the cosine to the mirrored wo."""
+    """Sampling by a power of the cosine to the mirrored wo."""
 
     def __init__(self, n: float) -> None:
         self._n = n
@@ -70,7 +70,7 @@ class AroundMirrored:
 
 
 class AtPowerNormals:
-    """Mirrored at normals drawn by a power of their cosine."""
+    """Reflection at normals sampled by a power of their cosine."""
 
     def __init__(self, n: float) -> None:
         self._n = n

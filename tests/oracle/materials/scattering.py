@@ -1,4 +1,4 @@
-"""What every material provides, and how directions are drawn.
+"""Interface of all materials, and sampling of directions.
 
 Local frame: wo and wi are unit and point away from the surface, +z is its normal on the side of wo.
 """
@@ -14,34 +14,34 @@ from ..vectors import Doubles, dot, unit
 
 
 class Sample(NamedTuple):
-    """wi (n, 3), and f·|cos wi| over its density, (n, 3), in radiance: what is refracted is spread or bundled."""
+    """wi (n, 3), and f·|cos wi| over its density, (n, 3), for radiance: includes its scaling by refraction."""
 
     wi: Doubles
     weight: Doubles
 
 
 class Scattering(Protocol):
-    """A material where rays hit it."""
+    """A material at ray hits."""
 
-    #: Where light passes into another medium: its absorption per length, (n, 3).
+    #: Absorption per length of the medium that light enters, if it does, (n, 3).
     absorption_beyond: Doubles | None = None
 
     def evaluate(self, wo: Doubles, wi: Doubles) -> Doubles:
-        """(n, 3) of f·|cos wi|, but for single directions."""
+        """Return f·|cos wi| (n, 3), 0 for specular directions."""
 
     def sample(self, wo: Doubles, rng: np.random.Generator) -> Sample:
-        """A direction for each row."""
+        """Sample a direction for each row."""
 
 
 class Strategy(Protocol):
-    """A way to draw directions, with its density per solid angle."""
+    """Way to sample directions, with its density per solid angle."""
 
     def draw(self, wo: Doubles, rng: np.random.Generator) -> Doubles: ...
     def density(self, wo: Doubles, wi: Doubles) -> Doubles: ...
 
 
 class Mixed(Scattering):
-    """A material whose directions are drawn by one of its strategies, each as often as the others."""
+    """A material whose directions are sampled by one of its strategies, all with equal probability."""
 
     strategies: list[Strategy]
 
@@ -58,7 +58,7 @@ class Mixed(Scattering):
 
 
 class Cosine:
-    """Around the normal, by the cosine."""
+    """Cosine-weighted sampling around the normal."""
 
     def draw(self, wo: Doubles, rng: np.random.Generator) -> Doubles:
         return power_directions(1.0, rng.random((len(wo), 2)))
@@ -68,7 +68,7 @@ class Cosine:
 
 
 class Uniform:
-    """Over the hemisphere."""
+    """Uniform sampling of the hemisphere."""
 
     def draw(self, wo: Doubles, rng: np.random.Generator) -> Doubles:
         return power_directions(0.0, rng.random((len(wo), 2)))
@@ -78,7 +78,7 @@ class Uniform:
 
 
 class Through:
-    """Another strategy, on the other side of the surface."""
+    """Another strategy, mirrored to the other side of the surface."""
 
     def __init__(self, strategy: Strategy) -> None:
         self._strategy = strategy
@@ -91,22 +91,22 @@ class Through:
 
 
 def mirrored_below(w: Doubles) -> Doubles:
-    """To the other side of the surface."""
+    """Mirror to the other side of the surface."""
     return w * [1.0, 1.0, -1.0]
 
 
 def reflected(wo: Doubles, h: Doubles) -> Doubles:
-    """The mirror image of wo about h."""
+    """Return the mirror image of wo about h."""
     return 2 * dot(wo, h)[:, None] * h - wo
 
 
 def halfway(wo: Doubles, wi: Doubles) -> Doubles:
-    """The unit half vector."""
+    """Return the unit half vector."""
     return unit(wo + wi)
 
 
 def power_directions(n: float | Doubles, u: Doubles) -> Doubles:
-    """Around +z, with a density of (n + 1)/2π·cosⁿ; u (k, 2) in [0, 1)."""
+    """Return directions around +z with a density of (n + 1)/2π·cosⁿ; u (k, 2) in [0, 1)."""
     z = u[:, 0]**(1 / (n + 1))
     r, phi = np.sqrt(1 - z * z), 2 * np.pi * u[:, 1]
     return np.column_stack([r * np.cos(phi), r * np.sin(phi), z])

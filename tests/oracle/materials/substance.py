@@ -1,4 +1,4 @@
-"""The parameters of metallic_roughness at hits, with KHR_materials_ior, _specular, and _transmission."""
+"""Parameters of metallic_roughness at hits, with KHR_materials_ior, _specular, and _transmission."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ class Fresnel:
     f90: Doubles
 
     def at(self, cosine: Doubles) -> Doubles:
-        """(n, 3) of cosines (n,)."""
+        """Return F (n, 3) at cosines (n,)."""
         return schlick(cosine, self.f0, self.f90)
 
     def reflected(self, bounce: tuple[Doubles, Doubles]) -> Doubles:
-        """(n, 3) of what a bounce sends somewhere, (n, 1) by f0 and f90."""
+        """Return a bounce's reflection (n, 3), given (n, 1) by f0 and f90."""
         return np.asarray(self.f0 * bounce[0] + self.f90 * bounce[1])
 
     def passed(self, bounce: tuple[Doubles, Doubles]) -> Doubles:
-        """(n, 3) likewise with 1 − F."""
+        """Return the same with 1 − F, (n, 3)."""
         return np.asarray((1 - self.f0) * bounce[0] + (1 - self.f90) * bounce[1])
 
 
 class Substance:
-    """dielectric, gloss: F of that part, and of it and the metal; body, passing: (n, 3) color of what light enters,
-    diffuse or a sheet; color (n, 3); metallic (n, 1)."""
+    """dielectric, gloss: F of the dielectric part, and mixed with the metal; body, passing: (n, 3) color of light that
+    enters, diffuse or transmitted; color (n, 3); metallic (n, 1)."""
 
     def __init__(self, material: MetallicRoughness, at: Surface) -> None:
         self.alpha, self.smith = alpha_of(at.number(material.roughness)), material.smith
