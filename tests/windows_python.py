@@ -1,6 +1,6 @@
-"""`clrt ARGUMENTS` as Windows' Python would meet its own modules: what os, signal and mmap lack there is taken away
-once all libraries are loaded, Ctrl-Break has its signal, ctypes cannot load the process itself, and text that is opened
-without an encoding is an error. A simulation: drivers, paths and processes stay.
+"""Runs `clrt ARGUMENTS` with the gaps of Python on Windows: names that os, signal and mmap lack there are removed
+once all libraries are loaded, SIGBREAK exists, ctypes cannot load the process itself, and opening text without an
+encoding is an error. Drivers, paths and processes are not simulated.
 
 usage: python -X warn_default_encoding -m tests.windows_python ARGUMENTS
 """
@@ -30,7 +30,7 @@ import platformdirs  # noqa: F401
 import pydantic  # noqa: F401
 import pyopencl.array  # noqa: F401
 
-#: Of those that the standard library documents as available on Unix alone; subprocess needs some others here.
+#: A part of what the standard library documents as available on Unix only; subprocess needs some others here.
 LACKS = {
     os: "chown fchmod fork forkpty getegid geteuid getgid getuid killpg mkfifo mknod nice O_DIRECT posix_fadvise pread "
         "pwrite register_at_fork sched_getaffinity sched_setaffinity setsid statvfs uname",
@@ -41,7 +41,7 @@ MODULES = ("fcntl", "grp", "pwd", "resource", "termios")
 
 
 def take_away() -> None:
-    """What is not there on Windows; Ctrl-Break's signal, which is there alone, is SIGUSR2."""
+    """Remove what Windows lacks, and add SIGBREAK, which exists only there, as SIGUSR2."""
     setattr(signal, "SIGBREAK", signal.SIGUSR2)
     for module, names in LACKS.items():
         for name in names.split():
@@ -53,7 +53,7 @@ def take_away() -> None:
 
 
 class _Library(ctypes.CDLL):
-    """A library, which has a name."""
+    """Library loader that requires a name."""
 
     def __init__(self, name: str | None, *arguments: Any, **options: Any) -> None:
         if name is None:
