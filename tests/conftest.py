@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 FOLDERS = {"farm": "farm", "oracle": "statistics", "study": "study", "window": "window"}
 #: Limit on PoCL's cache of compiled programs between runs; one run of all tests adds about 200 MB.
 MOST_KEPT_BYTES = 500_000_000
-#: Variables that control terminal output. Tests set them themselves, whatever the machine's environment has.
+#: Variables that control terminal output. Tests set them themselves, regardless of the machine's environment.
 DISPLAY_VARIABLES = ("CI", "COLUMNS", "FORCE_COLOR", "LINES", "NO_COLOR")
 
 

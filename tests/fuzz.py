@@ -1,8 +1,8 @@
 """Fuzzer of the file readers: each damaged file must load or raise one SceneError, in bounded time and memory.
 
-        python -m tests.fuzz 10000                  # 10000 files, made from small seeds that are written here
-        python -m tests.fuzz 10000 --seeds FOLDER   # also from the files in a folder
-        python -m tests.fuzz 300 --render 10        # also renders every tenth file that loads
+    python -m tests.fuzz 10000                  # 10000 files, made from small seeds that are written here
+    python -m tests.fuzz 10000 --seeds FOLDER   # also from the files in a folder
+    python -m tests.fuzz 300 --render 10        # also renders every tenth file that loads
 
 File number i is the same in every run. A worker process loads the files; if it crashes or takes too long, a new one
 resumes after the file that caused it.

@@ -1,9 +1,9 @@
 """Random sequences of valid and invalid public calls with threads, interrupts, forks and copies.
 
-        python -m tests.misuse 600 --first 40     # run for 600 seconds, from sequence 40 on
+    python -m tests.misuse 600 --first 40     # run for 600 seconds, from sequence 40 on
 
-    Sequence i makes the same calls in every run, in its own process, which must exit by itself; after every call the
-    same queries and renders must give the same results as at its start.
+Sequence i makes the same calls in every run, in its own process, which must exit by itself; after every call the
+same queries and renders must give the same results as at its start.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Renders the files in folders with `clrt render`: `python -m tests.outcomes FOLDER...` prints a table of outcomes.
 
-Each file is rendered small in its own process. A picture, listed with its warnings, and an error with exit code 3 are
-the expected outcomes.
+Each file is rendered small in its own process. An image (outcome "picture", with its warnings) and an error with exit
+code 3 are the expected outcomes.
 """
 
 from __future__ import annotations

@@ -105,7 +105,7 @@ def test_coherent_rays_meet_the_same_by_all_traversals(device: Device) -> None:
 
 @pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh", "packs", "list"])
 def test_copies_a_hair_away_are_told_apart(device: Device, layout: str) -> None:
-    """Of nine coincident triangles the lowest index is hit, also if t is hardly more than rounding error."""
+    """The lowest index of nine coincident triangles is hit, also if t is hardly more than rounding error."""
     rng = np.random.default_rng(6)
     order = rng.permutation(np.tile(np.arange(64), 9))
     corners = rng.uniform(-1, 1, (64, 3, 3)).astype(np.float32)

@@ -71,7 +71,7 @@ def test_locations_lie_on_ray_and_plane(device: Device) -> None:
 
 
 def test_rays_along_a_plane_are_located_on_the_triangle(device: Device) -> None:
-    """In float64 such rays meet the plane anywhere or nowhere; most hits found in float32 lie inside the triangle."""
+    """In float64 such rays intersect the plane anywhere or nowhere; most float32 hits lie inside the triangle."""
     mesh = trimesh.creation.icosphere()
     corners = mesh.triangles[RNG.integers(0, len(mesh.faces), 5000)]
     one, other = (np.einsum("nk,nkj->nj", weights, corners) for weights in RNG.dirichlet([1, 1, 1], (2, 5000)))

@@ -186,7 +186,7 @@ def test_a_ray_passes_eight_corners_in_order() -> None:
 
 
 def fullest(nodes: Records, choose: Callable[[Group], int], enters: Callable[[], bool]) -> int:
-    """Return the maximum number of waiting groups in a traversal with this order of nodes and choice of hits."""
+    """Return the most groups on the stack of a traversal that visits choose(group) and enters children if enters()."""
     group, waiting, most = [0], list[Group](), 0
     while True:
         node = group.pop(group.index(choose(group)))

@@ -73,7 +73,7 @@ def most_bvh8(records: Records, reference: int, instance: int, waiting: int) -> 
 
 
 def most_cwbvh(records: Records, node: int, instance: int, waiting: int) -> int:
-    """Return the maximum stack size: rests of node groups wait; in an instance, also its enclosing group and nodes."""
+    """Return the maximum stack size: unvisited nodes of a group wait; in an instance, its outer group and nodes too."""
     record = records.nodes[node]
     inner = [slot for slot in range(8) if record["imask"] >> slot & 1]
     leaves = [meta for slot, meta in enumerate(record["meta"].tolist()) if meta and slot not in inner]

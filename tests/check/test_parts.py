@@ -54,7 +54,7 @@ def test_units_in_the_last_place() -> None:
 
 
 def test_operands_round_to_all_sides() -> None:
-    """Of sums and products, 10 % round up, 10 % down, 5 % are halfway, and none leaves the normal range."""
+    """At least 10 % of sums and products round up, 10 % down, 5 % are halfway, and none leaves the normal range."""
     a, b, c = (values.astype(np.float64) for values in operands())
     for exact in (a + b, a * b):
         rounded = exact.astype(np.float32)

@@ -50,7 +50,7 @@ def test_devices_are_no_targets(folder: Path) -> None:
 
 
 def test_nothing_replaces_a_pipe_that_comes_later(folder: Path) -> None:
-    """Also through a link; a scene is not written if one of its files would replace a pipe."""
+    """A pipe is not replaced through a link either; a scene is not written if one of its files would replace a pipe."""
     os.mkfifo(folder / "pipe")
     (folder / "link").symlink_to(folder / "pipe")
     for path in (folder / "pipe", folder / "link"):
@@ -135,7 +135,7 @@ def test_no_file_of_the_scene_is_replaced(folder: Path, arguments: tuple[str, ..
 
 
 def test_checkpoints_of_any_version_are_replaced(folder: Path) -> None:
-    """Also damaged ones, as far as they can be recognized."""
+    """Damaged checkpoints are replaced too, as far as they can be recognized."""
     for content in (b"clrt checkpoint 1\nold", b"clrt check", b""):
         (folder / "a.ck").write_bytes(content)
         result = clrt("render", "ball.toml", "--spp", "1", "--checkpoint", "a.ck", cwd=folder)

@@ -44,7 +44,7 @@ def test_what_is_chosen_is_compiled(tmp_path: Path) -> None:
 
 
 def test_info_is_of_the_device_that_would_render(tmp_path: Path) -> None:
-    """The builder ploc is that of an opened device; an unknown device is refused."""
+    """With a device the builder is ploc, for which sah stands in without one; an unknown device is refused."""
     scene = tmp_path / "two.toml"
     scene.write_text("[[mesh]]\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]]\n"
                      "faces = [[0, 1, 2], [1, 3, 2]]\n")

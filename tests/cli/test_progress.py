@@ -44,7 +44,7 @@ def test_the_pace_is_that_of_late() -> None:
 
 
 def test_the_first_pace_is_the_mean_so_far() -> None:
-    """Also if the time has not advanced."""
+    """The rate stays the same if the time has not advanced."""
     pace = Pace()
     pace.add(2.0, 400)
     assert pace.rate == 200

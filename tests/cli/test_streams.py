@@ -24,7 +24,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def shell(arguments: str, redirection: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run clrt with a redirection; with pipefail, its exit code is that of the pipeline."""
+    """Run clrt with a redirection; in a pipe, pipefail preserves its exit code."""
     line = f"{sys.executable} -m clrt {arguments} {redirection}"
     return subprocess.run(["bash", "-o", "pipefail", "-c", line], cwd=folder, capture_output=True, text=True)
 
@@ -61,7 +61,7 @@ def test_results_that_cannot_be_printed(folder: Path, arguments: str) -> None:
 @pytest.mark.parametrize("arguments", ["devices", "info ball.toml", "doctor", "cache", "render ball.toml -q",
                                        "debug ball.toml --pixel 1,1"])
 def test_no_file_can_be_written(folder: Path, arguments: str) -> None:
-    """Not even temporary files: commands work, or fail with one error of the loader or for lack of a driver."""
+    """If no file can be written, commands work, or fail with one error: the loader's, or the lack of a driver."""
     (folder / "limited.sh").write_text(f"ulimit -f 0\nexec {sys.executable} -m clrt {arguments}\n")
     result = subprocess.run(["bash", "limited.sh"], cwd=folder, capture_output=True, text=True)
     assert result.returncode in {0, 4} and "Traceback" not in result.stderr

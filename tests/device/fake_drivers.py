@@ -29,7 +29,7 @@ def make_driver(vendors: Path, name: str, **choices: str) -> Path:
 
 
 def environment(folder: Path, **more: str) -> dict[str, str]:
-    """Return an environment with the drivers of folder/vendors and pip, a cache, and a log of loaded drivers."""
+    """Return an environment: drivers of folder/vendors and pip, cache in folder/cache, loaded drivers in folder/log."""
     kept = {name: value for name, value in os.environ.items() if name not in ("CLRT_DEVICE", "OCL_ICD_FILENAMES")}
     return kept | {"OCL_ICD_VENDORS": str(folder / "vendors"), "CLRT_CACHE_DIR": str(folder / "cache"),
                    "FAKE_LOG": str(folder / "log")} | more

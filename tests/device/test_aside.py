@@ -35,7 +35,7 @@ SOURCE = "kernel void add_%d(global float *x) { x[get_global_id(0)] += %d; }"
 
 def test_beside_large_data_no_compiler_takes_memory(tmp_path: Path) -> None:
     """The compiler's 80 MB and more are used by the other process, and the next process finds the program cached."""
-    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # which pip brings
+    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # installed by pip
 
     def built(data_bytes: int, kept: str) -> tuple[int, bool, int]:
         folder = str(tmp_path / kept)

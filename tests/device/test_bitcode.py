@@ -40,7 +40,7 @@ def multiplied(factor):
 device = open_device()
 print(json.dumps([multiplied(2), multiplied(3)]))
 """
-POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # which pip brings
+POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # installed by pip
 
 
 def places(folder: Path) -> dict[str, str]:

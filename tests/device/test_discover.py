@@ -139,7 +139,7 @@ def test_this_machines_devices() -> None:
 
 
 def test_the_one_that_is_preferred_is_chosen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Of three equal devices, the variable's is chosen, else the file's; none if no device matches."""
+    """The variable's device is chosen among three equal ones, else the file's; none if no device matches."""
     own = find_devices()[0][1]
     monkeypatch.setattr(discover, "load_platforms", lambda again: ([None], {}))
     monkeypatch.setattr(discover, "devices_of", lambda platform: 3 * [own])

@@ -23,7 +23,7 @@ GARBAGE = bytes(range(256)) * 4
 def test_a_damaged_program_is_compiled_again(tmp_path: Path, name: str, size: int) -> None:
     """Some damage is noticed at once; if PoCL aborts on it, the error says so and the damaged files are removed."""
     (tmp_path / "scene.toml").write_text(SCENE)
-    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # which pip brings
+    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # installed by pip
     places = surroundings(HOME=str(tmp_path), CLRT_CACHE_DIR=str(tmp_path / "cache"), OCL_ICD_VENDORS=str(pocl),
                           POCL_CACHE_DIR=str(tmp_path / "kept"))
 

@@ -111,7 +111,7 @@ def test_a_device_that_failed_is_used_only_if_named(info: DeviceInfo, caplog: py
 
 
 def test_the_next_best_is_used(info: DeviceInfo, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of three equal devices the first failed: the second is used, also if only the type is given."""
+    """If the first of three equal devices failed, the second is used, also if only the type is given."""
     own = next(device for each, device in find_devices() if each.id == info.id)
     monkeypatch.setattr(discover, "load_platforms", lambda again: ([None], {}))
     monkeypatch.setattr(discover, "devices_of", lambda platform: 3 * [own])

@@ -1,4 +1,4 @@
-"""Addresses without a scheduler, or where something else answers, raise an error in time that names them."""
+"""Connecting to an address without a scheduler raises an error in time that names the address."""
 
 from __future__ import annotations
 

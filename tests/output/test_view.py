@@ -45,7 +45,7 @@ def test_known_values() -> None:
     ("srgb", 1.055 * 0.18 ** (1 / 2.4) - 0.055), ("raw", 0.18), ("pbr_neutral", 1.055 * 0.14 ** (1 / 2.4) - 0.055),
     ("agx", 0.5), ("aces", 0.349188)])
 def test_grey_card(view: str, signal: float) -> None:
-    """0.18: by the sRGB curve; 0.14 of it, after Khronos's offset of 0.04; AgX's pivot; computed by OpenColorIO."""
+    """Values: sRGB of 0.18; sRGB of 0.14, which Khronos's offset of 0.04 leaves; AgX's pivot; OpenColorIO's."""
     card = np.full((1, 1, 3), 0.18, np.float32)
     assert view_called(view)(card)[0, 0] == pytest.approx([signal] * 3, abs=5e-5)
 

@@ -43,7 +43,7 @@ def noise(height: int, width: int) -> NDArray[np.float32]:
 @pytest.mark.parametrize("size", [(1, 1), (16, 24), (64, 80)], ids=str)
 @pytest.mark.parametrize("suffix", EXTENSIONS)
 def test_any_part_may_be_missing(tmp_path: Path, suffix: str, size: tuple[int, int], by_rows: bool) -> None:
-    """The missing part ranges from the last byte to the whole file; the old file stays in every case."""
+    """The missing part ranges from one byte, in the C library's buffer, to the whole file; the old file stays."""
     path, pixels = tmp_path / f"a{suffix}", noise(*size)
 
     def write(values: NDArray[np.float32]) -> None:

@@ -27,7 +27,7 @@ from clrt.study.probe import choices
 from clrt.study.random_draws import Draws
 from clrt.study.random_scenes import BATCH, random_scene
 
-#: Seeds other scenes every day, or is set by this environment variable.
+#: Environment variable of the seed; the default is the date, so that the scenes change every day.
 VARIABLE = "CLRT_COMBINATIONS_SEED"
 TODAY = int(os.environ.get(VARIABLE, date.today().toordinal()))
 #: Scenes of the test suite, from one batch, which shares programs.

@@ -90,7 +90,7 @@ def noisy(mean: NDArray[np.float64], spp: int, seeds: int, rng: np.random.Genera
 
 
 def test_both_tests_reject_as_often_as_they_should() -> None:
-    """Of 200 images with the true mean, Mitsuba's rule rejects none and the block test about 1 in 1000 families."""
+    """Mitsuba's rule rejects none of 200 images with the true mean, and the block test about 1 in 1000 families."""
     rng = np.random.default_rng(7)
     mean = np.random.default_rng(1).uniform(0.2, 2, (16, 16, 3))
     told = [(pixel_test(64 * 16, pictures.mean(0).reshape(-1, 3), mean.reshape(-1, 3), mean.reshape(-1, 3)**2),

@@ -27,7 +27,7 @@ from ..rendering.rays import hit_triangles
 pytestmark = pytest.mark.needs("embreex")
 RNG = np.random.default_rng(17)
 BALL = bumpy_ball(3)
-#: Not a multiple of the packet, chunk and block sizes.
+#: Number of rays that is no multiple of the packet, chunk and block sizes.
 COUNT = 4096 + 128 + 13
 MODULES = {"embreex": "embreex", "trimesh + embreex": "embreex", "trimesh + rtree": "rtree", "open3d": "open3d",
            "warp": "warp"}

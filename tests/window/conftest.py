@@ -28,7 +28,7 @@ def display() -> Iterator[str]:
 
 @pytest.fixture(autouse=True)
 def window_environment(display: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Open windows on that display, whatever display the environment has."""
+    """Open windows on that display instead of the one in the environment."""
     monkeypatch.setenv("DISPLAY", display)
     monkeypatch.setenv("LIBGL_ALWAYS_SOFTWARE", "1")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

@@ -81,7 +81,7 @@ class Driver:
 
 
 def changed(before: Levels, after: Levels) -> NDArray[np.bool_]:
-    """Return (height, width): where two images differ by more than one level of rounding."""
+    """Return a mask, (height, width), of the pixels where two images differ by more than one level."""
     return np.asarray(np.abs(before - after).max(axis=2) > 1)
 
 
