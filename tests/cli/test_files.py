@@ -119,7 +119,7 @@ MODEL = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0
     ("ball.toml", "-o", "b.png", "--plot", "paint.png"), ("ball.toml", "--turntable", "2", "-o", "t_####.png"),
     ("ball.toml", "-o", "b.png", "--checkpoint", "a.obj")], ids=" ".join)
 def test_no_file_of_the_scene_is_replaced(folder: Path, arguments: tuple[str, ...]) -> None:
-    """Models, their material libraries, textures and environment maps are checked before the render begins."""
+    """Scene files (models, .mtl, textures, maps) are checked before the render; a.obj's default output is a texture."""
     (folder / "a.obj").write_text(MODEL)
     (folder / "a.mtl").write_text("newmtl m\nmap_Kd a.png\n")
     textured = 'type = "diffuse"\ncolor = { image = "%s" }\n'
