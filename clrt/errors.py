@@ -9,7 +9,8 @@
     │   └── HungError    the device has stopped responding            exit code 4
     ├── KernelError   the device's compiler rejected the program      exit code 5
     └── OutputError   an image or report could not be written         exit code 6
-        └── KeptBesideError  written next to the file to be replaced  exit code 6
+        ├── KeptBesideError  written next to the file to be replaced  exit code 6
+        └── ReaderGoneError  the pipe's reader has ended              exit code 6, or 130 if by Ctrl-C
 
 The public interface raises only these for users' mistakes; any other exception is a bug in clrt.
 """
@@ -75,6 +76,10 @@ class OutputError(ClrtError):
 
 class KeptBesideError(OutputError):
     """A result cannot replace a file, and was saved next to it under another name."""
+
+
+class ReaderGoneError(OutputError):
+    """A result cannot be written to a pipe, as its reader has ended."""
 
 
 def check_choice(name: str, value: object, known: Iterable[object]) -> None:

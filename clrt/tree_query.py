@@ -246,6 +246,8 @@ def _shown(hits: NDArray[Any]) -> NDArray[Any]:
 
 def _coherent(directions: NDArray[np.float32]) -> bool:
     """Return whether consecutive rays (n, 3) have similar directions, from a sample of pairs."""
+    if len(directions) < 2:
+        return False
     first = np.linspace(0, max(0, len(directions) - 2), PAIRS).astype(np.intp)[:len(directions) - 1]
     with np.errstate(all="ignore"):
         one, other = directions[first].astype(np.float64), directions[first + 1].astype(np.float64)

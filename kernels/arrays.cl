@@ -1,10 +1,10 @@
-// Arrays of the scene. Where one is larger than the device's largest buffer all are in parts, and a record is looked up in
-// two steps; each part ends with the first PART_OVERLAP records of the next, so those of a leaf stand in one. Else an
-// array is a buffer, and this costs nothing.
+// Arrays of the scene. If one exceeds the device's largest buffer, all are split into parts and a record takes two
+// lookups; each part repeats the first PART_OVERLAP records of the next, so that the records of a leaf are contiguous.
+// Otherwise an array is a plain buffer, without overhead.
 //
 // RECORD(scene->name, i)         pointer to record i
-// ARRAY(Type) name               how functions take such an array
-// WHOLE(Type, name, pointer);    one of a single buffer, of at most as many records as a part has of its own
+// ARRAY(Type) name               parameter type of such an array
+// WHOLE(Type, name, pointer);    an array of a single buffer, with at most as many records as a part has of its own
 
 #if PART_BYTES
 #define ARRAY(type) global const type *const *

@@ -1,17 +1,17 @@
-// The materials of the scene by type. MATERIAL_TYPES lists those in use and the host includes their files; a scene
-// with one material compiles to that material alone.
+// Dispatch of materials by type. MATERIAL_TYPES lists the types in use and the host includes their files; a scene with
+// one material compiles to that material alone.
 #include "bsdf/interface.cl"
 #include MATERIAL_FILES
 #include NORMAL_MAPS_FILE
 
-// What the lanes hit: each lane's material is of one type, and only that member means something for it.
+// The BSDF at each lane's hit: only the member of the lane's material type is meaningful.
 typedef struct {
     ireal type;
 #define MEMBER(name, number) struct name name;
     MATERIAL_TYPES(MEMBER)
 } Bsdf;
 
-// A material's code is its type | its index among those of its type << 4.
+// A material's code is type | index << 4, with the index among the materials of its type.
 static inline void bsdf_at(const Scene *scene, const Surface *surface, Bsdf *bsdf) {
     bsdf->type = surface->material & 15;
 #define READ(name, number) { \
@@ -70,7 +70,8 @@ static inline real3 bsdf_albedo(const Bsdf *bsdf) {
     return albedo;
 }
 
-// Whether a direction is on the same side of the geometric normal as of the shading normal, given its cosines with them.
+// Whether a direction is on the same side of the geometric normal as of the shading normal, given its cosines with
+// both.
 static inline ireal same_side(real cos_ns, real cos_ng) {
 #if TRANSMISSION
     return ((cos_ns > 0.0f) & (cos_ng > 0.0f)) | ((cos_ns < 0.0f) & (cos_ng < 0.0f));
@@ -80,7 +81,7 @@ static inline ireal same_side(real cos_ns, real cos_ng) {
 }
 
 #if TRANSMISSION_LOBES
-// Whether this material, not only its type, scatters light from behind the surface.
+// Whether this material, not only its type, scatters light that arrives from behind the surface.
 static inline ireal is_lit_from_behind(const Bsdf *bsdf) {
     ireal lit = NO_LANES;
 #define SPREADING(name, number) { \
@@ -95,7 +96,7 @@ static inline ireal is_lit_from_behind(const Bsdf *bsdf) {
 #include HORIZON_FILE
 
 #if ATTENUATION
-// What is absorbed of light beyond the surface, per unit of length: as much as `here` where it has no inside.
+// Absorption coefficient beyond the surface, per unit of length; `here` if the material has no inside.
 static inline real3 absorption_beyond(const Bsdf *bsdf, real3 here) {
     real3 absorption = here;
 #define ABSORBING(name, number) \
@@ -104,7 +105,7 @@ static inline real3 absorption_beyond(const Bsdf *bsdf, real3 here) {
     return absorption;
 }
 
-// What is left of light after a distance (Beer and Lambert); all of it where nothing absorbs, however far.
+// Transmittance over a distance (Beer–Lambert law); 1 without absorption, even for an infinite distance.
 static inline real3 attenuated(real3 absorption, real distance) {
     return vector(absorption.x > 0.0f ? exp(-absorption.x * distance) : ONE,
                   absorption.y > 0.0f ? exp(-absorption.y * distance) : ONE,

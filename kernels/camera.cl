@@ -1,11 +1,11 @@
-// What a work-item sees: its pixels, and the camera's rays through them. World frame.
+// The pixels of a work-item and the camera rays through them. World frame.
 //
-// The camera's file in camera/ provides, for the place (sx, sy) of the picture, which goes from (−1, −1), its upper left
-// corner, to (1, 1), the lower right, and with a wide filter a little beyond:
+// The camera's file in camera/ provides, for the image position (sx, sy), from (−1, −1) at the upper left corner to
+// (1, 1) at the lower right, slightly beyond with a wide filter:
 //
-//   ray_through(launch, sx, sy, &sampler)     its ray; a camera that draws no numbers leaves them to the path
+//   ray_through(launch, sx, sy, &sampler)     the camera ray; cameras without random numbers leave `sampler` alone
 //
-// Each says what launch->right, up and forward are to it; clrt/rendering/camera.py makes them.
+// Each file documents the meaning of launch->right, up and forward; clrt/rendering/camera.py computes them.
 #include "sampler.cl"
 #include "vector.cl"
 #include FILTER
@@ -14,15 +14,15 @@ typedef struct { real3 origin, direction; } CameraRay;   // direction: unit
 
 #include CAMERA
 
-// What the lanes of a work-item see: LANES pixels of a tile of TILE x TILE. A launch takes those from first_pixel on,
-// counted tile by tile as `tiles` lists them, row by row in each. A lane past the picture's edge is given its first lane's
-// pixel and is not `inside`.
+// The pixels of a work-item's lanes: LANES pixels of a tile of TILE x TILE. A launch covers pixels from first_pixel
+// on, in the order of `tiles`, row by row within each tile. A lane outside the image gets the pixel of the first lane
+// and is not `inside`.
 typedef struct {
-    ureal index, x, y, code;   // index: of the pixel in the film, which is the picture or, of FILM_WINDOWS, the launch's
+    ureal index, x, y, code;   // index: in the film, which covers the image or, if FILM_WINDOWS, the launch
     ireal inside;
 } LanePixels;
 
-// The LANES pixels of number `group` in the launch; false where there are none.
+// Compute the pixels of group `group` of the launch; return false if the group is past its end.
 static inline bool group_pixels(const Launch *launch, global const uint *tiles, uint group, LanePixels *p) {
     uint first = group * LANES;
     if (first >= launch->pixel_count) return false;
@@ -48,13 +48,14 @@ static inline bool lane_pixels(const Launch *launch, global const uint *tiles, L
     return group_pixels(launch, tiles, (uint)get_global_id(0), p);
 }
 
-// A place (sx, sy) of the pixel (x, y): u draws it from the filter around the pixel's middle, which is that of (½, ½).
+// Return the image position (sx, sy) of a sample in pixel (x, y): u samples the filter around the pixel centre, u =
+// (½, ½).
 static inline real2 place_in_pixel(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u) {
     return (real2){2.0f * (TO_REAL(x) + filter_sample(scene, u.x)) / (float)launch->width - 1.0f,
                    2.0f * (TO_REAL(y) + filter_sample(scene, u.y)) / (float)launch->height - 1.0f};
 }
 
-// A ray through such a place.
+// Return a camera ray through pixel (x, y), filter-sampled by u.
 static inline CameraRay camera_ray(const Scene *scene, const Launch *launch, ureal x, ureal y, real2 u, Sampler *sampler) {
     real2 place = place_in_pixel(scene, launch, x, y, u);
     return ray_through(launch, place.x, place.y, sampler);

@@ -1,10 +1,10 @@
-// The paths of one pixel's samples, written down vertex by vertex: what path.cl follows, by the same stages of edge.cl, so
-// the contributions that are written add up to the samples of the render.
+// Record the paths of one pixel's samples vertex by vertex: the same paths as path.cl, by the same stages of edge.cl,
+// so the recorded contributions add up to the samples of the render.
 //
-// A lane follows a sample, `sample_count` of them from first_sample on, through the pixel first_pixel. Each has room for
-// max_depth records. VERTEX_ROWS, VERTEX_REALS and VERTEX_INTS list the members of a record by their kind, and END_… why a
-// path ended; the host writes both (clrt/debug/record.py). What a stage drew but does not return is drawn again from a copy
-// of its sampler. World frame.
+// Each lane follows one sample, `sample_count` of them from first_sample on, through the pixel first_pixel, with room
+// for max_depth records. VERTEX_ROWS, VERTEX_REALS and VERTEX_INTS list the members of a record by type, and END_…
+// why a path ended; the host writes both (clrt/debug/record.py). Random choices that a stage does not return are
+// drawn again from a copy of its sampler. World frame.
 #include "camera.cl"
 #include "edge.cl"
 #include "film.cl"
@@ -42,7 +42,7 @@ static inline void store_vertex(global Vertex *to, const VertexLanes *v, int lan
 
 static inline ireal flag(ireal mask) { return mask ? (ireal)(1) : (ireal)(0); }
 
-// Where the path arrived, and the emission that it finds there.
+// Record the path vertex and the emission found there.
 static inline void note_arrival(const Scene *scene, const Path *path, const Surface *surface, const Hits *hits, ireal hit,
                                 ireal escaped, VertexLanes *v) {
     v->throughput = at_eye(path, splat(ONE));
@@ -65,7 +65,7 @@ static inline void note_arrival(const Scene *scene, const Path *path, const Surf
 
 #if PRIMITIVES
 #if LIGHTS
-// What stops a shadow ray: the first surface on its way that lets nothing through.
+// Return the hit that blocks a shadow ray: the first opaque surface along it.
 static inline Hits blocker_of(const Scene *scene, const ShadowRay *ray, ireal stopped) {
     real3 direction = choose(ray->infinite, ray->wi, sub(ray->target, ray->origin));
     real t_max = ray->infinite ? (real)(INFINITY) : ONE;
@@ -82,7 +82,7 @@ static inline Hits blocker_of(const Scene *scene, const ShadowRay *ray, ireal st
     return hits;
 }
 
-// The light that is sampled, and what it contributes.
+// Record the sampled light and its contribution.
 static inline void note_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
                               ireal active, Sampler *sampler, VertexLanes *v) {
     Sampler again = *sampler;
@@ -115,13 +115,13 @@ static inline void note_light(const Scene *scene, const Path *path, const Surfac
 }
 #endif
 
-// The direction in which the path goes on, or why it ends here.
+// Record the sampled direction of the next segment, or why the path ends here.
 static inline ireal note_direction(Path *path, const Surface *surface, const Shading *shading, ireal active, int depth,
                                    int max_depth, Sampler *sampler, VertexLanes *v) {
     Sampler again = *sampler;
     ireal goes = go_on(path, surface, shading, active, depth, max_depth, sampler);
     v->end = goes ? (ireal)(END_NONE) : (ireal)(END_DEPTH);
-    if (sampler->dimension == again.dimension) return goes;   // a last edge, for which no direction was drawn
+    if (sampler->dimension == again.dimension) return goes;   // last vertex: no direction was sampled
     real2 u = next_2d(&again), choice = next_2d(&again);
     BsdfSample sample = shading_sample(shading, surface, u, choice.x);
     v->direction = choose(active, sample.wi, splat(ZERO));

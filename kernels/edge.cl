@@ -1,25 +1,25 @@
-// Path tracing with light samples and multiple importance sampling (Kajiya 1986; Veach 1997, ch. 9 and 10): what happens
-// along an edge of a path. path.cl and wave.cl put these stages together; each is for the edges in all lanes.
+// Path tracing with next-event estimation and multiple importance sampling (Kajiya 1986; Veach 1997, ch. 9 and 10):
+// the stages of one path segment, which path.cl and wave.cl combine. Each stage processes all lanes.
 //
-// World frame; light in W·sr⁻¹·m⁻². Light is returned as what reaches the eye, 0 in lanes that are not asked for.
+// World frame; radiance in W·sr⁻¹·m⁻². Light is returned as its contribution at the camera, 0 in inactive lanes.
 #include "light.cl"
 #include "shading.cl"
 #include VISIBILITY
 
-#define ROULETTE_DEPTH 4   // edges before Russian roulette may end a path
+#define ROULETTE_DEPTH 4   // path depth from which Russian roulette may end a path
 
-// A path that sets out on its next edge, from `origin` along `wi`.
+// State of a path whose next segment starts at `origin` in direction `wi`.
 typedef struct {
     real3 origin, wi;
-    real3 p, n;            // the point that it leaves, and the normal there
-    real pdf;              // density of wi
-    ireal specular;        // whether wi alone could have found what lies there
+    real3 p, n;            // previous path vertex and its normal
+    real pdf;              // density with which wi was sampled
+    ireal specular;        // whether wi is a specular direction, which light sampling cannot find
     real3 beta;            // throughput
 #if TRANSMISSION
-    real spread;           // radiance at the eye over that here, by the media between (bsdf/interface.cl)
+    real spread;           // radiance at the camera over radiance here, from the media crossed (bsdf/interface.cl)
 #endif
 #if ATTENUATION
-    real3 absorption;      // along wi, per unit of length
+    real3 absorption;      // absorption coefficient along wi, per unit of length
 #endif
 } Path;
 
@@ -39,6 +39,7 @@ static inline Path path_along(real3 eye, real3 direction) {
     return path;
 }
 
+// The contribution at the camera of radiance L that arrives along the current segment.
 static inline real3 at_eye(const Path *path, real3 L) {
 #if TRANSMISSION
     return mul(path->beta, scale(L, path->spread));
@@ -48,14 +49,14 @@ static inline real3 at_eye(const Path *path, real3 L) {
 }
 
 #if CLAMP
-// The factor that clamps a contribution to a sample, whose path has so many edges: it makes the largest channel at most
-// clamp_direct (up to two edges, as in Cycles) or clamp_indirect.
+// The factor that clamps a contribution of a path of `edges` segments to a sample: it limits the largest channel to
+// clamp_direct (up to two segments, as in Cycles) or to clamp_indirect.
 static inline real clamp_factor(const Launch *launch, real3 light, int edges) {
     real limit = (real)(edges <= 2 ? launch->clamp_direct : launch->clamp_indirect), most = largest(light);
     return most > limit ? limit / most : ONE;
 }
 
-// The clamped contribution. *removed gains the mean of the channels of what that removes.
+// Return the clamped contribution; add the mean over the channels of the energy removed to *removed.
 static inline real3 clamped(const Launch *launch, real3 light, int edges, real *removed) {
     real part = clamp_factor(launch, light, edges);
     *removed += (1.0f - part) * (light.x * (1.0f / 3.0f) + light.y * (1.0f / 3.0f) + light.z * (1.0f / 3.0f));
@@ -66,14 +67,14 @@ static inline real3 clamped(const Launch *launch, real3 light, int edges, real *
 #define clamped(launch, light, edges, removed) (light)
 #endif
 
-// What is absorbed on the way to where the ray ended.
+// Apply the absorption along the segment that ends after `distance`.
 static inline void absorb(Path *path, real distance) {
 #if ATTENUATION
     path->beta = mul(path->beta, attenuated(path->absorption, distance));
 #endif
 }
 
-// 1. What glows where the rays ended, weighted against the light sample that could have found it: surfaces …
+// 1. Emission at the end of the segment, with its MIS weight against light sampling: emissive surfaces …
 static inline real3 emitted_light(const Scene *scene, const Path *path, const Surface *surface, real t, ireal hit) {
 #if EMITTERS
     real pdf;
@@ -89,7 +90,7 @@ static inline real3 emitted_light(const Scene *scene, const Path *path, const Su
 static inline real3 escaped_light(const Scene *scene, const Path *path, ireal escaped) {
 #if ENVIRONMENT
     if (!ANY(escaped)) return splat(ZERO);
-    real3 wi = choose(escaped, path->wi, vector(ZERO, ONE, ZERO));   // an idle lane's may be NaN, and so its texel
+    real3 wi = choose(escaped, path->wi, vector(ZERO, ONE, ZERO));   // NaN in inactive lanes gives no valid texel
     real3 light = environment_light(scene, path->p, path->n, wi, path->pdf, path->specular);
     return choose(escaped, at_eye(path, light), splat(ZERO));
 #else
@@ -99,14 +100,14 @@ static inline real3 escaped_light(const Scene *scene, const Path *path, ireal es
 
 #if PRIMITIVES
 #if LIGHTS
-// A ray towards a sampled point of a light, and what comes along it if nothing is in between.
+// A shadow ray to a sampled point on a light, and its contribution if it is unoccluded.
 typedef struct {
     real3 origin, target, wi;
     ireal infinite;
     real3 light;
 } ShadowRay;
 
-// 2. Light by shadow rays: which lanes send one.
+// 2. Next-event estimation: sample a light and the shadow ray to it. Returns the lanes that need a shadow ray.
 static inline ireal aim_at_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
                                  ireal active, Sampler *sampler, ShadowRay *ray) {
     LightSample light = light_sample(scene, surface->p, choosing_normal(shading), sampler);
@@ -128,14 +129,15 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
     return useful;
 }
 
+// Trace the shadow rays of the lanes `sent`; return their contributions.
 static inline real3 light_along(const Scene *scene, const ShadowRay *ray, ireal sent) {
     real visible = transmittance(scene, ray->origin, ray->target, ray->wi, ray->infinite, sent);
     return choose(visible > 0.0f, scale(ray->light, visible), splat(ZERO));
 }
 #endif
 
-// 3. On in a direction drawn from the material: which paths do go on. None does on a last edge where nothing glows that it
-// could meet.
+// 3. Sample the BSDF for the direction of the next segment. Returns the lanes whose paths continue: none if the next
+// segment is the last one and the scene has neither emitters nor an environment that it could find.
 static inline ireal go_on(Path *path, const Surface *surface, const Shading *shading, ireal active, int depth,
                           int max_depth, Sampler *sampler) {
 #if !(EMITTERS || ENVIRONMENT)
@@ -158,8 +160,8 @@ static inline ireal go_on(Path *path, const Surface *surface, const Shading *sha
 #endif
     path->origin = offset_origin(surface->p, surface->p_error, surface->ng, path->wi);
 
-    // 4. Russian roulette: end weak paths, keep the mean (Arvo and Kirk 1990). Those that go on have a throughput of a
-    // third at least: in rooms the error falls by more than the time grows.
+    // 4. Russian roulette: end paths of low throughput without bias (Arvo and Kirk 1990). Survivors have a throughput
+    // of at least 1/3: in interiors the error falls by more than the time grows.
     if (depth >= ROULETTE_DEPTH) {
         real survival = minimum(3.0f * largest(path->beta), ONE);
         active = active & (choice.y < survival);

@@ -1,9 +1,9 @@
-// The accumulated picture: for each pixel the sum of its samples and of their squares, each as a float pair.
+// The film: per pixel the sum of its samples and of their squares, each as a pair of floats.
 //
-// A plain float sum of n samples stops growing near n = 2^24; here the rounding error of every addition is kept in a
-// second float (Knuth's two-sum), so the mean stays right to a few units in the last place for any n. The two-sum
-// has no products, hence nothing to contract. Samples that are not finite, or so bright that a sum of 2^24 of them
-// would overflow, are dropped and counted.
+// A plain float sum of n samples stops growing near n = 2^24. Compensated summation keeps the rounding error of every
+// addition in a second float (Knuth's two-sum), so the mean is accurate to a few ulps for any n. The two-sum contains
+// no products, hence nothing the compiler could contract. Samples that are not finite, or so bright that a sum of
+// 2^24 of them would overflow, are dropped and counted.
 #include "loops.cl"
 #include "vector.cl"
 
@@ -13,10 +13,10 @@ typedef struct {
     real3 sum, sum_error, square, square_error;
     ureal count, dropped, rays;
 #if DIRECT_LIGHT
-    real3 direct, direct_error;   // of the same samples: what came with two edges at most
+    real3 direct, direct_error;   // light of the same samples from paths of at most two segments
 #endif
 #if CLAMP
-    real clamped;                 // what clamps took from them, the mean of the channels
+    real clamped;                 // energy that clamping removed from them, mean of the channels
 #endif
 } Accumulator;
 
@@ -28,7 +28,7 @@ static inline void two_sum(real *sum, real *error, real x) {
     *error = e - (*sum - s);
 }
 
-// Which lanes' samples are kept.
+// Add a sample to each lane's pixel; return the lanes whose samples were kept.
 static inline ireal accumulate(Accumulator *a, real3 sample, ireal counted) {
     real3 size = absolute3(sample);
     ireal finite = (size.x <= BRIGHTEST) & (size.y <= BRIGHTEST) & (size.z <= BRIGHTEST);
@@ -39,7 +39,7 @@ static inline ireal accumulate(Accumulator *a, real3 sample, ireal counted) {
     two_sum(&a->sum.x, &a->sum_error.x, L.x);
     two_sum(&a->sum.y, &a->sum_error.y, L.y);
     two_sum(&a->sum.z, &a->sum_error.z, L.z);
-    // Squares are cut off, so that their sum does not overflow either; then they average to less than the mean's square.
+    // Squares are clamped so that their sum does not overflow; their mean is then less than the square of the mean.
     two_sum(&a->square.x, &a->square_error.x, minimum(L.x * L.x, (real)(BRIGHTEST)));
     two_sum(&a->square.y, &a->square_error.y, minimum(L.y * L.y, (real)(BRIGHTEST)));
     two_sum(&a->square.z, &a->square_error.z, minimum(L.z * L.z, (real)(BRIGHTEST)));
@@ -75,7 +75,7 @@ static inline void store_rows(global float *row, const real3 *value, int lane) {
     row[2] = LANE(value->z, lane);
 }
 
-// Nothing is stored where the driver ended loops early: the host then misses samples.
+// Store nothing if the driver ended loops early: the host then finds samples missing.
 static inline void store_pixels(global Pixel *film, ureal index, ireal stored, const Accumulator *a) {
     if (loops_ended(2 + (LANE_UINT(index, 0) == 0xffffffff))) return;
     for (int lane = 0; lane < LANES; ++lane) {

@@ -1,12 +1,12 @@
-// What the camera's rays meet first, without its light: pictures beside the picture (AOVs) for those who compose it.
+// First-hit AOVs for compositing: attributes of the first surface that camera rays hit, without its light.
 //
-// One work-item takes LANES pixels. SEEN_MEANS lists what is averaged over `sample_count` camera rays of each, as the
-// picture itself is; SEEN_MIDDLE what is that of the one ray through the pixel's middle, with its primitive: means of
-// places are of no place. The host writes both lists, of what is asked for. Where nothing is met all are 0, and the
-// primitive is -1. World frame.
+// One work-item renders LANES pixels. SEEN_MEANS lists the AOVs averaged over `sample_count` camera rays per pixel,
+// as the image is; SEEN_MIDDLE those taken from the single ray through the pixel centre, with its primitive, because
+// a mean of positions or ids is meaningless. The host writes both lists, according to the AOVs requested. On a miss
+// all values are 0 and the primitive is -1. World frame.
 //
-// SEEN_FILES are those of the materials, where what is asked for depends on them. To add one: a function seen_NAME here,
-// and its name in clrt/rendering/first_hits.py.
+// SEEN_FILES are the files of the materials, if a requested AOV depends on them. To add an AOV: add a function
+// seen_NAME here, and its name in clrt/rendering/first_hits.py.
 #include "camera.cl"
 #include "film.cl"
 #include VISIBILITY
@@ -27,7 +27,8 @@ static inline real3 seen_geometric_normal(const Scene *scene, const Surface *sur
 
 static inline real3 seen_position(const Scene *scene, const Surface *surface) { return surface->p; }
 
-// The surface that stops a ray, turned towards the camera; which lanes meet one, and its primitive and instance.
+// Intersect camera rays with the first surface that is not transparent and turn it towards the camera. Returns the
+// lanes that hit one.
 static inline ireal meet(const Scene *scene, const CameraRay *ray, ireal active, Sampler *sampler, Surface *surface,
                          ireal *primitive, ireal *instance) {
     Hits hits = first_surface(scene, ray->origin, ray->direction, true, active, sampler, surface);
@@ -38,7 +39,7 @@ static inline ireal meet(const Scene *scene, const CameraRay *ray, ireal active,
     bend_normal(scene, surface);
 #endif
     turn_towards(surface, negate(ray->direction));
-    surface->p = mad3(ray->direction, hits.t, ray->origin);   // its own is drawn in from a triangle's edges
+    surface->p = mad3(ray->direction, hits.t, ray->origin);   // surface->p is pulled inwards from a triangle's edges
     return hit;
 }
 #endif
@@ -65,7 +66,7 @@ kernel void first_hit(SCENE_PARAMETERS, global FirstHit *pixels, global const ui
     }
     real2 middle = {(real)(0.5f), (real)(0.5f)};
     Launch pinhole = launch;
-    pinhole.lens_radius = 0.0f;   // the ray through the middle of a lens, too
+    pinhole.lens_radius = 0.0f;   // use the ray through the centre of a lens as well
     sampler = sampler_at(own.code, (ureal)(0), launch.seed, launch.block_bits);
     CameraRay ray = camera_ray(&scene, &pinhole, own.x, own.y, middle, &sampler);
     hit = meet(&scene, &ray, own.inside, &sampler, &surface, &primitive, &instance);

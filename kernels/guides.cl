@@ -1,11 +1,11 @@
-// What is seen, without its light: pictures that guide a denoiser.
+// Auxiliary images for a denoiser: albedo and normal of the first visible non-specular surface.
 //
-// One work-item takes LANES pixels and averages `sample_count` camera rays of each. Rays go on from mirrors and glass,
-// there by the likelier of reflection and refraction, since guides are to be free of noise. The first surface that is
-// neither is what is seen, as Open Image Denoise asks, its albedo tinted by their colors. The sky, suns included,
-// has its radiance, up to 1, for albedo, and no normal. World frame.
+// One work-item takes LANES pixels and averages `sample_count` camera rays per pixel. Rays follow mirrors and glass,
+// taking the likelier of reflection and refraction since guides should be noise-free. They record the first surface
+// that is neither, as Open Image Denoise recommends, with its albedo tinted by the specular colors. The sky, suns
+// included, stores its radiance, clamped to 1, as albedo, and no normal. World frame.
 //
-// To add one: a field of the record GUIDE (clrt/rendering/records.py), its like in Seen, and what it is, below.
+// To add one: add a field to the record GUIDE (clrt/rendering/records.py) and to Seen, and compute it below.
 #include "camera.cl"
 #include "film.cl"
 #include "light.cl"

@@ -1,13 +1,14 @@
-// A sample a lane: a work-item takes LANES pixels through `sample_count` samples.
+// Megakernel: each lane computes one sample at a time; a work-item renders LANES pixels with `sample_count` samples
+// each.
 //
 // INTEGRATOR provides
 //
 //   seen_along(scene, launch, &ray, active, &sampler, &rays, &direct, &removed)
-//                                         what arrives at the eye along camera rays, 0 in idle lanes; adds how many rays
-//                                         that took; direct: set where DIRECT_LIGHT is compiled in; removed: what clamps
-//                                         took is added where CLAMP is
+//                                         radiance along the camera rays, 0 in inactive lanes; adds the number of rays
+//                                         traced to `rays`; sets `direct` if DIRECT_LIGHT is compiled in; adds the
+//                                         energy removed by clamping to `removed` if CLAMP is
 //
-// PIXEL_MIDDLE: all samples are of the ray through the pixel's middle.
+// PIXEL_MIDDLE: all samples use the ray through the pixel centre.
 #include "camera.cl"
 #include "film.cl"
 #include INTEGRATOR

@@ -1,9 +1,10 @@
-// Lane types: the shading code is written once over them and compiled for 1, 8 or 16 paths a work-item.
+// Lane types: the shading code is written once in terms of them and compiled for a SIMD width of 1, 8 or 16 paths per
+// work-item.
 //
-// real, ireal, ureal   a float, int, uint of every path          real3   a vector of three reals
-// A mask is an ireal: a comparison's result. Scalars are 0/1 and vectors 0/-1, so a mask is only ever used in
-// `m ? a : b`, `a & b`, `a | b`, `!m` and ANY(m), which mean the same for both.
-// GATHER(type, array, index, .member) reads one record of an array per lane; the index of an idle lane must be valid, too.
+// real, ireal, ureal   a float, int, uint per path           real3   a vector of three reals
+// A mask is an ireal, the result of a comparison. Scalars are 0/1 and vectors 0/-1, so masks are only used in `m ? a :
+// b`, `a & b`, `a | b`, `!m` and ANY(m), which mean the same for both.
+// GATHER(type, array, index, .member) reads one record of an array per lane; inactive lanes need a valid index, too.
 
 #include "mask.cl"
 #include "arrays.cl"
@@ -54,7 +55,7 @@ typedef struct { real x, y, z; } real3;
                                                GATHER(real, array, index, member[1]), \
                                                GATHER(real, array, index, member[2])})
 
-// One lane at a time, for the code that handles single rays: unions to write, LANE… to read.
+// Access to single lanes, for code that handles single rays: unions to write, LANE… to read.
 typedef union { real all; float lane[LANES]; } RealLanes;
 typedef union { ireal all; int lane[LANES]; } IntLanes;
 #define LANE(value, lane) (((const float *)&(value))[lane])

@@ -1,15 +1,15 @@
-// The lights of the scene: which is sampled and where, and what shines when a ray meets it.
+// The lights of the scene: choice and sampling of a light, and the radiance of emitters that a ray hits.
 //
-// LIGHT_TYPES lists the types in use, EMITTER_TYPES those that have a surface; the host includes their files. Lights are
-// numbered type by type in that order. Where there are several, light/choice.cl chooses one; the probability of that is
-// part of every pdf here. p, n: the point that is lit, and its unit normal on the side that is.
+// LIGHT_TYPES lists the types in use, EMITTER_TYPES those with a surface; the host includes their files. Lights are
+// numbered by type in that order. If there are several, light/choice.cl chooses one, and every pdf here includes the
+// probability of that choice. p, n: the shading point and its unit normal on the lit side.
 #include "light/interface.cl"
 #include MIS_WEIGHTS
 #include LIGHT_FILES
 #include LIGHT_CHOICE
 
 #if LIGHTS
-// A direction towards each lane's own light, by u.
+// Sample a direction towards each lane's light with u.
 static inline LightSample sample_of_light(const Scene *scene, ireal light, real3 p, real2 u) {
     LightSample sample = {splat(ZERO), splat(ZERO), ONE, splat(ZERO), NO_LANES, NO_LANES};
     int first = 0;
@@ -31,12 +31,13 @@ static inline LightSample sample_of_light(const Scene *scene, ireal light, real3
     return sample;
 }
 
-// A light for each lane, and the probability of that choice; u is left for a point on it.
+// Choose a light for each lane, with the probability of the choice; u is left for sampling a point on it.
 static inline ireal chosen_light(const Scene *scene, real3 p, real3 n, Sampler *sampler, real2 *u, real *probability) {
     *u = next_2d(sampler);
     return pick_light(scene, p, n, sampler, &u->x, probability);
 }
 
+// Choose a light and sample a direction towards it.
 static inline LightSample light_sample(const Scene *scene, real3 p, real3 n, Sampler *sampler) {
     real probability;
     real2 u;
@@ -48,8 +49,8 @@ static inline LightSample light_sample(const Scene *scene, real3 p, real3 n, Sam
 #endif
 
 #if EMITTERS
-// Radiance that arrives along wi from the emitters that lanes met at distance t, and the density with which
-// light_sample would have chosen that direction from p.
+// Radiance along wi from the emitters hit at distance t, and the pdf with which light_sample would have sampled that
+// direction from p.
 static inline real3 emitter_radiance(const Scene *scene, real3 p, real3 n, real3 wi, real t, const Surface *surface,
                                      ireal hit, real *pdf) {
     ireal emitter = hit & (surface->light >= 0);
@@ -73,11 +74,11 @@ static inline real3 emitter_radiance(const Scene *scene, real3 p, real3 n, real3
 }
 #endif
 
-// Whether a ray that escapes may find light: of the sky, or of suns with a size.
+// Whether a ray that escapes can find light: from the sky, or from suns with a size.
 #define ENVIRONMENT (SKY || LIGHT_SUN)
 
 #if SKY
-// Radiance that arrives along wi from the sky, and the density with which light_sample would have chosen wi at p.
+// Radiance along wi from the sky, and the pdf with which light_sample would have sampled wi at p.
 static inline real3 escaped_radiance(const Scene *scene, real3 p, real3 n, real3 wi, real *pdf) {
     real3 radiance = sky_radiance(scene, wi, pdf);
 #if LIGHT_SKY
@@ -88,7 +89,7 @@ static inline real3 escaped_radiance(const Scene *scene, real3 p, real3 n, real3
 #endif
 
 #if ENVIRONMENT
-// Radiance that arrives along wi from the sky and all suns.
+// Radiance along wi from the sky and all suns.
 static inline real3 environment_radiance(const Scene *scene, real3 wi) {
     real3 radiance = splat(ZERO);
     real pdf;
@@ -101,8 +102,8 @@ static inline real3 environment_radiance(const Scene *scene, real3 wi) {
     return radiance;
 }
 
-// The same at p, the radiance of each light with its MIS weight: wi was sampled by the BSDF with density `pdf`, or is a
-// specular direction, which light sampling cannot find.
+// The same at p, with the radiance of each light multiplied by its MIS weight: wi was sampled by the BSDF with
+// density `pdf`, or is a specular direction, which light sampling cannot find.
 static inline real3 environment_light(const Scene *scene, real3 p, real3 n, real3 wi, real pdf, ireal specular) {
     real3 light = splat(ZERO);
     real other;

@@ -1,9 +1,9 @@
-// Masks of eight and sixteen lanes as bits: bit i is set where lane i is true (−1). And what only CPUs have: one
-// instruction for that, one for putting lanes side by side, and prefetching; elsewhere the same is said in portable words.
+// Masks of eight and sixteen lanes as bits: bit i is set if lane i is true (−1). Also CPU intrinsics, with portable
+// fallbacks: one instruction for such a mask, one for compressing lanes, and prefetching.
 //
-// __AVX__ and the like are defined where a compiler makes code for such a processor directly.
+// __AVX__ and the like are defined if the compiler generates code for such a CPU directly.
 
-// Clang warns where another processor would pass a vector to a function in another way. No other code calls these.
+// Clang warns about the vector calling convention of other CPUs; these functions are only called from this program.
 #pragma clang diagnostic ignored "-Wpsabi"
 
 #if defined(__AVX__) && !PORTABLE_MASK
@@ -18,7 +18,7 @@ static inline uint mask_bits(int8 mask) {
     ulong bytes = as_ulong(convert_char8(mask));
     return (uint)(((bytes & 0x8040201008040201UL) * 0x0101010101010101UL) >> 56);
 }
-// By bytes: Oclgrind takes the upper half of sixteen lanes for uninitialised.
+// Via bytes: Oclgrind reports the upper half of sixteen lanes as uninitialised.
 static inline uint mask_bits16(int16 mask) {
     ulong2 bits = ((as_ulong2(convert_char16(mask)) & 0x8040201008040201UL) * 0x0101010101010101UL) >> 56;
     return (uint)(bits.x | bits.y << 8);
@@ -27,7 +27,7 @@ static inline uint mask_bits16(int16 mask) {
 
 static inline int first_bit(uint bits) { return (int)popcount(~bits & (bits - 1)); }
 
-// Writes the lanes whose bits are set to target[0], [1] …; up to target[7] anything may be overwritten.
+// Write the lanes whose bits are set to target[0], [1] …; everything up to target[7] may be overwritten.
 #if defined(__AVX512VL__) && !PORTABLE_MASK
 static inline void store_lanes(int8 lanes, uint bits, int *target) {
     vstore8(__builtin_ia32_compresssi256_mask(lanes, lanes, (uchar)bits), 0, target);
@@ -40,12 +40,12 @@ static inline void store_lanes(int8 lanes, uint bits, int *target) {
 }
 #endif
 
-// The same for many values by one mask: store_in_order(lanes, lane_order(bits), target).
+// The same for several values with one mask: store_in_order(lanes, lane_order(bits), target).
 #if defined(__AVX512VL__) && !PORTABLE_MASK
 static inline uint lane_order(uint bits) { return bits; }
 static inline void store_in_order(int8 lanes, uint order, int *target) { store_lanes(lanes, order, target); }
 #else
-// The numbers of the lanes whose bits are set, four bits each.
+// The indices of the lanes whose bits are set, four bits each.
 static inline uint lane_order(uint bits) {
     uint order = 0;
     for (uint shift = 0; bits; bits &= bits - 1, shift += 4) order |= (uint)first_bit(bits) << shift;
@@ -65,8 +65,8 @@ static inline void store_in_order(int8 lanes, uint order, int *target) {
 #endif
 #endif
 
-// The lane, of those in the mask, with the least number; all are >= 0. Numbers that differ in their last three bits only
-// count as equal. 7 where the mask is empty.
+// The lane with the smallest number among those in the mask; all numbers are >= 0. Numbers that differ only in their
+// last three bits compare equal. 7 if the mask is empty.
 static inline int least_lane(float8 numbers, int8 mask) {
     int8 eight = mask ? (as_int8(numbers) & ~7) | (int8)(0, 1, 2, 3, 4, 5, 6, 7) : (int8)(0x7fffffff);
     int4 four = eight.lo < eight.hi ? eight.lo : eight.hi;
@@ -74,7 +74,7 @@ static inline int least_lane(float8 numbers, int8 mask) {
     return (two.x < two.y ? two.x : two.y) & 7;
 }
 
-// Brings the cache lines of `bytes` from `address` on near; where that cannot be said, nothing.
+// Prefetch the cache lines of `bytes` from `address` on, if supported.
 #if defined(__SSE2__) && !PORTABLE_MASK
 #define PREFETCH(address, bytes) _Pragma("unroll") for (int line = 0; line < (bytes); line += 64) \
     __builtin_prefetch((global const char *)(address) + line);

@@ -1,9 +1,9 @@
-// The weights of multiple importance sampling (Veach 1997, ch. 9) where the light's and the BSDF's samples find the same
-// light. kernels/study has others, by which one of the two strategies finds all that it can.
+// MIS weights (Veach 1997, ch. 9) of light and BSDF samples of the same light. kernels/study has alternatives in which
+// one of the two strategies finds all light that it can.
 #include "sampling.cl"
 
-// Of a light sample of density `pdf`, which the BSDF would sample with bsdf_pdf.
+// The weight of a light sample of density `pdf`, which BSDF sampling has with bsdf_pdf.
 static inline real light_sample_weight(real pdf, real bsdf_pdf) { return power_heuristic(pdf, bsdf_pdf); }
 
-// Of light that a BSDF sample of density `pdf` found, and a light sample would with light_pdf.
+// The weight of emission found by a BSDF sample of density `pdf`, which light sampling has with light_pdf.
 static inline real bsdf_sample_weight(real pdf, real light_pdf) { return power_heuristic(pdf, light_pdf); }

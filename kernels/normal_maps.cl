@@ -1,10 +1,10 @@
-// Normal maps: they bend the shading normal, as glTF has it. (x, y) from 0 to 1 stand for −1 to 1, x along the tangent, y along
-// the bitangent. Before the normals are turned to a side.
+// Normal maps, as in glTF: (x, y) from 0 to 1 encode −1 to 1, x along the tangent, y along the bitangent. Applied
+// before the normals are turned towards the viewer.
 //
-// COAT_NORMALS: a coat lies on the unbent surface, or as a map of its own bends it. Types with such coats are evaluated in the
-// frame of the unbent normal, where those of coat and base are two directions (bsdf/layers.cl).
+// COAT_NORMALS: a coat uses the unbent normal or a normal map of its own. Material types with such coats are evaluated
+// in the frame of the unbent normal, in which the normals of coat and base are two directions (bsdf/layers.cl).
 
-// Of each lane's material the texture of a map, −1 for none, and how far it bends.
+// Each lane's normal map: its texture, −1 for none, and its scale.
 typedef struct { ireal texture; real strength; } NormalMap;
 
 #define READ_MAP(map, name, number) { \
@@ -31,8 +31,8 @@ static inline NormalMap coat_normal_map(const Scene *scene, const Surface *surfa
 #endif
 
 #if SPHERES
-// The tangent of a sphere and its handedness follow the image as the texture places it. On a sphere u goes to the east, a
-// turn for 1, and v to the south, half a turn for 1.
+// The tangent of a sphere and its handedness follow the texture transform of the image. On a sphere u runs east, one
+// turn per unit, and v south, half a turn per unit.
 static inline void place_sphere_tangent(const Scene *scene, ireal texture, real3 n, real3 *tangent, real *handedness) {
     real3 u_row = GATHER3(scene->textures, texture, .u_row), v_row = GATHER3(scene->textures, texture, .v_row);
     real side = u_row.x * v_row.y - u_row.y * v_row.x < 0.0f ? -ONE : ONE;
@@ -69,9 +69,9 @@ static inline void bend_normal(const Scene *scene, Surface *surface) {
     surface->ns = bent(scene, surface, normal_map(scene, surface));
 }
 
-// What bumps leave of matte light to or from w, unit, world frame: by the normal alone it would end at a hard edge, where w
-// sinks below the surface. GGX's shadowing, with a roughness for the slope of the bump (Estevez, Lecocq and Stein 2019, A
-// Microfacet-Based Shadowing Function to Solve the Bump Terminator Problem): 1 where no map bends, 0 at the horizon.
+// Bump shadowing of diffuse light to or from w, unit, world frame: without it light would end at a hard edge where w
+// sinks below the surface. GGX shadowing with a roughness derived from the bump's slope (Estevez, Lecocq and Stein
+// 2019, A Microfacet-Based Shadowing Function to Solve the Bump Terminator Problem): 1 without a map, 0 at the horizon.
 static inline real bump_shadowing(const Surface *surface, real3 w) {
     real up = dot3(w, surface->unbent), bend = dot3(surface->ns, surface->unbent), up2 = up * up, bend2 = bend * bend;
     real alpha2 = minimum(0.125f * maximum(1.0f - bend2, ZERO) / bend2, ONE);

@@ -1,4 +1,4 @@
-// How far surfaces stop light; OPACITY_TYPES lists the types of materials some of which do not stop all of it.
+// Surface opacity; OPACITY_TYPES lists the material types of which some are not opaque.
 #include "bsdf/interface.cl"
 
 #if CAMERA_CULLING
@@ -7,10 +7,10 @@
 #define ONE_SIDED(value) ((value) != 0.0f)
 #endif
 
-// What part of light along `direction` the surfaces stop, before they are turned (turn_towards). from_camera: whether that
-// is a camera ray, to which some have no back.
+// The opacity of surfaces for light along `direction`, before turn_towards. from_camera: whether the ray is a camera
+// ray, to which some surfaces are culled on their back side.
 static inline real opacity_at(const Scene *scene, const Surface *surface, real3 direction, int from_camera) {
-    real opacity = ONE, cutoff = ZERO;     // other materials stop all light, whatever the alpha of vertex colours is
+    real opacity = ONE, cutoff = ZERO;     // other materials are opaque, whatever the alpha of vertex colours
     ireal visible = ALL_LANES, from_behind = dot3(surface->ng, direction) > 0.0f;
 #define OPACITY_OF(name, number) { \
         ireal is_type = (surface->material & 15) == number; \

@@ -1,4 +1,5 @@
-// A path a lane, followed to its end (see integrate.cl). direct: what came with two edges at most; removed: what clamps took.
+// Path tracing integrator of the megakernel (integrate.cl). direct: light from paths of at most two segments;
+// removed: by clamps.
 #include "camera.cl"
 #include "edge.cl"
 

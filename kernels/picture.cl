@@ -1,9 +1,9 @@
-// Pictures without light, of what the camera's rays meet first; 0 where they meet nothing. World frame.
+// Images without light, of the first surface that camera rays hit; 0 on a miss. World frame.
 //
 // The file in picture/ provides
 //
-//   picture_value(scene, launch, direction, t, &surface) what the picture has of a surface that is t along the ray, not
-//                                                        turned to any side yet
+//   picture_value(scene, launch, direction, t, &surface) the value of a surface at t along the ray, before
+//                                                        turn_towards
 #include "camera.cl"
 #include "surface.cl"
 #include PICTURE

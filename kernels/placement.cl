@@ -1,14 +1,15 @@
-// Where instances stand: what was found in a mesh's frame is taken to the world.
+// Instance transforms: from a mesh's object frame to the world.
 //
-// Normals go by the cofactors of the matrix M, its inverse transposed but for a factor; a mirroring matrix turns them
-// round, so that a mesh keeps its front. A point is as wrong as it was in the mesh's frame, and further by the rounding of
-// the way there, where rays are met, and back: some units of |M|·|M^-1|·(|p| + |moved|) (pbrt, 4th ed., 6.8.6), much where
-// M shears. Instance 0 is what stands in the world as it is, if there is such; its matrix is the identity.
+// Normals are transformed by the cofactors of the matrix M, its inverse transpose up to a factor; for a mirroring M
+// they are flipped, so that a mesh keeps its front. The error of a point is that in the object frame plus the rounding
+// of the transforms to the object frame, where rays are intersected, and back: some ulps of |M|·|M^-1|·(|p| + |moved|)
+// (pbrt, 4th ed., 6.8.6), which is large if M shears. Instance 0 is the geometry without instancing, if there is any;
+// its matrix is the identity.
 
 typedef struct {
-    real3 x, y, z, moved;            // rows of M, and what comes last
+    real3 x, y, z, moved;            // rows of M, and its translation
     real3 normal_x, normal_y, normal_z;
-    real unit, side;                 // of unit·M no entry exceeds 1; side: 1, or −1 where M mirrors
+    real unit, side;                 // no entry of unit·M exceeds 1; side: 1, or −1 if M mirrors
 } Place;
 
 static inline real3 placed_normal(const Place *place, real3 n) {
@@ -26,7 +27,7 @@ static inline Place place_of(const Scene *scene, ireal instance) {
                          GATHER(real, scene->placements, instance, .to_world[2][3]));
     real unit = GATHER(real, scene->placements, instance, .unit);
     place.unit = absolute(unit);
-    // Products of M's own entries could leave the range of floats.
+    // Products of M's own entries could overflow or underflow.
     real3 x = scale(place.x, unit), y = scale(place.y, unit), z = scale(place.z, unit);
     place.normal_x = cross3(y, z);
     place.normal_y = cross3(z, x);
@@ -35,14 +36,14 @@ static inline Place place_of(const Scene *scene, ireal instance) {
     return place;
 }
 
-// A tangent of the mesh's in the world, of unit length; zero stays zero.
+// A mesh's tangent in the world, of unit length; zero stays zero.
 static inline real3 placed_tangent(const Place *place, real3 t) {
     real3 world = scale(vector(dot3(place->x, t), dot3(place->y, t), dot3(place->z, t)), place->unit);
     real norm2 = dot3(world, world);
     return scale(world, norm2 > 0.0f ? rsqrt(norm2) : ZERO);
 }
 
-// Takes a point and its error, and the geometric normal.
+// Transform the point with its error bound, and the geometric normal.
 static inline void place_surface(const Scene *scene, ireal instance, const Place *place, Surface *surface) {
     real3 p = surface->p, error = surface->p_error;
     surface->p = add(vector(dot3(place->x, p), dot3(place->y, p), dot3(place->z, p)), place->moved);

@@ -1,4 +1,4 @@
-// Ray queries over arrays: one work-item answers LANES rays, one by one or, where the host says so, together.
+// Ray queries over arrays: each work-item answers LANES rays, one by one or, if the host selects it, as a packet.
 #include "query_rays.cl"
 #include PACKETS
 
@@ -10,7 +10,7 @@
 #define ANY_HIT any_hit
 #endif
 
-// Answers of work-items whose loops the driver ended early say so: primitive −2, blocked 2.
+// Marks the answers of a work-item whose loops the driver ended early: primitive −2, blocked 2.
 #define LOOPS_ENDED loops_ended(2 + (first == 0xffffffff))
 
 static inline void store_hits(global RayHit *hits, const Rays *rays, uint first, uint count, const Hits *found) {
@@ -23,7 +23,7 @@ static inline void store_hits(global RayHit *hits, const Rays *rays, uint first,
 }
 
 #if NEXT_HIT
-// The hits behind those in `hits`, in their place.
+// Replace each hit in `hits` by the next one along its ray.
 __attribute__((vec_type_hint(real)))
 kernel void query_next_hit(SCENE_PARAMETERS, QUERY_RAYS, global RayHit *hits, float unit, uint count) {
     Scene scene = SCENE_ARGUMENTS;

@@ -1,4 +1,4 @@
-// The kernels of query.cl for processors on which it pays to keep many rays in flight: a work-item answers SHARE rays.
+// The kernels of query.cl for processors that benefit from many rays in flight: a work-item answers SHARE rays.
 #include "query_rays.cl"
 #include "traverse/pool.cl"
 
@@ -8,11 +8,11 @@ typedef uchar Answer;
 typedef RayHit Answer;
 #endif
 
-// The rays that take off next: LANES of the work-item's share, prepared together.
+// The next rays to start: LANES of the work-item's share, prepared together.
 typedef struct {
     Rays rays;
     FlightRays flights;
-    uint next, lane;   // the host's index of the next ray and its lane
+    uint next, lane;   // index of the next ray in the host's arrays, and its lane
 } Departures;
 
 static inline Answer answer(const Hit *hit, float to_t) {
@@ -29,7 +29,8 @@ __attribute__((noinline)) static void load_departures(Departures *d, QUERY_RAYS,
     d->lane = 0;
 }
 
-// Sends the next ray off in the place `f`, false if none is left. Rays that cannot hit anything are answered at once.
+// Start the next ray in the slot `f`; return false if none is left. Rays that cannot hit anything are answered
+// immediately.
 __attribute__((always_inline)) static inline bool depart(Departures *d, QUERY_RAYS, float unit, uint end, global Answer *answers, Flight *f) {
     while (d->next < end) {
         if (d->lane == LANES) load_departures(d, origins, directions, t_max, unit, end);
@@ -45,10 +46,10 @@ __attribute__((always_inline)) static inline bool depart(Departures *d, QUERY_RA
     return false;
 }
 
-// The flights that are at nodes and those that are at leaves; what stands behind the last one of a list does not count.
+// The rays that are at nodes and those that are at leaves; entries after the last one of a list are ignored.
 typedef struct { Flight *at_nodes[POOL + 1], *at_leaves[POOL + 1]; } Round;
 
-// Puts a flight on both lists, of which one grows.
+// Write a ray to both lists and advance the length of one, without a branch.
 #define LIST(f) { \
         int leaf = f->reference < 0; \
         then->at_nodes[inner] = then->at_leaves[leaves] = f; \
@@ -56,7 +57,7 @@ typedef struct { Flight *at_nodes[POOL + 1], *at_leaves[POOL + 1]; } Round;
         leaves += leaf; \
     }
 
-// Where a flight goes on: what it needs there is fetched. One that is done is answered, and the next ray departs.
+// Set where a ray continues and prefetch the node or leaf. A ray that is done is answered, and the next one starts.
 #define GO_ON(to) { \
         f->reference = to; \
         if (f->reference == DONE) { \
@@ -72,7 +73,7 @@ kernel void query_pool(SCENE_PARAMETERS, QUERY_RAYS, global Answer *answers, flo
     Scene scene = SCENE_ARGUMENTS;
     Flight flights[POOL];
     Round rounds[2], *now = rounds, *then = rounds + 1;
-    int inner = 0, leaves = 0;   // how many flights are on the lists of `then`
+    int inner = 0, leaves = 0;   // lengths of the lists in `then`
     Departures departures;
     departures.next = (uint)get_global_id(0) * SHARE;
     departures.lane = LANES;

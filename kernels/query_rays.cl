@@ -1,8 +1,9 @@
-// Rays of a query as they come from the host, LANES at a time, and their answers. World frame; t counts lengths of the
-// direction.
+// Rays of a query as received from the host, LANES at a time, and their results. World frame; t is in multiples of
+// the direction's length.
 //
-// `unit` is the power of two by which the tree's lengths were multiplied (clrt/scene/scaling.py). Directions are brought
-// to a length near 1 by a power of two, too, so that neither matters: a t of the host's is t·to_t.
+// `unit` is the power of two by which the lengths in the BVH were scaled (clrt/scene/scaling.py). Directions are
+// scaled to a length near 1 by a power of two as well, so that neither affects precision: t in the host's units is
+// t·to_t.
 #include "loops.cl"
 #include "traverse/trace.cl"
 
@@ -13,10 +14,10 @@
 typedef struct {
     real3 origin, direction;
     real t_max, to_t;
-    ireal row, valid;    // which of the host's rays a lane holds, and whether it can hit anything
+    ireal row, valid;    // index of the ray in the host's arrays, and whether it can hit anything
 } Rays;
 
-// Rays `first`, first + 1 … in the lanes; those from `end` on are not valid.
+// Load rays `first`, first + 1 … into the lanes; those at and after `end` are invalid.
 static inline Rays load_rays(QUERY_RAYS, float unit, uint first, uint end) {
     ureal ray = (ureal)(first) + LANE_INDEX;
     ireal inside = ray < end;
@@ -33,7 +34,7 @@ static inline Rays load_rays(QUERY_RAYS, float unit, uint first, uint end) {
     return r;
 }
 
-// What the host gets of a hit; primitive < 0: nothing was hit.
+// Convert a hit to the record returned to the host; primitive < 0: miss.
 static inline RayHit ray_hit(float t, float u, float v, int primitive, int instance, float to_t) {
     RayHit hit = {INFINITY, -1, 0.0f, 0.0f};
 #if INSTANCES

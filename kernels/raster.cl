@@ -1,5 +1,5 @@
-// The `raster` integrator: as `local`, but what the camera sees first is rasterised; rays are traced from there on. Each
-// sample is taken at the same place of its pixel as there.
+// The `raster` integrator: as `local`, but the first hits of camera rays are rasterised and rays are traced from there
+// on. Samples have the same positions in their pixels as there.
 #include "film.cl"
 #include "whitted.cl"
 #include "raster/tile.cl"
@@ -10,7 +10,7 @@ kernel void raster(SCENE_PARAMETERS, global Pixel *film, global const uint *tile
     Bins bins = BIN_ARGUMENTS;
     LanePixels own[ROWS];
     Accumulator pixels[ROWS];
-    int count = 0;   // of rows in the picture
+    int count = 0;   // of rows inside the image
     while (count < ROWS && group_pixels(&launch, tiles, (uint)get_global_id(0) * ROWS + count, own + count)) {
         pixels[count] = load_pixels(film, AS_INT(own[count].index));
         ++count;

@@ -1,7 +1,7 @@
-// Random bits as a function of four words, so that nothing depends on tiling, order or device.
+// Random bits as a hash of four words, so that results do not depend on tiling, order or device.
 //
-// The hash is pcg4d (Jarzynski and Olano 2020, "Hash Functions for GPU Rendering", JCGT 9(3)). Its first word is the
-// weakest: words of inputs 2^29 apart correlate in it, so the others are used first.
+// The hash is pcg4d (Jarzynski and Olano 2020, "Hash Functions for GPU Rendering", JCGT 9(3)). Its first output word is
+// the weakest: its values for inputs 2^29 apart are correlated, so the others are used first.
 #include "lanes.cl"
 
 static inline real unit_interval(ureal bits) { return TO_REAL(bits >> 8) * 5.9604645e-8f; }  // [0, 1), 24 bits

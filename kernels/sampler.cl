@@ -1,10 +1,10 @@
-// Where the numbers of a sample come from. Each sampler's file provides
+// The interface of a sampler; each sampler's file provides
 //
-//   Sampler, with a member `dimension`                      the next pair's, from 0
-//   sampler_at(pixel, sample, seed, block_bits)             of sample `sample` of a pixel; pixel: any number of its own
+//   Sampler, with a member `dimension`                      the dimension of the next pair, from 0
+//   sampler_at(pixel, sample, seed, block_bits)             the sampler of one sample of a pixel, with a unique number
 //   next_bits(&sampler)                                     the next pair, 32 bits each
 //
-// Its sample numbers come in blocks of 2^block_bits, each of which fills the square evenly; 32: there is but one block.
+// Samples come in blocks of 2^block_bits, each of which covers the unit square evenly; 32: a single block.
 #include "rng.cl"
 #include SAMPLER
 
@@ -22,5 +22,5 @@ static inline ureal spread_bits(ureal x) {
     return (x | x << 1) & 0x55555555u;
 }
 
-// The pixel's place along the Z curve (Morton 1966): neighbours are close, and each pixel's number is its own.
+// The pixel's index on the Z curve (Morton 1966): unique, and close for neighbours.
 static inline ureal pixel_code(ureal x, ureal y) { return spread_bits(x) | spread_bits(y) << 1; }

@@ -1,8 +1,8 @@
-// Warps of the unit square and their densities. Directions are unit vectors; densities are per solid angle.
+// Warps of the unit square and their pdfs. Directions are unit vectors; pdfs are per solid angle.
 #include "vector.cl"
 
-// sin and cos of 2·pi·u for u in [0, 1): octant reduction and minimax polynomials on [-pi/4, pi/4], error < 1.1e-7.
-// The built-in pair handles arguments of any size and costs several times as much.
+// sin and cos of 2·pi·u for u in [0, 1): octant reduction and minimax polynomials on [-pi/4, pi/4], error < 1.1e-7. The
+// built-in functions handle arguments of any size and are several times as expensive.
 static inline void sincos_turns(real u, real *sine, real *cosine) {
     ireal q = TO_INT(u * 4.0f + 0.5f);
     real x = (u * 4.0f - TO_REAL(q)) * (0.5f * PI);
@@ -23,8 +23,8 @@ static inline real3 sample_cosine(real2 u) {
 }
 static inline real cosine_pdf(real cos_theta) { return maximum(cos_theta, ZERO) * (1.0f / PI); }
 
-// Uniform in the cone around +z with 1 − cosθ ≤ `height`: pdf = 1/(2·pi·height). Written in 1 − cosθ so that a
-// cone of 1e-4 degrees keeps its digits.
+// Uniform in the cone around +z with 1 − cosθ ≤ `height`: pdf = 1/(2·pi·height). In terms of 1 − cosθ so that a cone of
+// 1e-4 degrees keeps its precision.
 static inline real3 sample_cone(real2 u, real height) {
     real s, c, h = u.x * height;
     sincos_turns(u.y, &s, &c);
@@ -39,7 +39,7 @@ static inline real2 sample_triangle(real2 u) {
     return (real2){root * (1.0f - u.y), root * u.y};
 }
 
-// Multiple importance sampling (Veach 1997, eq. 9.15, power 2), safe for infinite and huge densities.
+// Power heuristic (Veach 1997, eq. 9.15, power 2), safe for infinite and huge densities.
 static inline real power_heuristic(real pdf, real other) {
     real ratio = other / pdf;
     return 1.0f / (1.0f + ratio * ratio);

@@ -1,12 +1,12 @@
-// What the material of a surface is where a ray met it, in the frame of its shading normal, and how light is scattered there:
+// Material evaluation at a hit, in the frame of the shading normal:
 //
-//   shading_eval(shading, surface, wi)           bsdf_eval: value and density, 0 where wi is not on the side of the geometric
-//                                                surface that it belongs to: reflected light above, transmitted light below
-//   shading_sample(shading, surface, u, lobe)    bsdf_sample, its wi in the world frame, with a density of 0 where it failed
-//   absorption_along(shading, surface, wi, here) what is absorbed along wi, per unit of length, where it is `here` on wo's side
+//   shading_eval(shading, surface, wi)           bsdf_eval: value and pdf, 0 if wi is on the wrong geometric side:
+//                                                reflected light belongs above the surface, transmitted light below
+//   shading_sample(shading, surface, u, lobe)    bsdf_sample, with wi in the world frame; pdf 0 if sampling failed
+//   absorption_along(shading, surface, wi, here) absorption coefficient along wi, per unit of length; wo's is `here`
 //
-// wi: unit, world frame. HORIZON: what lobes around a bent or interpolated normal send to the wrong side is not lost
-// (horizon.cl).
+// wi: unit, world frame. HORIZON: light that lobes around a bent or interpolated normal scatter to the wrong side is
+// not lost (horizon.cl).
 #include "bsdf.cl"
 
 #if COAT_NORMALS
@@ -25,7 +25,7 @@ typedef struct {
 #endif
 } Shading;
 
-// Turns the surface to the side that a ray along `direction` comes from, with what its normal map says.
+// Apply the normal map, turn the surface towards the origin of a ray along `direction`, and read its material.
 static inline Shading shading_at(const Scene *scene, real3 direction, Surface *surface) {
     Shading shading;
     real3 towards = negate(direction);
@@ -43,7 +43,7 @@ static inline Shading shading_at(const Scene *scene, real3 direction, Surface *s
 }
 
 #if HORIZON
-// What bumps take of the matte part of light from w (local).
+// The fraction of diffuse light from w (local) that bump shadowing removes.
 static inline real taken_by_bumps(const Shading *shading, const Surface *surface, real3 w) {
 #if NORMAL_MAPS
     return 1.0f - bump_shadowing(surface, to_world(shading->frame, w));
@@ -74,7 +74,7 @@ static inline BsdfValue shading_eval(const Shading *shading, const Surface *surf
 #define SPREAD(sample) ONE
 #endif
 
-// Mirrors a sample that was drawn on the wrong side. Its weight becomes that of both directions that end where it does.
+// Mirror a sample that was drawn on the wrong side. Its weight accounts for both directions that map to the result.
 static inline void fold_sample(const Shading *shading, const Surface *surface, BsdfSample *sample) {
     real3 drawn = sample->wi;
     BsdfValue own = {scale(sample->weight, sample->pdf * SPREAD(sample)), sample->matte, sample->pdf};
@@ -113,7 +113,7 @@ static inline real3 absorption_along(const Shading *shading, const Surface *surf
 }
 #endif
 
-// The normal by which lights are chosen: no light behind it contributes anything.
+// The normal used to choose lights: lights behind it contribute nothing. 0 if light from either side counts.
 static inline real3 choosing_normal(const Shading *shading) {
 #if TRANSMISSION_LOBES
     return choose(is_lit_from_behind(&shading->bsdf), splat(ZERO), shading->frame.n);

@@ -1,8 +1,8 @@
-// What a ray hit: position with its error bound, normals, material and emitter. World frame.
+// Surface interaction: position with its error bound, normals, material and emitter. World frame.
 //
-// The position is rebuilt from the primitive, not (but for some spheres) from origin + t·direction: its error is a few
-// roundings of the primitive's own coordinates, however far the ray came (pbrt, 4th ed., 6.8). Where new rays start is
-// said in offset/. A mesh that is shown by instances is stored once, in a frame of its own (placement.cl).
+// The position is reconstructed from the primitive, not (except for some spheres) from origin + t·direction: its
+// error is a few roundings of the primitive's coordinates, however long the ray is (pbrt, 4th ed., 6.8). offset/
+// defines the origins of spawned rays. An instanced mesh is stored once, in its object frame (placement.cl).
 #include "traverse/trace.cl"
 #include TEXTURE_FILES
 
@@ -11,8 +11,8 @@ typedef struct {
     real3 ng, ns;         // geometric and shading normal, both on the front side
     ireal material;       // type | index << 4
     ireal light;          // entry of the light table, or -1
-    ireal front;          // whether it is seen from its front side, once it is turned (turn_towards)
-    real cos_o;           // between ns and where it is seen from, once it is turned
+    ireal front;          // whether the ray hit the front side; set by turn_towards
+    real cos_o;           // cosine of ns with the direction to the viewer; set by turn_towards
 #if TEXTURES
     Coordinates at;
 #endif
@@ -22,12 +22,12 @@ typedef struct {
 #endif
 #if NORMAL_MAPS
     real3 tangent;        // not of unit length
-    real handedness;      // of the bitangent; 0 where there are no tangents, 2 on spheres (place_sphere_tangent)
-    real3 unbent;         // the shading normal as no map bends it
+    real handedness;      // of the bitangent; 0 without tangents, 2 on spheres (place_sphere_tangent)
+    real3 unbent;         // the shading normal before normal mapping
 #endif
 #if COAT_NORMALS
-    real3 coat_normal;    // the shading normal as a coat's own map bends it (normal_maps.cl)
-    real coat_cos_o;      // as cos_o, between that and where it is seen from
+    real3 coat_normal;    // the shading normal after the coat's own normal map (normal_maps.cl)
+    real coat_cos_o;      // as cos_o, for coat_normal
 #endif
 } Surface;
 
@@ -38,11 +38,12 @@ typedef struct {
 #endif
 
 #if TRIANGLES
-// Nearer to a triangle's edge no point is: so far, in heights of the triangle, those beyond are drawn back along its plane.
-// That is more than they are then moved off it, so that rays from a corner of two walls do not start behind the other wall.
+// Minimum barycentric coordinate: points closer to an edge than this fraction of the triangle's height are pulled
+// inwards in its plane. That exceeds the offset of spawned rays, so that rays from a corner of two walls do not start
+// behind the other wall.
 #define INWARD (32.0f * UNIT_ROUNDOFF)
 
-// The edges are brought to length one or so first: the square of their product must not leave the range of floats.
+// The edges are scaled to a length near 1 first: the square of their product must not leave the range of floats.
 static inline real3 triangle_normal(real3 e1, real3 e2) {
     real3 n = cross3(scale(e1, 1.0f / largest(absolute3(e1))), scale(e2, 1.0f / largest(absolute3(e2))));
     return normalize3(n);
@@ -116,8 +117,8 @@ static inline void sphere_surface(const Scene *scene, real3 origin, real3 direct
     real3 n = normalize3(sub(met, center));
     surface->p = mad3(n, radius, center);
     surface->p_error = scale(add(absolute3(center), splat(radius)), (real)(GAMMA(9)));
-    // Near a sphere that is huge or far off, such as a ground, the ray itself says better where it was met: t is right to
-    // 3 units in the last place.
+    // For a huge or distant sphere, such as a ground, the point along the ray is more accurate: t is accurate to 3
+    // ulps.
     real3 met_error = scale(mad3(absolute3(direction), hits->t, absolute3(origin)), (real)(GAMMA(6)));
     ireal nearby = largest(met_error) < largest(surface->p_error);
     surface->p = choose(nearby, met, surface->p);
@@ -131,7 +132,7 @@ static inline void sphere_surface(const Scene *scene, real3 origin, real3 direct
     surface->tint_opacity = ONE;
 #endif
 #if NORMAL_MAPS
-    surface->tangent = vector(n.z, ZERO, -n.x);     // sin θ long
+    surface->tangent = vector(n.z, ZERO, -n.x);     // of length sin θ
     surface->handedness = (real)(2.0f);
 #endif
     surface->material = GATHER(ireal, scene->spheres, sphere, .material);
@@ -139,7 +140,7 @@ static inline void sphere_surface(const Scene *scene, real3 origin, real3 direct
 }
 #endif
 
-// The surface at the hits; lanes that hit nothing get the surface of primitive 0.
+// Return the surfaces at the hits; lanes that missed get the surface of primitive 0.
 static inline Surface surface_at(const Scene *scene, real3 origin, real3 direction, const Hits *hits) {
     Surface surface;
     ireal primitive = hits->primitive < 0 ? (ireal)(0) : hits->primitive;
@@ -188,13 +189,13 @@ static inline Surface surface_at(const Scene *scene, real3 origin, real3 directi
     return surface;
 }
 
-// A shading normal on the side of the geometric one, which replaces it if it faces away from `towards`.
+// Flip a shading normal to the side of the geometric one, which replaces it if it faces away from `towards`.
 static inline real3 turned(real3 n, const Surface *surface, real3 towards) {
     real3 aligned = choose(dot3(n, surface->ng) < 0.0f, negate(n), n);
     return choose(dot3(aligned, towards) > 0.0f, aligned, surface->ng);
 }
 
-// Turns all normals to the side of the unit vector `towards`; a shading normal that faces away from it is replaced.
+// Turn all normals to the side of the unit vector `towards`; a shading normal that faces away from it is replaced.
 static inline void turn_towards(Surface *surface, real3 towards) {
     surface->front = !(dot3(surface->ng, towards) < 0.0f);
     surface->ng = choose(surface->front, surface->ng, negate(surface->ng));

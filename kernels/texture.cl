@@ -1,13 +1,13 @@
-// Textures: texels of 8 bits a channel in one buffer, a record for each use of a picture (clrt/scene/textures.py).
+// Textures: texels of 8 bits per channel in one buffer, a record for each use of an image (clrt/scene/textures.py).
 //
-// Coordinates as glTF's: (0, 0) is the picture's upper left corner. Colours are decoded from sRGB before they are
-// filtered, by a table; numbers are linear.
+// Coordinates as in glTF: (0, 0) is the upper left corner of the image. Colours are decoded from sRGB by a table before
+// they are filtered; numbers are linear.
 #include "vector.cl"
 
 #define REPEAT 0
 #define MIRROR 1
 
-// Of a point of a surface: texture coordinates, each set's.
+// Texture coordinates of a surface point, for each set.
 typedef struct { real2 set[UV_SETS]; } Coordinates;
 
 #if TRIANGLES
@@ -25,7 +25,7 @@ static inline Coordinates triangle_coordinates(const Scene *scene, ireal primiti
 #endif
 
 #if SPHERES
-// The picture once around the sphere, its middle towards +z, its top towards +y.
+// The image wraps once around the sphere, its centre towards +z, its top towards +y.
 static inline Coordinates sphere_coordinates(real3 n) {
     real u = 0.5f + atan2(n.x, n.z) * (0.5f / PI);
     real y = n.y < -1.0f ? -ONE : (n.y < 1.0f ? n.y : ONE);
@@ -48,7 +48,7 @@ static inline real on_picture(real u, ireal wrap) {
     return wrap == REPEAT ? u - turns : wrap == MIRROR ? mirrored : clamped;
 }
 
-// A column or row next to the picture's edge or on it; never outside, whatever the coordinates were.
+// Wrap or clamp a column or row by at most one image size; the result is always inside, whatever the coordinates were.
 static inline ireal inside(ireal x, ireal size, ireal repeats) {
     ireal around = x < 0 ? x + size : (x >= size ? x - size : x);
     x = repeats ? around : x;
@@ -89,7 +89,7 @@ static inline real decoded(const Scene *scene, ureal texel, uint shift) {
     return GATHER(real, scene->srgb, AS_INT(texel >> shift & 255u), .linear);
 }
 
-// The texture times the factor; the factor where there is no texture (−1).
+// The texture times the factor, or the factor if there is no texture (−1).
 static inline real3 textured3(const Scene *scene, ireal texture, real3 factor, const Coordinates *at) {
     ireal present = texture >= 0;
     if (!ANY(present)) return factor;
@@ -103,7 +103,7 @@ static inline real3 textured3(const Scene *scene, ireal texture, real3 factor, c
     return choose(present, mul(color, factor), factor);
 }
 
-// A channel of the texture, from 0 to 1; shift: eight times its number.
+// A channel of the texture, from 0 to 1; shift: eight times its index.
 static inline real filtered(const Footprint *found, ureal shift) {
     real sum = ZERO;
     for (int i = 0; i < 4; ++i) sum += TO_REAL(found->texel[i] >> shift & 255u) * found->weight[i];

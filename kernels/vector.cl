@@ -1,5 +1,5 @@
 // Arithmetic on reals and vectors of three reals. min, max and abs are spelled out because some CPU drivers turn the
-// built-in ones into calls; where a NaN meets them the second operand wins.
+// built-in functions into calls; if an operand is NaN, the second operand is returned.
 #include "lanes.cl"
 
 #define PI 3.14159265358979f
@@ -34,7 +34,7 @@ static inline real3 choose(ireal mask, real3 a, real3 b) {
 }
 static inline real largest(real3 a) { return maximum(a.x, maximum(a.y, a.z)); }
 static inline real luminance(real3 a) { return 0.2126f * a.x + 0.7152f * a.y + 0.0722f * a.z; }
-// A NaN does, so that it ends in the film, which counts it, and not unseen.
+// True for NaN, so that it reaches the film, which counts it, instead of being hidden.
 static inline ireal carries_light(real3 a) { return !(a.x <= 0.0f) | !(a.y <= 0.0f) | !(a.z <= 0.0f); }
 
 // A right-handed frame (s, t, n) around a unit normal (Duff et al. 2017, "Building an Orthonormal Basis, Revisited").

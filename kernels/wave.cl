@@ -1,7 +1,8 @@
-// Many paths a lane: a work-item follows those of a tile, WAVE_SAMPLES samples of each pixel at a time, all edge by edge.
+// Wavefront path tracing: a work-item traces all paths of a tile together, WAVE_SAMPLES samples per pixel at a time,
+// one segment per iteration.
 //
-// Each stage of an edge is done for all paths before the next stage begins, and those that go on to it are packed, so that
-// lanes are full whatever becomes of a path. Loops that do one thing also suit a processor better than one that does all.
+// Each stage runs for all paths before the next stage begins, and the paths that continue are compacted, so that SIMD
+// lanes stay full however paths end. Short loops with a single job also run faster on a CPU than one large loop.
 #include "camera.cl"
 #include "edge.cl"
 #include "film.cl"
@@ -11,9 +12,10 @@
 #define TILE_PIXELS (TILE * TILE)
 #define WAVE (TILE_PIXELS * WAVE_SAMPLES)
 #define SHADOWS (PRIMITIVES && LIGHTS)
-#define ROW (WAVE + LANES)   // packing may write LANES further; and powers of two do not suit caches
+#define ROW (WAVE + LANES)   // compaction may write LANES past the end; powers of two cause cache conflicts
 
-// What is kept of paths between stages. slot: the number of the sample in the wave, pixel by pixel and then by sample.
+// Path state between stages. slot: the index of the sample in the wave, pixels within samples (slot % TILE_PIXELS is
+// the pixel).
 typedef struct {
     Path path;
     ureal slot;
@@ -25,22 +27,22 @@ typedef struct { Travel travel; Hits hits; } Arrival;
 typedef struct { ShadowRay ray; ureal slot; } Shadow;
 #endif
 
-// Some 70 KiB of private memory, packed in rows.
+// State of a wave: about 70 KiB of private memory, as structure of arrays.
 typedef struct {
-    int arrivals[WORDS(Arrival)][ROW];   // first the travels: an arrival's hits are added where its travel is
+    int arrivals[WORDS(Arrival)][ROW];   // holds Travel at first; the rows of Hits are appended by `trace`
     int escapes[WORDS(Travel)][ROW];
 #if SHADOWS
     int shadows[WORDS(Shadow)][ROW];
 #endif
-    float light[3][WAVE];                // of each slot
+    float light[3][WAVE];                // radiance by slot
 #if DIRECT_LIGHT
-    float direct[3][WAVE];               // what of it came with two edges at most
+    float direct[3][WAVE];               // the part from paths of at most two segments
 #endif
 #if CLAMP
-    float removed[WAVE];                 // what clamps took from it
+    float removed[WAVE];                 // energy removed by clamping
 #endif
     const Launch *launch;
-    uint x, y, sample;                   // of the first slot
+    uint x, y, sample;                   // of slot 0
     uint dimension, rays;
 } Wave;
 
@@ -57,11 +59,11 @@ static inline Sampler slot_sampler(const Wave *w, ureal slot) {
     return sampler;
 }
 
-// Light that took so many edges.
+// Add the contributions of paths of `edges` segments to their slots.
 static inline void add_light(Wave *w, ureal slot, real3 found, int edges) {
     real removed = ZERO;
     real3 light = clamped(w->launch, found, edges, &removed);
-    ireal some = (light.x != 0.0f) | (light.y != 0.0f) | (light.z != 0.0f);   // a NaN, too, for the film to drop
+    ireal some = (light.x != 0.0f) | (light.y != 0.0f) | (light.z != 0.0f);   // true for NaN too, which the film drops
     for (uint bits = mask_bits(some); bits; bits &= bits - 1) {
         int lane = first_bit(bits);
         uint to = LANE_UINT(slot, lane);
@@ -74,7 +76,7 @@ static inline void add_light(Wave *w, ureal slot, real3 found, int edges) {
     }
 }
 
-// Each stage returns how many paths, or rays, the next one has.
+// Stage 1: generate camera rays. Each stage returns the number of paths, or shadow rays, for the next one.
 __attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int slots) {
     int count = 0;
     uint dimension = 0;
@@ -98,6 +100,7 @@ __attribute__((noinline)) static int set_out(const Scene *scene, Wave *w, int sl
     return count;
 }
 
+// Stage 2: intersect the path segments with the scene.
 __attribute__((noinline)) static void trace(const Scene *scene, Wave *w, int count, int depth) {
     uint dimension = w->dimension;
     for (int i = 0; i < count; i += LANES) {
@@ -118,7 +121,7 @@ __attribute__((noinline)) static void trace(const Scene *scene, Wave *w, int cou
     w->rays += count;
 }
 
-// Packs the paths that hit something, and adds the light of the environment to those that escape.
+// Stage 3: compact the paths that hit a surface; add environment light for those that escape.
 __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int count, int depth) {
     int arrived = 0, escaped = 0;
     for (int i = 0; i < count; i += LANES) {
@@ -142,6 +145,7 @@ __attribute__((noinline)) static int sort_out(const Scene *scene, Wave *w, int c
 }
 
 #if PRIMITIVES
+// Stage 4: at each hit add emission, sample a light (NEE) and sample the BSDF. *sent: the number of shadow rays.
 __attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int count, int depth, int *sent) {
     int going = 0;
     uint dimension = w->dimension;
@@ -177,6 +181,7 @@ __attribute__((noinline)) static int shade(const Scene *scene, Wave *w, int coun
 #endif
 
 #if SHADOWS
+// Stage 5: trace the shadow rays and add the direct light of those that are unoccluded.
 __attribute__((noinline)) static void trace_shadows(const Scene *scene, Wave *w, int count, int depth) {
     for (int i = 0; i < count; i += LANES) {
         Shadow shadow;
@@ -188,6 +193,7 @@ __attribute__((noinline)) static void trace_shadows(const Scene *scene, Wave *w,
 #endif
 
 #if DIRECT_LIGHT
+// Save the light accumulated so far as the direct light.
 static inline void keep_direct(Wave *w) {
     for (int c = 0; c < 3; ++c) for (int i = 0; i < WAVE; ++i) w->direct[c][i] = w->light[c][i];
 }
@@ -197,8 +203,8 @@ static inline real3 slots_light(const float rows[3][WAVE], int first) {
     return vector(vload8(0, rows[0] + first), vload8(0, rows[1] + first), vload8(0, rows[2] + first));
 }
 
-// Adds the samples of each pixel in their order, so that no sum depends on how they were cut into waves. All rays of a
-// tile are counted with its first pixel. first_pixel: of the tile in the launch.
+// Add the samples of each pixel in order, so that sums do not depend on how samples are split into waves. All rays of
+// a tile are counted in its first pixel. first_pixel: index of the tile's first pixel in the launch.
 static inline void add_samples(const Wave *w, global Pixel *film, uint first_pixel, int slots) {
     for (int i = 0; i < TILE_PIXELS; i += LANES) {
         ureal slot = (uint)i + LANE_INDEX;
@@ -238,8 +244,10 @@ kernel void wave(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles,
         int slots = (int)(samples * TILE_PIXELS), sent = 0;
         w.sample = launch.first_sample + s;
         w.rays = 0;
+        // Generate camera rays
         int count = set_out(&scene, &w, slots);
         for (int depth = 1; count > 0; ++depth) {
+            // Trace and shade one path segment per iteration until no path is left
             trace(&scene, &w, count, depth);
             count = sort_out(&scene, &w, count, depth);
 #if PRIMITIVES
@@ -252,9 +260,10 @@ kernel void wave(SCENE_PARAMETERS, global Pixel *film, global const uint *tiles,
             trace_shadows(&scene, &w, sent, depth);
 #endif
 #if DIRECT_LIGHT
-            if (depth == 1) keep_direct(&w);   // of paths that end here, all
+            if (depth == 1) keep_direct(&w);   // includes all paths that end here
 #endif
         }
+        // Accumulate the wave's samples in the film
         add_samples(&w, film, first, slots);
     }
 }

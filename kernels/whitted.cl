@@ -1,17 +1,19 @@
-// The integrators `local` and `raster`: each light's own, directly, and none that surfaces send each other (Whitted 1980, "An
-// Improved Illumination Model for Shaded Display"; Nadolny 3.1 to 3.3, Suchiński 7.4 and 7.5).
+// The integrators `local` and `raster`: direct lighting only, without interreflection (Whitted 1980, "An Improved
+// Illumination Model for Shaded Display"; Nadolny 3.1 to 3.3, Suchiński 7.4 and 7.5).
 //
-// Perfect mirrors and smooth glass are followed, glass at random by either way. On the first surface that is neither falls
-//   the light of every light that a shadow ray finds visible: delta lights cast hard shadows; of area lights, and suns with
-//   a size, a point is sampled per sample, as the path integrator does; NO_SHADOWS: the light of all, without shadow rays;
-//   ambient light: the sky's, as if nothing stood in its way.
+// Perfect mirrors and smooth glass are followed; glass chooses reflection or refraction at random. The first other
+// surface receives
+//   direct light from every light that a shadow ray finds visible: delta lights cast hard shadows; area lights and
+//   suns with a size are sampled at one point per sample, as by the path integrator. NO_SHADOWS: from all lights,
+//   without shadow rays;
+//   ambient light: that of the sky, unoccluded.
 // World frame; L in W·sr⁻¹·m⁻².
 #include "camera.cl"
 #include "light.cl"
 #include "shading.cl"
 #include VISIBILITY
 
-// 1. What glows where the ray ended.
+// 1. Emission at the end of the ray: emissive surfaces and the environment.
 static inline real3 seen_light(const Scene *scene, real3 origin, real3 direction, const Surface *surface, real t, ireal hit,
                                ireal escaped) {
     real3 L = splat(ZERO);
@@ -26,7 +28,8 @@ static inline real3 seen_light(const Scene *scene, real3 origin, real3 direction
 }
 
 #if LIGHTS
-// 2. One light's, by way of a shadow ray. absorption: on the side that the surface is seen from, per unit of length.
+// 2. Direct light of one light, with a shadow ray. absorption: on the viewer's side of the surface, per unit of
+// length.
 static inline real3 light_of_one(const Scene *scene, int light, const Surface *surface, const Shading *shading,
                                  real3 absorption, ireal active, real2 u, ureal *rays) {
     LightSample sample = sample_of_light(scene, (ireal)(light), surface->p, u);
@@ -48,6 +51,7 @@ static inline real3 light_of_one(const Scene *scene, int light, const Surface *s
 }
 #endif
 
+// Shade a non-specular surface: unoccluded ambient light of the sky, and the direct light of every light.
 static inline real3 shade(const Scene *scene, const Surface *surface, const Shading *shading, real3 absorption, ireal active,
                           Sampler *sampler, ureal *rays) {
     real3 L = splat(ZERO);
@@ -63,12 +67,13 @@ static inline real3 shade(const Scene *scene, const Surface *surface, const Shad
     return choose(active, L, splat(ZERO));
 }
 
-// Along camera rays; closest: what they hit first, where that was rasterised.
+// Return the radiance along camera rays. closest: their first hits, if those were rasterised.
 static inline real3 local_light(const Scene *scene, const Launch *launch, const CameraRay *ray, const Hits *closest,
                                 ireal active, Sampler *sampler, ureal *rays) {
     real3 L = splat(ZERO), beta = splat(ONE), origin = ray->origin, direction = ray->direction, absorption = splat(ZERO);
     for (int depth = 1;; ++depth) {
         *rays += active ? (ureal)(1) : (ureal)(0);
+        // Intersect the ray with the scene
         Surface surface;
 #if RASTER
         Hits next = depth == 1 ? *closest : closest_hit(scene, origin, direction, (real)(INFINITY), active);
@@ -80,17 +85,19 @@ static inline real3 local_light(const Scene *scene, const Launch *launch, const 
 #if ATTENUATION
         beta = mul(beta, attenuated(absorption, hit ? hits.t : (real)(INFINITY)));
 #endif
+        // Add emission at the hit, or of the environment
         real3 seen = seen_light(scene, origin, direction, &surface, hits.t, hit, active & !hit);
         L = add(L, choose(active, mul(beta, seen), splat(ZERO)));
         active = hit;
         if (depth >= launch->max_depth || !ANY(active)) return L;
 #if PRIMITIVES
+        // Add direct light on non-specular surfaces
         Shading shading = shading_at(scene, direction, &surface);
         real2 u = next_2d(sampler), choice = next_2d(sampler);
         BsdfSample sample = shading_sample(&shading, &surface, u, choice.x);
         L = add(L, mul(beta, shade(scene, &surface, &shading, absorption, active & !sample.specular, sampler, rays)));
 
-        // 3. Go on from mirrors and glass.
+        // 3. Follow mirrors and glass
         direction = sample.wi;
         active = active & sample.specular & (sample.pdf > 0.0f);
         beta = choose(active, mul(beta, sample.weight), beta);

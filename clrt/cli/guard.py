@@ -15,6 +15,7 @@ from collections.abc import Callable
 from math import isinf
 
 from ..device.pulse import VARIABLE, call_in_progress, patience
+from .interrupt import end_by_signals
 
 #: By name, as Windows has few of them and imports this module, too.
 CRASHES = {"SIGSEGV", "SIGABRT", "SIGBUS", "SIGFPE", "SIGILL"}
@@ -41,6 +42,7 @@ def guarded(advice: Callable[[], str]) -> None:
         os._exit(_watch(child, watched, limit, advice))
     os.setpgid(0, 0)
     _die_with(parent)
+    end_by_signals()    # before any can come: there is more to load until it is known what to keep
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
@@ -92,7 +94,8 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
                  "so run it again" if damaged else "most likely in the device's driver: see `clrt devices --check`")
         _say(f"the render crashed ({name}), {cause}", advice)
         return DEVICE
-    _say(f"the render was ended from outside ({name}); by SIGKILL systems end what uses too much memory", advice)
+    known = "; by SIGKILL systems end what uses too much memory" if name == "SIGKILL" else ""
+    _say(f"the render was ended from outside ({name}){known}", advice)
     return 128 + os.WTERMSIG(status)
 
 

@@ -23,6 +23,13 @@ class Group(click.Group):
             context.fail(f'command "{arguments[0]}" {unknown(arguments[0], self.list_commands(context))}')
         return super().resolve_command(context, arguments)
 
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Each with the whole first sentence of its help, which click cuts to a line."""
+        commands = ((name, self.get_command(context, name)) for name in self.list_commands(context))
+        rows = [(name, command.get_short_help_str(limit=10_000)) for name, command in commands if command is not None]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
 
 class Size(click.ParamType[tuple[int, int]]):
     """WIDTHxHEIGHT in pixels, e.g. 1920x1080."""

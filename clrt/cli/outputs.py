@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import OutputError, UsageError
+from ..errors import OutputError, ReaderGoneError, UsageError
 from . import STARTED
 from .fallback import kept_elsewhere
 from .pipes import STDOUT, Pipe
@@ -191,4 +191,5 @@ class Outputs:
 
     def _raise_errors(self) -> None:
         if self._errors:
-            raise OutputError("; ".join(map(str, self._errors)))
+            gone = all(isinstance(error, ReaderGoneError) for error in self._errors)
+            raise (ReaderGoneError if gone else OutputError)("; ".join(map(str, self._errors)))

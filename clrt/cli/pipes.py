@@ -3,6 +3,7 @@ first, as encoders seek."""
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import sys
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from ..errors import OutputError, UsageError
+from ..errors import OutputError, ReaderGoneError, UsageError
 
 STDOUT = Path("-")
 #: Names of standard output, even if it is redirected to a file.
@@ -47,7 +48,8 @@ class Pipe:
                 with file.open("rb") as encoded, self._open() as pipe:
                     shutil.copyfileobj(encoded, pipe)
         except OSError as error:
-            raise OutputError(f"{self.path}: cannot be written ({error.strerror or error})") from error
+            kind = ReaderGoneError if error.errno == errno.EPIPE else OutputError
+            raise kind(f"{self.path}: cannot be written ({error.strerror or error})") from error
 
     def _open(self) -> IO[bytes]:
         return open(sys.stdout.fileno(), "wb", closefd=False) if self.path == STDOUT else self.path.open("wb")

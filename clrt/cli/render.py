@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import DeviceError, OutputError, UsageError
+from ..errors import DeviceError, OutputError, ReaderGoneError, UsageError
 from ..threads import beside
 from . import PROGRAM
 from .farm import cluster_for, farm_options, is_huge, make_renderer, render_frames, render_huge
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from ..output.denoise import Denoiser
     from ..rendering.renderer import Renderer, State
 
+#: The exit code after Ctrl-C.
+INTERRUPTED = 130
 #: With a reference, a warning is logged if the estimated error is off by more than this factor.
 RIGHT = 1.2
 
@@ -85,14 +87,15 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             view: str, exposure: float, progress_kind: str | None, force: bool, print_kernel: bool,
             quiet: bool, frames: str | None, turntable: int | None, fps: float | None, scheduler: str | None,
             local_cluster: int | None, **others: Any) -> None:
-    """Render SCENE, a .toml scene, a bare model, or - for a .toml scene on standard input, until the first of --spp,
-    --time and --error is reached."""
+    """Render SCENE, a .toml scene, a Mitsuba scene (.xml), a bare model, or - for a .toml scene on standard input,
+    until the first of --spp, --time and --error is reached."""
     def advice() -> str:
         kept = checkpoint is not None and checkpoint.exists()
         return f"; {checkpoint} holds what was rendered before, and --resume goes on from it" if kept else ""
 
     if click.get_current_context().obj == PROGRAM:
         guarded(advice)
+    end_by_signals()
     from ..output.data import check_denoisable
     from ..output.writer import load_writer
 
@@ -122,7 +125,6 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
     denoiser = _denoiser() if denoise else None
     if quiet:
         silence()
-    end_by_signals()
     options: dict[str, Any] = {
         "size": size, "max_depth": depth, "seed": seed, "device": devices or None,
         "integrator": integrator, "shadows": shadows, "sampler": sampler, "filter": pixel_filter, "adaptive": adaptive,
@@ -149,11 +151,11 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         goal = Goal(planned, seconds, error, error_percentile)
         if cluster and sequence:
             if not render_frames(cluster, content, options, goal, sequence, progress):
-                sys.exit(130)
+                sys.exit(INTERRUPTED)
             return
         if cluster and is_huge(size or content.render.size):
             if not render_huge(cluster, content, options, goal, results, progress):
-                sys.exit(130)
+                sys.exit(INTERRUPTED)
             return
         if opening is not None:
             options["device"] = opening()
@@ -171,9 +173,17 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
                 else:
                     _render_frames(renderer, sequence, goal, denoiser, progress)
             except (DeviceError, OutputError) as failure:
-                raise type(failure)(f"{failure}{advice()}") from failure
+                advised = type(failure)(f"{failure}{advice()}")
+                if interruptible.asked and isinstance(failure, ReaderGoneError):
+                    advised.exit_code = INTERRUPTED     # Ctrl-C ends all programs of a pipeline
+                raise advised from failure
+        if renderer.stop_reason == "interrupted":
+            logging.getLogger(__name__).warning("%s: interrupted; %s", content.name, (
+                "with --resume the same command renders the frames that are missing" if sequence else
+                f"--resume goes on from {checkpoint}" if checkpoint else
+                "a render that has a --checkpoint can go on with --resume"))
     if interruptible.asked:
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
 
 
 def _chosen_aovs(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -36,7 +36,8 @@ def _first(paths: PixelPaths, names: Names) -> str:
     rows = paths.rows[paths.starts]
     rows = rows[rows["primitive"] >= 0]
     missed = len(paths.starts) - len(rows)
-    seen = [_listed(_hits(rows, names, names.object))] * (len(rows) > 0)
+    behind = "" if rows["front"].any() else ", from behind"
+    seen = [_listed(_hits(rows, names, names.object)) + behind] * (len(rows) > 0)
     seen += [f"no object in {missed} of {len(paths.starts)} samples"] * (missed > 0)
     return f"the camera sees {' and '.join(seen)}"
 
@@ -83,7 +84,7 @@ def _darkness(paths: PixelPaths, names: Names) -> list[str]:
     backs = rows[(rows["emitter"] >= 0) & (rows["front"] == 0) & ~rows["radiance"].any(axis=1)]
     if len(backs):
         seen = " and ".join(_hits(backs, names, names.object))
-        facts.append(f"the emission of {seen} faces away")
+        facts.append(f"the emission of {seen} faces away (double_sided = true emits on both sides)")
     facts += _light_samples(rows[paths.depth == 1], names, "light samples there")
     facts += _light_samples(rows[paths.depth > 1], names, "light samples after that")
     if "LIGHTS" not in features and not escaped.any():

@@ -1,7 +1,7 @@
 """Redirect the OpenCL libraries' cache folders if the user's own are not writable.
 
-PoCL offers no device, and pyopencl fails, if their cache folders cannot be created (no HOME, or a read-only one). They
-read these variables when they are loaded, so this module is imported before pyopencl.
+PoCL offers no device, and pyopencl fails, if their cache folders cannot be created or have no room (no HOME, or a
+read-only or full one). They read these variables when they are loaded, so this module is imported before pyopencl.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from pathlib import Path
 
 #: Linux's memory-backed file system, writable also in containers whose file system is read-only.
 MEMORY = "/dev/shm"
+#: Bytes for which a folder must have room: less than the programs of a render.
+ROOM = 1 << 18
 
 
 def provide_cache_folders() -> None:
@@ -25,7 +27,8 @@ def provide_cache_folders() -> None:
         return
     folder = os.path.join(temporary, f"clrt-cache-{os.getuid() if hasattr(os, 'getuid') else 0}")
     if not _writable(folder):
-        folder = tempfile.mkdtemp(prefix="clrt-cache-")
+        has_room = _writable(temporary) or not _writable(MEMORY)
+        folder = tempfile.mkdtemp(prefix="clrt-cache-", dir=temporary if has_room else MEMORY)
     if home_is_closed:
         os.environ["XDG_CACHE_HOME"] = folder
     if programs_are_closed:
@@ -41,7 +44,9 @@ def _writable(folder: str) -> bool:
         if not os.path.isabs(folder):
             return False
         Path(folder).mkdir(mode=0o700, parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
+        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+            if file.write(bytes(ROOM)) < ROOM:
+                return False
             return not hasattr(os, "getuid") or os.stat(folder).st_uid == os.getuid()
     except (OSError, RuntimeError):
         return False

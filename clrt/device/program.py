@@ -138,8 +138,14 @@ def compile_ahead(device: Device, source: str) -> None:
 
 def make_kernel(device: Device, built: BuiltProgram, name: str) -> cl.Kernel:
     """Return the kernel `name` of a program. Raises KernelError if the driver fails only now."""
+    from sqlite3 import Error   # pyopencl imports it at the first kernel
+
     try:
-        return cl.Kernel(built.program, name + built.ending)
+        try:
+            return cl.Kernel(built.program, name + built.ending)
+        except Error:   # pyopencl's cache of kernel invokers is damaged, or its disk is full
+            cl._PYOPENCL_NO_CACHE = True
+            return cl.Kernel(built.program, name + built.ending)
     except cl.Error as error:
         raise KernelError(f"{_where(device)} cannot create kernel {name}: {error}") from error
 

@@ -14,6 +14,7 @@ from .files import check_target, replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 #: Points of seconds, and the error (√relMSE) after them.
@@ -51,7 +52,6 @@ def plot_errors(path: Path, panels: Mapping[str, Mapping[str, Curve]]) -> Path:
     are not positive are omitted, and curves without points. Raises OutputError.
     """
     from matplotlib.figure import Figure
-    from matplotlib.ticker import LogLocator, NullFormatter
 
     figure = Figure(figsize=(PANEL[0] * len(panels), PANEL[1]), layout="constrained")
     for axis, (title, curves) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items()):
@@ -59,10 +59,17 @@ def plot_errors(path: Path, panels: Mapping[str, Mapping[str, Curve]]) -> Path:
         axis.set(xscale="log", yscale="log", xlabel="seconds", ylabel="error (√relMSE)", title=title)
         axis.grid(linewidth=0.4, alpha=0.4)
         for ticks in (axis.xaxis, axis.yaxis):
-            ticks.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            ticks.set_major_formatter("{x:g}")
-            ticks.set_minor_formatter(NullFormatter())
+            label_short_range(ticks)
     return write_figure(path, figure)
+
+
+def label_short_range(ticks: Axis) -> None:
+    """Of a logarithmic axis over few decades, where matplotlib labels the steps between as 2×10⁰, 3×10⁰, 4×10⁰ …"""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    ticks.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ticks.set_major_formatter("{x:g}")
+    ticks.set_minor_formatter(NullFormatter())
 
 
 def write_figure(path: Path, figure: Figure) -> Path:

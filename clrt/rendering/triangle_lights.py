@@ -35,11 +35,12 @@ class TriangleLights(NamedTuple):
 def pack_triangle_lights(meshes: list[Mesh], textures: Textures) -> TriangleLights:
     """Pack the emissive triangles of the meshes, in order, except for those that are black or have no area in float32.
 
-    Textured ones are never joined, and are sampled according to the texels they cover.
+    Textured ones are never joined, and are sampled according to the texels they cover. Those whose opacity varies are
+    not joined either, as it is read at the texture coordinates of one triangle.
     """
     mesh = np.repeat(np.arange(len(meshes)), [len(each.faces) for each in meshes])
     emission = np.array([each.material.radiance for each in meshes], np.float64).reshape(-1, 3)
-    painted = np.array([isinstance(each.material.emission, Texture) for each in meshes], bool)
+    uneven = np.array([isinstance(each.material.emission, Texture) or _fades(each) for each in meshes], bool)
     texture = np.array([textures.number(each.material.emission) if isinstance(each.material.emission, Texture) else -1
                         for each in meshes], np.int32)
     shines: NDArray[np.bool_] = np.any(emission, axis=1)
@@ -49,7 +50,7 @@ def pack_triangle_lights(meshes: list[Mesh], textures: Textures) -> TriangleLigh
     area = _normals(corners)[1] / 2
     seen = (emission[mesh[lamps]] * around).any(axis=1) & (area.astype(np.float32) > 0)
     lamps, around = lamps[seen], around[seen]
-    corners, whole = _joined(corners[seen], mesh[lamps], lamps, ~painted[mesh[lamps]])
+    corners, whole = _joined(corners[seen], mesh[lamps], lamps, ~uneven[mesh[lamps]])
     begins = np.ones(len(lamps), bool)
     begins[1:] = ~whole[:-1]
     light = np.full(len(mesh), -1, np.int32)
@@ -59,6 +60,11 @@ def pack_triangle_lights(meshes: list[Mesh], textures: Textures) -> TriangleLigh
     records, groups = _packed(corners[begins], whole[begins], emission[mesh[own]], around[begins], both)
     records["texture"], records["primitive"] = texture[mesh[own]], own
     return TriangleLights(records, groups, light)
+
+
+def _fades(mesh: Mesh) -> bool:
+    """Return whether its opacity may vary over its triangles."""
+    return isinstance(mesh.material.opacity, Texture) or (mesh.colors is not None and mesh.material.opacity != 1)
 
 
 def _packed(corners: Doubles, whole: NDArray[np.bool_], radiance: Doubles,

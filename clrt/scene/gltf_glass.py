@@ -24,7 +24,7 @@ def glass(extensions: MaterialExtensions, made: MetallicRoughness, uv: list[NDAr
     distance = volume.attenuationDistance
     red, green, blue = (float(np.clip(value, 0, 1)) for value in volume.attenuationColor)
     return Dielectric(color=made.color, ior=made.ior, roughness=made.roughness, emission=made.emission,
-                      double_sided=made.double_sided, attenuation_color=(red, green, blue),
+                      normal_map=made.normal_map, double_sided=made.double_sided, attenuation_color=(red, green, blue),
                       attenuation_distance=distance if distance is not None and distance > 0 else None)
 
 

@@ -59,10 +59,10 @@ class Materials:
             roughness=_numbered(_unit(pbr.roughnessFactor), gloss, "green"),
             emission=self._emission(source, primitive, user), double_sided=source.doubleSided,
             **self._layers(source.extensions, primitive, user))
+        made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
         solid = glass(source.extensions, made, uv, faces)
         if solid is not None:
             return solid
-        made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
         if source.alphaMode == "OPAQUE":
             return made
         opacity = _numbered(_unit(pbr.baseColorFactor[3]), base, "alpha")

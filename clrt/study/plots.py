@@ -7,7 +7,7 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..output.plots import MARKERS, write_figure
+from ..output.plots import MARKERS, label_short_range, write_figure
 from .families import FIGURES
 
 if TYPE_CHECKING:
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Zero errors are drawn here, below all nonzero ones.
 ZERO = 1e-3
+#: An axis that is short and spans more than this factor has room for the labels of whole decades alone.
+SHORT = 30
 #: Okabe and Ito's palette, which is distinguishable with most kinds of color blindness.
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#f0e442")
 
@@ -57,12 +59,15 @@ def plot_convergence(path: Path, results: Sequence[Mapping[str, Any]], devices: 
         for axis, (key, label) in zip(column, (("seconds", "seconds"), ("spp", "samples a pixel"))):
             _draw_convergence(axis, result, names, key)
             axis.set(xscale="log", yscale="log", xlabel=label)
+            low, high = axis.get_xlim()
+            if high < SHORT * low:
+                label_short_range(axis.xaxis)
             axis.grid(linewidth=0.4, alpha=0.4)
         column[0].set_title(f"{result['scene']}, {'x'.join(map(str, result['size']))}", fontsize="medium")
     for row in axes:
         row[0].set_ylabel("error (√relMSE)")
     marks = {label: mark for axis in axes.flat for mark, label in zip(*axis.get_legend_handles_labels())}
-    figure.legend(marks.values(), marks.keys(), loc="outside lower center", ncols=2 + len(results), frameon=False,
+    figure.legend(marks.values(), marks.keys(), loc="outside lower center", ncols=1 + len(results), frameon=False,
                   fontsize="small", title="\n".join(devices), title_fontsize="x-small")
     return write_figure(path, figure)
 

@@ -1,8 +1,9 @@
-// What layers leave to what lies below them, of light from an angle, and what min(T(wo), T(wi)) takes beyond (layers.cl).
+// Energy that layers transmit to the lobes below them by angle, and the further energy that min(T(wo), T(wi)) removes
+// (layers.cl).
 #include LAYER_ENERGY_FILE
 
 #if CLEARCOAT
-// What a film of strength 1 reflects of light from an angle in a single bounce. What it loses lies below it.
+// Directional albedo of the single bounce of a coat of strength 1. What the bounce loses goes to the layers below.
 static inline real coat_albedo(const struct metallic_roughness *m, real cos_theta) {
     Bounce bounce = ggx_bounce(&m->coat_bounces, maximum(cos_theta, ZERO));
     return 0.04f * bounce.by_f0 + bounce.by_f90;
@@ -25,7 +26,7 @@ static inline real fibres_strength(const struct metallic_roughness *m) {
 #endif
 }
 
-// Few surfaces of a scene have layers, so nothing is computed where no lane has any.
+// Few surfaces of a scene have layers, so nothing is computed if no lane has any.
 static inline ireal has_layers(const struct metallic_roughness *m) {
     return (film_strength(m) > 0.0f) | (fibres_strength(m) > 0.0f);
 }
@@ -56,7 +57,7 @@ static inline Left left_at(const struct metallic_roughness *m, real base_cos, re
     return left;
 }
 
-// All that min takes beyond 1 − T.
+// The total energy that min(T(wo), T(wi)) removes beyond 1 − T.
 static inline real3 taken(const struct metallic_roughness *m, Left left) {
     real3 all = mad3(m->f0, left.taken_f0, splat(F90(m) * left.taken_f90));
 #if THROUGH
@@ -71,7 +72,7 @@ static inline real3 taken(const struct metallic_roughness *m, Left left) {
 
 #define SCATTERS (THROUGH && MULTIPLE_SCATTERING)
 
-// Means over the hemisphere of the diffuse lobes; `other`: of Lambert's, whatever its albedo.
+// Hemispherical means of the diffuse lobes; `other`: of a Lambertian lobe, independent of its albedo.
 typedef struct {
 #if COUPLING_ALBEDO
     real3 left;
@@ -83,7 +84,8 @@ typedef struct {
 } Means;
 
 #if LAYER_ENERGY
-// What layers make of the means without them: of f it is mean f·(T − 1), and of `left` what min takes, too.
+// Add the effect of layers to the means without layers: mean f·(T − 1) for each f, and for `left` also what min
+// removes.
 static inline void add_layers(const struct metallic_roughness *m, Means *mean) {
     real film = film_strength(m), fibres = fibres_strength(m), both = film * fibres, less[4];
     LayerEntry single = entry_at(m, LAYER_PRODUCTS), product = entry_at(m, LAYER_PRODUCTS + 1.0f);

@@ -1,7 +1,8 @@
-// Blinn's model (1977; Nadolny 3.3), by the half vector h instead of the mirrored direction, in the path integrators with the
-// factor that lets white gloss reflect all light from straight above (Giesen 2009, "Phong and Blinn–Phong normalization"):
+// Blinn–Phong reflection (Blinn 1977; Nadolny 3.3), with the half vector h instead of the mirrored direction. In the
+// path integrators normalised so that a white glossy lobe reflects all light at normal incidence (Giesen 2009, "Phong
+// and Blinn–Phong normalization"):
 //   f = color/pi + specular·(n + 2)(n + 4)/(8·pi·(2^(−n/2) + n))·cos^n h
-// with n = shininess. Less is reflected from elsewhere.
+// with n = shininess. Less is reflected at other angles.
 #include "bsdf/phong_lobes.cl"
 
 struct blinn_phong { PowerLobes lobes; };

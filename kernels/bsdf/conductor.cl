@@ -1,8 +1,8 @@
-// A metal by its complex index of refraction eta + i·k: Fresnel's equations at GGX's microfacets, which are drawn among those
-// visible from wo. f = F(wi·h)·G·D/(4·cos wi·cos wo), the height-correlated G; one bounce. Local frame.
+// A metal with a complex index of refraction eta + i·k: exact Fresnel equations at GGX microfacets, sampled by visible
+// normals. f = F(wi·h)·G·D/(4·cos wi·cos wo), with height-correlated G; single bounce. Local frame.
 //
-// Measurements are published as eta and k, and with them Fresnel's equations are exact in each channel. F0 with a tint at
-// 82° (Hoffman 2019; Kutz et al. 2021) would fit these curves, and need a fit of its own for every metal.
+// Measured metals are published as eta and k, with which Fresnel's equations are exact in each channel. F0 with a tint
+// at 82° (Hoffman 2019; Kutz et al. 2021) would fit these curves, but needs a fit for every metal.
 #include "bsdf/ggx.cl"
 #include "bsdf/interface.cl"
 
@@ -17,8 +17,8 @@ static inline struct conductor conductor_at(const Scene *scene, ireal index, con
                               maximum(roughness * roughness, (real)(ALPHA_MIN))};
 }
 
-// F for unpolarised light from vacuum (Born and Wolf, 14.2), with a² + b² = |n² − sin²| for n = eta + i·k; of 2a² the smaller
-// term is divided, not subtracted.
+// F for unpolarised light from vacuum (Born and Wolf, 14.2), with a² + b² = |n² − sin²| for n = eta + i·k. The smaller
+// term of 2a² is computed by a division instead of a subtraction, to avoid cancellation.
 static inline real fresnel_conductor(real cos_o, real eta, real k) {
     real cos2 = cos_o * cos_o, sin2 = maximum(1.0f - cos2, ZERO);
     real real_part = eta * eta - k * k - sin2, imaginary = 2.0f * eta * k;

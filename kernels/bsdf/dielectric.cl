@@ -1,11 +1,13 @@
-// Glass or water: light is reflected with the probability F that Fresnel's equations give, and else refracted by Snell's
-// law (pbrt, 4th ed., 9.3 and 9.5). `ior` inside, 1 outside; what is refracted is multiplied by `color`.
+// Glass or water: reflection with the Fresnel probability F, else refraction by Snell's law (pbrt, 4th ed., 9.3 and
+// 9.5). `ior` inside, 1 outside; refracted light is multiplied by `color`.
 //
-// ROUGH_DIELECTRIC: the same at microfacets (rough_dielectric.cl); DIELECTRIC_ENERGY: after several of them, too.
-// THIN_DIELECTRIC: a sheet whose two faces lie together. Of a wave that bounces between them
-//   F + (1 − F)²·c²F/(1 − c²F²) is reflected, 2F/(1 + F) for c = 1, and (1 − F)²·c/(1 − c²F²) passes without being bent,
-// c = color being what is left of light from face to face. A rough one spreads both ways alike (as glTF's transmission).
-// ATTENUATION: light is absorbed inside, as Beer and Lambert say (path.cl). A sheet leaves what is absorbed around it.
+// ROUGH_DIELECTRIC: the same at microfacets (rough_dielectric.cl); DIELECTRIC_ENERGY: with multiple scattering between
+// them.
+// THIN_DIELECTRIC: a sheet with coincident faces. With all internal reflections summed,
+//   F + (1 − F)²·c²F/(1 − c²F²) is reflected, 2F/(1 + F) for c = 1, and (1 − F)²·c/(1 − c²F²) is transmitted unbent,
+// where c = color is the transmittance from face to face. A rough sheet spreads both alike (as glTF's transmission).
+// ATTENUATION: absorption inside by the Beer–Lambert law (path.cl). A sheet leaves the surrounding absorption
+// unchanged.
 #include "bsdf/interface.cl"
 
 static inline real fresnel_of_cosines(real cos_o, real cos_t, real eta) {
@@ -14,7 +16,8 @@ static inline real fresnel_of_cosines(real cos_o, real cos_t, real eta) {
     return 0.5f * (parallel * parallel + perpendicular * perpendicular);
 }
 
-// F for unpolarised light that comes at cos_o > 0 to a medium eta times as dense; cos_t of what is refracted, 0 if nothing.
+// Fresnel reflectance F of unpolarised light at cos_o > 0 from a medium into one of relative index eta; cos_t of the
+// refracted direction, 0 for total internal reflection.
 static inline real fresnel_dielectric(real cos_o, real eta, real *cos_t) {
     real cos2_t = ((eta - 1.0f) * (eta + 1.0f) + cos_o * cos_o) / (eta * eta);   // 1 − sin²/eta² without cancellation
     *cos_t = safe_sqrt(cos2_t);
@@ -26,13 +29,13 @@ struct dielectric {
     real3 color;
     real eta;           // index of refraction beyond the surface over that on wo's side
 #if ROUGH_DIELECTRIC
-    real alpha;         // 0 where it is smooth
+    real alpha;         // 0 if smooth
 #endif
 #if DIELECTRIC_ENERGY
     const Scene *scene;
     ireal index, inside;
-    real row, grazing;          // of the table of what is lost: the row, and a cosine below which that is much
-    real range, later, returned;    // of later bounces (read_later)
+    real row, grazing;          // row of the energy table; cosine below which losses are large
+    real range, later, returned;    // of multiple scattering (read_later)
 #endif
 #if THIN_DIELECTRIC
     ireal thin;
@@ -56,8 +59,7 @@ static inline real3 dielectric_absorption(const struct dielectric *m, real3 here
 
 static inline real3 dielectric_albedo(const struct dielectric *m) { return m->color; }
 
-// How light divides where Fresnel's equations give F: the probability of following what is reflected, and what each then
-// weighs.
+// Fresnel split, given F: the probability of sampling reflection, and the weights of reflection and transmission.
 typedef struct { real reflected; real3 reflection, transmission; } Division;
 
 static inline real thin_reflection(real f, real c) {
@@ -80,7 +82,7 @@ static inline Division divide_light(const struct dielectric *m, real f) {
     return d;
 }
 
-// Radiance on wo's side over that beyond the surface.
+// Radiance on wo's side over radiance beyond the surface (non-symmetric scattering due to refraction).
 static inline real dielectric_spread(const struct dielectric *m) { return IS_THIN(m) ? ONE : 1.0f / (m->eta * m->eta); }
 
 static inline BsdfSample smooth_dielectric_sample(const struct dielectric *m, real3 wo, real lobe) {
@@ -114,7 +116,7 @@ static inline struct dielectric dielectric_at(const Scene *scene, ireal index, c
 #endif
 #if ROUGH_DIELECTRIC
     real roughness = PARAMETER(dielectric, roughness);
-    ireal rough = (roughness > 0.0f) & ((ior != 1.0f) | IS_THIN(&m));    // where nothing is bent, nothing is spread
+    ireal rough = (roughness > 0.0f) & ((ior != 1.0f) | IS_THIN(&m));    // without refraction there is no roughness
     m.alpha = rough ? maximum(roughness * roughness, (real)(ALPHA_MIN)) : ZERO;
 #endif
 #if DIELECTRIC_ENERGY

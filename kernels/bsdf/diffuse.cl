@@ -1,4 +1,4 @@
-// Lambert: f = color/pi, the same towards every direction of the upper half. Source: Suchiński 6.2.
+// Lambertian reflection: f = color/pi over the upper hemisphere. Source: Suchiński 6.2.
 #include "sampling.cl"
 #include "bsdf/interface.cl"
 

@@ -1,13 +1,13 @@
-// Directional albedos of GGX: what microfacets reflect in a single bounce of light from an angle, with Schlick's F,
+// Directional albedos of GGX: the fraction of light from an angle that a single bounce reflects, with Schlick's F,
 //   E(c) = f0·by_f0(c) + f90·by_f90(c)
-// and what a single bounce loses with F = 1, which meets further microfacets: lost = 1 − by_f0 − by_f90. By fits over all
-// angles and roughnesses for each form of masking–shadowing:
+// and the fraction a single bounce loses with F = 1, which hits further microfacets: lost = 1 − by_f0 − by_f90.
+// Computed by fits over all angles and roughnesses for each form of masking–shadowing:
 //   lost   = t² or t, t = (1 − q)·P(x, y), q = c/(c + width), x = 2·√(q·(1 + width)) − 1, y = 2·roughness − 1
 //   by_f90 = (1 − lost)·(1 − g)^5,         g = c + alpha·P(x, y), x with the width 2·alpha, y = 2·√roughness − 1
-// q brings what happens at cosines of about `width` to the same place for every alpha, and the root takes in the slope of
-// c·log c at c = 0; width is 2·alpha for Smith's forms. Behind its peak Smith's loss falls with 1/c², as (1 − q)² does,
-// Schlick's with 1/c. Their means over the hemisphere, weighted by 2·c, are polynomials in y = 2·√roughness − 1, that of
-// `lost` times `scale`. The fits are off by 1e-3 at most (tests/rendering/test_ggx_albedo.py does the integrals in
+// q maps the features at cosines of about `width` to the same position for every alpha, and the root resolves the slope
+// of c·log c at c = 0; width is 2·alpha for Smith's forms. Beyond its peak Smith's loss falls with 1/c², as (1 − q)²
+// does, Schlick's with 1/c. The hemispherical means, weighted by 2·c, are polynomials in y = 2·√roughness − 1, that of
+// `lost` times `scale`. The fits are accurate to 1e-3 (tests/rendering/test_ggx_albedo.py computes the integrals in
 // float64).
 #define SCHLICK_FORMS (ALBEDO_SCHLICK || ALBEDO_SCHLICK_IBL)
 #define LOSS_X 8
@@ -16,12 +16,12 @@
 #define FRESNEL_Y 6
 #define MEAN_LOSS_Y 12
 #define MEAN_FRESNEL_Y 9
-// Horner's loops are chains of dependent operations, which overlap where they are unrolled.
+// Horner's scheme is a chain of dependent operations; unrolled, the chains overlap.
 #define UNROLLED _Pragma("unroll")
 
 typedef struct { real by_f0, by_f90, lost; } Bounce;
 
-// Of one roughness: coefficients of x, widths, and the means.
+// Fits for one roughness: coefficients of x, widths, and the hemispherical means.
 typedef struct {
     real alpha, loss[LOSS_X], fresnel[FRESNEL_X];
     Bounce mean;
@@ -31,7 +31,7 @@ typedef struct {
 #endif
 } GgxAlbedo;
 
-// What ends all tables: the numbers of a form, at this alpha.
+// Evaluate the tables of one form of masking at this alpha.
 static inline GgxAlbedo ggx_albedo_of(real alpha, real width, ireal squared, real scale, constant float (*loss)[LOSS_Y],
                                       constant float (*fresnel)[FRESNEL_Y], constant float *mean_loss,
                                       constant float *mean_fresnel) {
@@ -110,7 +110,7 @@ static inline GgxAlbedo choose_ggx_albedo(ireal mask, GgxAlbedo a, GgxAlbedo b) 
 #define TAKE_FORM(number, name) bounces = choose_ggx_albedo(smith == number, name##_albedo(alpha), bounces)
 #endif
 
-// By the forms of masking that the scene's materials use.
+// Select the tables by the forms of masking that the scene's materials use.
 static inline GgxAlbedo bounces_of(real alpha, ireal smith) {
     GgxAlbedo bounces = {ZERO};
 #if ALBEDO_HEIGHT_CORRELATED
@@ -128,7 +128,7 @@ static inline GgxAlbedo bounces_of(real alpha, ireal smith) {
     return bounces;
 }
 
-// Schlick's F, of these ends, in a single bounce.
+// Directional albedo of a single bounce with Schlick's F between f0 and f90.
 static inline real3 bounce_albedo(real3 f0, real f90, Bounce bounce) {
     return mad3(f0, bounce.by_f0, splat(f90 * bounce.by_f90));
 }

@@ -1,21 +1,21 @@
-// What every material's file provides, by its name:
+// The interface of a material; its file provides, with NAME being its name:
 //
-//   struct NAME                              its parameters where it was hit, of every lane
+//   struct NAME                              parameters at the hit, of every lane
 //   NAME_at(scene, index, surface)           reads them: PARAMETER(NAME, x), PARAMETER3(NAME, x) for its
 //                                            dataclass's x, and COLOR(NAME) for its color
-//   NAME_eval(m, wo, wi)                     a BsdfValue: f·|cos wi|, and the density with which NAME_sample chooses wi
+//   NAME_eval(m, wo, wi)                     a BsdfValue: f·|cos wi|, and the pdf with which NAME_sample samples wi
 //   NAME_sample(m, wo, u, lobe)              a direction with its weight f·|cos|/pdf; u in [0,1)², lobe in [0,1)
-//   NAME_albedo(m)                           what part of white light from straight above it reflects or lets through,
+//   NAME_albedo(m)                           fraction of white light reflected or transmitted at normal incidence,
 //                                            in [0, 1]
 //
 // m: const struct NAME *. wo, wi: unit, local frame, both pointing away from the surface, +z the shading normal on the
-// side of wo; surface->front: whether that is the outside. wi.z < 0 goes through it: then the material has the feature
-// TRANSMISSION; TRANSMISSION_LOBES, too, where eval knows directions beyond the surface, with NAME_transmits(m): whether it
-// can be other than 0 there; and ATTENUATION, where light is absorbed there, with NAME_absorption(m, here): how much, per
-// unit of length, where it is `here` on the side of wo. What has no ATTENUATION has no inside either.
+// side of wo; surface->front: whether that is the outside. wi.z < 0 is transmission: the material then has the feature
+// TRANSMISSION; also TRANSMISSION_LOBES if eval supports directions beyond the surface, with NAME_transmits(m): whether
+// it can be nonzero there; and ATTENUATION if light is absorbed there, with NAME_absorption(m, here): the coefficient
+// per unit of length, given `here` on the side of wo. A material without ATTENUATION has no inside either.
 #include "surface.cl"
 
-// The preamble says of each parameter whether some material of its type reads it from a texture: READ_kind_name is
+// For each parameter the preamble defines whether any material of its type reads it from a texture: READ_kind_name is
 // CONSTANT or TEXTURED.
 #define PARAMETER(kind, name) PASTE(READ_##kind##_##name, 1)(kind, name)
 #define PARAMETER3(kind, name) PASTE(READ_##kind##_##name, 3)(kind, name)
@@ -31,11 +31,11 @@
 #define COLOR(kind) PARAMETER3(kind, color)
 #endif
 
-// Of one direction wi. Both are evaluated together, since they share most of what they are made of.
+// Value and pdf of one direction wi, evaluated together because they share most of their terms.
 typedef struct {
-    real3 value;        // f·|cos wi|, the spread included
-    real3 matte;        // the part of it that spreads light about as Lambert's law does (horizon.cl)
-    real pdf;           // density per solid angle
+    real3 value;        // f·|cos wi|, `spread` included
+    real3 matte;        // the diffuse part of it, close to Lambert's law (horizon.cl)
+    real pdf;           // pdf per solid angle
 } BsdfValue;
 
 typedef struct {
@@ -45,12 +45,12 @@ typedef struct {
     real3 matte;        // as in BsdfValue
 #endif
 #if TRANSMISSION
-    real spread;        // radiance along wo over that along wi, which a denser medium bundles, beside the weight
+    real spread;        // factor besides the weight: radiance along wo over that along wi, due to refraction
 #endif
-    ireal specular;     // a single direction: eval is zero for it, and no light sample can find it
+    ireal specular;     // a single direction: eval is 0 for it, and no light sample can find it
 } BsdfSample;
 
-// What a sample is until a material says otherwise.
+// The initial value of a sample: failed.
 static inline BsdfSample no_sample() {
     BsdfSample sample;
     sample.weight = splat(ZERO);
@@ -66,7 +66,7 @@ static inline BsdfSample no_sample() {
     return sample;
 }
 
-// Gives a sample the weight and density of its direction, where those are what `kept` lanes have.
+// Set the weight and pdf of a sample from the value of its direction; lanes outside `kept` fail.
 static inline void weigh_sample(BsdfSample *sample, BsdfValue at, ireal kept) {
     sample->pdf = kept ? at.pdf : ZERO;
     real inverse = sample->pdf <= 0.0f ? ZERO : 1.0f / sample->pdf;

@@ -1,22 +1,24 @@
-// What min(T(wo), T(wi)) takes from gloss and fibres (layers.cl) by the table of clrt/scene/layer_energy.py: for each roughness of
-// the base, the film and the fibres three entries of means, and those of LAYER_STEPS + 1 angles, even in √cos.
+// The energy that min(T(wo), T(wi)) removes from gloss and fibres (layers.cl), from the table of
+// clrt/scene/layer_energy.py: for each roughness of the base, the coat and the fibres, three entries of means and
+// LAYER_STEPS + 1 entries by angle, uniform in √cos.
 #define LAYER_STEPS 96
 #define LAYER_PARTS 8
 #define LAYER_ENTRIES (LAYER_STEPS + 4)
-// Places of entries; of an angle's see layer_place.
+// Indices of entries; layer_place returns that of an angle.
 #define LAYER_MEAN ZERO
 #define LAYER_PRODUCTS ONE
 
 typedef struct { real part[LAYER_PARTS]; } LayerEntry;
 
-// Linear between an entry and the next one, by the number of the former.
+// Interpolate linearly between entry `number` and the next.
 static inline float8 entry_between(const Scene *scene, int number, float across) {
     global const float *entry = RECORD(scene->layer_entries, number)->part;
     return mix(vload8(0, entry), vload8(1, entry), across);
 }
 
 #if LAYER_ROWS
-// Linear between the roughnesses next to the place on each of the three axes, which have as many steps: 0 where all agree.
+// Interpolate linearly between the nearest roughnesses on each of the three axes. steps: intervals per axis, 0 if it
+// has one row.
 static inline float8 entry_in_rows(const Scene *scene, int number, const float *place, const float *steps, float across) {
     float8 sum = 0.0f;
     for (int corner = 0; corner < 8; ++corner) {
@@ -40,7 +42,7 @@ static inline real layer_place(real cos_theta) {
 static inline LayerEntry entry_at(const struct metallic_roughness *m, real place) {
     RealLanes parts[LAYER_PARTS];
     for (int lane = 0; lane < LANES; ++lane) {
-        int step = clamp((int)LANE(place, lane), 0, LAYER_ENTRIES - 2);    // that of an idle lane may be anything
+        int step = clamp((int)LANE(place, lane), 0, LAYER_ENTRIES - 2);    // the value in an inactive lane is arbitrary
         int number = LANE_INT(m->first_entry, lane) + step;
         float across = LANE(place, lane) - step;
 #if LAYER_ROWS

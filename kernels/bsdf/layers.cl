@@ -1,22 +1,24 @@
-// What may lie on a metallic_roughness surface, and what may pass through it, as glTF's extensions have them:
-//   CLEARCOAT  a clear film over all, F0 = 0.04: factor `clearcoat`, GGX of its own roughness
+// Layers on a metallic_roughness surface, and transmission through it, following glTF's extensions:
+//   CLEARCOAT  a clear coat on top, F0 = 0.04: factor `clearcoat`, GGX with its own roughness
 //   SHEEN      fibres over the rest: sheen_color·D(h)·V (sheen.cl)
-//   THROUGH    the part `transmission` of the body is a thin sheet, which passes light on through microfacets, not bent:
+//   THROUGH    the fraction `transmission` of the body is a thin sheet: microfacet transmission without refraction,
 //              color·(1 − F(wo·h))·G·D/(4·cos wo·cos wi), wi mirrored to wo's side, F of the dielectric part
 //
-// COAT_NORMALS: wo and wi are in the frame of the unbent normal. The coat, and what lies below it, each reflect in a frame around
-// a normal of their own: nothing to below its horizon. Gloss that is sent below that of the unbent one is mirrored there, as at
-// the geometric surface (horizon.cl).
+// COAT_NORMALS: wo and wi are in the frame of the unbent normal. The coat and the base each reflect in a frame around
+// their own normal, and nothing below its horizon. Gloss scattered below the horizon of the unbent normal is mirrored
+// at it, as at the geometric surface (horizon.cl).
 //
-// A coat leaves T(c) = 1 − clearcoat·E(c) of light from an angle, with the albedo E of its single bounce (ggx_albedo.cl); what
-// that loses goes below. Fibres leave 1 − max(sheen_color)·E, E theirs. Of the product T of both
-//   gloss, fibres, and what passes through microfacets have min(T(wo), T(wi)): T of one angle where they are smooth
-//   the diffuse lobe r(wo)·r(wi)/(pi·mean r) becomes R(wo)·R(wi)/(pi·mean R), R = T·r + what min takes beyond 1 − T
-//   (layer_energy.cl), by colour; other diffuse lobes have T(wo)·T(wi)/mean T
-// All are reciprocal, and what is white in a white furnace stays so. The couplings without albedos lose what min takes.
-// glTF takes a coat's share at wo alone. The fibres' f is divided by the larger of the albedos of wo and wi where that exceeds 1.
+// A coat transmits T(c) = 1 − clearcoat·E(c) of light from an angle, with the albedo E of its single bounce
+// (ggx_albedo.cl); the energy that bounce loses goes to the base. Fibres transmit 1 − max(sheen_color)·E, with their
+// own E. With the product T of both
+//   gloss, fibres, and microfacet transmission are scaled by min(T(wo), T(wi)): T of one angle if they are smooth
+//   the diffuse lobe r(wo)·r(wi)/(pi·mean r) becomes R(wo)·R(wi)/(pi·mean R), R = T·r + what min removes beyond 1 − T
+//   (layer_energy.cl), per channel; other diffuse lobes are scaled by T(wo)·T(wi)/mean T
+// All are reciprocal, and a white material passes the white furnace test. Couplings without albedos lose what min
+// removes. glTF evaluates the coat's share at wo alone. The fibres' f is divided by the larger of the albedos of wo and
+// wi if that exceeds 1.
 //
-// What a single bounce loses of the light that passes is passed on by Kulla and Conty's lobe, if MULTIPLE_SCATTERING.
+// Transmitted light that a single bounce loses is returned by a Kulla–Conty lobe if MULTIPLE_SCATTERING.
 #if COAT_NORMALS
 #define IN_BASE(m, w) to_local((m)->base_frame, w)
 #define IN_COAT(m, w) to_local((m)->coat_frame, w)
@@ -37,7 +39,7 @@ static inline real coat_fresnel(const struct metallic_roughness *m, real cos_the
     return m->coat * (0.04f + 0.96f * c2 * c2 * c);
 }
 
-// G1·D/(4·cos wo), the density of reflecting by a normal visible from wo; *hidden: G2/G1.
+// G1·D/(4·cos wo), the pdf of reflection at a normal visible from wo; *hidden: G2/G1.
 static inline real reflected_density(real3 wo, real3 wi, real alpha, real *hidden) {
     real lambda_o = ggx_lambda(wo, alpha);
     *hidden = (1.0f + lambda_o) / (1.0f + lambda_o + ggx_lambda(wi, alpha));
@@ -56,13 +58,14 @@ static inline real3 sheen_value(const struct metallic_roughness *m, real3 wo, re
 #include "bsdf/below_layers.cl"
 
 #if THROUGH
-// What microfacets pass on in a single bounce.
+// Light transmitted by the microfacets in a single bounce.
 static inline real3 passed_on(const struct metallic_roughness *m, real cos_h) {
     return mul(sub(splat(ONE), fresnel_to(m->body_f0, m->body_f90, cos_h)), m->through);
 }
 #endif
 
-// Sets what is the same for all wi. specular_o, multiple_o, diffuse_o: what the lobes reflect of light from wo, without layers.
+// Compute the terms that do not depend on wi. specular_o, multiple_o, diffuse_o: albedos of the lobes at wo, without
+// layers.
 static inline void lay_over(struct metallic_roughness *m, const Surface *surface, real specular_o, real multiple_o,
                             real diffuse_o) {
     m->left = left_at(m, surface->cos_o, COAT_COS(surface));
@@ -115,7 +118,7 @@ static inline void lay_over(struct metallic_roughness *m, const Surface *surface
 static inline ireal metallic_roughness_transmits(const struct metallic_roughness *m) { return largest(m->through) > 0.0f; }
 #endif
 
-// What each lobe reflects, and what passes on.
+// Sum of the reflection lobes.
 static inline BsdfValue layers_reflected(const struct metallic_roughness *m, real3 wo, real3 wi) {
     real3 base_o = IN_BASE(m, wo), base_i = IN_BASE(m, wi), coat_o = IN_COAT(m, wo), coat_i = IN_COAT(m, wi);
     Left left = left_at(m, base_i.z, coat_i.z);
@@ -238,7 +241,7 @@ static inline BsdfSample metallic_roughness_sample(const struct metallic_roughne
 #endif
     ireal kept = through ? sample.wi.z < 0.0f : sample.wi.z > 0.0f;
 #if COAT_NORMALS
-    // What a lobe sends below its own horizon has failed, though another lobe may send something there.
+    // A sample below its own lobe's horizon fails, even if another lobe could scatter there.
     kept = kept & (lobe < share.coat ? reflected.z > 0.0f : own_side);
 #endif
     weigh_sample(&sample, layers_eval(m, wo, sample.wi), kept);

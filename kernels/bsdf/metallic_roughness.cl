@@ -1,22 +1,24 @@
-// Cook–Torrance over a diffuse body (Suchiński 6.5–6.15, Nadolny 3.5–3.13):
+// Cook–Torrance microfacet reflection over a diffuse body (Suchiński 6.5–6.15, Nadolny 3.5–3.13):
 //   f = F(wi·h)·G·D/(4·cos wi·cos wo) + coupling·albedo/pi,  F(c) = f0 + (f90 − f0)(1 − c)^5, h the half vector
-// The coupling is what the gloss leaves to the body:
+// The coupling is the energy that the glossy lobe leaves to the body:
 //   COUPLING_ALBEDO       (1 − E(wi))(1 − E(wo))/(1 − mean E), E the directional albedo of the dielectric's gloss
 //                         (ggx_albedo.cl): reciprocal, and white stays white (Kelemen and Szirmay-Kalos 2001)
 //   COUPLING_FRESNEL      (1 − F(cos wi))(1 − F(cos wo)): reciprocal, never more than 1 with the gloss
-//   COUPLING_HALF_VECTOR  1 − F(wi·h) of the sources and glTF, which makes light: at roughness 0.1 a white plastic reflects
-//                         1.7 times what it gets at grazing angles
+//   COUPLING_HALF_VECTOR  1 − F(wi·h), as in the sources and glTF, which creates energy: at roughness 0.1 white plastic
+//                         reflects 1.7 times the incident light at grazing angles
 //
-// D is GGX, and the microfacet lobe draws normals visible from wo (ggx.cl); lobes are chosen by their albedos at wo.
+// D is GGX, and the microfacet lobe samples normals visible from wo (ggx.cl); lobes are chosen by their albedos at wo.
 //
-// MULTIPLE_SCATTERING adds what further bounces between microfacets reflect (Kulla and Conty 2017):
+// MULTIPLE_SCATTERING adds the reflection of further bounces between microfacets (Kulla and Conty 2017):
 //   multiple·lost(cos wi)·lost(cos wo)/(pi·mean lost), multiple = mean F²·(1 − mean lost)/(1 − mean F·mean lost)
-// of the metal; of the couplings without albedos, of all of f0. lost is near 0.1 at cos ≈ alpha and falls with 1/cos² behind;
-// a lobe of its own is drawn with about that density. With COUPLING_ALBEDO this and the body are one lobe,
+// for the metal, or for all of f0 with the couplings without albedos. lost peaks near cos ≈ alpha, at about 0.1, and
+// falls with 1/cos² beyond; its own lobe is sampled with about that density. With COUPLING_ALBEDO this and the body
+// form one lobe,
 //   r(wi)·r(wo)/(pi·mean r), r(c) = albedo·(1 − E(c)) + multiple·lost(c)
 //
-// SPECULAR: f0 of the dielectric part times specular·specular_color, and F ends at `specular` (glTF's KHR_materials_specular).
-// LAYERS: what lies on it and passes through it (layers.cl).
+// SPECULAR: f0 of the dielectric part times specular·specular_color; F ends at `specular` (glTF's
+// KHR_materials_specular).
+// LAYERS: layers on top, and transmission (layers.cl).
 #include "bsdf/ggx.cl"
 #include "bsdf/smith.cl"
 #include "bsdf/interface.cl"
@@ -29,7 +31,7 @@
 #define BASE(name) metallic_roughness_##name
 #endif
 #define OTHER_COUPLINGS (COUPLING_FRESNEL || COUPLING_HALF_VECTOR)
-// Which lanes have the albedo coupling. Where no material has another, metals may count as having it.
+// The lanes that use the albedo coupling. If no material uses another, metals may count as using it.
 #if COUPLING_ALBEDO && OTHER_COUPLINGS
 #define BY_ALBEDO(m) ((m)->coupling == 0)
 #elif COUPLING_ALBEDO
@@ -38,15 +40,15 @@
 #define BY_ALBEDO(m) NO_LANES
 #endif
 
-// The lobes' probabilities: their shares of the reflected light, by their albedos at wo, or by the Fresnel term there.
+// Probabilities of the lobes: their shares of the reflected light, by their albedos at wo or by the Fresnel term there.
 typedef struct { real specular, multiple, diffuse; } LobeShares;
 
 #if LAYERS
-// What layers leave of light from a direction: the film to all below it, and it and the fibres to the body; what white fibres
-// reflect; and of what lies below, what min(T(wo), T(wi)) takes beyond 1 − T (layers.cl).
+// Transmittance of the layers by direction: of the coat to all below it, and of coat and fibres to the body; the albedo
+// of white fibres; and what min(T(wo), T(wi)) removes from the lobes below, beyond 1 − T (layers.cl).
 typedef struct { real film, body, fibres, taken_f0, taken_f90, taken_fibres; } Left;
 
-// The probabilities of the lobes: about their shares of the light that leaves.
+// Probabilities of the lobes: approximately their shares of the outgoing light.
 typedef struct { real coat, sheen, scattered, through, base; } LayerShares;
 #endif
 
@@ -64,7 +66,7 @@ struct metallic_roughness {
 #endif
 #if MULTIPLE_SCATTERING
     real3 multiple;
-    real spread, lost_o;        // the latter over its mean
+    real spread, lost_o;        // lost_o: divided by its mean
 #endif
 #if GGX_ALBEDO
     GgxAlbedo bounces;
@@ -88,17 +90,17 @@ struct metallic_roughness {
     ireal first_entry;
 #endif
 #if LAYER_ROWS
-    real3 row, last_row;        // of the base, the film and the fibres
+    real3 row, last_row;        // of the base, the coat and the fibres
 #endif
 #if COAT_NORMALS
-    Frame base_frame, coat_frame;   // in that of the unbent normal
+    Frame base_frame, coat_frame;   // relative to the frame of the unbent normal
 #endif
 #if SHEEN
     real3 sheen;
     Fibres fibres;
 #endif
 #if THROUGH
-    real3 through, scattered;   // by a single bounce, and by more of them
+    real3 through, scattered;   // transmission by a single bounce, and by multiple scattering
 #endif
 #if THROUGH && MULTIPLE_SCATTERING
     real scattered_scale;
@@ -106,12 +108,12 @@ struct metallic_roughness {
 };
 
 #if COUPLING_ALBEDO
-// What leaves the body of light from an angle: albedo·(1 − E).
+// The light that leaves the body at an angle: albedo·(1 − E).
 static inline real3 body_left(const struct metallic_roughness *m, Bounce bounce) {
     return mul(m->albedo, sub(splat(ONE), bounce_albedo(m->body_f0, m->body_f90, bounce)));
 }
 
-// r.
+// The factor r of the diffuse lobe.
 static inline real3 left_albedo(const struct metallic_roughness *m, Bounce bounce) {
     real3 left = body_left(m, bounce);
 #if MULTIPLE_SCATTERING
@@ -122,7 +124,8 @@ static inline real3 left_albedo(const struct metallic_roughness *m, Bounce bounc
 #endif
 
 #if MULTIPLE_SCATTERING
-// Around +z with a density of cos² + alpha² in cos²: pdf = cos/(pi·spread·(cos² + alpha²)), spread = log(1 + 1/alpha²).
+// Sample around +z with a density proportional to 1/(cos² + alpha²) in cos²: pdf = cos/(pi·spread·(cos² + alpha²)),
+// spread = log(1 + 1/alpha²).
 static inline real3 sample_multiple(const struct metallic_roughness *m, real2 u) {
     real s, c, z2 = minimum(m->alpha * m->alpha * (exp(u.x * m->spread) - 1.0f), ONE), r = sqrt(1.0f - z2);
     sincos_turns(u.y, &s, &c);
@@ -139,7 +142,7 @@ static inline real multiple_pdf(const struct metallic_roughness *m, real cos_the
 #define F90(m) ONE
 #endif
 
-// Schlick's F.
+// Schlick's Fresnel approximation.
 static inline real3 fresnel_to(real3 f0, real f90, real cos_theta) {
     real c = maximum(1.0f - cos_theta, ZERO), c2 = c * c;
     return mad3(sub(splat(f90), f0), c2 * c2 * c, f0);
@@ -149,7 +152,7 @@ static inline real3 base_fresnel(const struct metallic_roughness *m, real cos_th
     return fresnel_to(m->f0, F90(m), cos_theta);
 }
 
-// 1 − F, with 1 − (1 − c)^5 multiplied out so that it keeps its digits at grazing angles.
+// 1 − F, with 1 − (1 − c)^5 expanded so that it keeps its precision at grazing angles.
 static inline real3 transmitted(const struct metallic_roughness *m, real c) {
     real rest = c * (5.0f - c * (10.0f - c * (10.0f - c * (5.0f - c))));
     return mad3(sub(splat(F90(m)), m->f0), rest, splat(1.0f - F90(m)));
@@ -238,7 +241,7 @@ static inline struct metallic_roughness metallic_roughness_at(const Scene *scene
     specular_o = m.coupling == 0 ? luminance(bounce_albedo(m.f0, F90(&m), bounce_o)) : specular_o;
 #endif
 #if MULTIPLE_SCATTERING
-    m.lost_o = bounce_o.lost * inverse_or_zero(lost);     // the program has no fits of forms whose materials need none
+    m.lost_o = bounce_o.lost * inverse_or_zero(lost);     // forms that no material needs have no fits in the program
     multiple_o = luminance(m.multiple) * bounce_o.lost;
 #endif
 #if COUPLING_ALBEDO || THROUGH

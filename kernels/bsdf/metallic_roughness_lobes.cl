@@ -1,5 +1,5 @@
-// The lobes of metallic_roughness: what they reflect, their densities and samples.
-// By the couplings without albedos, of the body: f·pi. cos_h: wi·h.
+// The lobes of metallic_roughness: values, pdfs and samples.
+// The body under the couplings without albedos: f·pi. cos_h: wi·h.
 static inline real3 crossing_value(const struct metallic_roughness *m, real3 wo, real3 wi, real cos_h) {
     real3 crossing = mul(transmitted(m, wi.z), transmitted(m, wo.z));
 #if COUPLING_HALF_VECTOR
@@ -8,8 +8,8 @@ static inline real3 crossing_value(const struct metallic_roughness *m, real3 wo,
     return mul(crossing, m->albedo);
 }
 
-// The lobes of the body and of multiple scattering. matte: of the body alone; where both share a lobe, that part which is the
-// body's own by wi.
+// The lobes of the body and of multiple scattering. matte: of the body alone; if both share a lobe, the body's part at
+// wi.
 static inline BsdfValue diffuse_lobes(const struct metallic_roughness *m, real3 wo, real3 wi, real cos_h) {
     real3 body = splat(ZERO);
 #if OTHER_COUPLINGS
@@ -32,10 +32,10 @@ static inline BsdfValue diffuse_lobes(const struct metallic_roughness *m, real3 
     return (BsdfValue){scale(both, cosine), scale(body, cosine), pdf};
 }
 
-// gloss, diffuse: factors of the lobes.
+// The lobes, scaled by the factors gloss and diffuse.
 static inline BsdfValue weighed_lobes(const struct metallic_roughness *m, real3 wo, real3 wi, real gloss, real diffuse) {
     real3 sum = add(wo, wi);
-    real length = length3(sum), cos_h = 0.5f * length;     // wi·h = wo·h, which as products differ near wi = −wo
+    real length = length3(sum), cos_h = 0.5f * length;     // wi·h = wo·h; their dot products would differ near wi = −wo
     real facets = ggx_d(scale(sum, 1.0f / length), m->alpha) / (4.0f * wo.z);
     BsdfValue at = diffuse_lobes(m, wo, wi, cos_h);
     at.matte = scale(at.matte, diffuse);
@@ -49,8 +49,8 @@ static inline BsdfValue BASE(eval)(const struct metallic_roughness *m, real3 wo,
     return weighed_lobes(m, wo, wi, ONE, ONE);
 }
 
-// As if no light were lost between microfacets, without fits of their albedos: f0, and what goes through the surface
-// twice: (1 − f0) of it straight in, and (1 − f0)·20/21, the cosine-weighted mean of 1 − F, out again.
+// Albedo without the losses between microfacets, so without fits: f0, and the light that crosses the surface twice, (1
+// − f0) of it in at normal incidence and (1 − f0)·20/21, the cosine-weighted mean of 1 − F, out again.
 static inline real3 BASE(albedo)(const struct metallic_roughness *m) {
     real3 in = sub(splat(ONE), m->f0);
     real3 albedo = mad3(mul(mul(in, in), m->albedo), (real)(20.0f / 21.0f), m->f0);

@@ -1,4 +1,4 @@
-// A perfect mirror: all light comes from one direction, times color. Source: Suchiński 7.5.
+// A perfect mirror: specular reflection times color. Source: Suchiński 7.5.
 #include "bsdf/interface.cl"
 
 struct mirror { real3 color; };

@@ -1,7 +1,7 @@
-// Phong's model (Nadolny 3.1 to 3.3), in the path integrators as Lafortune and Willems (1994, "Using the modified Phong
-// reflectance model for physically based rendering") made it reciprocal and energy conserving:
+// Phong reflection (Nadolny 3.1 to 3.3), in the path integrators in the reciprocal and energy-conserving form of
+// Lafortune and Willems (1994, "Using the modified Phong reflectance model for physically based rendering"):
 //   f = color/pi + specular·(n + 2)/(2·pi)·cos^n a
-// with n = shininess, and a the angle between wi and the mirrored wo. Beyond the horizon the gloss is lost.
+// with n = shininess, and a the angle between wi and the mirrored wo. The part of the lobe below the horizon is lost.
 #include "bsdf/phong_lobes.cl"
 
 struct phong { PowerLobes lobes; };

@@ -1,7 +1,7 @@
-// What Phong's and Blinn's models share: a power of a cosine around Lambert's law. Local frame.
+// Shared parts of Phong and Blinn–Phong: a cosine-power lobe over a Lambertian body. Local frame.
 //
-// In the path integrators the body reflects what the gloss leaves, at most 1 − specular, so that no light is made. The local
-// integrator (LOCAL) draws both as their authors wrote them, with the irradiance over pi for a light's colour:
+// In the path integrators the body reflects what the gloss leaves, at most 1 − specular, which conserves energy. The
+// local integrator (LOCAL) uses both in their original form, with the irradiance over pi as the colour of a light:
 //   color·(n·l) + specular·(…)^shininess
 #include "bsdf/interface.cl"
 #include "sampling.cl"
@@ -45,13 +45,13 @@ static inline real3 lobes_albedo(const PowerLobes *m) {
 #endif
 }
 
-// The part of the light that the gloss is given, by luminance.
+// The fraction of samples given to the glossy lobe, by luminance.
 static inline real gloss_share(const PowerLobes *m) {
     real gloss = luminance(m->specular), sum = gloss + luminance(m->color);
     return sum > 0.0f ? gloss / sum : ZERO;
 }
 
-// Around +z with a density of (n + 1)/(2·pi)·z^n.
+// Sample around +z with pdf (n + 1)/(2·pi)·z^n.
 static inline real3 sample_power(real2 u, real n) {
     real s, c, z = power(u.x, 1.0f / (n + 1.0f)), r = safe_sqrt((1.0f - z) * (1.0f + z));
     sincos_turns(u.y, &s, &c);

@@ -1,12 +1,13 @@
-// Ground glass: Fresnel's and Snell's laws at microfacets, whose normals h are drawn among those visible from wo (Walter et
-// al. 2007, eq. 20 and 21, with the height-correlated G2 for both sides). Local frame; beyond the surface wi.z < 0.
+// Rough glass: Fresnel's and Snell's laws at microfacets, sampled by visible normals (Walter et al. 2007, eq. 20 and
+// 21, with the height-correlated G2 for both sides). Local frame; beyond the surface wi.z < 0.
 //
-// A single bounce: light that meets a second microfacet is lost. DIELECTRIC_ENERGY gives that back (dielectric_energy.cl).
+// Single bounce: light that hits a second microfacet is lost. DIELECTRIC_ENERGY compensates for that
+// (dielectric_energy.cl).
 #include "bsdf/ggx.cl"
 #include DIELECTRIC_ENERGY_FILE
 
-// The density with which microfacets reflect, or else pass, light to wi; that may be on the wrong side of the surface.
-// *d: how light divides there.
+// The pdf with which microfacets reflect, or transmit, light to wi, which may be on the wrong side of the surface. *d:
+// the Fresnel split there.
 static inline real scattered_pdf(const struct dielectric *m, real3 wo, real3 wi, ireal reflected, Division *d) {
     ireal mirrored = reflected | IS_THIN(m);
     real3 sum = choose(mirrored, add(wo, vector(wi.x, wi.y, reflected ? wi.z : -wi.z)), mad3(wi, m->eta, wo));
@@ -15,7 +16,7 @@ static inline real scattered_pdf(const struct dielectric *m, real3 wo, real3 wi,
     real cos_o = mirrored ? 0.5f * length : dot3(wo, h), cos_i = dot3(wi, h), cos_t;
     real f = fresnel_dielectric(cos_o, m->eta, &cos_t);
     *d = divide_light(m, mirrored ? f : fresnel_of_cosines(cos_o, -cos_i, m->eta));
-    // Of the normals visible from wo, of which dωi = 4·cos_o dωh or |wo + eta·wi|²/(eta²·|cos_i|) dωh is made.
+    // Change of variables from visible normals: dωi = 4·cos_o dωh, or |wo + eta·wi|²/(eta²·|cos_i|) dωh for refraction.
     real visible = ggx_d(h, m->alpha) / (wo.z * (1.0f + ggx_lambda(wo, m->alpha)));
     real turned = mirrored ? (real)(0.25f) : cos_o * m->eta * m->eta * absolute(cos_i) / length2;
     real pdf = visible * turned * (reflected ? d->reflected : 1.0f - d->reflected);
@@ -23,7 +24,7 @@ static inline real scattered_pdf(const struct dielectric *m, real3 wo, real3 wi,
     return possible ? pdf : ZERO;
 }
 
-// The density of wi, on either side of the surface; *value: f·|cos|, but for the spread.
+// The pdf of wi, on either side of the surface; *value: f·|cos|, without the spread.
 static inline real rough_dielectric(const struct dielectric *m, real3 wo, real3 wi, real3 *value) {
     *value = splat(ZERO);
     if (!ANY(m->alpha > 0.0f)) return ZERO;

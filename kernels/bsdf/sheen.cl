@@ -1,11 +1,12 @@
-// Fibres that stand on a surface, as glTF's KHR_materials_sheen has them, in the frame of its normal:
+// Sheen of fibres on a surface, as in glTF's KHR_materials_sheen, in the frame of its normal:
 //   D(h) = (2 + n)/(2·pi)·sin^n θh with n = 1/roughness² (Estevez and Kulla 2017, "Production Friendly Microfacet Sheen
 //   BRDF")
 //   V = 1/(4·(cos wo + cos wi − cos wo·cos wi)) (Neubelt and Pettineo 2013)
-// and E(cos wo) = ∫ D·V·cos wi dwi, what white ones reflect: a polynomial in x = 2·√cos − 1, whose coefficients are
-// polynomials in y = 1 + 2·log10(roughness), interpolated at the Chebyshev points of both. It is off by 2.5e-3 at most, near the
-// horizon, and by 7e-4 where cos > 0.02 (tests/rendering/test_sheen.py does the integral, and the interpolation, in float64).
-#define SMOOTHEST 0.1f   // smoother fibres would shine at the horizon alone
+// and E(cos wo) = ∫ D·V·cos wi dwi, the albedo of white fibres: a polynomial in x = 2·√cos − 1, whose coefficients are
+// polynomials in y = 1 + 2·log10(roughness), interpolated at the Chebyshev points of both. Its error is at most 2.5e-3,
+// near the horizon, and 7e-4 for cos > 0.02 (tests/rendering/test_sheen.py computes the integral and the interpolation
+// in float64).
+#define SMOOTHEST 0.1f   // smoother fibres would reflect at grazing angles only
 #define SHEEN_X 12
 #define SHEEN_Y 8
 
@@ -24,7 +25,7 @@ constant float SHEEN_ALBEDO[SHEEN_X][SHEEN_Y] = {   // [power of x][power of y]
     {0.06992617f, -0.131919f, 0.1645659f, -0.1574002f, 0.07664667f, 0.04872099f, -0.08088277f, 0.02789874f},
 };
 
-// power: n. albedo: of E, the coefficients of x at this roughness.
+// power: n. albedo: coefficients of E in x at this roughness.
 typedef struct { real power, albedo[SHEEN_X]; } Fibres;
 
 static inline Fibres fibres_of(real roughness) {
@@ -44,7 +45,7 @@ static inline real fibres_d(const Fibres *fibres, real cos_h) {
     return (2.0f + fibres->power) * (0.5f / PI) * exp(0.5f * fibres->power * log(sine2));
 }
 
-// E.
+// The albedo E.
 static inline real fibres_albedo(const Fibres *fibres, real cos_theta) {
     real x = 2.0f * sqrt(minimum(absolute(cos_theta), ONE)) - 1.0f, sum = ZERO;
     for (int k = SHEEN_X - 1; k >= 0; --k) sum = sum * x + fibres->albedo[k];

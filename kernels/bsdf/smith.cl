@@ -1,4 +1,4 @@
-// Smith's masking–shadowing G2 of GGX, by the forms that the scene's materials use.
+// Smith's masking–shadowing term G2 of GGX, in the forms that the scene's materials use.
 static inline real smith_shadowing(real3 wo, real3 wi, real alpha, ireal smith) {
     real g = ZERO;
     real lambda_o = ggx_lambda(wo, alpha), lambda_i = ggx_lambda(wi, alpha);

@@ -1,14 +1,15 @@
-// The binary tree between clustering and the wide tree: BinaryNode with the box around its two children.
+// The binary BVH from clustering, before it is collapsed to the wide BVH: a BinaryNode has the box around its two
+// children.
 #include "build/primitives.cl"
 #include "mask.cl"
 
-// A child is a node, or ~p for primitive p.
+// A child is a node index, or ~p for primitive p.
 static inline Box node_box(const Primitives *primitives, global const BinaryNode *nodes, int node) {
     if (node < 0) return primitive_box(primitives, ~node);
     return (Box){vload3(0, nodes[node].lo), vload3(0, nodes[node].hi)};
 }
 
-// Has nodes on their way before they are needed; primitives and EMPTY are none.
+// Prefetch a node; primitives and EMPTY are ignored.
 static inline void prefetch_node(global const BinaryNode *nodes, int node) {
     if ((uint)node < EMPTY) { PREFETCH(nodes + node, 32) }
 }

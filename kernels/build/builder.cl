@@ -1,5 +1,5 @@
-// The builder of trees: primitives along a space-filling curve, a binary tree of them, its subtrees at better places;
-// which of its nodes stay, become leaves or are opened; the wide nodes, level by level; records of nodes and leaves.
+// BVH builder: primitives along a space-filling curve, a binary BVH, optimisation by reinsertion; collapsing, which
+// decides which nodes stay, become leaves or are opened; the wide nodes, level by level; records of nodes and leaves.
 #include "build/morton.cl"
 #include "build/ploc.cl"
 #include REINSERTION

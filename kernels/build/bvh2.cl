@@ -1,7 +1,7 @@
-// Writes nodes and leaves of the layout bvh2 (clrt/accel/layouts.py, kernels/traverse/bvh2.cl) for one level.
+// Write the nodes and leaves of one level in the layout bvh2 (clrt/accel/layouts.py, kernels/traverse/bvh2.cl).
 //
-// A record stands in the one above its own: those of the two children of wide node w are 2 w + 2 and 2 w + 3. Records 0
-// and 1 are the root's and an unused one.
+// A node's own record is in its parent's pair: the children of wide node w have the records 2 w + 2 and 2 w + 3. Record
+// 0 is the root's, record 1 is unused.
 #include "build/leaves.cl"
 
 static inline void write_node(global Node *node, Box box, int left_first, int count) {

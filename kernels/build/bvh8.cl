@@ -1,4 +1,4 @@
-// Writes nodes and leaves of the layout bvh8 (clrt/accel/layouts.py, kernels/traverse/bvh8.cl) for one level.
+// Write the nodes and leaves of one level in the layout bvh8 (clrt/accel/layouts.py, kernels/traverse/bvh8.cl).
 #include "build/leaves.cl"
 
 static inline void write_lane(global float (*rows)[CHILDREN], int lane, float3 v) {

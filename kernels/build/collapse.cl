@@ -1,21 +1,23 @@
-// From the binary tree to one of CHILDREN children a node at least expected work, by dynamic programming (Ylitie, Karras
-// and Laine 2017, 3.1): 1 a node, 1 an intersection of PACK triangles or a sphere, times the chance that a ray comes there.
+// Collapse the binary BVH to one with CHILDREN children per node of minimum expected cost, by dynamic programming
+// (Ylitie, Karras and Laine 2017, 3.1): cost 1 per node and per intersection of PACK triangles or a sphere, times the
+// probability that a ray reaches it.
 //
-// The chance to meet a box is that of rays that start inside the scene, as a renderer's do: the share of its volume, for
-// those that start in it, and of the others half the share of its area, since they run one way along their line. The
-// surface area heuristic is for rays from without; it thinks the walls of a room, which have no volume, twice as likely
-// to be met, and packs several into one leaf that every ray meets. Trees of scans come out the same.
+// The probability of hitting a box is that of rays that start inside the scene, as a renderer's do: the fraction of its
+// volume, for rays that start in the box, and half the fraction of its area for the others, since they run one way
+// along their line. The surface area heuristic assumes rays from outside; it considers the walls of a room, which have
+// no volume, twice as likely to be hit, and packs several into one leaf that every ray visits. BVHs of scans are the
+// same with both.
 //
-// A subtree can be a leaf if it holds up to LEAF_SIZE primitives of one kind. With PACK > 1 one that can is, unless it
-// saves the share WORTHWHILE when opened: to save less would leave packs half empty.
+// A subtree can be a leaf if it holds up to LEAF_SIZE primitives of one kind. With PACK > 1 it becomes one, unless
+// opening it saves the fraction WORTHWHILE: smaller savings would leave packs half empty.
 #include "build/binary.cl"
 
 #define WORTHWHILE 0.2f
-#define PLANS_AHEAD 8   // nodes whose children's plans are on their way
+#define PLANS_AHEAD 8   // prefetch distance of children's plans, in nodes
 
-// A node's plan: for b = 2 … CHILDREN three bits say how many of b roots that stand for its subtree are the left
-// child's, 0 where it stays whole; then whether it is a leaf, which kinds it holds, whether it stays whole for any b, and
-// how many primitives it holds (at most 127).
+// A node's plan: for b = 2 … CHILDREN three bits with the left child's share of b roots that replace its subtree, 0 if
+// it stays whole; then whether it is a leaf, which kinds it holds, whether it stays whole for any b, and its number of
+// primitives (at most 127).
 #define SHARE(plan, b) ((plan) >> (3 * ((b) - 2)) & 7)
 #define IS_LEAF 0x200000u
 #define HAS_TRIANGLES 0x400000u
@@ -34,18 +36,20 @@ static inline uint plan_of(const Primitives *primitives, global const uint *plan
     return IS_LEAF | (is_sphere(primitives, ~node) ? HAS_SPHERES : HAS_TRIANGLES) | WHOLE | COUNTED(1);
 }
 
-// Intersections that a leaf takes.
+// The number of intersection tests in a leaf.
 static inline float tests_of(bool sphere, uint count) { return (float)(sphere ? count : (count + PACK - 1) / PACK); }
 
-// Here and below products stand in an fma, alone if need be, so that none can be contracted with a sum, or not.
+// Here and below products are in an fma, alone if necessary, so that contraction with a sum cannot differ between
+// devices.
 static inline float chance(Box box, const World *world) {
     float3 sides = fma(box.hi - box.lo, vload3(0, world->per_side), vload3(0, world->no_side));
     float volume = fma(sides.x * sides.y, sides.z, 0.0f), area = fma(half_area(box), world->per_area, world->no_area);
     return fma(1.0f - volume, 0.5f * area, volume);
 }
 
-// A binary tree whose nodes are being planned, children first. costs[b − 1] of a node: with at most b roots, b < CHILDREN,
-// unless it stays whole. leaves, of a node that fits into a leaf: as one, and at least, with whatever stands for it.
+// A binary BVH whose nodes are planned, children first. costs[b − 1] of a node: with at most b roots, b < CHILDREN,
+// unless it stays whole. leaves, of a node that fits into a leaf: its cost as one, and its least cost with any
+// replacement.
 typedef struct {
     Primitives primitives;
     global const BinaryNode *nodes;
@@ -66,8 +70,8 @@ static inline void costs_of(const Planned *tree, int node, float *cost) {
     for (int b = 1; b < CHILDREN; ++b) cost[b] = whole ? leaf : tree->costs[(CHILDREN - 1) * node + b - 1];
 }
 
-// best[b], b = 2 … CHILDREN: what a node costs that is opened, its children's subtrees having b roots together; the left
-// one's are shares[b] of them.
+// best[b], b = 2 … CHILDREN: the cost of a node that is opened, with b roots for the subtrees of its children;
+// shares[b] of them are the left child's.
 static inline void share_roots(const Planned *tree, int left, int right, float *best, uint *shares) {
     float from_left[CHILDREN], from_right[CHILDREN];
     costs_of(tree, left, from_left);
@@ -83,7 +87,7 @@ static inline void share_roots(const Planned *tree, int left, int right, float *
     }
 }
 
-// The plan of a node from its children's, and its costs. The root is never a leaf.
+// Plan a node from the plans of its children, and compute its costs. The root is never a leaf.
 static inline uint plan_node(const Planned *tree, int node, int root) {
     int left = tree->nodes[node].left, right = tree->nodes[node].right;
     uint below[2] = {plan_of(&tree->primitives, tree->plans, left), plan_of(&tree->primitives, tree->plans, right)};
@@ -120,7 +124,7 @@ static inline void prefetch_planned(const Planned *tree, int node) {
     PREFETCH(tree->leaves + node, 8)
 }
 
-// Plans of `count` nodes from `node` on, whose children have theirs.
+// Plan `count` nodes from `node` on, whose children are planned.
 kernel void plan_nodes(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *nodes, uint node,
                        uint root, const World world, global uint *plans, global float *costs, global float2 *leaves) {
     Planned tree = {PRIMITIVE_ARGUMENTS, nodes, plans, costs, leaves, world};

@@ -1,14 +1,14 @@
-// Writes nodes and leaves of the layout cwbvh (clrt/accel/cwbvh.py, kernels/traverse/cwbvh.cl) for one level.
+// Write the nodes and leaves of one level in the layout cwbvh (clrt/accel/cwbvh.py, kernels/traverse/cwbvh.cl).
 #include "build/leaves.cl"
 
-// The exponent of the smallest power of two above extent / 255, as a float stores it; 1 for the smallest normal number.
+// The float exponent bits of the smallest power of two above extent / 255; 1, the smallest normal number's, at least.
 static inline uint step_exponent(float extent) {
     uint exponent = as_uint(extent) >> 23;
     exponent = exponent > 8 ? exponent - 7 : 1;
     return extent < 255.0f * as_float(exponent << 23) ? exponent : exponent + 1;
 }
 
-// The children's boxes on one axis, in steps from the node's low corner; a box without a child is inside out.
+// Write the children's boxes on one axis, in steps from the node's low corner; a box without a child is inverted.
 static inline void write_axis(global Node *node, int axis, const float *lo, const float *hi, float low, float high) {
     uint exponent = step_exponent(high - low);
     float steps = as_float((254 - exponent) << 23);

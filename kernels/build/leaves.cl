@@ -11,7 +11,7 @@ static inline void write_spheres(const Primitives *primitives, const int *member
 #endif
 
 #if TRIANGLES && LANES == 8
-// Unused lanes get corners of NaN, which no ray hits, and primitive −1.
+// Unused lanes get NaN corners, which no ray hits, and primitive −1.
 static inline void write_triangles(const Primitives *primitives, const int *members, int count, global Triangles *pack) {
     for (int lane = 0; lane < LANES; ++lane) {
         bool used = lane < count;
@@ -35,13 +35,14 @@ static inline void write_triangles(const Primitives *primitives, const int *memb
 }
 #endif
 
-// The area of what stands in a slot, a leaf's once for each intersection: what a visit costs, by the surface area heuristic.
+// The SAH cost of a slot: its area, for a leaf once per intersection test.
 static inline float visited_area(Box box, Content content) {
     return half_area(box) * (content.leaf ? tests_of(content.sphere, content.count) : 1.0f);
 }
 
-// Where the next wide node below a level goes, and the next records of triangles and spheres. Levels start at first_node
-// and next_node, the records of this one at first_triangle and first_sphere. work: areas by block, summed over levels.
+// The indices of the next wide node of the level below, and of the next records of triangles and spheres. Levels start
+// at first_node and next_node, the records of this one at first_triangle and first_sphere. work: areas by block, summed
+// over levels.
 typedef struct { uint node, triangle, sphere; } Places;
 
 #define LEVEL_PARAMETERS PRIMITIVE_PARAMETERS, global const BinaryNode *binary, global const uint *plans, \
@@ -50,7 +51,7 @@ typedef struct { uint node, triangle, sphere; } Places;
                          global LeafSphere *leaf_spheres, global float *work
 #define PLACES(i) {next_node + places[i], first_triangle + places[count + (i)], first_sphere + places[2 * count + (i)]}
 
-// Takes the place of what stands in a slot; writes the records of a leaf.
+// Allocate the index of a slot's content; write the records of a leaf.
 static inline uint fill_slot(const Primitives *primitives, global const BinaryNode *nodes, Content content, Places *next,
                              global Triangles *triangles, global LeafSphere *leaf_spheres) {
     if (!content.leaf) return next->node++;

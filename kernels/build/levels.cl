@@ -1,15 +1,16 @@
-// A binary tree in the order of its levels: the deepest first and the root last, with every node's parent, depth and
-// height. Node indices of list: the old ones, from the root down, so that the new index of list[k] is root − k.
+// Sort a binary BVH by level, the deepest first and the root last, with the parent, depth and height of every node.
+// Entries of list: the old node indices, from the root down, so that the new index of list[k] is root − k.
 #include "build/binary.cl"
 
-// Where a child is in arrays over all nodes, `root` + 1 of them, and then all primitives.
+// The index of a child in arrays over all nodes, `root` + 1 of them, followed by all primitives.
 static inline uint place_of(int child, uint root) { return child >= 0 ? (uint)child : root + 1 + (uint)~child; }
 
 #define LEVEL(depth, height) ((uint)(depth) | (uint)(height) << 16)
 #define DEPTH(level) ((level) & 0xffff)
 #define HEIGHT(level) ((level) >> 16)
 
-// In each block of a level that starts at list[start]: how many children are nodes. The first level is the root.
+// For each block of a level that starts at list[start]: the number of children that are nodes. The first level is the
+// root.
 kernel void count_below(uint count, uint block, global const BinaryNode *nodes, uint root, global uint *list, uint start,
                         global uint *counts) {
     uint me = get_global_id(0), blocks = (count + block - 1) / block;
@@ -23,7 +24,7 @@ kernel void count_below(uint count, uint block, global const BinaryNode *nodes, 
     counts[me] = below;
 }
 
-// Writes the nodes of the level, and the next level's list behind this one's. offsets: the counts, scanned.
+// Write the nodes of the level, and append the list of the next level. offsets: the counts, scanned.
 kernel void write_binary_level(uint count, uint block, global const BinaryNode *nodes, uint root, global uint *list,
                                uint start, uint depth, global const uint *offsets, global BinaryNode *sorted,
                                global uint *parents, global uint *levels) {
@@ -51,7 +52,7 @@ kernel void write_binary_level(uint count, uint block, global const BinaryNode *
 
 static inline uint height_of(global const uint *levels, int child) { return child >= 0 ? HEIGHT(levels[child]) : 0; }
 
-// Boxes and heights of `count` nodes from `node` on, whose children have theirs.
+// Compute boxes and heights of `count` nodes from `node` on, whose children have theirs.
 kernel void refit_nodes(uint count, uint block, PRIMITIVE_PARAMETERS, global BinaryNode *nodes, uint node,
                         global uint *levels) {
     Primitives primitives = PRIMITIVE_ARGUMENTS;

@@ -1,9 +1,9 @@
-// Primitives in the order of a space-filling curve: Morton codes of their boxes' centres, 21 bits an axis.
+// Sort primitives along a space-filling curve by the Morton codes of their boxes' centres, 21 bits per axis.
 #include "build/primitives.cl"
 #include "build/sort.cl"
 #include "mask.cl"
 
-#define SHAPES_AHEAD 16   // shapes that are on their way
+#define SHAPES_AHEAD 16   // prefetch distance, in primitives
 
 #define SCENE_PARAMETERS global const float *triangles, global const float *spheres, uint triangle_count
 
@@ -28,7 +28,7 @@ kernel void centre_bounds(uint count, uint block, SCENE_PARAMETERS, global float
     vstore3(bounds.hi, 2 * get_global_id(0) + 1, partial);
 }
 
-// The 21 bits of x, three places apart.
+// Spread the 21 bits of x, three places apart.
 static inline ulong spread(uint x) {
     ulong s = x;
     s = (s | s << 32) & 0x001f00000000ffffUL;
@@ -51,7 +51,7 @@ kernel void morton_codes(uint count, uint block, SCENE_PARAMETERS, float low_x, 
     }
 }
 
-// The scene's primitives `ids`, one after another.
+// Gather the scene's primitives `ids` contiguously.
 kernel void gather_shapes(uint count, uint block, SCENE_PARAMETERS, global const uint *ids, global float *shapes) {
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
     for (uint i = first; i < end; ++i) {

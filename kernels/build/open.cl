@@ -1,9 +1,10 @@
-// The wide tree's nodes, level by level from the root, as the plans say; each level is one range of consecutive nodes.
+// Build the nodes of the wide BVH level by level from the root, following the plans; each level is a range of
+// consecutive nodes.
 #include "build/collapse.cl"
 #include SLOTS
 
-// What stands in a slot: a wide node, a leaf of triangles, one of spheres, or nothing, whose count is 0. `units`: the
-// leaf records that it takes.
+// The content of a slot: a wide node, a leaf of triangles or of spheres, or nothing if count is 0. `units`: the leaf
+// records that it takes.
 typedef struct { int node; bool leaf, sphere; uint count, units; } Content;
 
 static inline void contents_of(const Primitives *primitives, global const uint *plans, global const int *slots,
@@ -17,12 +18,12 @@ static inline void contents_of(const Primitives *primitives, global const uint *
         triangles |= leaf && !sphere;
     }
 #if ONE_KIND
-    // A node with leaves of both kinds: those of spheres come into nodes of their own.
+    // A node with leaves of both kinds: those of spheres get nodes of their own.
     for (int s = 0; s < CHILDREN; ++s) contents[s].leaf = contents[s].leaf && !(triangles && contents[s].sphere);
 #endif
 }
 
-// The binary nodes that become the children of a wide one in place of `top`; EMPTY in slots that are not used.
+// The binary nodes that become the children of a wide node in place of `top`; EMPTY in unused slots.
 static inline void open_node(const Primitives *primitives, global const BinaryNode *nodes, global const uint *plans,
                              int top, global int *slots) {
     int slot[CHILDREN], roots[CHILDREN], used = 1;
@@ -42,7 +43,7 @@ static inline void open_node(const Primitives *primitives, global const BinaryNo
     put_in_slots(primitives, nodes, top, slot, used, slots);
 }
 
-// Of the nodes that the next wide node holds the children, and of those that the one after it holds they themselves.
+// Prefetch the children of the nodes that the next wide node holds, and the nodes that the one after it holds.
 static inline void prefetch_slots(global const BinaryNode *nodes, global const uint *plans, global const int *slots,
                                   uint i, uint end) {
     if (i + 2 >= end) return;
@@ -56,7 +57,7 @@ static inline void prefetch_slots(global const BinaryNode *nodes, global const u
 
 typedef struct { int children; uint nodes, triangles, spheres; } Needs;
 
-// How many children a node has, and how many wide nodes and leaf records they take.
+// The number of a node's children, and of the wide nodes and leaf records they take.
 static inline Needs needs_of(const Content *contents) {
     Needs needs = {0, 0, 0, 0};
     for (int s = 0; s < CHILDREN; ++s) {
@@ -69,10 +70,11 @@ static inline Needs needs_of(const Content *contents) {
     return needs;
 }
 
-// Opens the nodes below `count` wide ones. slots: [CHILDREN] a node, of binary nodes and EMPTY. places: first the place
-// of each one's first wide child. waiting: entries on a traversal's stack when it comes to a node; with GROUPS, the
-// nodes below one are one entry. All three are filled in for the `below` children, of places three times as many: how
-// many wide nodes, records of triangles and of spheres each of them needs. most[0]: the most entries on the stack.
+// Open the nodes below `count` wide ones. slots: [CHILDREN] per node, of binary nodes and EMPTY. places: starts with
+// the index of the first wide child of each node. waiting: entries on the traversal stack when it reaches a node; with
+// GROUPS, the child nodes of one node are one entry. All three are written for the `below` children, with three times
+// as many places: how many wide nodes, records of triangles and of spheres each needs. most[0]: the maximum number of
+// entries on the stack.
 kernel void open_level(uint count, uint block, PRIMITIVE_PARAMETERS, global const BinaryNode *nodes,
                        global const uint *plans, global const int *slots, global const uint *places,
                        global const int *waiting, uint below, global int *next_slots, global uint *next_places,

@@ -1,12 +1,11 @@
-// A binary tree from the bottom up: parallel locally-ordered clustering (Meister and Bittner 2018, "Parallel
+// Bottom-up build of a binary BVH: parallel locally-ordered clustering (Meister and Bittner 2018, "Parallel
 // Locally-Ordered Clustering for Bounding Volume Hierarchy Construction"; rounds as in Benthin et al. 2022, "PLOC++").
 //
-// Clusters lie in Morton order. In each round every cluster looks RADIUS places to both sides for its nearest, and those
-// that are nearest to each other become one. A cluster is a column of seven rows, `pitch` apart: its box (lo x, y, z, hi
-// x, y, z), and as an integer its node << 4 | the number of its primitives, at most MANY; ~p stands for primitive p.
-// RADIUS columns that are far from everything precede the first cluster and follow the last. A round that joins fewer
-// than one cluster in SLOW is followed by one that joins all neighbours, so that depth and time are bounded for any input,
-// nested boxes included.
+// Clusters are in Morton order. In each round every cluster searches RADIUS places to both sides for its nearest
+// neighbour, and mutual nearest neighbours are merged. A cluster is a column of seven rows, `pitch` apart: its box (lo
+// x, y, z, hi x, y, z), and as an integer its node << 4 | the number of its primitives, at most MANY; ~p is primitive
+// p. RADIUS columns at infinite distance pad both ends. A round that merges fewer than one cluster in SLOW is followed
+// by one that merges all neighbours, so that depth and time are bounded for any input, nested boxes included.
 #include "build/primitives.cl"
 #include "mask.cl"
 
@@ -16,9 +15,9 @@
 #define CLUSTER(node, count) ((int)((uint)(node) << 4) | (int)(count))
 #define NODE(cluster) ((cluster) >> 4)
 
-// How far apart two clusters are: the area of their common box, less what their own areas save. Where both fit into one
-// leaf its price replaces theirs; above, these shares made the cheapest trees of those that were tried, of few children
-// and of many. (The area alone makes trees that cost 3 to 4 % more.)
+// The distance of two clusters: the area of their common box, less a fraction of their own areas. If both fit into one
+// leaf its cost replaces theirs; above leaves, these fractions gave the cheapest BVHs of those tried, with few children
+// and with many. (The area alone gives BVHs that cost 3 to 4 % more.)
 #define SAVED_IN_LEAF 1.0f
 #define SAVED_ABOVE (CHILDREN > 2 ? 0.75f : 0.4f)
 
@@ -69,9 +68,9 @@ static inline float8 distances(global const float *row, uint pitch, Box box, flo
     return fma(-saved, areas, fma(x, y + z, y * z));
 }
 
-// Where the nearest of cluster i is: the difference of their indices. Of equally near ones the first by the exclusive or
-// of both indices: that is an order of all pairs, so the nearest pair of all chooses itself, and where all are equal
-// neighbours pair up. With `forced` they do, whatever their boxes: rounds of that kind halve the clusters.
+// The offset from cluster i to its nearest neighbour. Ties are broken by the exclusive or of both indices, which orders
+// all pairs, so the nearest pair of all is always mutual, and neighbours pair up if all distances are equal. With
+// `forced` neighbours pair up whatever their boxes: such rounds halve the number of clusters.
 static inline int nearest_of(global const float *clusters, uint pitch, uint count, uint forced, uint i) {
     if (forced) return (i ^ 1) < count ? (int)(i ^ 1) - (int)i : 0;
     Box box = cluster_box(clusters, pitch, i);
@@ -93,13 +92,13 @@ static inline int nearest_of(global const float *clusters, uint pitch, uint coun
     return (int)(first_of_equal ^ i) - (int)i;
 }
 
-// The step to the cluster that i is joined with, 0 if it stays alone.
+// The offset to the cluster that i is merged with, 0 if it stays alone.
 static inline int partner(global const char *nearest, uint i) {
     int step = nearest[i];
     return nearest[i + step] == -step ? step : 0;
 }
 
-// Of the clusters first … end − 1, x: how many stay; y: pairs that are joined.
+// Of the clusters first … end − 1, x: how many remain; y: pairs that are merged.
 static inline uint2 count_of(global const char *nearest, uint first, uint end) {
     uint2 counts = {0, 0};
     for (uint i = first; i < end; ++i) {
@@ -109,8 +108,8 @@ static inline uint2 count_of(global const char *nearest, uint first, uint end) {
     return counts;
 }
 
-// Puts those of the clusters first … end − 1 that stay at `place` and on, in the next round; new nodes are numbered from
-// `node` on.
+// Write those of the clusters first … end − 1 that remain to `place` and on, in the next round; new nodes are numbered
+// from `node` on.
 static inline void join(global const char *nearest, uint first, uint end, global const float *clusters, uint pitch,
                         global float *next, uint next_pitch, uint place, global BinaryNode *nodes, uint node) {
     for (uint i = first; i < end; ++i) {
@@ -137,7 +136,7 @@ kernel void nearest_clusters(uint count, uint block, global const float *cluster
     for (uint i = first; i < end; ++i) nearest[i] = nearest_of(clusters, pitch, count, forced, i);
 }
 
-// In each block: counts[block] clusters that stay, counts[blocks + block] pairs that are joined.
+// In each block: counts[block] clusters that remain, counts[blocks + block] pairs that are merged.
 kernel void count_pairs(uint count, uint block, global const char *nearest, global uint *counts) {
     uint me = get_global_id(0), blocks = (count + block - 1) / block;
     if (me >= blocks) return;
@@ -146,7 +145,7 @@ kernel void count_pairs(uint count, uint block, global const char *nearest, glob
     counts[blocks + me] = mine.y;
 }
 
-// The clusters of the next round; new nodes are numbered from `node` on.
+// Write the clusters of the next round; new nodes are numbered from `node` on.
 kernel void join_pairs(uint count, uint block, global const char *nearest, global const uint *offsets,
                        global const uint *totals, global const float *clusters, uint pitch, global float *next,
                        uint next_pitch, global BinaryNode *nodes, uint node) {
@@ -157,8 +156,8 @@ kernel void join_pairs(uint count, uint block, global const char *nearest, globa
          next_pitch, offsets[me], nodes, node + offsets[blocks + me]);
 }
 
-// All further rounds by one work-group: of few clusters none takes as long as the launches of its kernels. rounds[0]
-// becomes their number, and from rounds[1] on there is how many nodes each of them made.
+// All further rounds in one work-group: with few clusters a round is faster than the launches of its kernels. rounds[0]
+// receives their number, and rounds[1] and on the number of nodes that each of them made.
 kernel void last_rounds(uint count, uint forced, global char *nearest, global float *clusters, uint pitch,
                         global float *next, uint next_pitch, global BinaryNode *nodes, uint node, global uint *rounds) {
     local uint2 counts[SCAN_ITEMS];

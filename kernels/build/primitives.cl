@@ -1,14 +1,14 @@
-// What a tree is built over: triangles and spheres in one order, their boxes and areas; lengths of the scene.
+// The primitives of a BVH: triangles and spheres in one order, their boxes and areas, in scene units.
 //
-// Coordinates are finite and below 1e18, so that no area overflows. Every kernel of the builder works on a block of
-// consecutive items in each work-item: a long one on a CPU, a short one on a GPU.
+// Coordinates are finite and below 1e18, so that no area overflows. Every kernel of the builder processes a block of
+// consecutive items per work-item: a long one on a CPU, a short one on a GPU.
 
 typedef struct { float3 lo, hi; } Box;
 
 #define NO_BOX ((Box){(float3)(INFINITY), (float3)(-INFINITY)})
 
-// Primitive p is nine floats from shapes[9 p] on: a triangle's corners, or a sphere's centre and radius. In the scene,
-// where triangles come first, it has the number ids[p].
+// Primitive p is nine floats at shapes[9 p]: a triangle's corners, or a sphere's centre and radius. ids[p] is its index
+// in the scene, where triangles come first.
 typedef struct {
     global const float *shapes;
     global const uint *ids;
@@ -27,7 +27,7 @@ static inline Box box_union(Box a, Box b) {
     return (Box){a.lo < b.lo ? a.lo : b.lo, a.hi > b.hi ? a.hi : b.hi};
 }
 
-#define TRIANGLE_PAD 4.7683716e-7f   // 2^-21; why: see clrt/accel/layouts.py
+#define TRIANGLE_PAD 4.7683716e-7f   // 2^-21; for the reason see clrt/accel/layouts.py
 
 static inline Box triangle_box(float3 a, float3 b, float3 c) {
     Box box = box_union(box_union((Box){a, a}, (Box){b, b}), (Box){c, c});
@@ -51,7 +51,7 @@ static inline Box primitive_box(const Primitives *primitives, int primitive) {
     return shape_box(primitives->shapes + SHAPE * primitive, is_sphere(primitives, primitive));
 }
 
-// With one explicit fma there is nothing left to contract: all devices get the same number, hence the same tree.
+// One explicit fma leaves nothing to contract: all devices compute the same area, hence the same BVH.
 static inline float half_area(Box box) {
     float3 size = box.hi - box.lo;
     return fma(size.x, size.y + size.z, size.y * size.z);

@@ -1,7 +1,7 @@
-// New corners and boxes for a tree whose vertices have moved; what is below what stays. From the leaves up: a launch a
-// level, the deepest first, of which each item is a node.
+// Refit a BVH after its vertices have moved: new corners and boxes, same topology. From the leaves up: a launch per
+// level, the deepest first, with a node per item.
 //
-// vertices: three floats each, lengths of the tree. faces: three indices each, those that the tree was built over.
+// vertices: three floats each, in the BVH's units. faces: three indices each, those that the BVH was built over.
 #include "build/primitives.cl"
 
 #define REFIT_PARAMETERS uint first_node, global const float *vertices, global const int *faces, global Node *nodes, \

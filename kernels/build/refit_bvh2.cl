@@ -1,4 +1,4 @@
-// Refits one level of the layout bvh2 (clrt/accel/layouts.py), whose leaves are triangles one after another.
+// Refit one level of the layout bvh2 (clrt/accel/layouts.py), whose leaves are consecutive triangles.
 #include "build/refit.cl"
 
 static inline Box refit_triangle(global const float *vertices, global const int *faces, global Triangles *leaf) {

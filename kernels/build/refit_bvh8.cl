@@ -1,4 +1,4 @@
-// Refits one level of the layout bvh8 (clrt/accel/layouts.py), whose leaves are packs of eight triangles.
+// Refit one level of the layout bvh8 (clrt/accel/layouts.py), whose leaves are packs of eight triangles.
 #include "build/refit.cl"
 
 static inline void store_lane(global float rows[3][8], int lane, float3 v) {
@@ -7,7 +7,7 @@ static inline void store_lane(global float rows[3][8], int lane, float3 v) {
     rows[2][lane] = v.z;
 }
 
-// Unused lanes, which come last, keep their corners of NaN.
+// Unused lanes, which come last, keep their NaN corners.
 static inline Box refit_pack(global const float *vertices, global const int *faces, global Triangles *pack) {
     Box box = NO_BOX;
     for (int lane = 0; lane < 8 && pack->primitive[lane] >= 0; ++lane) {
@@ -26,7 +26,7 @@ static inline float least(float8 a) {
     return two.x < two.y ? two.x : two.y;
 }
 
-// Around all children; boxes of unused slots are turned inside out.
+// The bounds of all children; boxes of unused slots are inverted.
 static inline Box node_bounds(global const Node *node) {
     return (Box){(float3)(least(vload8(0, node->lo[0])), least(vload8(0, node->lo[1])), least(vload8(0, node->lo[2]))),
                  -(float3)(least(-vload8(0, node->hi[0])), least(-vload8(0, node->hi[1])), least(-vload8(0, node->hi[2])))};

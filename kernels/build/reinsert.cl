@@ -1,14 +1,14 @@
-// Subtrees of the binary tree are taken out and put in elsewhere, where the sum of all nodes' areas falls (Meister and
-// Bittner 2017, "Parallel Reinsertion for Bounding Volume Hierarchy Optimization").
+// Optimise the binary BVH by reinsertion: subtrees are removed and inserted elsewhere if that reduces the total area of
+// all nodes (Meister and Bittner 2017, "Parallel Reinsertion for Bounding Volume Hierarchy Optimization").
 //
-// Of each subtree below the topmost nodes the best new place is sought. Then moves that would touch a node in common
-// compete: all but the one that gains most give way. With 32 bits at a time that takes two steps, first the gain and then
-// the number of the move, so that the same moves win whatever the order of the work.
+// For each subtree below the topmost nodes the best new position is searched. Then moves that would touch a common node
+// compete, and only the one with the largest gain is kept. With 32-bit atomics that takes two steps, first the gain and
+// then the index of the move, so that the same moves win whatever the order of execution.
 #include "build/levels.cl"
 
-#define WAITING 96       // subtrees that are still to be searched; those that do not fit are not
-#define VISITS 256       // most places that are tried for a subtree
-#define ROUNDING 5e-7f   // of the area that all changes are in, covers what sums and differences of areas round off
+#define WAITING 96       // capacity for subtrees still to be searched; others are skipped
+#define VISITS 256       // maximum number of positions tried per subtree
+#define ROUNDING 5e-7f   // relative to the area of all changes; covers the rounding of sums and differences of areas
 
 typedef struct {
     global BinaryNode *nodes;
@@ -25,15 +25,16 @@ static inline int sibling_of(const Binary *tree, int child, int parent) {
     return tree->nodes[parent].left == child ? tree->nodes[parent].right : tree->nodes[parent].left;
 }
 
-// Whether a leaf would come to lie deeper than `deepest`. So much for one move; since those that are made together keep
-// off each other's paths, at most every second node above a leaf can get a new parent: none gets below 1.5 deepest.
+// Whether a leaf would become deeper than `deepest`. That bounds a single move; since moves made together have disjoint
+// paths, at most every second node above a leaf can get a new parent, so none gets deeper than 1.5 deepest.
 static inline bool too_deep(const Binary *tree, int moved, int target, uint deepest) {
     uint a = height_of(tree->levels, moved), b = height_of(tree->levels, target);
     return DEPTH(tree->levels[parent_of(tree, target)]) + 2 + (a > b ? a : b) > deepest;
 }
 
-// The best place in the subtree `top`, which does not hold `moved`, the box. saved: by taking it out, less ROUNDING. On
-// the way down the nodes above grow; a subtree is left alone where even a box of no more than `area` would not pay.
+// Search the best position in the subtree `top`, which does not hold `moved`, of box `box`. saved: the area saved by
+// its removal, less ROUNDING. The nodes on the path down grow; a subtree is skipped if even a
+// new parent of area `area`, the least possible, would not pay off.
 static inline void search(const Primitives *primitives, const Binary *tree, int top, int pivot, Box box, float saved,
                           uint deepest, int *visits, Move *best) {
     int waiting[WAITING], count = 1;
@@ -86,16 +87,16 @@ kernel void find_moves(uint count, uint block, PRIMITIVE_PARAMETERS, BINARY_PARA
     }
 }
 
-// Steps in which moves compete for the nodes that they touch: those whose links change, and those on the way from both
-// subtrees to the pivot, whose boxes do. gain: of a node, the largest of those that want it, infinite once it is given
-// away. owner: whose that is, 0 for nobody. Winners are marked by a negative gain.
-#define GIVE_UP 0  // moves that want what is given away drop out
-#define CLAIM 1    // every node learns the largest gain
+// Steps in which moves compete for the nodes that they touch: those whose links change, and those on the paths from
+// both subtrees to the pivot, whose boxes change. gain: per node the largest gain of the moves that touch it, infinite
+// once it is assigned. owner: the move that owns it, 0 for none. Winners are marked by a negative gain.
+#define GIVE_UP 0  // moves that need an assigned node drop out
+#define CLAIM 1    // every node receives the largest gain
 #define OWN 2      // and the last move that has it
-#define WIN 3      // who owns all its nodes has won
-#define SETTLE 4   // winners keep their nodes, all others give theirs back
+#define WIN 3      // moves that own all their nodes win
+#define SETTLE 4   // winners keep their nodes, all others release theirs
 
-// Whether the node can be had, or is.
+// Whether the move can get the node, or has it.
 static inline bool compete(int step, const Move *move, uint name, global uint *gain, global uint *owner) {
     uint mine = as_uint(move->gain);
     if (step == GIVE_UP) return *gain != as_uint(INFINITY);
@@ -134,7 +135,7 @@ static inline void replace_child(global BinaryNode *node, int old, int new) {
     else node->right = new;
 }
 
-// Changes the links; boxes follow when the tree is refitted.
+// Change the links; boxes are updated when the BVH is refitted.
 kernel void make_moves(uint count, uint block, BINARY_PARAMETERS, global const Move *moves) {
     Binary tree = BINARY_ARGUMENTS;
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;

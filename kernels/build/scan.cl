@@ -1,7 +1,7 @@
-// Exclusive prefix sums of several arrays of `count` numbers, one after another in `values`, in place.
+// Exclusive prefix sums of several arrays of `count` numbers, stored consecutively in `values`, in place.
 //
-// Each array is cut into `parts`, one a work-group. Where there are several, the sums of the parts are scanned in turn,
-// and what stood before each part is added to it.
+// Each array is split into `parts`, one per work-group. If there are several, the sums of the parts are scanned in
+// turn, and the sum before each part is added to it.
 #define SCAN_ITEMS 256
 
 kernel void scan(global uint *values, uint count, uint parts, global uint *totals) {
@@ -25,7 +25,7 @@ kernel void scan(global uint *values, uint count, uint parts, global uint *total
     if (me == items - 1) totals[group] = before;
 }
 
-// count: of all arrays together, `each` of one.
+// count: of all arrays together; `each`: of one array.
 kernel void add_before(uint count, uint block, global uint *values, uint each, uint parts, global const uint *before) {
     uint first = (uint)get_global_id(0) * block, end = first + block < count ? first + block : count;
     uint part = (each + parts - 1) / parts;

@@ -1,4 +1,4 @@
-// The children of a wide node in its slots, one after another.
+// Put the children of a wide node into its slots in order.
 #include "build/binary.cl"
 
 static inline void put_in_slots(const Primitives *primitives, global const BinaryNode *nodes, int top,

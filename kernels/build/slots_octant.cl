@@ -1,12 +1,13 @@
-// The children of a wide node in slots so that near ones come first for all rays (Ylitie, Karras and Laine 2017, 3.2):
-// slot i should hold what lies farthest towards the corner of the node whose bit a is set on the high side of axis a.
+// Put the children of a wide node into slots so that near ones come first for all rays (Ylitie, Karras and Laine 2017,
+// 3.2): slot i should hold the child farthest towards the corner of the node that is on the high side of axis a if bit
+// a of i is set.
 #include "build/binary.cl"
 
 static inline float towards(float3 offset, int slot) {
     return (slot & 1 ? offset.x : -offset.x) + (slot & 2 ? offset.y : -offset.y) + (slot & 4 ? offset.z : -offset.z);
 }
 
-// Of all children and slots that are left the pair that fits best is taken, again and again.
+// Greedy assignment: of the remaining children and slots, the best pair is chosen repeatedly.
 static inline void put_in_slots(const Primitives *primitives, global const BinaryNode *nodes, int top,
                                 const int *children, int used, global int *slots) {
     Box around = node_box(primitives, nodes, top);

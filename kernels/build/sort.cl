@@ -1,7 +1,7 @@
-// Radix sort of codes with their indices, stable, eight bits a pass, without atomics.
+// Stable radix sort of codes with their indices, eight bits per pass, without atomics.
 //
-// A work-item counts the digits of its block; the counts, digit by digit and in it block by block, are scanned into
-// places; then it moves its block there in order.
+// Each work-item counts the digits of its block; the counts, by digit and then by block, are scanned into offsets; then
+// each work-item moves its block to them in order.
 #include "build/scan.cl"
 
 #define DIGITS 256

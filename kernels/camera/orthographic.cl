@@ -1,4 +1,4 @@
-// Parallel rays along forward, a unit vector; right, up: half the picture's width and height in the scene. World frame.
+// Orthographic camera: parallel rays along forward, unit; right, up: half the image's width and height. World frame.
 #include "vector.cl"
 
 static inline CameraRay ray_through(const Launch *launch, real sx, real sy, Sampler *sampler) {

@@ -1,8 +1,9 @@
-// Thin lens: all rays through one place of the picture meet in one point of the plane of focus, and cross the lens evenly
-// (Cook, Porter and Carpenter 1984, "Distributed Ray Tracing"). Its middle is where a pinhole would be, so a point at the
-// distance d is seen as a disc, which on the plane of focus, at s, has the radius lens_radius·|s − d|/d.
+// Thin-lens camera: all rays through one image position meet in a point of the plane of focus, and are distributed
+// uniformly over the lens (Cook, Porter and Carpenter 1984, "Distributed Ray Tracing"). The lens is centred on the
+// pinhole, so a point at the distance d is seen as a disc, which on the plane of focus, at s, has the radius
+// lens_radius·|s − d|/d.
 //
-// right, up, forward: the pinhole's times s, so that they reach to the plane of focus. World frame.
+// right, up, forward: the pinhole's times s, so that they reach the plane of focus. World frame.
 #include "sampling.cl"
 
 static inline CameraRay ray_through(const Launch *launch, real sx, real sy, Sampler *sampler) {

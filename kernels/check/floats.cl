@@ -1,6 +1,6 @@
-// Operations on floats that the other kernels build on, each alone, for the host to compare with exact answers.
+// Single float operations that the other kernels rely on, for the host to compare with exact results.
 //
-// The host numbers the rows (ROW_…): row r of vector i is out[r·count + i]; a float's as its bits, a mask's as it is.
+// The host numbers the rows (ROW_…): row r of vector i is out[r·count + i]; floats as their bits, masks as they are.
 #include "check/rows.cl"
 #include "vector.cl"
 

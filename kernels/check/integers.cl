@@ -1,4 +1,4 @@
-// Operations on whole numbers that the other kernels build on, each alone, for the host to compare with exact answers.
+// Single integer operations that the other kernels rely on, for the host to compare with exact results.
 //
 // The host numbers the rows (ROW_…): row r of vector i is out[r·count + i].
 #include "check/rows.cl"

@@ -1,6 +1,6 @@
-// The masks of eight lanes by which trees are walked (mask.cl). Each i has three rows of eight: the lanes' masks of
-// a < b; the lanes of a that are set, put side by side, then −1; the mask's bits, how many and the first of them, the lane
-// of those with the least b, and the bits of sixteen lanes, whose upper eight are the others.
+// The masks of eight lanes used in BVH traversal (mask.cl). Each i has three rows of eight: the lanes' masks of a < b;
+// the set lanes of a, compressed, then −1; the mask's bits, their number and the first of them, the lane with the
+// smallest b among them, and the bits of sixteen lanes, of which the upper eight are the complement.
 #include "check/rows.cl"
 
 // in: a, b, eight of each; b >= 0

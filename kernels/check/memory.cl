@@ -1,9 +1,10 @@
-// Reading and writing as the other kernels do it: vectors at any float, work-items that share a number, and groups that
-// scan together.
+// Memory access as in the other kernels: vectors at any float alignment, atomics on shared numbers, and work-group
+// scans.
 #include "build/scan.cl"
 #include "check/rows.cl"
 
-// Moves 17 floats for each i, by ones, threes, fours and eights: mostly at places that are no multiples of their size.
+// Copy 17 floats for each i, by ones, threes, fours and eights: mostly at addresses that are not multiples of their
+// size.
 kernel void move(uint count, uint block, global const float *in, global float *out) {
     FOR_BLOCK(i) {
         global const float *from = in + 17 * i;
@@ -16,7 +17,7 @@ kernel void move(uint count, uint block, global const float *in, global float *o
     }
 }
 
-// How many of the numbers fall to each of `places`, and the largest of them.
+// Count the numbers modulo `places`, and find the largest of each.
 kernel void share(uint count, uint block, global const uint *in, uint places, global uint *counts, global uint *largest) {
     FOR_BLOCK(i) {
         atomic_inc(counts + in[i] % places);

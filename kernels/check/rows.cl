@@ -1,4 +1,4 @@
-// What the kernels of this folder share: a work-item goes through its block of the vectors (see device/blocks.py).
+// Shared by the kernels of this folder: a work-item processes its block of the vectors (see device/blocks.py).
 #include "lanes.cl"
 
 #define FOR_BLOCK(i) \

@@ -1,9 +1,9 @@
-// Random numbers and sums of samples, for the host to compare with exact answers.
+// Random numbers and sums of samples, for the host to compare with exact results.
 #include "check/rows.cl"
 #include "film.cl"
 #include "sampler.cl"
 
-// in: pixel, sample. out: two dimensions' bits, then the numbers made of them
+// in: pixel, sample. out: the bits of two dimensions, then the numbers made from them
 kernel void numbers(uint count, uint block, global const ureal *in, uint seed, uint dimension, global ureal *bits,
                     global real *units) {
     FOR_BLOCK(i) {
@@ -17,7 +17,7 @@ kernel void numbers(uint count, uint block, global const ureal *in, uint seed, u
     }
 }
 
-// in: `samples` rows of radiance. out: sum, its error, sum of squares, its error; then how many were kept and dropped
+// in: `samples` rows of radiance. out: sum, its error, sum of squares, its error; then the numbers kept and dropped
 kernel void sums(uint count, uint block, global const real *in, uint samples, global real *out, global ureal *counts) {
     FOR_BLOCK(i) {
         Accumulator a = {splat(ZERO), splat(ZERO), splat(ZERO), splat(ZERO), (ureal)(0), (ureal)(0), (ureal)(0)};

@@ -1,4 +1,4 @@
-// Numbers of eight and of 64 bits, as the masks, the space-filling curve and the compressed nodes use them.
+// Integers of eight and 64 bits, as used by masks, the space-filling curve and compressed nodes.
 //
 // The host numbers the rows (ROW_…): row r of item i is out[r·count + i].
 #include "check/rows.cl"

@@ -1,4 +1,4 @@
-// The pixel itself: every place in it counts alike.
+// Box filter: uniform over the pixel.
 #include "lanes.cl"
 
 static inline real filter_sample(const Scene *scene, real u) { return u; }

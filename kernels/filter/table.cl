@@ -1,5 +1,5 @@
-// A filter by its quantiles, so that samples fall with its density and all weigh the same (Ernst, Stamminger and Greiner
-// 2006, "Filter Importance Sampling"). Places are in pixels from the pixel's left or upper edge.
+// Tabulated filter, sampled by its quantiles, so that all samples have equal weight (Ernst, Stamminger and Greiner
+// 2006, "Filter Importance Sampling"). Positions are in pixels from the pixel's left or upper edge.
 #include "lanes.cl"
 
 #define FILTER_CELLS 1024

@@ -1,13 +1,14 @@
-// Ray against boxes by slabs (Nadolny 2.1–2.6), one multiplication a plane.
+// Ray–box intersection by slabs (Nadolny 2.1–2.6), one multiplication per plane.
 //
-// A plane's t is (plane − origin)·(1/direction). Near planes are pulled in and far planes pushed out by SLAB_PAD of that,
-// which costs nothing as it is folded into 1/direction. A zero component gives ±inf, and on a slab plane 0·inf = NaN, which
-// every comparison here drops: such a ray counts as inside the slab. Flat boxes are kept since near == far counts as a hit.
+// A plane's t is (plane − origin)·(1/direction). Near planes are pulled in and far planes pushed out by the relative
+// SLAB_PAD, at no cost since it is folded into 1/direction. A zero component gives ±inf, and on a slab plane 0·inf =
+// NaN, which every comparison here drops: such a ray counts as inside the slab. Flat boxes are hit since near == far
+// counts as a hit.
 #include "geometry/wide.cl"
 #include "vector.cl"
 #include BOX_TEST
 
-// Boxes that end before this t are not entered: the last hit's, where the next one is searched for.
+// Boxes that end before this t are skipped: with NEXT_HIT, the t of the last hit.
 #if NEXT_HIT
 #define FIRST_T(ray) ((ray)->after_t)
 #else
@@ -16,13 +17,13 @@
 
 typedef struct {
     float origin[3], near[3], far[3];   // near, far: padded 1/direction
-    int backward[3];                    // where the ray runs towards the box's low side
+    int backward[3];                    // whether the ray runs towards the box's low side
 #if NEXT_HIT
     float after_t;
 #endif
 } SlabRay;
 
-typedef struct { real near[3], far[3]; ireal backward[3]; } SlabRays;   // the same for all lanes, made at once
+typedef struct { real near[3], far[3]; ireal backward[3]; } SlabRays;   // the same for all lanes, set up together
 
 static inline SlabRays slab_rays(real3 direction) {
     SlabRays r;

@@ -1,5 +1,5 @@
-// Boxes without padding, the slab test of textbooks: rounding makes rays miss boxes at their edges, and what is in them.
-// Beside a zero component of the direction, t by inverse and shift is a NaN: all such planes count as entered.
+// Textbook slab test, without padding: rounding makes rays miss boxes at their edges, and the primitives inside. With a
+// zero component of the direction, t by inverse and shift is NaN, and all such planes count as entered.
 
 #define SLAB_PAD 0.0f
 #define ORIGIN_PAD 0.0f

@@ -1,16 +1,16 @@
-// A ray against eight boxes at once, by slabs with one multiplication-addition a plane.
+// Ray against eight boxes at once by slabs, one multiply-add per plane.
 //
-// A plane's t is plane·inverse + shift, inverse = 1/direction and shift = −origin·inverse. Near planes are pulled in and
-// far planes pushed out by BOX_PAD of t, folded into inverse and shift, and by BOX_PAD of |shift|. A direction's component
-// below 1/STEEPEST, or zero, counts as that small, and SIDE pads its planes. Where numbers overflow a NaN comes out, which
-// the comparisons drop: such a ray counts as inside the slab. Flat boxes are kept since near == far counts as a hit.
-// Directions are of a length near 1.
+// A plane's t is plane·inverse + shift, inverse = 1/direction and shift = −origin·inverse. Near planes are pulled in
+// and far planes pushed out by BOX_PAD of t, folded into inverse and shift, and by BOX_PAD of |shift|. A direction
+// component below 1/STEEPEST is replaced by that value, and SIDE pads its planes. Overflow gives NaN, which the
+// comparisons drop: such a ray counts as inside the slab. Flat boxes are hit since near == far counts as a hit.
+// Directions have a length near 1.
 #include "vector.cl"
 #include BOX_TEST
 
 typedef struct {
     float near[3], far[3], near_shift[3], far_shift[3];
-    int near_row[3], far_row[3];   // bytes into a node's bounds (lo x, y, z, hi x, y, z, eight floats each)
+    int near_row[3], far_row[3];   // offsets in bytes in a node's bounds (lo x, y, z, hi x, y, z, eight floats each)
 } BoxRay;
 
 typedef struct { real near[3], far[3], near_shift[3], far_shift[3]; ireal near_row[3], far_row[3]; } BoxRays;
@@ -44,7 +44,7 @@ static inline BoxRay box_ray(const BoxRays *rays, int lane) {
                     INT_OF_LANE(far_row)};
 }
 
-// Which boxes are entered at 0 <= t <= t_max, and where. bounds: six rows as above.
+// The boxes that are entered at 0 <= t <= t_max, and their entry distances. bounds: six rows as above.
 static inline int8 enter_eight(const BoxRay *ray, global const float *bounds, float t_max, float8 *entry) {
     global const char *rows = (global const char *)bounds;
     float8 t_near = 0.0f, t_far = t_max;

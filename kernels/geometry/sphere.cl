@@ -1,13 +1,13 @@
-// Ray against a sphere: both roots, right from outside and inside (Nadolny 1.8).
+// Ray–sphere intersection: both roots, accurate from outside and inside (Nadolny 1.8).
 //
 // With f from the centre to the origin: a·t² + 2b·t + c = 0, a = d·d, b = f·d, c = f·f − r², and a quarter of the
 // discriminant is a·r² − |f×d|² (Haines et al. 2019, "Precision Improvements for Ray/Sphere Intersection", Ray Tracing
-// Gems, ch. 7, from the closest approach). What cancels there is computed in twice as many digits: c near the surface of
-// a large sphere, and the cross product far from a small one. The sign of c says on which side the origin is, so a ray
-// that leaves never meets its own sphere; the smaller root comes from the product of the roots.
+// Gems, ch. 7, from the closest approach). Terms with cancellation are computed in double-word arithmetic: c near the
+// surface of a large sphere, and the cross product far from a small one. The sign of c says on which side the origin
+// is, so a ray that leaves a sphere never hits it; the smaller root comes from the product of the roots.
 //
-// may_meet is told at once, in single digits, of most spheres that a ray passes by: each of its three terms is right to
-// 8 u of |f|²·a, and 64 u of that are what it leaves.
+// may_meet rejects most missed spheres early, in single precision: each of its three terms has an error of at most 8 u
+// of |f|²·a, and its margin is 64 u of that.
 #include "geometry/twice.cl"
 #include "vector.cl"
 
@@ -36,7 +36,7 @@
         Twice a = name##_dot(d, d), r2 = name##_product(r, r); \
         type discriminant = name##_value(name##_sum(name##_product(a, r2), name##_negative(name##_dot(n, n)))); \
         type b = name##_value(name##_dot(f, d)), c = name##_value(name##_sum(name##_dot(f, f), name##_negative(r2))); \
-        type q = -b - copysign(sqrt(discriminant), b);   /* a NaN where the ray misses */ \
+        type q = -b - copysign(sqrt(discriminant), b);   /* NaN on a miss */ \
         type t0 = c / q, t1 = q / name##_value(a); \
         *near = t0 < t1 ? t0 : t1; \
         *far = t0 < t1 ? t1 : t0; \

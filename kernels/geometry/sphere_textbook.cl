@@ -1,5 +1,5 @@
-// Ray against a sphere by the quadratic formula of textbooks (Nadolny 1.8): a·t² + b·t + c = 0, both roots. It loses
-// digits where b² and 4ac, or −b and the root, nearly cancel: small or far spheres, and huge ones near by.
+// Ray–sphere intersection by the textbook quadratic formula (Nadolny 1.8): a·t² + b·t + c = 0, both roots. It suffers
+// from cancellation of b² and 4ac, or of −b and the root: small or distant spheres, and huge ones nearby.
 #include "vector.cl"
 
 #define SPHERE_OF(type, mask, Twice, name) \
@@ -13,7 +13,7 @@
         type a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]; \
         type b = 2.0f * (fx * d[0] + fy * d[1] + fz * d[2]); \
         type c = fx * fx + fy * fy + fz * fz - radius * radius; \
-        type root = sqrt(b * b - 4.0f * a * c);   /* a NaN where the ray misses */ \
+        type root = sqrt(b * b - 4.0f * a * c);   /* NaN on a miss */ \
         *near = (-b - root) / (2.0f * a); \
         *far = (-b + root) / (2.0f * a); \
     }

@@ -1,6 +1,7 @@
-// Ray against triangles by the map that takes each to the unit triangle of the plane w = 0 (Baldwin and Weber 2016, "Fast
-// Ray-Triangle Intersections by Coordinate Transformation", JCGT 5(3)): the rows u, v, w of the map are stored. Cracks along
-// edges and, as nothing is subtracted from the origin before it is multiplied, loses digits far from the coordinates' origin.
+// Ray–triangle test by the transformation that maps each triangle to the unit triangle in the plane w = 0 (Baldwin and
+// Weber 2016, "Fast Ray-Triangle Intersections by Coordinate Transformation", JCGT 5(3)): the rows u, v, w of the map
+// are stored. Not watertight at edges, and imprecise far from the coordinates' origin, since nothing is subtracted from
+// the ray's origin before it is multiplied.
 #include "geometry/plain_ray.cl"
 
 #define ROW_DOT(row, a) (LOAD_WIDE(leaf->row[0]) * a[0] + LOAD_WIDE(leaf->row[1]) * a[1] + LOAD_WIDE(leaf->row[2]) * a[2])

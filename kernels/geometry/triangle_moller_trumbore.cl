@@ -1,5 +1,5 @@
-// Ray against triangles with the least memory and arithmetic (Möller and Trumbore 1997; Suchiński 3.6, Nadolny 1.15):
-// q = d×e2, r = s×e1, (t, u, v) = (r·e2, q·s, r·d)/(q·e1). It leaves cracks along edges: see the watertight test.
+// Ray–triangle test with the least memory and arithmetic (Möller and Trumbore 1997; Suchiński 3.6, Nadolny 1.15): q =
+// d×e2, r = s×e1, (t, u, v) = (r·e2, q·s, r·d)/(q·e1). Not watertight at edges: see the watertight test.
 #include "geometry/plain_ray.cl"
 
 static inline WideHit intersect_triangles(const TriangleRay *ray, global const Triangles *leaf, float t_max) {

@@ -1,5 +1,5 @@
-// Ray against triangles whose edges and normal n = e1×e2 are stored (Suchiński 2022, eq. 3.7): s = origin − p0, m = s×d,
-// (t, u, v) = (n·s, m·e2, −m·e1)/(−n·d). It leaves cracks along edges: see the watertight test.
+// Ray–triangle test with precomputed edges and normal n = e1×e2 (Suchiński 2022, eq. 3.7): s = origin − p0, m = s×d,
+// (t, u, v) = (n·s, m·e2, −m·e1)/(−n·d). Not watertight at edges: see the watertight test.
 #include "geometry/plain_ray.cl"
 
 static inline WideHit intersect_triangles(const TriangleRay *ray, global const Triangles *leaf, float t_max) {

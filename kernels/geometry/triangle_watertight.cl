@@ -1,15 +1,16 @@
-// Ray against triangles without cracks (Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection", JCGT 2(1)).
+// Watertight ray–triangle test (Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection", JCGT 2(1)).
 //
 // The ray is sheared onto the z axis; a vertex's sheared coordinates depend on the vertex and the ray alone, so both
-// triangles at an edge see the same ones. The side of an edge is found by comparing its two products instead of
-// subtracting them: both triangles form the same two products, and no compiler can contract a comparison. Rounding keeps
-// order, so only equal products leave the side open; then their rounding errors are compared, which are exact (fma). So
-// every side is right for the corners as they were sheared, and the ray meets the edge itself on both sides or neither.
+// triangles at an edge use the same ones. The side of an edge is found by comparing its two products instead of
+// subtracting them: both triangles form the same two products, and no compiler can contract a comparison. Rounding is
+// monotonic, so only equal products leave the side undecided; then their rounding errors are compared, which are exact
+// (fma). So every side is exact for the sheared corners, and a ray through the edge itself hits on both sides or on
+// neither.
 //
-// t is a mean of the corners' t with weights of one sign, so it is right to rounding, and above 0, where all corners lie
-// ahead, however small or thin the triangle. Where some do not, and t may be no more than rounding, it is taken from the
-// volume between origin and triangle in twice as many digits, whose sign is right: rays that start beside a surface and
-// leave it never meet it, and none slips through a sliver.
+// t is a weighted mean of the corners' t with weights of one sign, so it is accurate to rounding, and above 0 if all
+// corners are ahead, however small or thin the triangle. If some are not, and t may be mere rounding error, it is
+// computed from the volume between origin and triangle in double-word arithmetic, whose sign is exact: rays that start
+// next to a surface and leave it never hit it, and none passes through a sliver.
 #include "geometry/wide.cl"
 #include "geometry/twice.cl"
 #include "vector.cl"
@@ -17,7 +18,7 @@
 TWICE_OF(wide, TwiceWide, wide)
 
 typedef struct {
-    int kx, ky, kz;       // kz: the direction's largest component
+    int kx, ky, kz;       // kz: axis of the direction's largest component
     float sx, sy, sz;     // shear and scale
     float ox, oy, oz;     // the origin, permuted
 } TriangleRay;
@@ -49,8 +50,9 @@ static inline TriangleRay triangle_ray(const TriangleRays *rays, const Ray *ray,
 
 typedef struct { wide sx, sy, sz, ox, oy, oz; } ShearedRay;
 
-// Six times the volume between the ray's origin and a triangle: the determinant of the corners seen from there. What is
-// no more than its own rounding is none: six products of three components are summed, each right to 2^-46 or so.
+// Six times the volume between the ray's origin and a triangle: the determinant of the corners relative to the origin.
+// A value within its own rounding counts as 0: six products of three components are summed, each accurate to about
+// 2^-46.
 static inline wide volume(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray) {
 #define FROM_ORIGIN(p) {wide_difference(p[0], ray->ox), wide_difference(p[1], ray->oy), wide_difference(p[2], ray->oz)}
     TwiceWide a[3] = FROM_ORIGIN(p0), b[3] = FROM_ORIGIN(p1), c[3] = FROM_ORIGIN(p2);
@@ -63,7 +65,7 @@ static inline wide volume(const wide p0[3], const wide p1[3], const wide p2[3], 
     return WIDE_ABS(sum) > error ? sum : 0.0f;
 }
 
-// A corner as the ray sees it: beside it in x and y, along it in z.
+// A corner in the ray's sheared frame: x and y across the ray, z along it.
 typedef struct { wide x, y, z; } Sheared;
 
 static inline Sheared shear(const wide p[3], const ShearedRay *ray) {
@@ -71,7 +73,7 @@ static inline Sheared shear(const wide p[3], const ShearedRay *ray) {
     return (Sheared){fma(-ray->sx, z, p[0] - ray->ox), fma(-ray->sy, z, p[1] - ray->oy), z};
 }
 
-// The two products of each edge, of which the greater says on which side of it the ray passes.
+// The two products of each edge, the greater of which tells on which side of the edge the ray passes.
 typedef struct { wide u1, u2, v1, v2, w1, w2; } Edges;
 
 static inline Edges edges_of(const Sheared *a, const Sheared *b, const Sheared *c) {
@@ -84,20 +86,21 @@ static inline wide_mask inside_edges(const Edges *e) {
 
 static inline wide weighted(wide u, wide v, wide w, wide ta, wide tb, wide tc) { return fma(w, tc, fma(v, tb, u * ta)); }
 
-// What the shear says. open: where t may be no more than rounding, and settle decides; det: its triangle's area, twice.
+// Result of the sheared test. open: t may be mere rounding error, and `settle` decides; inverse_det: 1 over twice the
+// area.
 typedef struct { WideHit hit; wide_mask open; wide inverse_det; } ShearedHit;
 
-// The rounding error of t is at most T_ERROR·reach·(reach + slope·depth)·depth·|sz/det|. By pbrt (4th ed., 6.8.8) a sheared
-// corner is off by 5 u of reach + slope·depth, hence each of u, v, w by 24 u of reach·(reach + slope·depth), which
-// depth·|sz/det| carries to t, thrice; with the sum's own roundings that makes 108 u.
+// The rounding error of t is at most T_ERROR·reach·(reach + slope·depth)·depth·|sz/det|. By pbrt (4th ed., 6.8.8) a
+// sheared corner has an error of 5 u of reach + slope·depth, hence each of u, v, w of 24 u of reach·(reach +
+// slope·depth), which depth·|sz/det| carries to t, thrice; with the sum's own roundings that makes 108 u.
 #define T_ERROR (108.0f * UNIT_ROUNDOFF)
-// A t behind the origin is believed unless the triangle, seen along the ray, is so thin that t may be off by this part of
-// the triangle's depth.
+// A t behind the origin is accepted unless the triangle, seen along the ray, is so thin that the error of t may reach
+// this fraction of the triangle's depth.
 #define THIN 0.01f
 
 static inline wide wide_far(wide x, wide y) { return WIDE_ABS(x) > WIDE_ABS(y) ? WIDE_ABS(x) : WIDE_ABS(y); }
 
-// Corners with permuted components, one triangle in each lane against one ray, or one for all lanes against a ray in each.
+// Corners with permuted components: one triangle per lane against one ray, or one triangle against a ray per lane.
 __attribute__((always_inline))
 static inline ShearedHit intersect_sheared(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray,
                                            wide t_max) {
@@ -115,7 +118,7 @@ static inline ShearedHit intersect_sheared(const wide p0[3], const wide p1[3], c
         w = w == 0.0f ? fma(b.x, a.y, -edges.w1) - fma(b.y, a.x, -edges.w2) : w;
         result.hit.hit = ((u >= 0.0f) & (v >= 0.0f) & (w >= 0.0f)) | ((u <= 0.0f) & (v <= 0.0f) & (w <= 0.0f));
     }
-    result.inverse_det = 1.0f / (u + v + w);   // of a triangle without an area infinite, so that t is a NaN
+    result.inverse_det = 1.0f / (u + v + w);   // infinite for a degenerate triangle, so that t is NaN
     wide ta = a.z * ray->sz, tb = b.z * ray->sz, tc = c.z * ray->sz;
     result.hit.t = weighted(u, v, w, ta, tb, tc) * result.inverse_det;
     result.hit.u = v * result.inverse_det;
@@ -135,8 +138,8 @@ static inline ShearedHit intersect_sheared(const wide p0[3], const wide p1[3], c
     return result;
 }
 
-// The hits, with t in twice as many digits where it is left open. Seldom called, so it and what calls it begin anew: to
-// hand over what is known, all tests would have to put it into memory.
+// The hits, with t in double-word arithmetic if it is undecided. Rarely called, so it recomputes everything: passing on
+// known values would force all tests to store them in memory.
 static inline WideHit settle(const wide p0[3], const wide p1[3], const wide p2[3], const ShearedRay *ray, wide t_max) {
     ShearedHit sheared = intersect_sheared(p0, p1, p2, ray, t_max);
     WideHit result = sheared.hit;

@@ -1,18 +1,18 @@
-// One ray against all triangles of a scene that has few, in packs: what geometry/triangle_watertight.cl says, for less
-// where nothing is close. Packs that its line passes by cost no division; what it meets costs no branch.
+// One ray against all triangles of a scene with few, in packs: as geometry/triangle_watertight.cl, but cheaper if no
+// decision is close. Packs that the ray's line misses cost no division; hits cost no branch.
 //
-// Left to the exact test is whatever may need it: a ray through an edge, a t that may be no more than rounding, and two at
-// the same t in a lane, as packs are in no order. How small a volume is no more than rounding is said once a ray, for
-// corners as far away as any of the scene is.
+// Left to the exact test: a ray through an edge, a t that may be mere rounding error, and two hits at the same t in a
+// lane, as packs are unordered. The threshold below which a volume is mere rounding error is computed once per ray, for
+// corners as far away as any in the scene.
 #include "geometry/triangle_watertight.cl"
 
 #define HALVES (PACK_SIZE / WIDTH)
 #define LAST_BIT 31
 
-// Packs are chosen by a bit each; the last is set, and stands for all from there on.
+// Packs are chosen by one bit each; the last bit stands for all packs from there on.
 static inline bool is_chosen(uint chosen, int pack) { return chosen >> (pack < LAST_BIT ? pack : LAST_BIT) & 1; }
 
-// The triangles that are tested i-th: a pack, or half of one, whose rows begin so much later.
+// The triangles that are tested i-th: a pack, or half of one, whose rows start at an offset.
 static inline global const Triangles *pack_at(ARRAY(Triangles) packs, int i) {
     return (global const Triangles *)((global const float *)RECORD(packs, i / HALVES) + i % HALVES * WIDTH);
 }
@@ -28,7 +28,7 @@ static inline float wide_least(wide x) {
     return two.x < two.y ? two.x : two.y;
 }
 
-// Whether hits at t come after the last one, where the next one is searched for.
+// Whether hits at t come after the last one, if NEXT_HIT.
 static inline wide_mask comes_next(const Ray *ray, global const Triangles *leaf, wide t) {
 #if NEXT_HIT
     return (t > ray->after_t) | ((t == ray->after_t) & (LOAD_WIDE(leaf->primitive) > ray->after_primitive));
@@ -37,13 +37,13 @@ static inline wide_mask comes_next(const Ray *ray, global const Triangles *leaf,
 #endif
 }
 
-// The closest hit in chosen packs, or whether there is any. False where that is left open.
+// Find the closest hit, or any, in the chosen packs. Return false if that is undecided.
 static inline bool meet_packs(const TriangleRay *ray, const Ray *whole, ARRAY(Triangles) packs, uint chosen,
                               const bool stop_at_first, Hit *hit) {
     // As in intersect_sheared, with reach <= 2 far and depth <= far.
     float far = RECORD(packs, 0)->extent + fabs(ray->ox) + fabs(ray->oy) + fabs(ray->oz);
     float error = T_ERROR * 6.0f * far * far, rounding = error * far * fabs(ray->sz), thin = error / THIN;
-    // A hit so far is of a primitive behind all these, and gives way to one at the same t.
+    // An earlier hit has a primitive after all of these, so it yields to one at the same t.
     wide t = hit->primitive < 0 ? hit->t : as_float(as_int(hit->t) + 1), u = 0.0f, v = 0.0f;
     wide_mask pack = (wide_mask)(-1), open = (wide_mask)(0);
     for (int i = 0; i < RECORD(packs, 0)->count * HALVES; ++i) {

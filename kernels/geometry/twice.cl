@@ -1,8 +1,8 @@
-// Numbers of twice the digits of a float, hi + lo, for what a float's rounding would decide wrongly (Dekker 1971, "A
-// Floating-Point Technique for Extending the Available Precision"; Joldes et al. 2017, "Tight and Rigorous Error Bounds
-// for Basic Building Blocks of Double-Word Arithmetic"). Sums and products are right to a few units of 2^-46.
+// Double-word arithmetic, hi + lo, where float rounding would decide wrongly (Dekker 1971, "A Floating-Point Technique
+// for Extending the Available Precision"; Joldes et al. 2017, "Tight and Rigorous Error Bounds for Basic Building
+// Blocks of Double-Word Arithmetic"). Sums and products are accurate to a few units of 2^-46.
 //
-// They are macros over the type: float for one thing, wide for several at once.
+// Macros over the type: float for single values, wide for several at once.
 
 #define TWICE_OF(type, Twice, name) \
     typedef struct { type hi, lo; } Twice; \
@@ -13,7 +13,7 @@
     static inline Twice name##_sum(Twice a, Twice b) { \
         type s = a.hi + b.hi, z = s - a.hi; \
         type e = ((a.hi - (s - z)) + (b.hi - z)) + (a.lo + b.lo), hi = s + e; \
-        return (Twice){hi, e - (hi - s)}; /* where the his cancel, what is left must move up */ \
+        return (Twice){hi, e - (hi - s)}; /* renormalise, for cancellation of the high words */ \
     } \
     static inline Twice name##_product(Twice a, Twice b) { \
         type p = a.hi * b.hi; \

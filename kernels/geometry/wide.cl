@@ -1,5 +1,5 @@
-// Triangles are stored in packs of PACK_SIZE: 1 in trees of single triangles, 8 where a leaf is a pack, 16 without a tree.
-// They are tested WIDTH at a time, all of a pack, but sixteen by halves where no register takes them. `wide` holds one
+// Triangles are stored in packs of PACK_SIZE: 1 in BVHs of single triangles, 8 if a leaf is a pack, 16 without a BVH.
+// They are tested WIDTH at a time: all of a pack, or sixteen in halves if no register holds them. `wide` holds one
 // float of each; LOAD_WIDE reads a row of a record, whatever the width.
 #include "mask.cl"
 
@@ -38,21 +38,21 @@ static inline uint wide_bits(wide_mask mask) { return mask_bits16(mask); }
 #endif
 
 typedef struct {
-    float origin[3], direction[3], t_max;      // t counts lengths of `direction`
+    float origin[3], direction[3], t_max;      // t is in multiples of the length of `direction`
 #if NEXT_HIT
-    float after_t;                             // only hits behind this one count, by t and then by primitive
+    float after_t;                             // only hits after this one count, by t and then by primitive
     int after_primitive;
 #if INSTANCES
     int after_instance;
 #endif
 #endif
 #if INSTANCES
-    int instance;                              // in whose frame the ray is, or IN_WORLD
+    int instance;                              // the instance in whose frame the ray is, or IN_WORLD
 #endif
 } Ray;
 typedef struct {
     float t, u, v;
-    int primitive;                             // < 0: nothing was hit
+    int primitive;                             // < 0: miss
 #if INSTANCES
     int instance;
 #endif

@@ -1,10 +1,10 @@
-// Light sampling: each light is chosen by its importance at the point, and a part of the choices is uniform, because a
-// bright light may be occluded. Many lights of finite extent are represented by groups, from which a light BVH leads on.
+// Light selection: lights are chosen by their importance at the shading point, with a uniform fraction because a bright
+// light may be occluded. Many lights of finite extent are represented by groups, the roots of a light BVH.
 //
-// The rule: the probability of a light is 0 only where the light contributes nothing. Delta lights are found by light
-// sampling alone, so a probability of 0 anywhere else would lose them without a trace.
+// Invariant: the probability of a light is 0 only if the light contributes nothing. Delta lights are found by light
+// sampling alone, so a probability of 0 anywhere else would silently lose their light.
 //
-// The first CHOICES of the groups are chosen from. The last INFINITE_LIGHTS of these are infinite lights.
+// The choice is among the first CHOICES groups, the last INFINITE_LIGHTS of which are infinite lights.
 #include "sampler.cl"
 #include "light/importance.cl"
 #include LIGHT_TREE_FILE
@@ -17,8 +17,8 @@ static inline void light_chances(const Scene *scene, real3 p, real3 n, real *cha
     make_chances(chances, CHOICES, EVENLY);
 }
 
-// A light and the probability of the choice. u makes it and is as good as new afterwards, but for a few digits; the tree,
-// which would use up all, draws a number of its own.
+// Choose a light and return the probability of the choice. u is consumed and rescaled for reuse, losing a few digits;
+// the light BVH, which would use up all of u, draws a number of its own.
 static inline ireal pick_light(const Scene *scene, real3 p, real3 n, Sampler *sampler, real *u, real *probability) {
     real chances[CHOICES];
     light_chances(scene, p, n, chances);
@@ -30,7 +30,7 @@ static inline ireal pick_light(const Scene *scene, real3 p, real3 n, Sampler *sa
 #endif
 }
 
-// That with which pick_light chooses a light.
+// The probability with which pick_light chooses a light.
 static inline real light_probability(const Scene *scene, real3 p, real3 n, ireal light) {
     real chances[CHOICES], probability = ONE;
     ireal group = light;

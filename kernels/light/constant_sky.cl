@@ -1,5 +1,5 @@
-// The same radiance from every direction. A ray that escapes brings it; it is not sampled as a light, since directions
-// chosen by the surface are never worse for it.
+// A sky of constant radiance, seen by rays that escape. It is not sampled as a light, since BSDF sampling is never
+// worse for it.
 #include "light/interface.cl"
 
 static inline real3 sky_radiance(const Scene *scene, real3 wi, real *pdf) {

@@ -1,4 +1,5 @@
-// A delta light infinitely far away; `towards` is the unit vector to it. A sun with a size is in sun.cl. World frame.
+// Directional light: a delta light at infinity; `towards` is the unit vector to it. sun.cl has suns with a size. World
+// frame.
 #include "light/interface.cl"
 
 static inline LightSample directional_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {

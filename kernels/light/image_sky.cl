@@ -1,15 +1,16 @@
-// Light from a latitude–longitude picture. LIGHT_SKY: sampled where it is brighter than its mean. World frame.
+// Environment map: a latitude–longitude image. LIGHT_SKY: sampled where it is brighter than its mean. World frame.
 //
-// u = atan2(x, −z)/2·pi mod 1, v = acos(y)/pi, row 0 on top; bilinear between texel centres, u wraps, v clamps. A
-// row is drawn, then a texel of it, then the place inside it uniformly in (u, v): density(u, v) per texel is constant, so
-// pdf = density/(2·pi²·sin(pi·v)) (pbrt, 4th ed., 12.5.2). Directions follow the random numbers without jumps.
+// u = atan2(x, −z)/2·pi mod 1, v = acos(y)/pi, row 0 at the top; bilinear between texel centres, u wraps, v clamps. A
+// row is sampled, then a texel in it, then a position in the texel uniformly in (u, v): density(u, v) per texel is
+// constant, so pdf = density/(2·pi²·sin(pi·v)) (pbrt, 4th ed., 12.5.2). Directions are continuous in the random
+// numbers.
 #include "light/interface.cl"
 
 static inline real2 sky_uv(const Scene *scene, real3 wi) {
     real c = (real)(RECORD(scene->environment, 0)->rotation_cos), s = (real)(RECORD(scene->environment, 0)->rotation_sin);
     real x = c * wi.x - s * wi.z, z = s * wi.x + c * wi.z;
     real u = atan2(x, -z) * (0.5f / PI);
-    // Near a pole acos(y) loses half its digits and the arc's sine does not.
+    // Near a pole acos(y) loses half its digits; the arc's sine does not.
     real v = atan2(sqrt(x * x + z * z), wi.y) * (1.0f / PI);
     return (real2){u < 0.0f ? u + 1.0f : u, v};
 }
@@ -53,8 +54,9 @@ static inline real sky_pdf(const Scene *scene, ireal texel, real sin_theta) {
     return sin_theta > 0.0f ? pdf : ZERO;
 }
 
-// The one of n steps, each as high as its probability, that u falls into; u becomes the place inside it. `first`: of the
-// table. A search from where the table says that this n-th of [0, 1) begins (Chen and Asau 1974).
+// Sample a discrete distribution of n steps by inversion; u is rescaled to the position inside the step. `first`: start
+// of its CDF in the table, which is searched from a guide entry: where the n-th of [0, 1) that holds u begins (Chen and
+// Asau 1974).
 static inline ireal pick_step(ARRAY(SkyStep) table, ireal first, int n, real *u) {
     ireal step = first + GATHER(ireal, table, first + TO_INT(*u * (float)n), .start);
     real top = GATHER(real, table, step, .top);

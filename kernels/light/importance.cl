@@ -1,15 +1,17 @@
-// How much light a group of lights can bring to a point, were nothing in between, and choices in proportion to it.
+// The importance of a group of lights at a point, an estimate of its unoccluded irradiance, and selection in proportion
+// to it.
 //
-// A group is what lies in a sphere and shines within 90 degrees, spots within less, of normals that lie in a cone. Its
-// importance is the irradiance by it as if all came from its middle, with both cosines at their best: 0 only where it can
-// bring none (after Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", eq. 3).
-// World frame. n: unit, on the side of the surface that is lit, or 0 where light from either side counts.
+// The bounds of a group are a bounding sphere and a cone of emission normals; emission is within 90 degrees of a
+// normal, less for spots. The importance is the irradiance as if all light came from the centre, with both cosines at
+// their maximum: 0 only if the group contributes nothing (after Conty Estevez and Kulla 2018, "Importance Sampling of
+// Many Lights with Adaptive Tree Splitting", eq. 3). World frame. n: unit, on the lit side of the surface, or 0 if
+// light from either side counts.
 #include "vector.cl"
 
-#define LEAST_IMPORTANCE 1e-30f   // of a group that can contribute: a smaller one could underflow in sums and quotients
+#define LEAST_IMPORTANCE 1e-30f   // if a group can contribute: less could underflow in sums and quotients
 
-// The best cosine towards a sphere of radius r; `along` is distance·cos for its middle. Not quite that of the angle less
-// the sphere's own, but easier, 0 for the same spheres, and as good to choose by.
+// The largest cosine towards a sphere of radius r; `along` is distance·cos to its centre. It approximates the cosine of
+// the angle less the sphere's angular radius: cheaper, 0 for the same spheres, and as good for importance.
 static inline real best_cosine(real along, real distance, real r) { return (along + r) / (distance + r); }
 
 // distance·cos of the angle to the nearest direction in a cone; `along` is that to its axis.
@@ -19,8 +21,8 @@ static inline real along_cone(real along, real distance, real cos_cone) {
 }
 
 #if LIGHT_SPOT
-// Whether a sphere of radius r lies, at least in part, within an angle of the nearest direction, whose cosine is cos_reach;
-// `along`: along_cone's.
+// Whether a sphere of radius r is at least partly within an angle, of cosine cos_reach, of the nearest direction;
+// `along`: from along_cone.
 static inline ireal is_reached(real along, real distance, real r, real cos_reach) {
     real cosine = along / distance, size = r / distance, cos_size = safe_sqrt(1.0f - size * size);
     real nearest = cosine * cos_size + safe_sqrt(1.0f - cosine * cosine) * size;
@@ -28,7 +30,7 @@ static inline ireal is_reached(real along, real distance, real r, real cos_reach
 }
 #endif
 
-// Whether light from behind the surface counts, too.
+// Whether light from behind the surface counts as well.
 static inline ireal is_lit_from_both_sides(real3 n) {
 #if TRANSMISSION_LOBES
     return dot3(n, n) == 0.0f;
@@ -37,7 +39,7 @@ static inline ireal is_lit_from_both_sides(real3 n) {
 #endif
 }
 
-// Of scene->light_groups[group] at p. Inlined, or it costs half as much again.
+// The importance at p of scene->light_groups[group]. Without forced inlining it takes 1.5 times as long.
 __attribute__((always_inline)) static inline real importance(const Scene *scene, ireal group, real3 p, real3 n) {
     real3 d = sub(GATHER3(scene->light_groups, group, .center), p), axis = GATHER3(scene->light_groups, group, .axis);
     real r = GATHER(real, scene->light_groups, group, .radius);
@@ -54,22 +56,22 @@ __attribute__((always_inline)) static inline real importance(const Scene *scene,
     return contributes ? irradiance : ZERO;
 }
 
-// The importance of an infinite light, whose irradiance is about max(intensity + n·axis, 0).
+// The importance of an infinite light, whose irradiance is approximately max(intensity + n·axis, 0).
 static inline real infinite_importance(const Scene *scene, ireal group, real3 n) {
     real3 axis = GATHER3(scene->light_groups, group, .axis);
     real directed = is_lit_from_both_sides(n) ? length3(axis) : dot3(n, axis);
     return maximum(GATHER(real, scene->light_groups, group, .intensity) + directed, ZERO);
 }
 
-// Makes chances, which add up to 1, of the importances of n things. A part of them, `evenly`, is shared alike by all that
-// have any importance; where none has, the first gets all.
+// Turn the importances of n items into probabilities, which add up to 1. The fraction `evenly` is distributed uniformly
+// over all items with nonzero importance; if none has any, the first item gets all.
 static inline void make_chances(real *chances, int n, float evenly) {
     real total = ZERO, able = ZERO;
     for (int i = 0; i < n; ++i) {
         total += chances[i];
         able += chances[i] > 0.0f ? ONE : ZERO;
     }
-    ireal some = total > 1e-37f;    // its inverse is a number
+    ireal some = total > 1e-37f;    // so that 1/total is finite
     real scale = (1.0f - evenly) / total, share = evenly / able;
     for (int i = 0; i < n; ++i) {
         ireal has = some & (chances[i] > 0.0f);
@@ -78,7 +80,8 @@ static inline void make_chances(real *chances, int n, float evenly) {
     chances[0] = some ? chances[0] : ONE;
 }
 
-// The one of n things whose chance u falls into, never one without any; u becomes the place inside that.
+// Sample one of n items by inversion, never one of probability 0; u is rescaled to the position inside the item's
+// interval.
 static inline ireal draw(const real *chances, int n, real *u, real *probability) {
     ireal drawn = (ireal)(0);
     real below = ZERO, start = ZERO, chance = ONE;

@@ -1,4 +1,4 @@
-// There is one light, so nothing is to be chosen (see light/choice.cl).
+// Trivial light selection for a single light (see light/choice.cl).
 #include "sampler.cl"
 
 static inline ireal pick_light(const Scene *scene, real3 p, real3 n, Sampler *sampler, real *u, real *probability) {

@@ -1,4 +1,4 @@
-// A point that shines alike in all directions: intensity/d² (Suchiński 7.4.1). World frame.
+// Isotropic point light: intensity/d² (Suchiński 7.4.1). World frame.
 #include "light/interface.cl"
 
 static inline LightSample point_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {

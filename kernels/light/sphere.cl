@@ -1,12 +1,13 @@
-// A sphere that shines outwards: a direction uniform over the cone it fills (Shirley et al. 1996). World frame.
+// Sphere light that emits outwards: directions uniform over the cone it subtends (Shirley et al. 1996). World frame.
 //
-// One that shines inwards, too, is found there by the BSDF's directions alone: it lies in all of them. So is that inner side from
-// outside, where its near side lets light through: points are drawn on the near side.
+// The inner side of a double-sided sphere light is found by BSDF sampling only: from inside it covers all directions.
+// So is the inner side seen from outside through a transparent near side: points are sampled on the near side.
 #include "light/interface.cl"
 #include OPACITY_FILE
 
-// 1 − cos of the cone's half angle, without cancellation for a far sphere; 0 from inside, where nothing shines, and for
-// points on the sphere itself, which see its inside alone: within their rounding error (surface.cl) of it.
+// 1 − cos of the cone's half angle, without cancellation for a distant sphere. It is 0 from inside, where the sphere
+// does not emit, and for points on the sphere itself, within their rounding error (surface.cl), which see only its
+// inside.
 static inline real sphere_light_cone(real3 center, real radius, real3 to_center) {
     real sin2 = radius * radius / dot3(to_center, to_center);
     real reach = radius + (real)(GAMMA(32)) * (largest(absolute3(center)) + radius);

@@ -1,7 +1,7 @@
-// A point that shines in a cone: intensity·f²/d², where f falls evenly in the cosine of the angle from the axis, from 1 at the
-// inner cone to 0 at the outer one (Khronos, KHR_lights_punctual). World frame.
+// Spot light: intensity·f²/d², where f falls linearly in the cosine of the angle from the axis, from 1 at the inner
+// cone to 0 at the outer one (Khronos, KHR_lights_punctual). World frame.
 //
-// Cosines are taken as 1 − cos, so that a narrow cone keeps its digits.
+// Cosines are stored as 1 − cos, so that narrow cones keep their precision.
 #include "light/interface.cl"
 
 static inline LightSample spot_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {

@@ -1,7 +1,8 @@
-// The disc of a sun: radiance from every direction within a small angle of `towards`, and none outside. World frame.
+// Sun with a disc: constant radiance within a small angle of `towards`, none outside. World frame.
 //
-// Directions are uniform in the cone (Shirley et al. 1996). The angle is held as 1 − cos, and 1 − wi·towards is taken from
-// their difference, whose square is twice that: so a disc of 1e-3 degrees keeps its digits.
+// Directions are uniform in the cone (Shirley et al. 1996). The angle is stored as 1 − cos, and 1 − wi·towards is
+// computed from the difference of the two vectors, whose square is twice that, so that a disc of 1e-3 degrees keeps its
+// precision.
 #include "light/interface.cl"
 
 static inline LightSample sun_light_sample(const Scene *scene, ireal index, real3 p, real2 u) {
@@ -15,7 +16,7 @@ static inline LightSample sun_light_sample(const Scene *scene, ireal index, real
     return s;
 }
 
-// Radiance that arrives along wi from one sun, and the density with which it is sampled there.
+// Radiance along wi from one sun, and the pdf with which light sampling would sample wi.
 static inline real3 sun_radiance(const Scene *scene, int sun, real3 wi, real *pdf) {
     ireal index = (ireal)(sun);
     real height = GATHER(real, scene->sun_lights, index, .height);

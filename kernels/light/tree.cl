@@ -1,8 +1,9 @@
-// Many lights: nodes of eight groups each, in which a light is found by the importance of each group on the way (Conty
-// Estevez and Kulla 2018; pbrt, 4th ed., 12.6.3, with two).
+// Light BVH for many lights: nodes of eight groups, descended by the importance of each group (Conty Estevez and Kulla
+// 2018; pbrt, 4th ed., 12.6.3, with two).
 //
-// They come after the first CHOICES groups. `below`: the first group of the node into which a group is divided, or ~light.
-// `above`, of the first group of a node: the group that the node divides. The first is never empty, others may be.
+// The nodes follow the first CHOICES groups. `below`: the first group of the child node of a group, or ~light for a
+// leaf. `above`, in the first group of a node: the parent group. The first group of a node is never empty, others may
+// be.
 #include "light/importance.cl"
 
 #define NODE 8
@@ -12,7 +13,7 @@ static inline void node_chances(const Scene *scene, ireal first, real3 p, real3 
     make_chances(chances, NODE, 0.0f);
 }
 
-// A light of a group; *probability is multiplied by that of finding it there.
+// Sample a light of a group; *probability is multiplied by that of finding it there.
 static inline ireal tree_pick(const Scene *scene, real3 p, real3 n, ireal group, real u, real *probability) {
     ireal next = GATHER(ireal, scene->light_groups, group, .below);
     for (ireal open = next >= 0; ANY(open); open = next >= 0) {
@@ -26,7 +27,8 @@ static inline ireal tree_pick(const Scene *scene, real3 p, real3 n, ireal group,
     return ~next;
 }
 
-// The group, of the first ones, that a light is in; *probability is multiplied by that of finding it there.
+// Climb from a light to its group among the first CHOICES; *probability is multiplied by that of finding the light
+// there.
 static inline ireal tree_climb(const Scene *scene, real3 p, real3 n, ireal light, real *probability) {
     ireal group = GATHER(ireal, scene->light_places, light, .group);
     for (ireal open = group >= CHOICES; ANY(open); open = group >= CHOICES) {

@@ -1,9 +1,10 @@
-// A triangle, or the parallelogram of two, that shines from its front side, or from both: a point uniform over its area. World
+// Triangle light, or the parallelogram of two triangles, single- or double-sided: points uniform over its area. World
 // frame.
 #include "light/interface.cl"
 #include OPACITY_FILE
 
-// The cosine on the side that emits, from that on the front side: positive on the back as well if both sides emit.
+// The cosine on the emitting side, given that on the front side; for double-sided lights it is positive on the back as
+// well.
 static inline real triangle_light_cosine(const Scene *scene, ireal index, real front) {
 #if DOUBLE_SIDED_LIGHTS
     front = GATHER(ireal, scene->triangle_lights, index, .double_sided) != 0 ? absolute(front) : front;

@@ -1,4 +1,4 @@
-// What part of white light the surface reflects or lets through, head on.
+// Albedo: the fraction of white light reflected or transmitted at normal incidence.
 #include "bsdf.cl"
 
 static inline real3 picture_value(const Scene *scene, const Launch *launch, real3 direction, real t,

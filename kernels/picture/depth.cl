@@ -1,5 +1,5 @@
-// How far ahead of the camera the pixel's middle is, measured along the view, in units of the scene; all around the camera
-// it is the distance. Not averaged over the pixel: the mean of what is near and what is far is no place.
+// Depth at the pixel centre, along the viewing direction, in scene units; for a 360° camera the distance. Not averaged
+// over the pixel, since the mean of a near and a far depth is meaningless.
 #include "surface.cl"
 
 static inline real3 picture_value(const Scene *scene, const Launch *launch, real3 direction, real t,

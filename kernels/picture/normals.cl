@@ -1,4 +1,4 @@
-// The shading normal on the camera's side, unit before it is averaged over the pixel. World frame.
+// The shading normal on the camera's side, normalised before it is averaged over the pixel. World frame.
 #include "bsdf.cl"
 
 static inline real3 picture_value(const Scene *scene, const Launch *launch, real3 direction, real t,

@@ -1,21 +1,21 @@
-// Sorts what a camera sees into the bins of its picture: the outline of each primitive, and which bins it touches.
+// Binning: compute the outline of each primitive that a camera sees, and the bins that it overlaps.
 //
-// Points are seen from the eye. The place (sx, sy) of the picture, as camera.cl has it, lies along the direction
-// sx·right − sy·up + forward. A plane through the eye and two corners a, b cuts the picture in a line, on whose sides
-// (a × b)·direction, a function e0·sx + e1·sy + e2, has either sign; and with a triangle's normal N, 1 over the length in
-// which that direction meets it is N·direction/N·corner, another such function. That holds wherever the corners are, so
-// nothing is clipped: what is behind the eye lies on the wrong side of some edge (Olano and Greer 1997, "Triangle Scan
-// Conversion using 2D Homogeneous Coordinates").
+// Points are relative to the eye. The image position (sx, sy), as in camera.cl, is in the direction sx·right − sy·up +
+// forward. The plane through the eye and two corners a, b cuts the image in a line, on whose two sides the edge
+// function (a × b)·direction, a function e0·sx + e1·sy + e2, has opposite signs; and with a triangle's normal N, 1 over
+// the distance at which that direction hits its plane is N·direction/N·corner, another such function. That holds
+// wherever the corners are, so no clipping is needed: anything behind the eye is on the wrong side of some edge (Olano
+// and Greer 1997, "Triangle Scan Conversion using 2D Homogeneous Coordinates").
 //
-// Both triangles at an edge take its corners in one order and multiply by explicit fma: they find the same function, but
-// for its sign, so no place of the picture lies between them.
+// Both triangles at an edge use its corners in the same order and multiply by explicit fma: they compute the same
+// function up to its sign, so no image position falls between them.
 #include "vector.cl"
 #include "raster/bins.cl"
 
-#define SLACK 0.0625f   // of bounds, in pixels: far more than what rounding moves edges by
-#define MOST_BINS 64    // of one size that a primitive is entered in, unless it is too large for any
+#define SLACK 0.0625f   // of bounds, in pixels: far more than the rounding of edges
+#define MOST_BINS 64    // of one size in which a primitive is entered, unless it is too large for any
 
-typedef struct { real3 eye, right, up, forward, per_right, per_up; } View;   // per_…: over the square of their lengths
+typedef struct { real3 eye, right, up, forward, per_right, per_up; } View;   // per_…: divided by their squared lengths
 
 static inline View view_of(const Launch *launch) {
     real3 right = broadcast(launch->right), up = broadcast(launch->up);
@@ -38,11 +38,11 @@ static inline real3 edge_between(const View *view, real3 a, real3 b) {
     return choose(turned, negate(edge), edge);
 }
 
-// What a primitive may cover, in pixels.
+// Conservative bounds of a primitive, in pixels.
 typedef struct { real left, right, top, bottom; ireal visible; } Bounds;
 
-// Places along one axis of the picture: corners a, b over their depths w, v; between a corner ahead and one that is not the
-// edge goes off to infinity. rounding: of the depths.
+// Extend the bounds along one axis of the image by the corners a, b, at depths w, v; an edge between a corner ahead and
+// one that is not extends to infinity. rounding: of the depths.
 static inline void widen(real a, real w, real b, real v, real rounding, real *low, real *high) {
     ireal ahead = w > 0.0f, goes = ahead != (v > 0.0f);
     real at = a / w, towards = ahead ? b * w - a * v : a * v - b * w, error = rounding * (absolute(a) + absolute(b));
@@ -61,11 +61,12 @@ static inline Bounds in_pixels(const Launch *launch, real left, real right, real
     return bounds;
 }
 
-// The outlines of all lanes: what an Outline has, but for its numbers; of spheres edge0 is the centre and edge1.x the radius.
+// The outlines of all lanes: the members of an Outline, without its ids; for spheres edge0 is the centre and edge1.x
+// the radius.
 typedef struct { real3 edge0, edge1, edge2, nearness; Bounds bounds; } Outlines;
 
 #if TRIANGLES
-// A mesh's vector or point in the world.
+// Transform a mesh's vector or point to the world.
 static inline real3 placed(const Scene *scene, ireal instance, real3 v, bool moved) {
 #if INSTANCES
 #define MOVED(row) (moved ? GATHER(real, scene->placements, instance, .to_world[row][3]) : ZERO)
@@ -88,9 +89,9 @@ static inline Outlines triangle_outlines(const Scene *scene, const Launch *launc
     p2 = sub(placed(scene, instance, p2, true), view->eye);
     real3 n = cross3(scale(e1, 1.0f / largest(absolute3(e1))), scale(e2, 1.0f / largest(absolute3(e2))));
     real d0 = dot3(p0, p0), d1 = dot3(p1, p1), d2 = dot3(p2, p2);
-    real3 nearest = choose((d0 <= d1) & (d0 <= d2), p0, choose(d1 <= d2, p1, p2));   // rounding is least there
+    real3 nearest = choose((d0 <= d1) & (d0 <= d2), p0, choose(d1 <= d2, p1, p2));   // rounding is smallest there
     real distance = exact_dot3(n, nearest);
-    real side = distance < 0.0f ? (real)(-1.0f) : ONE;   // inside all edges are to be positive, whichever side is seen
+    real side = distance < 0.0f ? (real)(-1.0f) : ONE;   // makes edge functions positive inside on either side
     Outlines outlines;
     outlines.nearness = scale(along_view(view, n), 1.0f / distance);
     outlines.edge0 = scale(edge_between(view, p1, p2), side);
@@ -110,14 +111,15 @@ static inline Outlines triangle_outlines(const Scene *scene, const Launch *launc
     widen(y1, w1, y2, w2, rounding, &top, &bottom);
     widen(y2, w2, y0, w0, rounding, &top, &bottom);
     ireal ahead = (w0 > 0.0f) | (w1 > 0.0f) | (w2 > 0.0f);
-    ireal faces = absolute(distance) > 0.0f;   // neither edge-on nor without an area
+    ireal faces = absolute(distance) > 0.0f;   // neither edge-on nor degenerate
     outlines.bounds = in_pixels(launch, left, right, top, bottom, ahead & faces);
     return outlines;
 }
 #endif
 
 #if SPHERES
-// Along one axis: the lines through the eye that touch the circle around (a, w); all of the axis unless it is well ahead.
+// Bounds along one axis: the lines through the eye tangent to the circle around (a, w); unbounded unless it is well
+// ahead.
 static inline void touch(real a, real w, real radius, real *low, real *high) {
     real below = (w - radius) * (w + radius), root = radius * sqrt(a * a + below);
     real q = a * w + (a < 0.0f ? -root : root), far = q / below, near = (a - radius) * (a + radius) / q;
@@ -141,12 +143,12 @@ static inline Outlines sphere_outlines(const Scene *scene, const Launch *launch,
 }
 #endif
 
-// Whether an edge leaves any of a bin inside.
+// Whether any part of a bin is on the inner side of an edge.
 static inline bool reaches(const float edge[3], float left, float right, float top, float bottom) {
     return edge[0] * (edge[0] > 0.0f ? right : left) + edge[1] * (edge[1] > 0.0f ? bottom : top) + edge[2] >= 0.0f;
 }
 
-// Counts an outline in the bins that it touches, or enters its number there.
+// Count an outline in the bins that it overlaps, or enter its index there.
 static inline void sort_in(const Launch *launch, const Outline *outline, uint left, uint right, uint number, uint fill,
                            global uint *bins, global uint *entries) {
     uint x0 = left / TILE, x1 = right / TILE;
@@ -178,7 +180,7 @@ static inline void put3(float *row, const real3 *value, int lane) {
 }
 
 #if INSTANCES
-// Which instance the triangle stands in that is number `drawn` of all that are; starts: of each instance's.
+// The instance of triangle number `drawn` among all that are drawn; starts: of each instance's triangles.
 static inline ireal instance_of(global const uint *starts, uint places, ureal drawn) {
     ureal instance = (ureal)(0);
     for (uint step = 1u << (31 - clz(places)); step; step >>= 1) {
@@ -190,15 +192,15 @@ static inline ireal instance_of(global const uint *starts, uint places, ureal dr
 }
 #endif
 
-// The pixel of a place along an axis of so many, or the nearest one.
+// The pixel of a position along an axis of `pixels` pixels, clamped.
 static inline uint within(float place, uint pixels) {
     return place > 0.0f ? (uint)(place < pixels - 1 ? place : pixels - 1) : 0;
 }
 
 #define SORTED_PARAMETERS uint fill, global uint *numbers, global uint *bins, global uint *entries, global Outline *outlines
 
-// Numbers those of the lanes' outlines that the camera may see as they come, and counts them in the bins that they touch;
-// with `fill` they are entered there, from bins[i] on, and stored. instance: below 0 for spheres.
+// Number the visible outlines of the lanes consecutively, and count them in the bins that they overlap; with `fill`
+// they are entered there, from bins[i] on, and stored. instance: below 0 for spheres.
 static inline void sort_lanes(const Launch *launch, const Outlines *seen, ireal active, ireal primitive, ireal instance,
                               SORTED_PARAMETERS) {
     ireal visible = active & seen->bounds.visible;
@@ -232,7 +234,7 @@ static inline void sort_lanes(const Launch *launch, const Outlines *seen, ireal 
     for (uint i = begin; i < end; i += LANES)
 
 #if TRIANGLES
-// starts: how many triangles stand in each of so many places before it.
+// starts: for each of `places` instances, the number of triangles before it.
 kernel void sort_triangles(SORT_PARAMETERS, global const uint *starts, uint places) {
     FOR_DRAWN {
         ureal drawn = i + LANE_INDEX;
@@ -258,7 +260,7 @@ kernel void sort_spheres(SORT_PARAMETERS) {
         ireal active = drawn < end;
         ireal sphere = AS_INT(active ? drawn : (ureal)(i)), primitive = sphere + scene.counts.triangles;
 #if INSTANCES
-        primitive -= RECORD(scene.placements, 0)->first;   // counted from those of the rest
+        primitive -= RECORD(scene.placements, 0)->first;   // relative to the geometry without instancing
 #endif
         Outlines seen = sphere_outlines(&scene, &launch, &view, sphere);
         sort_lanes(&launch, &seen, active, primitive, (ireal)(-1), fill, numbers, bins, entries, outlines);

@@ -1,7 +1,7 @@
-// What is seen first through places of a tile: the nearest of the primitives in its bins (raster/outline.cl), of equally
-// near ones the first, in whatever order they were entered.
+// Rasterise a tile: for each sample position the nearest primitive in the bins of the tile (raster/outline.cl); of
+// equally near ones the first, whatever the order of entries.
 //
-// A work-item takes ROWS times LANES pixels: on a CPU a whole tile, so that each outline is read once for all of it.
+// A work-item takes ROWS times LANES pixels: on a CPU a whole tile, so that each outline is read once per tile.
 #include "camera.cl"
 #include "surface.cl"
 #include "raster/bins.cl"
@@ -23,17 +23,17 @@ typedef struct {
 #define BIN_PARAMETERS global const uint *bin_starts, global const uint *bin_entries, global const Outline *bin_outlines
 #define BIN_ARGUMENTS {bin_starts, bin_entries, bin_outlines}
 
-// LANES places of a tile, the camera's rays through them, and what is seen there so far.
+// LANES sample positions of a tile, their camera rays, and the nearest primitive found so far.
 typedef struct {
     real2 place;
     CameraRay ray;
-    real length;               // of a direction whose part along the view is 1
+    real length;               // of the direction scaled to a depth of 1
     ireal active;
-    real nearness;             // 1 over how far along the view it is
-    real edge0, edge1, edge2;  // of a triangle: the functions of its edges
+    real nearness;             // 1/depth along the viewing direction
+    real edge0, edge1, edge2;  // edge functions of a triangle
     ireal primitive, instance;
 #if SPHERES
-    real t;                    // of a sphere, or 0
+    real t;                    // of a sphere, else 0
 #endif
 } Row;
 
@@ -52,7 +52,7 @@ static inline Row row_of(const Launch *launch, real2 place, CameraRay ray, ireal
     return row;
 }
 
-// Where an outline is met nearer than all before; of equals the first counts.
+// Whether an outline is nearer than the current one; of equals the first counts.
 static inline ireal is_first(const Row *row, real nearness, int primitive, int instance) {
     ireal before = (instance < row->instance) | ((instance == row->instance) & (primitive < row->primitive));
     return (nearness > row->nearness) | ((nearness == row->nearness) & before);
@@ -101,7 +101,7 @@ static inline void meet_sphere(global const Outline *outline, Row *row) {
 }
 #endif
 
-// Has `count` rows see all that is in the bins of their tile; (x, y): the first one's first pixel.
+// Rasterise all primitives in the bins of a tile for `count` rows; (x, y): the first pixel of the first row.
 static inline void rasterise(const Bins *bins, const Launch *launch, uint x, uint y, Row *rows,
                              int count) {
     for (uint level = 0; level < BIN_LEVELS; ++level) {

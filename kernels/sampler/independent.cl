@@ -1,4 +1,4 @@
-// Independent samples: noise falls as one over the root of their number. The simplest, to compare with.
+// Independent samples: the error falls as 1/√n. The simplest sampler, for comparison.
 #include "rng.cl"
 
 typedef struct {

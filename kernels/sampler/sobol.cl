@@ -1,19 +1,19 @@
-// The first two dimensions of Sobol's sequence, scrambled as Owen does and padded: every pair of dimensions takes the
-// same points, in an order and with a scrambling of its own (Burley 2020, "Practical Hash-Based Owen Scrambling", JCGT
+// Padded (0, 2)-sequences: the first two dimensions of the Sobol' sequence, Owen-scrambled; every pair of dimensions
+// uses the same points with its own order and scrambling (Burley 2020, "Practical Hash-Based Owen Scrambling", JCGT
 // 9(4), with the hash of Laine and Karras 2011 and Vegdahl's constants). The error of a smooth integral falls nearly as
-// one over the number of samples, and any 2^k consecutive ones from a multiple of 2^k on are a (0, k, 2)-net.
+// 1/n, and any 2^k consecutive samples starting at a multiple of 2^k are a (0, k, 2)-net.
 //
-// Pixels of a square take blocks of 2^block_bits points of one sequence along the Z curve, so that those of neighbours
-// are stratified together and their errors cancel where eyes and filters average them (Ahmed and Wonka 2020). Each
-// square, and each later block, has a sequence of its own: errors of pixels that share one rise and fall together, and
-// were that all of them, no change of a picture would tell what its error is (clrt/rendering/noise.py). With
-// block_bits = 32, where nobody knows how many samples there will be, each pixel has its own.
+// The pixels of a square take blocks of 2^block_bits points of one sequence along the Z curve, so that neighbouring
+// pixels are stratified together and their errors cancel when the eye or a filter averages them (Ahmed and Wonka 2020).
+// Each square, and each later block, has its own sequence: the errors of pixels that share a sequence are correlated,
+// and if all pixels did, changes of the image would not reveal its error (clrt/rendering/noise.py). With block_bits =
+// 32, for an unknown number of samples, each pixel has its own sequence.
 #include "rng.cl"
 
-#define SQUARE_BITS 8   // of a pixel's number in its square, unless points of so many pixels are too many for 32 bits
+#define SQUARE_BITS 8   // of a pixel's index in its square, unless the points of that many pixels exceed 32 bits
 
 typedef struct {
-    ureal reversed_index, key;   // the point's number with its bits reversed; the sequence's key
+    ureal reversed_index, key;   // the point's index with its bits reversed; the sequence's key
     uint dimension;
 } Sampler;
 
@@ -36,7 +36,7 @@ static inline Sampler sampler_at(ureal pixel, ureal sample, uint seed, uint bloc
     return (Sampler){reverse_bits(index), hash4(sequence, block, (ureal)(seed), (ureal)(0)).y, 0};
 }
 
-// Flips each bit by a hash of those below it: Owen's scrambling of a number whose bits are reversed.
+// Owen scrambling of a bit-reversed number: flip each bit by a hash of the lower bits.
 static inline ureal scrambled(ureal x, ureal key) {
     x ^= x * 0x3d20adeau;
     x += key;
@@ -45,8 +45,8 @@ static inline ureal scrambled(ureal x, ureal key) {
     return x ^ x * 0x53a22864u;
 }
 
-// The second dimension of the point `index`, its bits reversed, as those of the index itself are the first's: the sum of
-// the rows of Pascal's triangle modulo 2 that the index's bits name, which is i(1 + z) for a polynomial i(z).
+// The bit-reversed second dimension of the point `index` (the first is the index itself): the sum modulo 2 of the rows
+// of Pascal's triangle selected by the index's bits, which is i(1 + z) for a polynomial i(z).
 static inline ureal second_dimension(ureal index) {
     index ^= index >> 16;
     index ^= (index & 0xff00ff00u) >> 8;

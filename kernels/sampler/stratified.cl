@@ -1,9 +1,10 @@
-// Jittered samples: the pairs of a block of 2^k samples lie one in each cell of a grid of 2^k cells, in an order of each
-// pixel and pair of dimensions (Cook et al. 1984; Kensler 2013, "Correlated Multi-Jittered Sampling", for the order).
+// Stratified (jittered) samples: the pairs of a block of 2^k samples fall one into each cell of a grid of 2^k cells, in
+// a random order per pixel and pair of dimensions (Cook et al. 1984; Kensler 2013, "Correlated Multi-Jittered
+// Sampling", for the order).
 #include "rng.cl"
 
 #define MOST_CELLS_BITS 16   // of a grid
-#define DEFAULT_CELLS_BITS 8 // where it is not known how many samples there will be
+#define DEFAULT_CELLS_BITS 8 // if the number of samples is unknown
 
 typedef struct {
     ureal key, sample;
@@ -16,7 +17,7 @@ static inline Sampler sampler_at(ureal pixel, ureal sample, uint seed, uint bloc
     return (Sampler){key, sample, 0, bits};
 }
 
-// A permutation of the numbers of `bits` bits: each step can be undone, and the last makes all equally likely.
+// A permutation of the numbers of `bits` bits: each step is invertible, and the last makes the result uniform.
 static inline ureal shuffled(ureal x, uint bits, ureal4 keys) {
     ureal mask = (ureal)((1u << bits) - 1);
     uint middle = (bits + 1) / 2;

@@ -1,4 +1,4 @@
-// In place of mis.cl: BSDF sampling finds all light but that of delta lights.
+// Replaces mis.cl: BSDF sampling finds all light except that of delta lights.
 #include "sampling.cl"
 
 static inline real light_sample_weight(real pdf, real bsdf_pdf) { return ZERO; }

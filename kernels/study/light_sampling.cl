@@ -1,5 +1,5 @@
-// In place of mis.cl: light sampling finds all light but what it never samples: skies below their mean, and what specular
-// directions lead to.
+// Replaces mis.cl: light sampling finds all light except what it never samples: skies below their mean, and light along
+// specular directions.
 #include "sampling.cl"
 
 static inline real light_sample_weight(real pdf, real bsdf_pdf) { return ONE; }

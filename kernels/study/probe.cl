@@ -1,7 +1,7 @@
-// Entry points that hand arrays to one function of the kernels each, LANES elements a work-item (clrt/study/probe.py).
+// Kernels that apply one function each to arrays, LANES elements per work-item (clrt/study/probe.py).
 //
-// A scene's program with this file in place of path.cl: what is probed is what renders that scene. Arrays are rows of n
-// floats: row r of element i is array[r·n + i]. Whole numbers up to 2^24 and masks (0, 1) are written as floats.
+// Compiled into a scene's program in place of path.cl, so the probed code is that which renders the scene. Arrays are
+// rows of n floats: row r of element i is array[r·n + i]. Integers up to 2^24 and masks (0, 1) are stored as floats.
 #include "shading.cl"
 #include "camera.cl"
 #include "film.cl"
@@ -59,8 +59,8 @@ kernel void probe_random(SCENE_PARAMETERS, uint n, global const float *in, globa
     put(out, n, 1, u.y);
 }
 
-// in: two radiances (3 each), and sums, sum_errors, squares, square_errors (3 each) of what came before -> out: these with
-// `samples` samples added, every `period`-th of the second radiance; how many were counted, and how many dropped
+// in: two radiances (3 each), and previous sums, sum_errors, squares, square_errors (3 each) -> out: these with
+// `samples` samples added, every `period`-th of the second radiance; the numbers counted and dropped
 kernel void probe_accumulate(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint samples, uint period) {
     ELEMENTS
     Accumulator a = {ROW3(in, 6), ROW3(in, 9), ROW3(in, 12), ROW3(in, 15), (ureal)(0), (ureal)(0), (ureal)(0)};
@@ -74,7 +74,7 @@ kernel void probe_accumulate(SCENE_PARAMETERS, uint n, global const float *in, g
     put(out, n, 13, TO_REAL(a.dropped));
 }
 
-// A material, by its code, on a surface that is seen from wo, at the origin of its texture coordinates.
+// A material, by its code, on a surface seen from wo, at the origin of its texture coordinates.
 static Bsdf material_at(const Scene *scene, real code, real3 wo, ireal front) {
     Surface surface;
     surface.material = TO_INT(code);
@@ -123,7 +123,7 @@ kernel void probe_bsdf_value(SCENE_PARAMETERS, uint n, global const float *in, g
 }
 
 #if PRIMITIVES
-// A material, by its code, on a surface with these normals, seen along −wo. No map bends it.
+// A material, by its code, on a surface with these normals, seen along −wo, without a normal map.
 static Shading shading_between(const Scene *scene, real code, real3 ng, real3 ns, real3 wo, Surface *surface) {
     surface->material = TO_INT(code);
     surface->ng = ng;
@@ -174,7 +174,7 @@ kernel void probe_shading_value(SCENE_PARAMETERS, uint n, global const float *in
 #endif
 
 #if MATERIAL_METALLIC_ROUGHNESS
-// in: wo (3), alpha, u (2) -> out: the normal that is drawn of those visible from wo
+// in: wo (3), alpha, u (2) -> out: the sampled visible normal
 kernel void probe_visible_normal(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     real2 u = {ROW(in, 4), ROW(in, 5)};
@@ -192,15 +192,15 @@ kernel void probe_closest_hit(SCENE_PARAMETERS, uint n, global const float *in, 
     put(out, n, 3, TO_REAL(hits.primitive));
 }
 
-// in: origin (3), direction (3), t_max -> out: whether something is hit
+// in: origin (3), direction (3), t_max -> out: whether anything is hit
 kernel void probe_any_hit(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     put(out, n, 0, FLAG(any_hit(&scene, ROW3(in, 0), ROW3(in, 3), ROW(in, 6), active)));
 }
 
 #if PRIMITIVES
-// in: origin (3), direction (3), new direction (3) -> out: primitive; p, p_error, ng (3 each); the new ray's origin (3), its
-// t. All is 0 where the first ray misses.
+// in: origin (3), direction (3), new direction (3) -> out: primitive; p, p_error, ng (3 each); the new ray's origin
+// (3), its t. All are 0 if the first ray misses.
 kernel void probe_leave(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     real3 origin = ROW3(in, 0), direction = ROW3(in, 3), next = ROW3(in, 6);
@@ -231,7 +231,7 @@ kernel void probe_texture(SCENE_PARAMETERS, uint n, global const float *in, glob
 #endif
 
 #if LIGHTS
-// in: p (3), n (3) -> out: the light that the numbers of pixel i choose, the probability of that, and what u becomes
+// in: p (3), n (3) -> out: the light chosen by the random numbers of pixel i, its probability, and the rescaled u
 kernel void probe_pick_light(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed) {
     ELEMENTS
     Sampler sampler = sampler_at(element, (ureal)(0), seed, 32);
@@ -242,13 +242,14 @@ kernel void probe_pick_light(SCENE_PARAMETERS, uint n, global const float *in, g
     put(out, n, 2, u);
 }
 
-// in: p (3), n (3), light -> out: the probability with which it is chosen
+// in: p (3), n (3), light -> out: its selection probability
 kernel void probe_light_probability(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     put(out, n, 0, light_probability(&scene, ROW3(in, 0), ROW3(in, 3), TO_INT(ROW(in, 6))));
 }
 
-// in: p (3), n (3) -> out: wi (3), radiance (3), pdf, target (3), infinite, delta. Element i draws the numbers of pixel i.
+// in: p (3), n (3) -> out: wi (3), radiance (3), pdf, target (3), infinite, delta. Element i uses the numbers of pixel
+// i.
 kernel void probe_light_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed) {
     ELEMENTS
     Sampler sampler = sampler_at(element, (ureal)(0), seed, 32);
@@ -263,7 +264,7 @@ kernel void probe_light_sample(SCENE_PARAMETERS, uint n, global const float *in,
 #endif
 
 #if EMITTERS
-// in: p (3), n (3), wi (3) -> out: radiance (3) of the emitter met, the density with which light_sample chooses wi, primitive
+// in: p (3), n (3), wi (3) -> out: radiance (3) of the emitter hit, the pdf of light_sample at wi, primitive
 kernel void probe_emitter(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     real3 p = ROW3(in, 0), wi = ROW3(in, 6);
@@ -277,7 +278,7 @@ kernel void probe_emitter(SCENE_PARAMETERS, uint n, global const float *in, glob
 #endif
 
 #if SKY
-// in: p (3), n (3), wi (3) -> out: radiance (3), the density with which light_sample chooses wi
+// in: p (3), n (3), wi (3) -> out: radiance (3), the pdf of light_sample at wi
 kernel void probe_sky(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     real pdf;
@@ -287,8 +288,8 @@ kernel void probe_sky(SCENE_PARAMETERS, uint n, global const float *in, global f
 #endif
 
 #if LIGHT_SUN
-// in: p (3), n (3), wi (3), density -> out: radiance (3) from the sky and all suns, and what of it counts (3) where wi was
-// drawn with that density
+// in: p (3), n (3), wi (3), pdf -> out: radiance (3) from the sky and all suns, and its MIS-weighted part (3) if wi was
+// sampled with that pdf
 kernel void probe_environment(SCENE_PARAMETERS, uint n, global const float *in, global float *out) {
     ELEMENTS
     put3(out, n, 0, environment_radiance(&scene, ROW3(in, 6)));

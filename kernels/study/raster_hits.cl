@@ -1,4 +1,4 @@
-// What is seen first through a place of each pixel, rasterised and traced (clrt/study/raster.py).
+// First hits at one position of each pixel, rasterised and traced (clrt/study/raster.py).
 #include "film.cl"
 #include "surface.cl"
 #include "raster/tile.cl"

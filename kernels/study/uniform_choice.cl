@@ -1,4 +1,4 @@
-// In place of light/choice.cl: every light has the same probability everywhere.
+// Replaces light/choice.cl: every light has the same probability everywhere.
 #include "sampler.cl"
 
 static inline ireal pick_light(const Scene *scene, real3 p, real3 n, Sampler *sampler, real *u, real *probability) {

@@ -1,9 +1,9 @@
-// A binary tree (Nadolny 5.4.4–5.4.5): 32-byte nodes, children side by side, one triangle at a time.
+// Binary BVH (Nadolny 5.4.4–5.4.5): 32-byte nodes, siblings adjacent, one triangle at a time.
 //
-// Both children are tested at their parent; the nearer is entered, the farther waits with its distance on a stack
-// whose size the host computed for this very tree, so that it cannot overflow. count = 0 is an interior node,
-// count > 0 a leaf of triangles, count < 0 of spheres; first is the left child or the leaf's first primitive, in the
-// upper level of two its instance.
+// Both children are tested at their parent; the nearer is visited, the farther is pushed with its distance on a stack
+// whose size the host computed for this BVH, so that it cannot overflow. count = 0 is an interior node, count > 0 a
+// leaf of triangles, count < 0 of spheres; first is the left child or the leaf's first primitive, in the top level of a
+// two-level BVH its instance.
 #include "geometry/box.cl"
 #include "traverse/leaf.cl"
 #include UPPER_LEVEL

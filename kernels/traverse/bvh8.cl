@@ -1,9 +1,9 @@
-// An 8-wide tree for processors with vectors: a ray meets a node's eight boxes, or a pack of eight triangles, at once.
+// 8-wide BVH for CPUs with SIMD: a ray is intersected with a node's eight boxes, or a pack of eight triangles, at once.
 //
-// The nearest child is entered, the others wait unsorted with their distances. The host computed the stack's size for
-// this very tree, so that it cannot overflow. A child reference >= 0 is a node, < 0 is
-// ~(first << 4 | sphere << 3 | count − 1), a pack of triangles or `count` spheres, and in the upper level of two an
-// instance; empty slots have boxes turned inside out.
+// The nearest child is visited, the others are pushed unsorted with their distances. The host computed the stack size
+// for this BVH, so that it cannot overflow. A child reference >= 0 is a node, < 0 is ~(first << 4 | sphere << 3 | count
+// − 1), a pack of triangles or `count` spheres, and in the top level of a two-level BVH an instance; empty slots have
+// inverted boxes.
 #include "geometry/box.cl"
 #include "traverse/leaf.cl"
 #include UPPER_LEVEL
@@ -25,7 +25,7 @@ static inline void hit_leaf(const Scene *scene, const LeafRay *ray, int referenc
 #endif
 }
 
-// Tests the eight boxes of a node; returns the bits of those entered and where.
+// Intersect the eight boxes of a node; return the bits of those hit, and their entry distances.
 static inline uint enter_boxes(const SlabRay *ray, global const Node *node, float t_max, float *entry) {
     float8 t_near = FIRST_T(ray), t_far = t_max;
     global const float *low = node->lo[0], *high = node->hi[0];

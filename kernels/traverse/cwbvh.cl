@@ -1,22 +1,22 @@
-// A compressed 8-wide tree for GPUs (Ylitie, Karras and Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through
-// Compressed Wide BVHs"): 80-byte nodes, whose boxes have eight bits a plane.
+// Compressed 8-wide BVH for GPUs (Ylitie, Karras and Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through
+// Compressed Wide BVHs"): 80-byte nodes, with boxes of eight bits per plane.
 //
-// What a ray enters of a node is one word: a bit each for the nodes (31 … 24) and for the primitives (23 … 0) below it.
-// Nodes stand in the order in which a ray of this octant passes their slots, so the next one is the highest bit and
-// nothing is sorted. A group is the index of the first and such bits; what is left of a group of nodes waits on a stack,
-// one group a level at most, whose size the host computed for this very tree, so that it cannot overflow.
-// In the upper level of two a node's primitives are instances: they wait as a group, too, and what is left of it,
-// below an instance's tree on the stack, says LEAVE.
+// The children of a node that a ray hits are one word: a bit each for child nodes (31 … 24) and for primitives (23 …
+// 0). Bits of nodes are in the order in which a ray of this octant visits the slots, so the next one is the highest bit
+// and nothing is sorted. A group is the index of the first child and such bits; the rest of a node group is pushed on a
+// stack, at most one group per level, whose size the host computed for this BVH, so that it cannot overflow. In the top
+// level of a two-level BVH the primitives of a node are instances, which form a group as well; the rest of it, below an
+// instance's BVH on the stack, is marked LEAVE.
 //
-// Watertight as geometry/box.cl is. A plane at p + q·step is seen from the ray at q·step + (p − origin): q·step is exact,
-// and the sum's rounding is within what SLAB_PAD keeps in hand. The roundings of p − origin, and of plane − p when the
-// tree was built, are below 3 units of p − origin, and ORIGIN_PAD is 4. The product with 1/direction stays apart, which
-// costs one a plane, so that zeros and infinities mean here what they mean there.
+// Watertight, as geometry/box.cl. A plane at p + q·step is at q·step + (p − origin) relative to the ray: q·step is
+// exact, and the rounding of the sum is within the margin of SLAB_PAD. The roundings of p − origin, and of plane − p
+// during the build, are below 3 ulps of p − origin; ORIGIN_PAD is 4. The product with 1/direction stays separate, at
+// one operation per plane, so that zeros and infinities behave as they do there.
 #include "geometry/box.cl"
 #include "traverse/leaf.cl"
 #include UPPER_LEVEL
 
-typedef struct { float step[3], near[3], far[3]; } Grid;   // a node's: the step, and p − origin for near and far planes
+typedef struct { float step[3], near[3], far[3]; } Grid;   // the step, and p − origin for near and far planes
 typedef struct { uint first, bits; } Group;
 
 static inline Grid node_grid(const SlabRay *ray, uint4 frame) {
@@ -32,7 +32,8 @@ static inline Grid node_grid(const SlabRay *ray, uint4 frame) {
     return grid;
 }
 
-// Of four children of a node, a byte each in meta and in each axis of low and high, the bits of those that are entered.
+// Intersect four children of a node, one byte each in meta and in each axis of low and high; return the bits of those
+// hit.
 static inline uint enter_four(const SlabRay *ray, const Grid *grid, uint order, float t_max, uint meta,
                               const uint low[3], const uint high[3]) {
     float4 t_near = FIRST_T(ray), t_far = t_max;
@@ -44,7 +45,8 @@ static inline uint enter_four(const SlabRay *ray, const Grid *grid, uint order, 
         t_near = fmax(near, t_near);   // these drop NaN, as box.cl's comparisons do, and are one instruction on GPUs
         t_far = fmin(far, t_far);
     }
-    // Of a node the low bits of meta are 24 + slot, whose order is the ray's; of a leaf less than 24, and stay.
+    // For nodes the low bits of meta are 24 + slot, permuted to the ray's order; for leaves they are below 24 and
+    // unchanged.
     uint nodes = (meta & meta << 1 & 0x10101010) >> 4;
     uint4 place = convert_uint4(as_uchar4((meta ^ nodes * order) & 0x1f1f1f1f));
     uint4 bits = convert_uint4(as_uchar4(meta >> 5 & 0x07070707)) << place & as_uint4(t_near <= t_far);
@@ -59,7 +61,7 @@ static inline void enter_node(const SlabRay *ray, global const Node *node, uint 
     Grid grid = node_grid(ray, frame);
     uint bits = enter_four(ray, &grid, order, t_max, links.z, low[0], high[0])
               | enter_four(ray, &grid, order, t_max, links.w, low[1], high[1]);
-    *nodes = (Group){links.x, (bits & 0xff000000) | frame.w >> 24};   // which slots are nodes: where a child is from `first`
+    *nodes = (Group){links.x, (bits & 0xff000000) | frame.w >> 24};   // slots that are nodes, to index children
     *primitives = (Group){links.y, bits & 0x00ffffff};
 }
 
@@ -119,7 +121,7 @@ static inline Hit traverse(const Scene *scene, const TreeRays *rays, const Ray *
             nodes = waiting[--top];
         }
 #if INSTANCES
-        while (nodes.bits <= 0x00ffffff) {   // instances: the first is entered, or all have been seen
+        while (nodes.bits <= 0x00ffffff) {   // instances: the first is entered, unless all have been visited
             if (nodes.bits) {
                 int place = nodes.first + first_bit(nodes.bits);
                 nodes.bits &= nodes.bits - 1;

@@ -1,13 +1,13 @@
-// The upper level of a two-level tree: its leaves are instances, each a tree of its own in another frame.
+// Top level of a two-level BVH: its leaves are instances, each a BVH of its own in an object frame.
 //
-// A ray that comes to an instance goes on in the object's frame from that tree's root, with LEAVE on the stack under it;
-// when that comes up again all of the instance has been seen, and the ray is back in the world's frame. Directions are not
-// brought to unit length, so t means the same in all frames.
+// A ray that reaches an instance continues in the object frame from that BVH's root, with LEAVE below it on the stack;
+// when LEAVE is popped the instance is finished and the ray returns to the world frame. Directions are not normalised,
+// so t is the same in all frames.
 
 #define LEAVE 0x7ffffffe
 #define IN_WORLD -1
 
-// With explicit fma there is nothing left to contract: all layouts and devices see the same ray.
+// Explicit fma leaves nothing to contract: all layouts and devices compute the same ray.
 static inline Ray object_ray(const Ray *world, ARRAY(Instance) instances, int place) {
     global const Instance *instance = RECORD(instances, place);
     const float *d = world->direction, *o = world->origin;

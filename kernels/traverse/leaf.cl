@@ -1,13 +1,13 @@
-// What a leaf holds and what happens there; the trees know only these two functions.
+// Leaf intersection; BVH traversal uses only the two functions of this file.
 //
-// Of several hits at the same t the lowest primitive wins (of the lowest instance), so the answer does not depend on the
-// tree. `stop_at_first` is a constant at every call: with it, the first hit found ends the search.
+// Of several hits at the same t the lowest primitive wins (of the lowest instance), so the result does not depend on
+// the BVH. `stop_at_first` is a compile-time constant at every call: with it, the search ends at the first hit found.
 #include "geometry/wide.cl"
 #include "traverse/visits.cl"
 #include TRIANGLE_TEST
 #include SPHERE_TEST
 
-// Triangles alone need the ray only in the form of their test.
+// With triangles alone, only the triangle test's form of the ray is needed.
 #define WHOLE_RAY (LEAF_SPHERES || NEXT_HIT || INSTANCES)
 
 typedef struct {
@@ -23,7 +23,7 @@ typedef struct {
 typedef TriangleRays LeafRays;
 static inline LeafRays leaf_rays(real3 origin, real3 direction) { return triangle_rays(origin, direction); }
 #else
-typedef int LeafRays;   // a sphere's test needs nothing but the ray
+typedef int LeafRays;   // the sphere test needs only the ray
 static inline LeafRays leaf_rays(real3 origin, real3 direction) { return 0; }
 #endif
 
@@ -86,7 +86,7 @@ static inline void hit_triangles(const LeafRay *ray, global const Triangles *lea
 #if LEAF_SPHERES
 SPHERE_OF(float, int, Twice, sphere)
 
-// The nearest root beyond t_min and not beyond t_max, if there is one.
+// Find the nearest root in (t_min, t_max], if there is one.
 static inline bool intersect_sphere(const Ray *ray, global const LeafSphere *sphere, float t_min, float t_max, float *t) {
     const float f[3] = {ray->origin[0] - sphere->center[0], ray->origin[1] - sphere->center[1],
                         ray->origin[2] - sphere->center[2]};
@@ -101,7 +101,7 @@ static inline void hit_spheres(const LeafRay *ray, global const LeafSphere *sphe
     for (int i = 0; i < count; ++i) {
         float t = 0.0f;
 #if NEXT_HIT
-        while (intersect_sphere(&ray->ray, spheres + i, t, hit->t, &t))   // where the ray enters, and where it leaves
+        while (intersect_sphere(&ray->ray, spheres + i, t, hit->t, &t))   // the entry and the exit point
 #else
         if (intersect_sphere(&ray->ray, spheres + i, t, hit->t, &t))
 #endif

@@ -1,4 +1,4 @@
-// No tree: every primitive is tested. The yardstick for the trees.
+// Brute force (no BVH): every primitive is tested. The reference for BVHs.
 #include "traverse/leaf.cl"
 
 typedef LeafRays TreeRays;

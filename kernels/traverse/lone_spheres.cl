@@ -1,11 +1,11 @@
-// Spheres of a scene that has few: the rays of all lanes meet each of them, before any goes through the tree alone. One
-// costs a ray less than a node of the tree.
+// Spheres of a scene that has few: the rays of all lanes are tested against each sphere before each traverses the BVH
+// alone. A test costs less per ray than a BVH node.
 #include "vector.cl"
 #include SPHERE_TEST
 
 SPHERE_OF(real, ireal, TwiceReal, lone)
 
-// Whether a hit at t > 0 comes after the last one, where the next one is searched for.
+// Whether a hit at t > 0 comes after the last one, if NEXT_HIT.
 static inline ireal is_ahead(real t, int primitive, const Hits *after) {
 #if NEXT_HIT
     ireal later = (after->instance < 0) | ((after->instance == 0) & (after->primitive < primitive));
@@ -15,7 +15,7 @@ static inline ireal is_ahead(real t, int primitive, const Hits *after) {
 #endif
 }
 
-// The closest hits of enabled lanes nearer than t_max among the spheres (see next_hit), or their t_max and no primitive.
+// The closest sphere hits of enabled lanes nearer than t_max (see next_hit); on a miss t_max and no primitive.
 static inline Hits meet_spheres(const Scene *scene, real3 origin, real3 direction, real t_max, ireal enabled,
                                 const Hits *after) {
     Hits hits = {t_max, ZERO, ZERO, (ireal)(-1), (ireal)(0)};
@@ -23,12 +23,12 @@ static inline Hits meet_spheres(const Scene *scene, real3 origin, real3 directio
     for (int i = 0; i < scene->counts.spheres; ++i) {
         global const LeafSphere *sphere = RECORD(scene->leaf_spheres, i);
         const real f[3] = {o[0] - sphere->center[0], o[1] - sphere->center[1], o[2] - sphere->center[2]};
-        ireal meets = enabled ? lone_may_meet(f, d, sphere->radius) : NO_LANES;   // idle lanes hold no rays
+        ireal meets = enabled ? lone_may_meet(f, d, sphere->radius) : NO_LANES;   // inactive lanes hold no rays
         if (!ANY(meets)) continue;
         real near, far;
         lone_roots(o, d, sphere->center, sphere->radius, &near, &far);
         real t = is_ahead(near, sphere->primitive, after) ? near : far;
-        meets = meets ? is_ahead(t, sphere->primitive, after) & (t < hits.t) : NO_LANES;   // of equals the first stays
+        meets = meets ? is_ahead(t, sphere->primitive, after) & (t < hits.t) : NO_LANES;   // at equal t the first stays
         hits.t = meets ? t : hits.t;
         hits.primitive = meets ? (ireal)(sphere->primitive) : hits.primitive;
     }

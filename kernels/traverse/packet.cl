@@ -1,15 +1,17 @@
-// Closest hits of coherent rays, for the layout bvh8 with LANES = 8: the rays of all lanes go through the tree together.
+// Packet traversal of coherent rays, for the layout bvh8 with LANES = 8: the rays of all lanes traverse the BVH
+// together.
 //
-// A box, or a triangle, is met by the eight rays at once. A node costs as much arithmetic as for eight rays one by one, but
-// is loaded, put on the stack and taken from it once. Rays must agree in the signs of their directions and in their largest
-// component; others are traced one by one. Hits are the same: arithmetic is, and only its order differs.
+// A box or triangle is tested against the eight rays at once. A node takes as much arithmetic as for eight single rays,
+// but is loaded, pushed and popped once. Rays must agree in the signs of their directions and in their largest
+// component; otherwise they are traced one by one. Hits are identical: the arithmetic is the same, only its order
+// differs.
 #include "geometry/boxes.cl"
 #include "traverse/trace.cl"
 
 typedef struct {
     BoxRays boxes;
     ShearedRay triangles;
-    int near_row[3], far_row[3], axis[3];   // what all rays agree in: see BoxRay and TriangleRay
+    int near_row[3], far_row[3], axis[3];   // the same for all rays: see BoxRay and TriangleRay
     ireal active;
 } Packet;
 
@@ -17,7 +19,7 @@ static inline bool agree(ireal numbers, ireal active, int lead) {
     return !ANY((numbers != (ireal)(LANE_INT(numbers, lead))) & active);
 }
 
-// False where the rays do not agree.
+// Return false if the rays do not agree.
 static inline bool make_packet(real3 origin, real3 direction, ireal active, Packet *packet) {
     TriangleRays rays = triangle_rays(origin, direction);
     packet->boxes = box_rays(origin, direction);
@@ -36,7 +38,7 @@ static inline bool make_packet(real3 origin, real3 direction, ireal active, Pack
     return all;
 }
 
-// Where the rays enter child `child` of a node, and which do at 0 <= t <= t_max.
+// Intersect child `child` of a node; return the rays that enter it at 0 <= t <= t_max, and their entry distances.
 static inline ireal enter_child(const Packet *packet, global const float *bounds, int child, real t_max, real *entry) {
     real t_near = ZERO, t_far = t_max;
 #define CHILD_SLABS(k) { \
@@ -83,7 +85,7 @@ static inline void hit_pack(const Packet *packet, global const Triangles *pack, 
     }
 }
 
-// Puts the children that any ray enters on the stack, the one that the first such ray enters first on top.
+// Push the children that any ray enters, with the one that the first such ray enters first on top.
 static inline int push_children(const Packet *packet, global const Node *node, real t_max, int *waiting, real *entries,
                                 int top) {
     float least = INFINITY;
@@ -111,7 +113,7 @@ static inline int push_children(const Packet *packet, global const Node *node, r
     return top;
 }
 
-// The hits of a packet's rays, the closest or any. A ray that is blocked, where that is all that counts, is no longer active.
+// Trace a packet for the closest or any hits. A ray that is blocked is deactivated if only that counts.
 static inline Hits trace_packet(const Scene *scene, Packet *packet, real t_max, const bool stop_at_first) {
     Hits hits = {t_max, ZERO, ZERO, (ireal)(-1), (ireal)(0)};
     int waiting[STACK_SIZE + 1], top = 1;
@@ -131,7 +133,7 @@ static inline Hits trace_packet(const Scene *scene, Packet *packet, real t_max, 
     return hits;
 }
 
-// As closest_hit and any_hit, faster where the lanes' rays run together.
+// As closest_hit and any_hit, but faster if the rays of the lanes are coherent.
 static inline Hits closest_hit_coherent(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active) {
     Packet packet;
     active = active & is_ray(origin, direction);

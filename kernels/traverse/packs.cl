@@ -1,12 +1,12 @@
-// No tree: a scene of few triangles, WIDTH at a time. Where eight would be met in a leaf after its box, this needs no
-// guess of what comes next, which costs a processor more than the triangles. Each pack has a box, which the rays of all
-// lanes meet together.
+// Brute force for scenes of few triangles, WIDTH at a time. If a BVH would only find a leaf of eight behind a box, this
+// avoids branch mispredictions, which cost a CPU more than the triangle tests. Each pack has a box, which the rays of
+// all lanes are tested against together.
 #include "geometry/box.cl"
 #include "traverse/leaf.cl"
 
 typedef struct {
     LeafRays leaves;
-    ireal chosen;   // the packs whose boxes a ray meets: see is_chosen
+    ireal chosen;   // bits of the packs whose boxes a ray hits: see is_chosen
 } TreeRays;
 
 #if TRIANGLES
@@ -35,7 +35,7 @@ static inline ireal choose_packs(const Scene *scene, real3 origin, real3 directi
     return chosen;
 }
 
-// Seldom called.
+// Rarely called.
 __attribute__((noinline)) static Hit meet_packs_exactly(const LeafRay *leaf, ARRAY(Triangles) packs,
                                                         const bool stop_at_first, Hit hit) {
     for (int i = 0; i < RECORD(packs, 0)->count * HALVES && !(stop_at_first && hit.primitive >= 0); ++i)

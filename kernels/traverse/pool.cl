@@ -1,8 +1,8 @@
-// Many rays in flight in one work-item, for the layout bvh8 on processors whose caches are far from their memory.
+// Many rays in flight per work-item, for the layout bvh8 on CPUs with high memory latency.
 //
-// POOL rays take turns, a step each: a node or a leaf, and while the others have theirs, what a ray needs next is fetched.
-// A ray that is done leaves its place to the next one. Steps are without branches where that can be; rays at nodes and
-// rays at leaves are listed apart, so that a step's kind need not be guessed.
+// POOL rays take turns, one step each: a node or a leaf. While the others take theirs, the data that a ray needs next
+// is prefetched. A finished ray is replaced by the next one. Steps are branchless if possible; rays at nodes and rays
+// at leaves are listed separately, to avoid branch mispredictions.
 #include "geometry/boxes.cl"
 #include "traverse/bvh8.cl"
 
@@ -24,7 +24,7 @@ static inline void fetch(const Scene *scene, int reference) {
     uint last_line = sizeof(Node) - 64;
 #if TRIANGLES
     record = reference < 0 ? (global const void *)RECORD(scene->packs, ~reference >> 4) : record;
-    last_line = reference < 0 ? sizeof(Triangles) - 64 : last_line;   // a pack is one line longer
+    last_line = reference < 0 ? sizeof(Triangles) - 64 : last_line;   // a pack has one more cache line
 #endif
 #if LEAF_SPHERES
     record = reference < 0 && (~reference & 8) ? (global const void *)RECORD(scene->leaf_spheres, ~reference >> 4) : record;
@@ -37,12 +37,12 @@ typedef struct {
     FlightRay ray;
     Hit hit;
     int reference, top;
-    uint index;     // the host's of the ray, and what its t is multiplied by
+    uint index;     // index of the ray in the host's arrays, and the factor of its t
     float to_t;
 #if INSTANCES
     FlightRay world;
 #endif
-    int waiting[1 + STACK_SIZE + 8];   // the first says DONE and is never too far; store_lanes may write over eight more
+    int waiting[1 + STACK_SIZE + 8];   // the first is DONE, at distance −∞; store_lanes may overwrite eight more
     float distance[1 + STACK_SIZE + 8];
 } Flight;
 
@@ -60,7 +60,7 @@ static inline void take_off(Flight *f, const FlightRays *rays, const Ray *ray, i
     f->distance[0] = -INFINITY;
 }
 
-// The next one to visit of those that wait; for the closest hit of those that are not behind it.
+// Pop the next entry from the stack; for the closest hit, skip those behind it.
 static inline int next_waiting(Flight *f, const bool stop_at_first) {
     int top = f->top - 1;
 #if INSTANCES

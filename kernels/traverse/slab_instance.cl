@@ -1,11 +1,11 @@
-// Instances in the trees whose boxes are met by geometry/box.cl: a ray in an instance's frame, ready for its tree.
+// Instances in BVHs whose boxes are tested by geometry/box.cl: sets up the ray in an instance's object frame.
 #include "geometry/box.cl"
 #include "traverse/leaf.cl"
 #include "traverse/instance.cl"
 
 static inline bool in_world(const LeafRay *ray) { return ray->ray.instance == IN_WORLD; }
 
-// Takes the ray into the frame of the instance at `place`; returns the root of its tree.
+// Transform the ray into the frame of the instance at `place`; return the root of its BVH.
 static inline int enter_instance(const Scene *scene, const Ray *world, int place, LeafRay *leaf, SlabRay *slabs) {
     Ray ray = object_ray(world, scene->instances, place);
     real3 origin = broadcast(ray.origin), direction = broadcast(ray.direction);

@@ -1,9 +1,9 @@
-// Rays of all lanes: closest_hit and any_hit, by the tree that the host chose.
+// Ray tracing of all lanes: closest_hit and any_hit, with the BVH layout that the host chose.
 //
-// A scene without primitives has no tree: every ray escapes, and none of this is compiled.
+// A scene without primitives has no BVH: every ray escapes, and none of this is compiled.
 #include "vector.cl"
 
-typedef struct { real t, u, v; ireal primitive, instance; } Hits;   // primitive < 0: nothing was hit
+typedef struct { real t, u, v; ireal primitive, instance; } Hits;   // primitive < 0: miss
 
 static inline Hits choose_hits(ireal mask, const Hits *a, const Hits *b) {
     return (Hits){mask ? a->t : b->t, mask ? a->u : b->u, mask ? a->v : b->v, mask ? a->primitive : b->primitive,
@@ -37,15 +37,15 @@ static inline Ray one_ray(const real3 *origin, const real3 *direction, const rea
 }
 #endif
 
-// Whether a ray has finite numbers and a direction: one of NaN would enter every box, the empty slots' too, and run off
-// the stack. Such rays meet nothing.
+// Whether a ray is finite with a nonzero direction: NaN would enter every box, also those of empty slots, and overflow
+// the stack. Other rays hit nothing.
 static inline ireal is_ray(real3 origin, real3 direction) {
     real sum = origin.x + origin.y + origin.z + (direction.x + direction.y + direction.z);
     return (absolute(sum) <= 3.4e38f) & (largest(absolute3(direction)) > 0.0f);
 }
 
-// The closest hit of each active lane's ray with 0 < t < t_max; in a program with NEXT_HIT the first one after `after`, in
-// the order of (t, instance, primitive).
+// The closest hit of each active lane's ray with 0 < t < t_max; if NEXT_HIT the first one after `after`, in the order
+// of (t, instance, primitive).
 static inline Hits next_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active,
                             const Hits *after) {
     Hits hits = {(real)(INFINITY), ZERO, ZERO, (ireal)(-1), (ireal)(0)};
@@ -95,7 +95,7 @@ static inline Hits closest_hit(const Scene *scene, real3 origin, real3 direction
     return next_hit(scene, origin, direction, t_max, active, &none);
 }
 
-// Which active lanes meet anything with 0 < t < t_max.
+// Return the active lanes whose rays hit anything with 0 < t < t_max.
 static inline ireal any_hit(const Scene *scene, real3 origin, real3 direction, real t_max, ireal active) {
     ireal blocked = NO_LANES;
 #if PRIMITIVES

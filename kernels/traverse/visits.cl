@@ -1,5 +1,5 @@
-// What rays visit is counted in programs whose scene has a buffer to count in (clrt/study/visits.py), elsewhere not:
-// nodes whose children's boxes are met, and tests of what is in leaves, be it a triangle or a pack.
+// Traversal statistics, counted only in programs whose scene has a buffer for them (clrt/study/visits.py): nodes whose
+// children's boxes are tested, and tests of primitives in leaves, each of a triangle or a pack.
 
 #if COUNT_VISITS
 #define VISIT(what) atomic_inc((volatile global uint *)&RECORD(scene->visits, 0)->what)

@@ -1,19 +1,19 @@
-// Visibility where some surfaces let light straight through: alpha masks, partial opacity, and surfaces with one side.
+// Visibility with surfaces that light passes straight through: alpha masks, partial opacity, and single-sided surfaces.
 //
-// Such a surface stops a ray with the probability of its opacity; a shadow ray loses that part. The ray keeps its origin,
-// and the next surface follows in the order of hits (next_hit): each counts once, however many there are, and also where
-// they touch or coincide. A ray that leaves one of several coincident surfaces starts beyond all of them.
+// Such a surface stops a ray with the probability of its opacity, and attenuates a shadow ray by it. The ray keeps its
+// origin, and the next surface follows in the order of hits (next_hit): each counts once, however many there are, also
+// if they touch or coincide. A ray that leaves one of several coincident surfaces starts beyond all of them.
 #include "opacity.cl"
 #include "bsdf.cl"
 #include "sampler.cl"
 
-// The first surfaces that stop rays whose closest hits are known; lanes without one get any. from_camera: see opacity_at.
+// The first surfaces that stop rays whose closest hits are known; on a miss any surface. from_camera: see opacity_at.
 static inline Hits first_surface_from(const Scene *scene, const Hits *closest, real3 origin, real3 direction,
                                       int from_camera, ireal active, Sampler *sampler, Surface *surface) {
     real u = next_1d(sampler), left = ONE;
     Hits hits = *closest;
 #if RASTER
-    // A rasterised t differs from the traced one by rounding, and the order of hits is that of traced ones.
+    // A rasterised t differs from the traced one by rounding; the order of hits uses traced ones.
     *surface = surface_at(scene, origin, direction, &hits);
     ireal clear = active & (hits.primitive >= 0) & (opacity_at(scene, surface, direction, from_camera) < 1.0f);
     if (ANY(clear)) {
@@ -37,7 +37,7 @@ static inline Hits first_surface(const Scene *scene, real3 origin, real3 directi
     return first_surface_from(scene, &closest, origin, direction, from_camera, active, sampler, surface);
 }
 
-// What part of the light comes through to `origin` from a target, or from infinitely far along wi.
+// The transmittance to `origin` from a target, or from infinity along wi.
 static inline real transmittance(const Scene *scene, real3 origin, real3 target, real3 wi, ireal infinite, ireal active) {
     real3 direction = choose(infinite, wi, sub(target, origin));
     real left = active ? ONE : ZERO, t_max = infinite ? (real)(INFINITY) : ONE;

@@ -106,7 +106,9 @@ def test_the_first_signal_keeps_everything(folder: Path, number: signal.Signals)
     process = started("--time", "600", "--report", "r.json", cwd=folder)
     time.sleep(0.2)
     process.send_signal(number)
-    assert process.communicate(timeout=60)[0].split() == ["a.exr", "r.json"] and process.returncode == 130
+    output, messages = process.communicate(timeout=60)
+    assert output.split() == ["a.exr", "r.json"] and process.returncode == 130
+    assert "ball: interrupted; --resume goes on from a.ck" in messages
     report = json.loads((folder / "r.json").read_text())
     assert report["stop_reason"] == "interrupted" and read_image(folder / "a.exr").shape == (64, 96, 3)
     film = read_checkpoint(folder / "a.ck", KINDS)[1]["film"]

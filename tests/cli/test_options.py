@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from clrt.accel.kernels import BOX_TESTS, BUILDER_NAMES, SPHERE_TESTS, TREES, TRIANGLE_TESTS
-from clrt.cli import bench_rays, debug, info, render
+from clrt.cli import bench_rays, commands, debug, info, render
 from clrt.errors import DeviceError
 from clrt.rendering.choices import OFFSETS
 
@@ -53,3 +53,10 @@ def test_info_is_of_the_device_that_would_render(tmp_path: Path) -> None:
     assert json.loads(listed.stdout)["tree"]["builder"] == "ploc"
     refused = CliRunner().invoke(info.command, [*options, "--device", "no such device"])
     assert isinstance(refused.exception, DeviceError)
+
+
+def test_help_has_whole_sentences() -> None:
+    """The summary of every command is a whole sentence, not truncated to a line."""
+    _, told = CliRunner().invoke(commands, ["--help"], catch_exceptions=False).output.split("Commands:")
+    told = " ".join(told.split())
+    assert told.startswith("render Render SCENE, ") and " is reached. view Show SCENE, " in told and "..." not in told

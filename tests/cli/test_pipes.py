@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pty
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -111,3 +113,21 @@ def test_a_reader_that_has_gone_loses_nothing(folder: Path, to: str) -> None:
     assert str(kept) in done.stderr and "a.ck holds what was rendered" in done.stderr
     assert subprocess.run([*line, "-o", "b.exr", "--resume"]).returncode == 0
     assert np.array_equal(read_image(kept), read_image(Path("b.exr")))
+
+
+def test_ctrl_c_that_ends_the_reader_as_well(folder: Path) -> None:
+    """Ctrl-C reaches every program of a pipeline: the render is interrupted, with its image in the working folder."""
+    reading, writing = os.pipe()
+    line = [*CLRT.split(), "render", "ball.toml", "--time", "600", "--progress", "json", "-o", "exr:-"]
+    process = subprocess.Popen(line, stdout=writing, stderr=subprocess.PIPE, text=True)
+    os.close(writing)
+    assert process.stderr is not None
+    while "spp" not in json.loads(process.stderr.readline()):
+        pass
+    os.close(reading)
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    kept, = folder.glob("image-*.exr")
+    assert process.returncode == 130 and read_image(kept).shape == (64, 96, 3)
+    error, = (each for each in told.splitlines() if not each.startswith("{"))
+    assert error.startswith("error: -: cannot be ") and str(kept) in error

@@ -62,6 +62,25 @@ def test_suspended_it_goes_on(folder: Path, who: str) -> None:
         assert time.perf_counter() - start >= goal + pause - LONGEST
 
 
+AT_ONCE = """
+import os, sys, time
+from clrt.cli.guard import guarded
+guarded(lambda: "")
+try:
+    os.kill(os.getppid(), int(sys.argv[1]))
+    time.sleep(20)
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_interrupted_before_anything_is_loaded(number: signal.Signals) -> None:
+    """All signals act like Ctrl-C as soon as the guard handles them."""
+    done = subprocess.run([sys.executable, "-c", AT_ONCE, str(int(number))], stderr=subprocess.PIPE, text=True)
+    assert (done.returncode, done.stderr) == (130, "")
+
+
 def test_nohup_is_heeded(folder: Path) -> None:
     """A render started with SIGHUP ignored keeps ignoring it."""
     process = rendering(folder, "--spp", "4096", preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))

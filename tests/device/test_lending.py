@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import subprocess
 import sys
 import time
@@ -10,6 +11,7 @@ import weakref
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -189,3 +191,11 @@ def test_process_lives(device: Device, how: str) -> None:
     last = ["RuntimeError: as it is meant"] if how == "exception" else []
     assert done.returncode == len(last) and done.stderr.splitlines()[-1:] == last, done.stderr
     assert "ignored" not in done.stderr
+
+
+def test_nothing_uses_memory_that_was_freed(device: Device) -> None:
+    """Each array of 4 KiB or more is unmapped when it is freed, so a command that still uses it crashes."""
+    unmapped = {"MALLOC_MMAP_THRESHOLD_": "4096", "MALLOC_TOP_PAD_": "0"}    # glibc's
+    done = subprocess.run([sys.executable, "-m", "tests.device.left_renders", str(device.info.index)], text=True,
+                          capture_output=True, env=os.environ | unmapped, cwd=Path(__file__).parents[2])
+    assert (done.returncode, done.stdout) == (0, "all left\n"), done.stderr

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -219,3 +222,22 @@ def test_a_binary_comes_back_only_whole(tmp_path: Path, monkeypatch: pytest.Monk
 def test_programs_of_a_process_are_kept(device: Device) -> None:
     first, second = build(device, DOUBLE), build(device, DOUBLE)
     assert second.program is first.program and second.cached
+
+
+KEPT_CALLS = """
+import sys, clrt
+query = clrt.RayQuery([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], device=int(sys.argv[1]))
+print(query.any_hit([0.2, 0.2, 1], [0, 0, -1]))
+"""
+
+
+def test_what_pyopencl_keeps_is_damaged(device: Device, tmp_path: Path) -> None:
+    """A damaged cache of pyopencl is ignored silently."""
+    for damaged in (False, True):
+        done = subprocess.run([sys.executable, "-c", KEPT_CALLS, str(device.info.index)], capture_output=True,
+                              text=True, env=os.environ | {"XDG_CACHE_HOME": str(tmp_path)})
+        assert (done.returncode, done.stdout, done.stderr) == (0, "[ True]\n", ""), damaged
+        kept = list(tmp_path.glob("pytools/*.sqlite"))
+        assert kept
+        for file in kept:
+            file.write_bytes(b"damaged" * 1000)

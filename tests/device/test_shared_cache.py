@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import resource
 import subprocess
 import sys
 import threading
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 from clrt.device import background, cache
+from clrt.device.environment import ROOM
 from clrt.errors import KernelError
 from clrt.output.images import read_image
 
@@ -62,6 +64,17 @@ def test_whatever_the_home_is(tmp_path: Path, home: str) -> None:
                             capture_output=True, text=True, timeout=100, preexec_fn=no_rights)
     assert (result.returncode, result.stdout) == (0, "picture.png\n"), result.stderr
     assert not (tmp_path / "~").exists() and not list(closed.iterdir())
+
+
+@pytest.mark.parametrize("missing", [0, 1])
+def test_a_folder_without_room_is_not_taken(tmp_path: Path, missing: int) -> None:
+    """A folder on a full disk or beyond a quota is rejected, here by a file size limit."""
+    code = f"from clrt.device.environment import _writable; print(_writable({str(tmp_path)!r}))"
+    places = surroundings(TMPDIR=str(tmp_path), HOME=str(tmp_path))
+    most = ROOM - missing
+    done = subprocess.run([sys.executable, "-c", code], env=places, capture_output=True, text=True,
+                          preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)))
+    assert (done.returncode, done.stdout) == (0, f"{not missing}\n"), done.stderr
 
 
 def test_a_compiler_that_hangs_is_given_up(monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:

@@ -29,7 +29,7 @@ def gradient() -> NDArray[np.float32]:
 
 
 def smooth() -> NDArray[np.float32]:
-    """A third of the light, or less, is above the mean."""
+    """Without small bright parts."""
     v, u = np.meshgrid((np.arange(HEIGHT) + 0.5) / HEIGHT, (np.arange(WIDTH) + 0.5) / WIDTH, indexing="ij")
     return np.stack([0.1 + v, 1.5 + np.sin(2 * np.pi * u), 1.2 + v * np.cos(2 * np.pi * u)], axis=-1).astype(np.float32)
 
@@ -41,12 +41,20 @@ def sun() -> NDArray[np.float32]:
     return image
 
 
+def low_sun() -> NDArray[np.float32]:
+    """A blue sky over dark ground, and a texel that adds a tenth to their light: under a third is above the mean."""
+    image = np.repeat(np.array([[0.3, 0.5, 1.0], [0.15, 0.12, 0.1]], np.float32), HEIGHT // 2, axis=0)[:, None]
+    image = np.tile(image, (1, WIDTH, 1))
+    image[3, 20] += 20
+    return image
+
+
 def texel(values: tuple[float, float, float]) -> NDArray[np.float32]:
     return np.array([[values]], np.float32)
 
 
 SKIES = {"gradient": (gradient(), 0.0), "turned": (gradient(), 77.0), "sun": (sun(), -130.0),
-         "smooth": (smooth(), 30.0), "one_texel": (texel((0.5, 1.0, 2.0)), 10.0)}
+         "low_sun": (low_sun(), 0.0), "smooth": (smooth(), 30.0), "one_texel": (texel((0.5, 1.0, 2.0)), 10.0)}
 #: Those that are left to the surfaces' own directions.
 EVEN = ("smooth", "one_texel")
 

@@ -212,9 +212,11 @@ def test_normal_maps_on_spheres(device: Device) -> None:
     assert a.max() > 0.3 and np.abs(a - b).max() < 1e-5
 
 
+@pytest.mark.parametrize("cut", [False, True], ids=["painted", "cut out"])
 @pytest.mark.parametrize("lanes", [8, *others(1)])
-def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: int) -> None:
-    """A picture that is half black: the light below is that of the other half alone, by light samples and without.
+def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: int, cut: bool) -> None:
+    """A picture that is half black, as emission or opacity: the light below is that of the other half alone, by light
+    samples and without.
 
     Of the half the lanes do not matter.
     """
@@ -222,10 +224,12 @@ def test_half_a_lamp_is_a_lamp_of_half_the_size(device: Device, lanes: int) -> N
     half.texels[0, 0, :3] = 0
     above = (QUAD * (1, 1, 0) + (0, 1, 1))[:, [0, 2, 1]]
     ground = Mesh((QUAD * 9)[:, [0, 2, 1]].astype(np.float32), FACES[:, ::-1].copy(), Diffuse(color=(0.8, 0.8, 0.8)))
-    emission = Texture(picture=half, factor=5.0, filter="nearest")
-    painted = Mesh(above.astype(np.float32), FACES, Diffuse(color=BLACK, emission=emission), uv=UV)
+    glow = (5.0, 5.0, 5.0)
+    material = (Diffuse(color=BLACK, emission=glow, opacity=Texture(picture=half, filter="nearest")) if cut else
+                Diffuse(color=BLACK, emission=Texture(picture=half, factor=5.0, filter="nearest")))
+    painted = Mesh(above.astype(np.float32), FACES, material, uv=UV)
     right = np.where(UV[:, :1] == 0, above * (0, 1, 1), above)
-    small = Mesh(right.astype(np.float32), FACES, Diffuse(color=BLACK, emission=(5.0, 5.0, 5.0)))
+    small = Mesh(right.astype(np.float32), FACES, Diffuse(color=BLACK, emission=glow))
     pictures = []
     for lamp in (painted, small):
         scene = Scene(meshes=[ground, lamp], camera=Camera(position=(0, 0.5, 8), look_at=(0, 0.5, 0)),

@@ -11,6 +11,7 @@ from clrt.device.open import Device
 from clrt.rendering.compile import compile_scene
 from clrt.scene.materials import Diffuse
 from clrt.scene.model import Mesh, Scene
+from clrt.scene.textures import WHITE, Texture
 from clrt.study.probe import choices
 
 pytestmark = pytest.mark.statistics
@@ -36,6 +37,17 @@ def test_two_triangles_of_a_parallelogram_are_one_light(device: Device, corners:
     assert light_count(device, [mesh, replace(mesh, vertices=mesh.vertices + np.float32(5))]) == 2 * (2 - joined)
     assert light_count(device, [replace(mesh, faces=faces[:1]), replace(mesh, faces=faces[1:])]) == 2
     assert light_count(device, [replace(mesh, faces=np.array([faces[0], faces[1, ::-1]]))]) == 2
+
+
+def test_a_parallelogram_that_fades_is_two_lights(device: Device) -> None:
+    """By a picture or the alpha of its corners, where that counts."""
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], np.float32)
+    mesh = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), LAMP, uv=corners[:, :2])
+    colors = np.array([[1, 1, 1, alpha] for alpha in (0, 1, 1, 0)], np.float32)
+    assert light_count(device, [replace(mesh, material=replace(LAMP, opacity=Texture(picture=WHITE)))]) == 2
+    assert light_count(device, [replace(mesh, colors=colors, material=replace(LAMP, opacity=0.5))]) == 2
+    assert light_count(device, [replace(mesh, colors=colors)]) == 1
+    assert light_count(device, [replace(mesh, material=replace(LAMP, opacity=0.5))]) == 1
 
 
 def light_count(device: Device, meshes: list[Mesh]) -> int:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clrt.scene.material import as_color
+from clrt.scene.material import Material, as_color
 from clrt.scene.materials import Dielectric, MetallicRoughness
 from clrt.scene.textures import Texture
 from .glb import TRIANGLE, Gltf, ball, read
@@ -18,6 +18,13 @@ from .shapes import icosphere
 
 
 def textured(color: tuple[int, int, int], folder: Path, **material: Any) -> MetallicRoughness:
+    """`drawn`, of what is no glass."""
+    found = drawn(color, folder, **material)
+    assert isinstance(found, MetallicRoughness)
+    return found
+
+
+def drawn(color: tuple[int, int, int], folder: Path, **material: Any) -> Material:
     """The material of a triangle whose three corners address the right one of a texture's two texels."""
     import imageio.v3 as imageio
     gltf = Gltf()
@@ -28,9 +35,7 @@ def textured(color: tuple[int, int, int], folder: Path, **material: Any) -> Meta
     gltf.document["materials"] = [material]
     uv = gltf.accessor(np.array([[0.6, 0.5], [0.99, 0.1], [-0.25, 1.0]]))
     gltf.mesh(attributes={"POSITION": gltf.accessor(TRIANGLE), "TEXCOORD_0": uv}, material=0)
-    found = read(gltf, folder).meshes[0].material
-    assert isinstance(found, MetallicRoughness)
-    return found
+    return read(gltf, folder).meshes[0].material
 
 
 def test_material_factors_are_cut_to_their_limits(tmp_path: Path) -> None:
@@ -115,6 +120,14 @@ def test_layers_and_glass(tmp_path: Path) -> None:
     gltf.document["meshes"][0]["primitives"][0]["material"] = 0
     assert read(gltf, tmp_path).meshes[0].material == Dielectric(
         color=(1, 0.5, 1), ior=1.4, roughness=0.5, attenuation_color=(0.5, 1, 1), attenuation_distance=2)
+
+
+def test_glass_has_bumps(tmp_path: Path) -> None:
+    """As any other surface."""
+    material = drawn((255, 255, 255), tmp_path, normalTexture={"index": 0, "scale": 0.25}, extensions={
+        "KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1}},
+        pbrMetallicRoughness={"metallicFactor": 0})
+    assert isinstance(material, Dielectric) and material.normal_map is not None and material.normal_map.factor == 0.25
 
 
 @pytest.mark.parametrize("wrap, name", [(10497, "repeat"), (33648, "mirror"), (33071, "clamp")])

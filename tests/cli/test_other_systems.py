@@ -1,4 +1,4 @@
-"""Commands work without the parts of Python that Windows lacks, and in locales that are not UTF-8."""
+"""Commands work without the parts of Python that Windows and macOS lack, and in locales that are not UTF-8."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from clrt.cli import COMMANDS
 
 from ..covering import others
 
-HOUSE = Path(__file__).parents[2]
+OTHER = Path(__file__).parents[1] / "other_system.py"
 SMALL = ("--size", "16x16", "--spp", "1", "-q")
 #: A call of each command; only the help of those that need a display or other software.
 CALLS = {"render": ("render", "scene.toml", *SMALL, "-o", "image.png"),
@@ -41,24 +41,29 @@ def test_every_command_is_called() -> None:
     assert set(CALLS) == set(COMMANDS)
 
 
-@pytest.mark.parametrize("name", ["render", "convert", "compare", "cache", "view",
-                                  *others("debug", "info", "devices", "doctor", "bench")])
-def test_commands_need_nothing_that_windows_lacks(folder: Path, name: str) -> None:
-    program = [sys.executable, "-X", "warn_default_encoding", str(HOUSE / "tests" / "windows_python.py")]
+@pytest.mark.parametrize(("system", "name"), [
+    *(("win32", name) for name in ("render", "convert", "compare", "cache", "view")),
+    *(("darwin", name) for name in ("render", "debug", "doctor")),
+    *others(*(("win32", name) for name in ("debug", "info", "devices", "doctor", "bench"))),
+    *others(*(("darwin", name) for name in ("convert", "compare", "cache", "view", "info", "devices", "bench")))])
+def test_commands_need_nothing_that_another_system_lacks(folder: Path, system: str, name: str) -> None:
+    program = [sys.executable, "-X", "warn_default_encoding", str(OTHER), system]
     done = subprocess.run([*program, *CALLS[name]], cwd=folder, capture_output=True, text=True, encoding="utf-8",
                           env=os.environ | {"PYTHONUTF8": "0", "CLRT_CACHE_DIR": str(folder)})
     assert done.returncode == 0, done.stderr
 
 
-def test_ctrl_break_keeps_the_picture(folder: Path) -> None:
-    """Ctrl-Break works like Ctrl-C."""
-    process = subprocess.Popen([sys.executable, str(HOUSE / "tests" / "windows_python.py"), "render", "scene.toml",
-                                "--size", "16x16", "--time", "600", "--progress", "json", "-o", "image.png"],
-                               cwd=folder, stderr=subprocess.PIPE, text=True)
+@pytest.mark.parametrize(("system", "number"), [("win32", signal.SIGUSR2), ("darwin", signal.SIGINT),
+                                                ("darwin", signal.SIGHUP)])
+def test_interrupted_it_keeps_the_picture(folder: Path, system: str, number: signal.Signals) -> None:
+    """Ctrl-Break, simulated by SIGUSR2, works like Ctrl-C."""
+    process = subprocess.Popen([sys.executable, str(OTHER), system, "render", "scene.toml", "--size", "16x16", "--time",
+                                "600", "--progress", "json", "-o", "image.png"], cwd=folder, stderr=subprocess.PIPE,
+                               text=True)
     assert process.stderr is not None
     while '"spp"' not in process.stderr.readline():
         assert process.poll() is None, "ended before it was interrupted"
-    process.send_signal(signal.SIGUSR2)
+    process.send_signal(number)
     process.communicate(timeout=60)
     assert process.returncode == 130 and (folder / "image.png").is_file()
 
