@@ -1,1 +1,1 @@
-"""Tests of clrt, laid out like its rooms."""
+"""Tests of clrt, laid out like its packages."""

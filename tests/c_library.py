@@ -1,4 +1,4 @@
-"""Shared libraries that tests compile from C. Such tests are marked as needing gcc."""
+"""Compiles shared libraries from C for tests, which are marked as needing gcc."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from pathlib import Path
 
 
 def compile_library(source: Path, library: Path, *options: str) -> Path:
-    """The library, compiled."""
+    """Compile `source` into the shared library and return its path."""
     subprocess.run(["gcc", "-shared", "-fPIC", "-w", "-o", library, source, *options], check=True)
     return library

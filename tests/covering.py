@@ -1,4 +1,4 @@
-"""Tests of products of parameters: a covering array is run by default, and the rest is the group `combinations`."""
+"""Parametrization by covering arrays: the array's rows run by default, the rest are marked `combinations`."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ Row = tuple[int, ...]
 def covering(names: str, *factors: Iterable[Any], strength: int = 1) -> pytest.MarkDecorator:
     """Parametrize a test with all combinations of the factors' values.
 
-    By default those of a covering array are run: each value (strength 1) or each pair of values of two factors
-    (strength 2) occurs. The others are marked `combinations`.
+    By default only a covering array runs, in which each value (strength 1) or each pair of values of two factors
+    (strength 2) occurs. The other combinations are marked `combinations`.
     """
     values = [list(factor) for factor in factors]
     chosen = covering_array([len(each) for each in values], strength)
@@ -26,15 +26,15 @@ def covering(names: str, *factors: Iterable[Any], strength: int = 1) -> pytest.M
 
 
 def others(*cases: Any) -> list[Any]:
-    """Parameters, tuples where there are several, that are not run by default but marked `combinations`."""
+    """Return parameters (tuples if there are several) that do not run by default but are marked `combinations`."""
     return [pytest.param(*(case if isinstance(case, tuple) else [case]), marks=pytest.mark.combinations)
             for case in cases]
 
 
 def covering_array(sizes: Sequence[int], strength: int) -> set[Row]:
-    """Rows of indices below `sizes` that hold all combinations of indices of any `strength` columns.
+    """Return rows of indices below `sizes` in which all combinations of indices of any `strength` columns occur.
 
-    Greedily, always the row with the most that are missing; of equal ones the first.
+    Greedy: adds the row with the most missing combinations; ties go to the first.
     """
     def held(row: Row) -> set[Any]:
         return set(combinations(enumerate(row), strength))

@@ -1,11 +1,11 @@
-"""Damaged files of every format: each must load, or end in one SceneError, in bounded time and memory.
+"""Fuzzer of the file readers: each damaged file must load or raise one SceneError, in bounded time and memory.
 
-    python -m tests.fuzz 10000                  # so many files, made from small ones that are written here
-    python -m tests.fuzz 10000 --seeds FOLDER   # and from the files in a folder
-    python -m tests.fuzz 300 --render 10        # every tenth that loads is rendered, too
+    python -m tests.fuzz 10000                  # 10000 files, made from small seeds that are written here
+    python -m tests.fuzz 10000 --seeds FOLDER   # also from the files in a folder
+    python -m tests.fuzz 300 --render 10        # also renders every tenth file that loads
 
-File number i is the same in every run. A process does the loading; when it dies or takes too long, another goes on
-behind the file that it died of.
+File number i is the same in every run. A worker process loads the files; if it crashes or takes too long, a new one
+resumes after the file that caused it.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-#: Bytes of memory beyond which the loading process gets a MemoryError, and seconds that a file may take.
+#: Memory limit of the worker in bytes, beyond which it gets a MemoryError, and time limit per file in seconds.
 MEMORY = 4 * 2**30
 SECONDS = 30
-#: Files larger than this are no seeds.
+#: Files larger than this number of bytes are not used as seeds.
 LARGEST = 300_000
 PICTURES = (".hdr", ".exr", ".png", ".jpg")
 FORMATS = (".toml", ".glb", ".gltf", ".obj", ".mtl", ".ply", ".stl", ".off", *PICTURES)
@@ -51,7 +51,7 @@ def seeds_in(folder: Path) -> list[Path]:
 
 
 def case(seeds: list[Path], number: int) -> tuple[Path, bytes]:
-    """The seed and the content of file `number`."""
+    """Return the seed and the damaged content of file `number`."""
     rng = random.Random(number)
     seed = seeds[number % len(seeds)]
     content = seed.read_bytes()
@@ -65,7 +65,7 @@ def case(seeds: list[Path], number: int) -> tuple[Path, bytes]:
 
 
 def _in_chunk(content: bytes, change: Change, rng: random.Random) -> bytes:
-    """A change within a .glb file's text, or in one of four its binary chunk, with lengths put right."""
+    """Change the JSON chunk of a .glb file, or its binary chunk in 1 of 4 cases, and correct the chunk lengths."""
     size, = struct.unpack_from("<I", content.ljust(16, b"\0"), 12)
     text, rest = content[20:20 + size], content[28 + size:]
     if change is not _json and rng.random() < 0.25:
@@ -78,12 +78,12 @@ def _in_chunk(content: bytes, change: Change, rng: random.Random) -> bytes:
 
 
 def _place(content: bytes, rng: random.Random) -> int:
-    """Somewhere in the content; headers, which steer the rest, as often as all else."""
+    """Return a random position in the content; half of the time in the first 400 bytes, where headers are."""
     return rng.randrange(min(len(content), 400) if rng.random() < 0.5 else len(content)) if content else 0
 
 
 def _numbers(content: bytes, rng: random.Random) -> bytes:
-    """Another word for a number in the text after some place."""
+    """Replace the first number in the text after a random position."""
     start = _place(content, rng)
     new = rng.choice(NUMBERS).encode()
     return content[:start] + re.sub(rb"-?\d+(\.\d+)?", lambda match: new, content[start:], count=1)
@@ -116,7 +116,7 @@ def _truncated(content: bytes, rng: random.Random) -> bytes:
 
 
 def _lines(content: bytes, rng: random.Random) -> bytes:
-    """Two lines change places."""
+    """Swap two random lines."""
     lines = content.split(b"\n")
     i, j = rng.randrange(len(lines)), rng.randrange(len(lines))
     lines[i], lines[j] = lines[j], lines[i]
@@ -124,7 +124,7 @@ def _lines(content: bytes, rng: random.Random) -> bytes:
 
 
 def _json(content: bytes, rng: random.Random) -> bytes:
-    """A value in a glTF document becomes another, or goes."""
+    """Replace or delete a random value in a glTF document."""
     try:
         document = json.loads(content)
         place, key = rng.choice(list(_places(document)))
@@ -138,14 +138,14 @@ def _json(content: bytes, rng: random.Random) -> bytes:
 
 
 def _places(value: Any) -> Iterator[tuple[Any, Any]]:
-    """Every container of a document with each of its keys."""
+    """Yield every container of a document with each of its keys."""
     for key in list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ():
         yield value, key
         yield from _places(value[key])
 
 
 def outcome(file: Path, render: bool) -> str:
-    """What loading a file came to: picture, error, or traceback and what it says."""
+    """Load a file and return the outcome: "picture", "error", or "traceback: " and the details."""
     from clrt.errors import SceneError
     from clrt.formats.images.image_reader import read_picture, read_texels
     from clrt.formats.load_scene import load
@@ -173,7 +173,7 @@ def _give_up(*_: object) -> None:
 
 
 def work(folder: Path, first: int, last: int, render: int) -> None:
-    """The loading process: a line for each file, "number outcome"."""
+    """Run the worker process: print a line "number outcome" for each file."""
     import resource
 
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
@@ -198,7 +198,7 @@ def work(folder: Path, first: int, last: int, render: int) -> None:
 
 def run(count: int, folder: Path, render: int = 0, told: Callable[[str], None] = lambda line: None,
         ) -> dict[str, Counter[str]]:
-    """The outcomes of files 0 … count − 1 by format; the seeds are in folder/seeds. Bad ones are `told` of."""
+    """Return the outcomes of files 0 … count − 1 by format, with the seeds in folder/seeds; pass bad ones to `told`."""
     seeds = seeds_in(folder / "seeds")
     results: dict[str, Counter[str]] = {}
     first = 0

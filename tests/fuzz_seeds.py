@@ -1,4 +1,4 @@
-"""Small good files of every format, which tests.fuzz damages."""
+"""Small valid files of every format, as seeds for tests.fuzz."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ map_Kd -s 2 2 2 wood.png
 
 
 def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
-    """One or a few of each format, and those in the folders `more` that are small."""
+    """Write a few seeds of each format to `folder`, and the small files found in the folders `more`."""
     folder.mkdir(parents=True)
     for name, write in {"a.obj": obj, "n.obj": obj_with_normals, "a.ply": ply_ascii, "b.ply": ply_binary,
                         "c.ply": ply_big_endian, "n.ply": ply_with_normals, "a.stl": stl_ascii, "b.stl": stl_binary,
@@ -100,14 +100,14 @@ def write_seeds(folder: Path, more: Iterable[Path] = ()) -> None:
         document.write(folder / name)
     for place in more:
         for file in sorted(place.rglob("*")):
-            if file.suffix == ".bin":  # by the name that its model knows
+            if file.suffix == ".bin":  # under the name that its model refers to
                 shutil.copyfile(file, folder / file.name)
             elif file.is_file() and file.suffix.lower() in FORMATS and file.stat().st_size <= LARGEST:
                 shutil.copyfile(file, folder / f"{place.name}-{file.name.lower()}")
 
 
 def textured(picture: bytes) -> Gltf:
-    """A strided, quantised and sparse ball with a picture inside."""
+    """Return a textured sphere with strided, quantized and sparse accessors and an embedded image."""
     vertices, faces = icosphere(0)
     gltf = Gltf()
     rows = np.zeros(len(vertices), [("position", "<i2", 4), ("uv", "<u2", 2)])

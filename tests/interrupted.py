@@ -1,4 +1,4 @@
-"""An exception at a given line, as a signal's handler raises it wherever the program is."""
+"""Raises an exception at a given line, as a signal handler can at any point of the program."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 
 class Interrupted(Exception):
-    """As if a signal had come."""
+    """Exception that stands for one raised by a signal handler."""
 
 
 def run(call: Callable[[], object], files: tuple[str, ...], last: int = -1) -> int:
-    """Calls it up to its line of this number, counted over all that it runs of files whose paths begin so; how many
-    there were. As many as `last`, or more: it was interrupted there."""
+    """Call `call` and return how many lines it ran of files whose paths begin with `files`. Stop it with Interrupted at
+    line number `last` of these; a result of `last` or more means that it was interrupted."""
     count = 0
 
     def trace(frame: FrameType, event: str, argument: Any) -> Any:

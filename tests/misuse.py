@@ -1,10 +1,9 @@
-"""Random sequences of public calls, right and wrong, with threads, interrupts, forks and copies among them.
+"""Random sequences of valid and invalid public calls with threads, interrupts, forks and copies.
 
-    python -m tests.misuse 600                # for so many seconds
-    python -m tests.misuse 600 --first 40     # from sequence 40 on
+    python -m tests.misuse 600 --first 40     # run for 600 seconds, from sequence 40 on
 
-Sequence i makes the same calls in every run. Each has a process of its own, which must end by itself; after every call
-the same questions must have the same answers as at its beginning.
+Sequence i makes the same calls in every run, in its own process, which must exit by itself; after every call the
+same queries and renders must give the same results as at its start.
 """
 
 from __future__ import annotations
@@ -32,8 +31,7 @@ import clrt
 from clrt.errors import ClrtError, UsageError
 
 CALLS = 30
-#: After which a sequence is taken to hang.
-SECONDS = 240
+SECONDS = 240     # after which a sequence counts as hung
 SCENE = Path(__file__).parents[1] / "scenes" / "cornell.toml"
 SIZE, SPP = (24, 16), 4
 LAYOUTS = ("bvh8", "bvh2", "cwbvh", "packs", "list", None)
@@ -41,11 +39,11 @@ WRONG: tuple[Any, ...] = (None, "x", -1, np.nan, [], [[1, 2]], np.zeros((2, 4)),
 
 
 class Interrupted(BaseException):
-    """What a signal's handler raises, wherever the program is."""
+    """Exception raised by the signal handler at an arbitrary point of the program."""
 
 
 class Sequence:
-    """What one process does: calls, and between them `check`."""
+    """Calls that one process makes, with `check` after each."""
 
     def __init__(self, number: int) -> None:
         self.rng = np.random.default_rng(number)
@@ -73,7 +71,7 @@ class Sequence:
             self.check()
 
     def check(self) -> None:
-        """A query, one that is made now, and a picture, as at first."""
+        """Check that the query, a newly built query and a new render give the initial results."""
         self.ask()
         another = clrt.RayQuery(self.vertices, self.faces, layout=self._any(LAYOUTS))
         np.testing.assert_array_equal(another.closest_hit(*self.rays), self.hits)
@@ -81,7 +79,7 @@ class Sequence:
         np.testing.assert_array_equal(self._finished(self._renderer()), self.pixels)
 
     def ask(self) -> None:
-        """What went there and back may be rounded otherwise than at first."""
+        """Compare hits with the initial ones; t may be rounded differently after a refit there and back."""
         for found, expected in ((self.query.closest_hit(*self.rays), self.hits),
                                 (self.query.all_hits(*self.rays)[1], self.all_hits)):
             assert (found["primitive"] == expected["primitive"]).mean() > 0.999
@@ -89,7 +87,7 @@ class Sequence:
             assert np.median(abs(found["t"][both] - expected["t"][both])) < 1e-6
 
     def ask_interrupted(self) -> None:
-        """What lies in freed memory after that, a kernel that still runs would write over."""
+        """A kernel left running after an interrupt would overwrite freed memory, where the guard arrays now lie."""
         origins, directions = np.tile(self.rays[0], (60, 1)), np.tile(self.rays[1], (60, 1))
         for _ in range(3):
             self._interrupt(0.1, self._any((self.query.closest_hit, self.query.any_hit, self.query.all_hits)),
@@ -110,7 +108,7 @@ class Sequence:
                 call(one) if call == self.query.refit else call(one, other)
 
     def refit(self) -> None:
-        """There and back, or interrupted and then back."""
+        """Refit to moved vertices, possibly interrupted, and back."""
         moved = self.vertices + self.rng.normal(size=3)
         if self.rng.random() < 0.5:
             self.query.refit(moved)
@@ -122,7 +120,7 @@ class Sequence:
         layout, builder = self._any(LAYOUTS), self._any(("sah", "midpoint", "ploc", "reinsertion", None))
 
         def keep() -> None:
-            with suppress(UsageError):      # not every builder makes every layout
+            with suppress(UsageError):      # not every builder supports every layout
                 self.kept.append(clrt.RayQuery(self.vertices, self.faces, layout=layout, builder=builder))
 
         self._interrupt(0.3, keep)
@@ -132,9 +130,9 @@ class Sequence:
         self.query = how(self.query)
 
     def fork(self) -> None:
-        """The child gets an error where it asks; the parent goes on."""
+        """In the child process every query and render must raise ClrtError; the parent continues to work."""
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)     # other threads may be alive
+            warnings.simplefilter("ignore", DeprecationWarning)     # other threads may be running
             child = os.fork()
         if child == 0:
             refused = 0
@@ -155,7 +153,6 @@ class Sequence:
         np.testing.assert_array_equal(many.closest_hit(*self.rays), before)
 
     def render(self) -> None:
-        """On with an old one, which may have come so far already."""
         self.renderer = self.renderer if self.rng.random() < 0.5 else self._renderer()
         assert np.isfinite(self._finished(self.renderer)).all()
 
@@ -166,7 +163,6 @@ class Sequence:
                 break
 
     def render_interrupted(self) -> None:
-        """And then on: the picture is what it would have been."""
         renderer = self._renderer()
         for _ in range(2):
             self._interrupt(0.05, self._finished, renderer)
@@ -180,7 +176,7 @@ class Sequence:
         self.kept.append(passes[1])
 
     def render_from_threads(self) -> None:
-        """One renderer in several: each call ends, in an error or with the picture."""
+        """If several threads use one renderer, each call ends with an error or the image."""
         renderer = self._renderer()
 
         def finish() -> None:
@@ -245,7 +241,7 @@ class Sequence:
             raise faults[0]
 
     def _interrupt(self, seconds: float, call: Callable[..., object], *given: Any) -> None:
-        """An exception out of a signal's handler within so many seconds, if what is called takes as long."""
+        """Call `call` and raise an exception from a signal handler at a random time within `seconds`."""
         delay = max(self.rng.random() * seconds, 1e-6)
         try:
             self.armed = True
@@ -267,7 +263,7 @@ class Sequence:
 
 
 def outcome(number: int) -> str:
-    """Of a sequence in a process of its own: "" if all was well."""
+    """Run a sequence in its own process; return "" if it succeeded, otherwise a description of the failure."""
     command = [sys.executable, "-m", __spec__.name, "--sequence", str(number)]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS)

@@ -1,8 +1,8 @@
-"""The small work as a program for Oclgrind, with workarounds for what Oclgrind 21.10 takes for uninitialised.
+"""Program that runs the small work in Oclgrind, with workarounds for Oclgrind 21.10's false uninitialized reads.
 
     python -c 'from tests.oclgrind_program import main; main("cpu", "answers.npz")'
 
-works with the device as with a CPU, and stores what came out, and which kernel files were compiled.
+uses the device as if it were a CPU, and stores the results and the names of the kernel files that were compiled.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from clrt.scene.geometry import instancing
 
 from .small_work import work
 
-#: How a device is worked with, whatever its type.
+#: Execution settings by device type, which override those of the device.
 DEVICES: dict[str, dict[str, Any]] = {"cpu": {"lanes": 8, "local_size": 1, "layout": "bvh8"},
                                       "gpu": {"lanes": 1, "local_size": 4, "layout": "cwbvh", "fuses": False}}
-#: Shares so small that even here several work-items get one.
+#: Block sizes so small that even this work gives several work-items a block each.
 SHARES = {"SMALLEST_BLOCK": {"cpu": 4, "gpu": 4}, "SCAN_ITEMS": 4, "SCAN_PART": 256}
 ENQUEUE_COPY = cl.enqueue_copy
 
 
 class KeptBuffer(cl.Buffer):
-    """Is never released. What a released buffer had not, Oclgrind takes for never written in the next of its number."""
+    """Buffer that is never released: Oclgrind carries the uninitialized state of a released one over to a reused id."""
 
     kept: list[cl.Buffer] = []
 
@@ -41,11 +41,11 @@ class KeptBuffer(cl.Buffer):
         self.kept.append(self)
 
     def release(self) -> None:
-        """Not now."""
+        """Do nothing."""
 
 
 def copy_whole(queue: cl.CommandQueue, to: Any, source: Any, **options: Any) -> Any:
-    """enqueue_copy, but all the rest of the buffer is written, too: Oclgrind takes it for never written otherwise."""
+    """Copy like enqueue_copy, but write the whole buffer: Oclgrind treats the rest as uninitialized otherwise."""
     if not isinstance(to, cl.Buffer):
         return ENQUEUE_COPY(queue, to, source, **options)
     whole, first = np.empty(to.size, np.uint8), options.get("dst_offset", 0)
@@ -60,20 +60,20 @@ def copy_whole(queue: cl.CommandQueue, to: Any, source: Any, **options: Any) -> 
 
 
 def at_once(where: str, work: Callable[[], Any]) -> Any:
-    """in_background, but in this thread: what Oclgrind is asked to look for here makes it crash in any other."""
+    """Replace in_background by a call in this thread: with these checks, Oclgrind crashes in any other thread."""
     return work()
 
 
 def compiled_files() -> list[str]:
-    """The kernel files of all programs that this process has built."""
+    """Return the kernel files of all programs that this process has built."""
     return sorted({file for shared in contexts._shared.values() for built in shared.programs.values()
                    for file in program.files_of(built.source)})
 
 
 def main(form: str, path: str) -> None:
-    """Works with the device as with a `form` of DEVICES; writes the answers to `path`, an .npz file."""
+    """Run the small work with the settings DEVICES[form]; write the answers to `path`, an .npz file."""
     workarounds = {"Buffer": KeptBuffer, "enqueue_copy": copy_whole}
-    instancing.FEW_TRIANGLES = 0   # instances of small meshes, too
+    instancing.FEW_TRIANGLES = 0   # instance small meshes, too
     contexts.MOST_COMPILED = program.MOST_KEPT = sys.maxsize    # see compiled_files
     alone = {"in_background": at_once}
     for owner, values in ((Device, DEVICES[form]), (data_parallel, SHARES), (cl, workarounds), (program, alone),

@@ -1,8 +1,8 @@
-"""`clrt ARGUMENTS` as the Python of another system would meet its own modules: what os, signal and others lack there is
-taken away once all libraries are loaded. A simulation: drivers, file names and processes stay.
+"""Runs `clrt ARGUMENTS` with the gaps of Python on another system: names that os, signal and others lack there are
+removed once all libraries are loaded. Drivers, file names and processes are not simulated.
 
-Windows: Ctrl-Break has its signal, ctypes cannot load the process itself, and text that is opened without an encoding
-is an error. macOS (darwin): sys.platform says so, there is no /proc, and the C library has nothing of glibc's own.
+Windows: SIGBREAK exists, ctypes cannot load the process itself, and opening text without an encoding is an error.
+macOS (darwin): sys.platform is "darwin", there is no /proc, and the C library lacks functions specific to glibc.
 
 usage: python -X warn_default_encoding -m tests.other_system win32|darwin ARGUMENTS
 """
@@ -36,7 +36,7 @@ import platformdirs  # noqa: F401
 import pydantic  # noqa: F401
 import pyopencl.array  # noqa: F401
 
-#: Of those that the standard library documents as available elsewhere alone; it needs some others itself here.
+#: A part of what the standard library documents as unavailable there; it needs some others itself on Linux.
 LACKS: dict[str, dict[Any, str]] = {
     "win32": {
         os: "chown fchmod fork forkpty getegid geteuid getgid getuid killpg mkfifo mknod nice O_DIRECT posix_fadvise "
@@ -62,9 +62,9 @@ C_LACKS = {"win32": "", "darwin": "mallopt malloc_trim prctl sched_getaffinity"}
 
 
 def become(system: str) -> None:
-    """Takes away what is not there."""
+    """Remove what the system lacks; on Windows, add SIGBREAK as SIGUSR2."""
     if system == "win32":
-        setattr(signal, "SIGBREAK", signal.SIGUSR2)     # which is there alone
+        setattr(signal, "SIGBREAK", signal.SIGUSR2)     # exists on Windows only
     for module, names in LACKS[system].items():
         for name in names.split():
             if hasattr(module, name):
@@ -80,7 +80,7 @@ def become(system: str) -> None:
 
 
 class _Library(ctypes.CDLL):
-    """A library; nameless: that of the process itself can be had."""
+    """Library loader; `nameless`: whether the library of the process itself can be loaded."""
 
     lacks: set[str] = set()
     nameless = True
@@ -97,7 +97,7 @@ class _Library(ctypes.CDLL):
 
 
 def _forget_proc() -> None:
-    """Whatever is asked of /proc is not there."""
+    """Make all accesses to /proc raise FileNotFoundError."""
     def check(path: object) -> None:
         if isinstance(path, str | bytes | os.PathLike) and os.fsdecode(path).startswith("/proc"):
             raise FileNotFoundError(2, "No such file or directory", path)
@@ -109,7 +109,7 @@ def _forget_proc() -> None:
         return stat(path, **options)
 
     os.stat = checked_stat
-    # "open" is both open's and os.open's.
+    # The event "open" is raised by both open and os.open.
     sys.addaudithook(lambda event, given: check(given[0]) if event in ("open", "os.listdir", "os.scandir") else None)
 
 

@@ -1,7 +1,7 @@
-"""What `clrt render` makes of the files in some folders: `python -m tests.outcomes FOLDER...` prints a table.
+"""Renders the files in folders with `clrt render`: `python -m tests.outcomes FOLDER...` prints a table of outcomes.
 
-Each file is rendered small in a process of its own: a picture, with the warnings counted, or an error, exit code 3,
-is as it should be.
+Each file is rendered small in its own process. An image (outcome "picture", with its warnings) and an error with exit
+code 3 are the expected outcomes.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from pathlib import Path
 
 from clrt.formats.models import SUFFIXES
 
-#: Seconds that one file may take.
+#: Time limit per file in seconds.
 LIMIT = 120
 
 
 def outcome(file: Path, picture: Path) -> tuple[str, str]:
-    """picture, error, or what it must not be; and what was said, without the file's path."""
+    """Return the outcome ("picture", "error", or a failure) and the messages without the file's path."""
     command = [sys.executable, "-m", "clrt", "render", str(file), "--size", "64x64", "--spp", "4", "-o", str(picture)]
     try:
         done = subprocess.run([*command, "--progress", "json"], capture_output=True, text=True, timeout=LIMIT)

@@ -1,4 +1,4 @@
-"""The programs that PoCL keeps between test runs, bounded."""
+"""Bounds the cache of compiled programs that PoCL keeps between test runs."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 
 
 def remove_oldest(folder: Path, most_bytes: int) -> None:
-    """Delete the programs and kernels in a cache of PoCL's that were not used for longest, until the others take
-    `most_bytes` at most. Only while no process compiles: PoCL expects the files that it has opened to stay.
+    """Delete the least recently used programs and kernels in a PoCL cache until the rest take at most `most_bytes`.
 
-    File systems keep times of reading to a day at best, which is enough to tell old versions of kernels.
+    Call it only while no process compiles: PoCL expects files that it has opened to stay. File systems update access
+    times only to about a day, which is enough to recognize old versions of kernels.
     """
     kept = []
     for entry in chain(folder.glob("[A-Z][A-Z]/*"), folder.glob("*_*")):

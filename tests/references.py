@@ -1,11 +1,11 @@
-"""Scenes stored as JSON beside their converged pictures, turned into clrt's scenes.
+"""Reference scenes stored as JSON together with converged images, converted to clrt scenes.
 
-`NAME.json` has a camera (`fov`: full angle, of a square picture), materials, shapes (.ply meshes, spheres), lights and
-`max_depth`; `NAME.exr` is the converged picture; meshes and environment pictures lie beside them.
+`NAME.json` has a camera (`fov`: full angle, of a square image), materials, shapes (.ply meshes, spheres), lights and
+`max_depth`; `NAME.exr` is the converged image; meshes and environment maps are in the same folder.
 
     python -m tests.references FOLDER [SPP]
 
-renders each and prints how far it is from its picture.
+renders each and prints how far it is from its reference image.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Record = dict[str, Any]
 
 
 def load_reference(json_path: Path) -> tuple[Scene, NDArray[np.float32]]:
-    """The scene of `json_path` and the (h, w, 3) float32 linear picture beside it. ValueError for what clrt lacks."""
+    """Return the scene of `json_path` and its (h, w, 3) float32 linear image. ValueError if clrt lacks a feature."""
     record: Record = json.loads(json_path.read_text(encoding="utf-8"))
     folder, view = json_path.parent, record["camera"]
     if view["width"] != view["height"]:
@@ -77,7 +77,7 @@ def _material(shape: Record, materials: dict[str, Record]) -> Material:
 
 
 def _ggx(record: Record) -> Material:
-    """GGX with a constant Fresnel term, which is Schlick's where F0 = 1, and then only."""
+    """Return GGX with a constant Fresnel term, which Schlick's equals only if F0 = 1."""
     if record["color"] != [1, 1, 1]:
         raise ValueError(f"ggx of color {record['color']}: only white has the same reflectance at every angle")
     return MetallicRoughness(color=(1.0, 1.0, 1.0), metallic=1.0, roughness=sqrt(record["alpha"]), smith="separable")
@@ -99,7 +99,7 @@ def _triple(values: list[float]) -> tuple[float, float, float]:
 
 
 def main(folder: Path, spp: int) -> None:
-    """Prints a line for each reference in `folder`."""
+    """Print a line for each reference in `folder`."""
     import clrt
 
     print(f"{'reference':16} {'relMSE':>10} {'noise²':>10}  {'mean ratio - 1, in 1e-5':28} seconds")
@@ -107,7 +107,7 @@ def main(folder: Path, spp: int) -> None:
         try:
             scene, expected = load_reference(path)
         except (ValueError, KeyError):
-            continue  # an index or a table, or a scene that clrt cannot draw
+            continue  # an index or a table, or a scene that clrt does not support
         image = clrt.render(scene, spp=spp)
         result = clrt.compare(image.pixels, expected)
         ratios = "".join(f"{(ratio - 1) * 1e5:9.1f}" for ratio in result["mean_ratio"])

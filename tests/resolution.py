@@ -1,8 +1,8 @@
-"""Whether pip finds wheels of all that clrt and its extras need, by platform and Python; asks the package index.
+"""Checks that pip finds wheels for clrt and its extras on each platform and Python version; queries the package index.
 
     pip install uv && python -m tests.resolution
 
-uv evaluates environment markers for the platform that is asked about, which pip does for the one it runs on.
+uv evaluates environment markers for the requested platform; pip only for the one it runs on.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MACOS = {"MACOSX_DEPLOYMENT_TARGET": "14.0"}
 
 
 def requirements() -> dict[str, list[str]]:
-    """Those of clrt alone, by the name "clrt", and with each extra."""
+    """Return the requirements of clrt alone, under "clrt", and with each extra."""
     setup = ConfigParser()
     setup.read(Path(__file__).parents[1] / "setup.cfg", encoding="utf-8")
     own = setup["options"]["install_requires"].strip().splitlines()
@@ -32,7 +32,7 @@ def requirements() -> dict[str, list[str]]:
 
 
 def fault(needed: list[str], platform: str, python: str) -> str:
-    """Why a set of requirements has no solution of wheels alone; empty where it has one."""
+    """Return why wheels alone cannot satisfy the requirements, or "" if they can."""
     options = ["--only-binary", ":all:", "--no-config", "--python-platform", platform, "--python-version", python]
     done = subprocess.run([sys.executable, "-m", "uv", "pip", "compile", "-", "--quiet", *options],
                           input="\n".join(needed), capture_output=True, text=True, env=os.environ | MACOS)
@@ -40,14 +40,14 @@ def fault(needed: list[str], platform: str, python: str) -> str:
 
 
 def faults_at(platform: str, python: str) -> dict[str, str]:
-    """The fault of clrt alone and with each extra; all of them are asked for together first, which is mostly enough."""
+    """Return the faults of clrt alone and with each extra; first tries all together, which usually succeeds."""
     sets = requirements()
     together = fault(sorted({each for needed in sets.values() for each in needed}), PLATFORMS[platform], python)
     return {name: together and fault(needed, PLATFORMS[platform], python) for name, needed in sets.items()}
 
 
 def main() -> int:
-    """Prints a table, and below it what is wrong; returns the exit status."""
+    """Print a table and the faults below it; return the exit status."""
     places = list(product(PLATFORMS, PYTHONS))
     with ThreadPoolExecutor(8) as pool:
         found = dict(zip(places, pool.map(lambda place: faults_at(*place), places)))

@@ -1,4 +1,4 @@
-"""Every kernel at work on something small, in all its forms: little enough for a simulator."""
+"""Runs every kernel in all its variants on inputs small enough for a simulator."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Answers = dict[str, NDArray[Any]]
 
 
 def scene() -> Scene:
-    """All kinds of primitives, materials and lights, and few triangles."""
+    """Return a scene with all kinds of primitives, materials and lights, and few triangles."""
     full, (vertices, faces) = everything(), icosphere(0)
     smooth = [Mesh((mesh.vertices.mean(axis=0) + vertices).astype(np.float32), faces, mesh.material, normals=vertices)
               for mesh in full.meshes if mesh.normals is not None]
@@ -51,32 +51,32 @@ def scene() -> Scene:
 
 
 def started(device: Device, what: Scene, **chosen: Any) -> Session:
-    """Ready to render it. chosen: see Choices."""
+    """Return a session ready to render the scene. chosen: see Choices."""
     compiled = compile_scene(what, choices(device, **chosen), device=device)
     return Session(device, compiled, what.render.size, what.render.max_depth, what.render.seed)
 
 
 def picture(device: Device, what: Scene, **chosen: Any) -> Answers:
-    """Its mean, (h, w, 3). chosen: see Choices."""
+    """Return the mean image, (h, w, 3). chosen: see Choices."""
     return {"mean": film(started(device, what, **chosen), what.render.spp).mean}
 
 
 def film(session: Session, spp: int) -> Film:
-    """What it renders."""
+    """Render and return the film."""
     for _ in session.render(spp):
         pass
     return session.film()
 
 
 def hits(query: clrt.RayQuery | clrt.InstancedRayQuery) -> Answers:
-    """What the rays meet first and next, and whether they meet anything close."""
+    """Return the closest hits, the first two hits, and whether anything is hit within t = 0.7, per ray."""
     closest, (ray, several) = query.closest_hit(ORIGINS, DIRECTIONS), query.all_hits(ORIGINS, DIRECTIONS, max_hits=2)
     return {"t": closest["t"], "primitive": closest["primitive"], "blocked": query.any_hit(ORIGINS, DIRECTIONS, 0.7),
             "ray": ray, "several": several["primitive"]}
 
 
 def mesh_hits(device: Device, layout: str, traversal: str) -> Answers:
-    """In a tree that was built over other triangles, and refitted."""
+    """Intersect a mesh with a BVH that was built over other triangles and refitted."""
     query = clrt.RayQuery(TRIANGLES[::-1].reshape(-1, 3), FACES, device=device.info.index, layout=layout,
                           builder="sah", traversal=traversal)
     query.refit(TRIANGLES.reshape(-1, 3))
@@ -84,15 +84,15 @@ def mesh_hits(device: Device, layout: str, traversal: str) -> Answers:
 
 
 def instance_hits(device: Device, layout: str, traversal: str) -> Answers:
-    """Of five instances of two meshes."""
+    """Intersect five instances of two meshes."""
     meshes = [(TRIANGLES[part].reshape(-1, 3), FACES[:len(TRIANGLES[part])]) for part in (slice(0, 40), slice(40, 60))]
     return hits(clrt.InstancedRayQuery(meshes, [0, 1, 1, 0, 1], TO_WORLD, device=device.info.index, layout=layout,
                                        traversal=traversal))
 
 
 def variants() -> Iterator[tuple[RenderSettings, dict[str, Any]]]:
-    """Choices that are there to compare, each at least once but the first of its kind, which other work takes; and each
-    other sampler."""
+    """Yield each alternative triangle, box and sphere test and ray offset at least once, except the defaults, which
+    other work covers; and each other sampler."""
     settings = [replace(SETTINGS, sampler="stratified", filter="tent"), replace(SETTINGS, sampler="independent")]
     for i, triangle in enumerate(TRIANGLE_TESTS):
         box, sphere, offset = (list(known)[i % len(known)] for known in (BOX_TESTS, SPHERE_TESTS, OFFSETS))
@@ -101,7 +101,7 @@ def variants() -> Iterator[tuple[RenderSettings, dict[str, Any]]]:
 
 
 def work(device: Device) -> Iterator[tuple[str, Answers]]:
-    """Answers by subject and way. All ways should answer alike."""
+    """Yield answers by subject and variant. All devices should give the same."""
     for layout in TREES:
         builder = "ploc" if layout in SHAPES else "sah"
         yield f"scene {layout}", picture(device, scene(), layout=layout, builder=builder)

@@ -1,12 +1,12 @@
-"""Random edits of a live session for some minutes: no error, and memory that does not grow.
+"""Soak test of a live session: random edits for some minutes must cause no error and no memory growth.
 
-What they need is a few dozen programs: PoCL's compiler keeps some two megabytes of each that it compiles.
+The edits need a few dozen programs; PoCL's compiler keeps about 2 MB for each that it compiles.
 
     python tests/soak_live.py SCENE --minutes 30
 
-Prints a line from time to time, and at the end what became of memory: of the process, of that what is in use (by
-glibc's own count, which tells a leak from what compilers leave in pieces), and of the device. Exits with 1 where any
-grew by more than 5 %, where an edit that should work failed, or one that should not work did.
+Prints a line every 30 s, and at the end the memory use of the process, of its heap (allocated bytes by glibc's own
+count, which distinguishes a leak from the allocator's fragmentation), and of the device. Exits with 1 if any grew by
+more than 5 %, if a valid edit failed, or if an invalid one succeeded.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def main() -> int:
     print(f"{soak.edits} edits, {dict(soak.kinds)}")
     print(f"{soak.pictures} pictures, {soak.programs} changes of program; seconds from edit to picture: "
           f"median {np.median(soak.latencies):.3f}, 99 % {np.percentile(soak.latencies, 99):.3f}")
-    # Caches fill in the first third; what grows after it is a leak.
+    # Caches fill in the first third; growth after it is a leak.
     settled, last = (np.median(np.array(part), axis=0) for part in np.array_split(memory, 3)[1:])
     for name, before, after in zip(("process", "process in use", "device"), settled, last):
         print(f"memory of the {name} in the second third {before / 2**20:.1f} MiB, in the last {after / 2**20:.1f} MiB")
@@ -66,7 +66,7 @@ def main() -> int:
 
 
 class Soak:
-    """What was done, and what was wrong with it."""
+    """Random edits and the problems found."""
 
     def __init__(self, live: Live, random: random.Random) -> None:
         self.live, self.random = live, random
@@ -79,7 +79,7 @@ class Soak:
             self.light, self.sky, self.integrator, self.settings, self.undo, self.redo, self.mistake]
 
     def run(self, seconds: float) -> list[tuple[int, int, int]]:
-        """Edits for so long; memory of the process, what of it is in use, and on the device, second by second."""
+        """Edit for `seconds`; return process memory, heap memory in use and device memory after each edit."""
         end, memory, told = time.monotonic() + seconds, [], 0.0
         while time.monotonic() < end:
             edit = self.random.choice(self._edits)
@@ -105,7 +105,7 @@ class Soak:
         return memory
 
     def walk(self) -> None:
-        """Ten steps."""
+        """Move the camera ten steps."""
         for _ in range(10):
             camera = self.live.scene.camera
             x, y, z = (value + self.random.gauss(0, 0.01) for value in camera.position)
@@ -114,13 +114,13 @@ class Soak:
             time.sleep(self.random.uniform(0, 0.05))
 
     def material(self) -> None:
-        """Another colour of one of them."""
+        """Change the color of a material."""
         old = self._material()
         if isinstance(old, Diffuse | MetallicRoughness | Mirror | Dielectric):
             self._edit(with_material(self.live.scene, old, replace(old, color=self._color(1))))
 
     def preset(self) -> None:
-        """Another type of the first ball's, or another substance."""
+        """Change the material type or preset of the first sphere."""
         substance = self.random.choice(get_args(Preset))
         new = self.random.choice([Diffuse(), Mirror(), Dielectric(ior=self.random.uniform(1.1, 2)),
                                   MetallicRoughness(preset=substance, roughness=self.random.random())])
@@ -128,7 +128,7 @@ class Soak:
         self._edit(replace(self.live.scene, spheres=[replace(first, material=new), *others]))
 
     def move_sphere(self) -> None:
-        """One that there is, as with a mouse."""
+        """Move a sphere, as with a mouse."""
         spheres = list(self.live.scene.spheres)
         if spheres:
             i = self.random.randrange(len(spheres))
@@ -137,49 +137,49 @@ class Soak:
                 self._edit(replace(self.live.scene, spheres=list(spheres)), moving=True)
 
     def add_sphere(self) -> None:
-        """Up to a dozen."""
+        """Add a sphere, up to twelve."""
         ball = Sphere(center=self._point(), radius=0.1, material=self.live.scene.spheres[0].material)
         if len(self.live.scene.spheres) < 12:
             self._edit(replace(self.live.scene, spheres=[*self.live.scene.spheres, ball]))
 
     def remove_sphere(self) -> None:
-        """The last one, but for the first."""
+        """Remove the last sphere, but never the first."""
         self._edit(replace(self.live.scene, spheres=self.live.scene.spheres[:1] + self.live.scene.spheres[1:-1]))
 
     def light(self) -> None:
-        """Another one, and some less."""
+        """Add a point light, and drop some of the others."""
         lights = [each for each in self.live.scene.lights if self.random.random() < 0.7][:5]
         lamp = PointLight(position=self._point(), intensity=self._color(5))
         self._edit(replace(self.live.scene, lights=[*lights, lamp]))
 
     def sky(self) -> None:
-        """Another strength, direction and colour."""
+        """Change the strength, rotation and color of the environment."""
         sky = replace(self.live.scene.environment, strength=self.random.uniform(0.1, 2), color=self._color(1),
                       rotation_degrees=self.random.uniform(0, 360))
         self._edit(replace(self.live.scene, environment=sky))
 
     def integrator(self) -> None:
-        """Another one, or depth."""
+        """Change the integrator and the path depth."""
         names: list[Integrator] = ["path", "path", "direct", "local", "raster"]
         name = self.random.choice(names)
         render = replace(self.live.scene.render, integrator=name, max_depth=self.random.randint(1, 12))
         self._edit(replace(self.live.scene, render=render))
 
     def settings(self) -> None:
-        """Tree, scale, samples a frame."""
+        """Change the BVH use, image scale and samples per frame."""
         self.live.choose(replace(self.live.settings, tree=self.random.choice((None, True)),
                                  scale=self.random.choice((1.0, 0.5)), samples=self.random.choice((1, 2))))
 
     def undo(self) -> None:
-        """The last step."""
+        """Undo the last step."""
         self.live.undo()
 
     def redo(self) -> None:
-        """The last one undone."""
+        """Redo the last undone step."""
         self.live.redo()
 
     def mistake(self) -> None:
-        """What cannot be rendered says so, and the last picture stays."""
+        """An invalid edit must report an error and keep the last image."""
         right, shown = self.live.scene, self.live.snapshot().number
         self.live.edit(replace(right, camera=replace(right.camera, fov_degrees=200)), step=False)
         seen = self.live.wait(lambda now: now.asked == self.live.asked, 60)
@@ -201,7 +201,7 @@ class Soak:
 
 
 def process_memory() -> int:
-    """Bytes that this process has in memory."""
+    """Return the resident memory of this process in bytes."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
 
@@ -213,7 +213,7 @@ class Mallinfo(ctypes.Structure):
 
 
 def memory_in_use() -> int:
-    """Bytes that were allocated and not freed since."""
+    """Return the heap bytes that are allocated and not freed."""
     libc = ctypes.CDLL("libc.so.6")
     libc.mallinfo2.restype = Mallinfo
     told = libc.mallinfo2()
@@ -221,7 +221,7 @@ def memory_in_use() -> int:
 
 
 def device_memory() -> int:
-    """Bytes that it has on NVIDIA's devices; 0 without any."""
+    """Return the used memory of NVIDIA devices in bytes; 0 without any."""
     if not shutil.which("nvidia-smi"):
         return 0
     asked = ["nvidia-smi", "--query-gpu=memory.used", "--format=csv,noheader,nounits"]

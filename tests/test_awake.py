@@ -1,4 +1,4 @@
-"""Clocks of the time in which a process runs."""
+"""Tests of the clocks that count only the time in which the process runs, not time suspended."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RNG = np.random.default_rng(5)
 
 
 class Time:
-    """That of a system, which passes as it is told to."""
+    """Fake system clock that the test advances."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now = 1000.0
@@ -22,7 +22,7 @@ class Time:
 
 
 def test_a_long_time_between_looks_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of random gaps all that count is what is not longer than LONGEST; reading it changes nothing."""
+    """Each of 200 random gaps counts for at most LONGEST; reading `seconds` changes nothing."""
     system = Time(monkeypatch)
     clock, expected = AwakeClock(3.0), 3.0
     for gap in RNG.exponential(LONGEST, 200):
@@ -36,7 +36,7 @@ def test_a_long_time_between_looks_is_none(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_waiting_leaves_a_suspension_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An hour that passes in one of the looks is not waited for; what is set then is found."""
+    """An hour that passes within one wait does not count; an event that is set is found."""
     system, event, looks = Time(monkeypatch), Event(), list[float]()
 
     def wait(seconds: float) -> bool:

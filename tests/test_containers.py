@@ -1,4 +1,4 @@
-"""The container files name what there is and run as no root. Whether they build, an engine must tell."""
+"""The container files refer to existing files and run as a non-root user; they are not built here."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FILES = sorted((HOUSE / "containers").glob("*.Containerfile"))
 
 
 def steps(path: Path) -> list[tuple[str, str]]:
-    """Instructions and their arguments; lines that end in a backslash go on."""
+    """Return instructions and their arguments, with continuation lines joined."""
     text = re.sub(r"\\\n", " ", path.read_text())
     return [(word, rest) for word, _, rest in (line.partition(" ") for line in text.splitlines()
                                                if line and not line.startswith("#"))]
@@ -32,7 +32,7 @@ def test_a_container_file(path: Path) -> None:
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_what_is_installed_is_copied(path: Path) -> None:
-    """Everything that setup.cfg and pyproject.toml name, and nothing else of the tree."""
+    """The image copies everything that setup.cfg and pyproject.toml name, and nothing else of the tree."""
     copied = {name for word, rest in steps(path) if word == "COPY" for name in rest.split()[:-1]}
     config = configparser.ConfigParser()
     config.read(HOUSE / "setup.cfg")

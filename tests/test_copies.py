@@ -1,4 +1,4 @@
-"""Queries and scenes that are pickled, copied, or sent to another process."""
+"""Queries and scenes can be pickled, copied and sent to another process."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SCENES = sorted((Path(__file__).parents[1] / "scenes").glob("*.toml"))
 
 COPIES: dict[str, Callable[[Any], Any]] = {
     "pickle": lambda each: pickle.loads(pickle.dumps(each)), "copy": copy.copy, "deepcopy": copy.deepcopy}
-#: Of queries: each layout, and what else there is to keep.
+#: Query options: each layout, and other state that a copy must keep.
 OPTIONS: dict[str, dict[str, Any]] = {
     **{layout: {"layout": layout} for layout in ("bvh8", "bvh2", "cwbvh", "packs", "list")},
     "ploc": {"builder": "ploc"}, "spheres": {"spheres": SPHERES}, "pool": {"traversal": "pool"}}
@@ -53,7 +53,7 @@ def assert_same(one: Any, other: Any) -> None:
 
 @covering("name, how", OPTIONS, COPIES)
 def test_a_copy_answers_the_same(device: Device, name: str, how: str) -> None:
-    """Before it has been asked and after, also once either has been refitted; the two share nothing that changes."""
+    """Copies made before and after a query or a refit give the same hits and share no mutable state."""
     made = query(device, **OPTIONS[name])
     before = COPIES[how](made)
     assert_same(made, before)
@@ -69,7 +69,7 @@ def test_a_copy_answers_the_same(device: Device, name: str, how: str) -> None:
 
 @covering("layout, how", ["bvh8", "bvh2", "cwbvh"], COPIES)
 def test_a_copy_of_instances(device: Device, how: str, layout: str) -> None:
-    """Also where either moves."""
+    """A copy of instances gives the same hits, also if the original or the copy moves."""
     made = instanced(device, layout=layout)
     other = COPIES[how](made)
     made.move(PLACES[::-1])
@@ -79,7 +79,7 @@ def test_a_copy_of_instances(device: Device, how: str, layout: str) -> None:
 
 
 def test_another_process(device: Device) -> None:
-    """One that knows of no other than what it is sent."""
+    """A query pickled to a spawned process gives the same hits."""
     made = query(device)
     with ProcessPoolExecutor(1, get_context("spawn")) as processes:
         found = processes.submit(made.closest_hit, *RAYS).result()
@@ -94,7 +94,7 @@ def test_a_device_that_is_not_there(device: Device) -> None:
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 def test_scenes(path: Path) -> None:
-    """With all that makes their picture, and objects that are shared are so in the copy."""
+    """Copies keep the scene hash, settings and cameras, and objects shared in the scene are shared in the copy."""
     scene = clrt.load(path)
     for how, make in COPIES.items():
         other = make(scene)

@@ -1,4 +1,4 @@
-"""What is run by default of products of parameters."""
+"""Tests of the covering arrays that select which combinations run by default."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .covering import covering, covering_array
 @pytest.mark.parametrize("sizes", [(3,), (4, 3), (3, 3, 2), (5, 3, 2, 2)])
 @pytest.mark.parametrize("strength", [1, 2])
 def test_all_values_and_pairs_are_covered(sizes: tuple[int, ...], strength: int) -> None:
-    """With few more rows than the largest factors have values together, below which it is not possible."""
+    """The array covers all tuples with at most two rows more than the product of the largest sizes."""
     rows = covering_array(sizes, strength)
     for columns in combinations(range(len(sizes)), strength):
         assert {tuple(row[i] for i in columns) for row in rows} == set(product(*(range(sizes[i]) for i in columns)))

@@ -1,4 +1,4 @@
-"""A caller for whom numpy makes errors of everything: clrt answers as ever."""
+"""clrt gives the same results if the caller makes numpy raise all floating-point errors and warnings."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OPTIONS: list[dict[str, Any]] = [
 
 
 def strictly(work: Callable[[], Any]) -> Any:
-    """What it returns where every floating-point error and every warning is raised."""
+    """Return the result of `work`, with every floating-point error and every warning raised."""
     with np.errstate(all="raise"), warnings.catch_warnings():
         warnings.simplefilter("error")
         return work()
@@ -32,7 +32,7 @@ def strictly(work: Callable[[], Any]) -> Any:
 
 @pytest.mark.parametrize("size", SIZES)
 def test_queries(device: Device, size: float) -> None:
-    """Of meshes and rays of all sizes, with those that are nowhere."""
+    """Query meshes and rays of all sizes, including NaN, infinite and zero rays."""
     rng = np.random.default_rng(2)
     vertices, faces = rng.random((60, 3)) * size, rng.integers(0, 60, (90, 3))
     origins, directions = rng.normal(size=(200, 3)) * size, rng.normal(size=(200, 3)) * rng.choice(SIZES, (200, 1))
@@ -58,7 +58,7 @@ def test_queries(device: Device, size: float) -> None:
 @pytest.mark.parametrize("options", OPTIONS, ids=str)
 @pytest.mark.parametrize("name", ["spheres", "instances", "materials", "dragon"])
 def test_pictures(device: Device, tmp_path: Path, name: str, options: dict[str, Any]) -> None:
-    """Scenes that are read, rendered, saved and compared."""
+    """Load, render, save and compare scenes."""
     def work() -> Any:
         scene = clrt.load(SCENES / f"{name}.toml")
         image = clrt.render(scene, size=(24, 16), spp=4, device=device.info.index, **options)

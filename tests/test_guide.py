@@ -1,4 +1,4 @@
-"""docs/rays.md: its examples run, and print what they say."""
+"""The examples of docs/rays.md run and print the output that they state."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GUIDE = Path(__file__).parents[1] / "docs" / "rays.md"
 
 
 def test_examples_print_what_they_say(capsys: pytest.CaptureFixture[str]) -> None:
-    """Each block goes on from the one before; behind a print stands its output."""
+    """Blocks run in order and share variables; the comment after each print is its expected output."""
     names: dict[str, Any] = {}
     blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
     for block in blocks:

@@ -1,4 +1,4 @@
-"""Triangle and box tests other than the default: right where float32 can tell, and what they are known to lose."""
+"""Triangle and box tests other than the default: correct away from edges, with the known losses at them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ RNG = np.random.default_rng(3)
 
 
 def flat_triangles() -> NDArray[np.float32]:
-    """Without an area: points, repeated corners, three corners on a line in steps that float32 holds."""
+    """Return triangles without area: points, repeated corners, and collinear corners exact in float32."""
     a, e = RNG.random((60, 3)), RNG.integers(-64, 64, (60, 3)) / 256
     a = np.round(a * 256) / 256
     steps = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 1], [0, 1, 2], [2, 0, 1], [0, 3, 1]])[np.arange(60) % 6]
@@ -39,7 +39,7 @@ VERTICES, FACES = CORNERS.reshape(-1, 3), np.arange(3 * len(CORNERS), dtype=np.i
 
 
 def aimed_rays() -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Half of them at anything, half at points of the triangles without an area."""
+    """Return rays, half toward random points, half toward points of the triangles without area."""
     origins = RNG.uniform(-1, 2, (3000, 3)).astype(np.float32)
     weights = RNG.dirichlet([1, 1, 1], 1500)
     on_flat = np.einsum("nk,nkj->nj", weights, FLAT[RNG.integers(0, len(FLAT), 1500)].astype(np.float64))
@@ -51,10 +51,9 @@ ORIGINS, DIRECTIONS = aimed_rays()
 
 @covering("triangle, layout", VARIANTS, ["bvh8", "bvh2", "cwbvh"])
 def test_hits_are_those_of_float64_away_from_edges(device: Device, triangle: str, layout: str) -> None:
-    """In every layout, the same bits as without a tree. Where records know the area, triangles without one are never
-    met.
+    """Every layout agrees with float64 away from edges, and bit for bit with brute force.
 
-    (From corners alone, rounding may make one that is met.)
+    Forms that precompute the area never hit triangles without area; from corners alone, rounding may allow a hit.
     """
     faces = FACES if triangle in FORMS else FACES[:len(GOOD)]
     origins, directions = ORIGINS.astype(np.float64), DIRECTIONS.astype(np.float64)
@@ -79,7 +78,7 @@ def test_hits_are_those_of_float64_away_from_edges(device: Device, triangle: str
 @pytest.mark.parametrize("triangle", FORMS)
 @pytest.mark.parametrize("layout", ["bvh8", "cwbvh"])
 def test_records_are_what_the_papers_say(layout: str, triangle: str) -> None:
-    """The map takes the corners to (0, 0), (1, 0), (0, 1) of the plane w = 0; edges and normal are rounded once."""
+    """The map takes the corners to (0, 0), (1, 0), (0, 1) in the plane w = 0; edges and normal are rounded once."""
     corners = pack(layout, "sah", GOOD, NO_SPHERES)
     tree = in_form(corners, triangle, None)
     name = "packs" if layout == "bvh8" else "leaf_triangles"
@@ -92,7 +91,7 @@ def test_records_are_what_the_papers_say(layout: str, triangle: str) -> None:
     if triangle == "baldwin_weber":
         points = np.concatenate([expected, np.ones((len(expected), 3, 1))], axis=2)
         mapped = np.stack([np.einsum("nij,nj->ni", points, rows[row]) for row in "uvw"], axis=2)
-        # A row's rounding counts as many times as it is longer than the triangle's size has it.
+        # A row's rounding error scales with its length relative to the triangle's size.
         size = sum(np.abs(rows[row]).max(axis=1) for row in "uvw")[:, None, None]
         assert (np.abs(mapped - [[0, 0, 0], [1, 0, 0], [0, 1, 0]]) / size).max() < 3e-7
     else:
@@ -103,7 +102,7 @@ def test_records_are_what_the_papers_say(layout: str, triangle: str) -> None:
 
 @pytest.mark.parametrize("layout, triangle", list(zip(["bvh8", "cwbvh"], FORMS)))
 def test_instances_are_hit_by_every_test_alike(device: Device, layout: str, triangle: str) -> None:
-    """Within rounding, but at edges; also where they have been moved to."""
+    """Away from edges, all tests agree within rounding, also after the instances move."""
     rng = np.random.default_rng(7)
     mesh, to_world = rng.integers(0, 3, 40), transforms(rng, "stretched", 40)
     origins, targets = rng.uniform(-6, 6, (2, 3000, 3)).astype(np.float32)
@@ -115,7 +114,7 @@ def test_instances_are_hit_by_every_test_alike(device: Device, layout: str, tria
         expected, found = (query.closest_hit(origins, targets - origins) for query in (one, other))
         same = (expected["primitive"] == found["primitive"]) & (expected["instance"] == found["instance"])
         assert np.mean(~same) < 1e-3 and np.mean(expected["primitive"] >= 0) > 0.3
-        # An origin is known to some 2^-23 of the world, which is about as large as the rays are long.
+        # An origin is known to about 2^-23 of the world's size, which is about the length of the rays.
         np.testing.assert_allclose(found["t"][same], expected["t"][same], rtol=1e-4, atol=1e-6)
 
 
@@ -131,10 +130,10 @@ def test_moved_vertices_get_new_records(device: Device, triangle: str) -> None:
 @pytest.mark.parametrize("layout, traversal", [
     ("bvh8", "single"), ("cwbvh", None), *others(("bvh8", "pool"), ("bvh2", None))])
 def test_plain_boxes_lose_what_robust_ones_find(device: Device, layout: str, traversal: str | None) -> None:
-    """From inside a closed mesh to its vertices, where boxes end; to the middles of faces both answer alike.
+    """Plain boxes miss some vertices seen from inside a closed mesh, where boxes end; face centers give equal hits.
 
-    It stands ten radii from the coordinates' origin, so that what the tree's boxes are larger is rounded away, and a
-    ball opposite keeps it there.
+    The mesh is ten radii from the origin, so that the BVH's box padding is rounded away; a sphere opposite it keeps
+    the scene from being recentered.
     """
     ball, faces = icosphere(4)
     vertices = np.asarray(ball + 10, np.float32)

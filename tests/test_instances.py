@@ -1,4 +1,4 @@
-"""InstancedRayQuery: the hits of the same triangles baked into the world, whatever the transforms."""
+"""InstancedRayQuery returns the hits of the same triangles transformed to the world, for all kinds of transforms."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ MESHES = [(RNG.uniform(-1, 1, (3 * n, 3)).astype(np.float32), np.arange(3 * n, d
 RAYS = 1500
 LAYOUTS = ["bvh8", "bvh2", "cwbvh"]
 WAYS = (("bvh8", "single"), ("bvh8", "pool"), ("bvh2", None), ("cwbvh", None))
-#: Where the leaves of each are.
+#: Name of the leaf buffer by layout.
 LEAVES = {"bvh8": "packs", "bvh2": "leaf_triangles", "cwbvh": "leaf_triangles"}
 
 
 def transforms(rng: np.random.Generator, kind: str, count: int) -> Doubles:
-    """(count, 3, 4): turned, stretched, mirrored or nearly flattened."""
+    """Return (count, 3, 4) transforms: rotated, scaled, mirrored or nearly flattened."""
     turned = np.linalg.qr(rng.normal(size=(count, 3, 3)))[0]
     scale = {"turned": np.ones((count, 1, 3)), "stretched": rng.uniform(0.1, 3, (count, 1, 3)),
              "mirrored": rng.choice([-1.0, 1.0], (count, 1, 3)), "flat": np.tile([1.0, 1.0, 1e-5], (count, 1, 1)),
@@ -34,7 +34,7 @@ def transforms(rng: np.random.Generator, kind: str, count: int) -> Doubles:
 
 
 def baked(mesh: NDArray[Any], to_world: Doubles) -> tuple[Doubles, NDArray[np.intp]]:
-    """(m, 3, 3) corners in the world, and (m, 2) instance and primitive of each."""
+    """Return (m, 3, 3) corners in the world, and the (m, 2) instance and primitive of each."""
     corners = [MESHES[index][0].astype(np.float64) @ matrix[:, :3].T + matrix[:, 3]
                for index, matrix in zip(mesh, to_world)]
     names = [(i, primitive) for i, index in enumerate(mesh) for primitive in range(len(MESHES[index][1]))]
@@ -42,7 +42,7 @@ def baked(mesh: NDArray[Any], to_world: Doubles) -> tuple[Doubles, NDArray[np.in
 
 
 def aimed(rng: np.random.Generator, corners: Doubles) -> tuple[Doubles, Doubles]:
-    """Rays through points well inside triangles of the world, from all around."""
+    """Return rays through points well inside triangles of the world, from all directions."""
     weights = rng.dirichlet([4, 4, 4], RAYS)
     targets = np.einsum("nk,nkj->nj", weights, corners[rng.integers(0, len(corners), RAYS)])
     origins = rng.normal(size=(RAYS, 3)) * 6
@@ -50,7 +50,7 @@ def aimed(rng: np.random.Generator, corners: Doubles) -> tuple[Doubles, Doubles]
 
 
 def brute_force(corners: Doubles, origins: Doubles, directions: Doubles) -> tuple[Doubles, Doubles]:
-    """(n, m) float64: t of each ray at each triangle, inf outside, and how far inside a hit lies, in barycentrics."""
+    """Return (n, m) float64: t of each ray at each triangle, inf outside, and the smallest barycentric of the hit."""
     p0, e1, e2 = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(e1, e2)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -78,7 +78,7 @@ def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, way: 
     normal = np.cross(corners[first, 1] - corners[first, 0], corners[first, 2] - corners[first, 0])
     grazing = np.abs((normal * directions).sum(1)) < 0.05 * np.linalg.norm(normal, axis=1) * np.linalg.norm(directions,
                                                                                                             axis=1)
-    # Of a tiny mesh far away the ray is known only to a hundredth of its size.
+    # Relative to a tiny, distant mesh, rays are only accurate to a hundredth of its size.
     clear = (np.abs(depth) > (0.03 if kind == "tiny" else 1e-3)).all(axis=1) & (second > 1.001 * nearest) & ~grazing
     assert clear.sum() > 50
     query = clrt.InstancedRayQuery(MESHES, mesh, to_world, device=device.info.index, layout=layout,
@@ -94,7 +94,7 @@ def test_instances_are_hit_like_baked_triangles(device: Device, kind: str, way: 
 @pytest.mark.parametrize("lanes, ways", [(1, WAYS[::3]), (8, WAYS)])
 def test_layouts_agree_to_the_last_bit(device: Device, lanes: int, ways: tuple[tuple[str, str | None], ...],
                                        monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where many instances overlap, so that a ray comes back to the upper level many times."""
+    """Includes many overlapping instances, so that a ray returns to the upper level many times."""
     monkeypatch.setattr(Device, "lanes", lanes)
     rng = np.random.default_rng(7)
     mesh = rng.integers(0, 3, 300)
@@ -115,7 +115,7 @@ def test_layouts_agree_to_the_last_bit(device: Device, lanes: int, ways: tuple[t
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("mesh_size, world_size", [(1e-20, 1.0), (1e15, 1.0), (1.0, 1e-20), (1e15, 1e15)])
 def test_sizes_do_not_matter(device: Device, layout: str, mesh_size: float, world_size: float) -> None:
-    """Neither of the meshes nor of the world that transforms put them in: sizes of powers of two change no bit."""
+    """Scaling the meshes or the world by powers of two changes no bit of the hits."""
     mesh_size, world_size = (2.0 ** round(np.log2(size)) for size in (mesh_size, world_size))
     rng = np.random.default_rng(5)
     mesh, to_world = rng.integers(0, 3, 20), transforms(rng, "stretched", 20)
@@ -132,7 +132,7 @@ def test_sizes_do_not_matter(device: Device, layout: str, mesh_size: float, worl
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_all_hits_of_instances_that_coincide(device: Device, layout: str) -> None:
-    """Equal t: the lowest instance first, then the lowest primitive; each once."""
+    """At equal t, hits are ordered by instance, then primitive, and each occurs once."""
     triangle = (np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], np.float32), np.array([[0, 1, 2], [0, 1, 2]], np.int32))
     same = np.tile(np.eye(3, 4), (3, 1, 1))
     query = clrt.InstancedRayQuery([triangle], [0, 0, 0], same, device=device.info.index, layout=layout)
@@ -143,7 +143,7 @@ def test_all_hits_of_instances_that_coincide(device: Device, layout: str) -> Non
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_ten_thousand_instances_cost_the_memory_of_one(device: Device, layout: str) -> None:
-    """A grid of them: the ray down each cell hits its own; the tree below is stored once."""
+    """On a grid, the ray into each cell hits its own instance; the lower-level BVH is stored once."""
     side = 100
     cells = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)
     to_world = np.tile(np.eye(3, 4), (side * side, 1, 1))

@@ -1,4 +1,4 @@
-"""What kernels must not do though OpenCL C allows it."""
+"""Constructs that OpenCL C allows but that the kernels must avoid."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FUNCTION = re.compile(HEAD + r"\{([^\n]*\}$|.*?^\})", re.M | re.S)
 
 
 def changed_parameters(text: str, structs: set[str]) -> Iterator[tuple[str, str]]:
-    """Functions, and structs that they get by value and assign to."""
+    """Yield functions with the struct parameters that they receive by value and modify."""
     for function, parameters, body in FUNCTION.findall(re.sub(r"//.*", "", text)):
         for name in re.findall(rf"\b(?:{'|'.join(sorted(structs))}) (\w+)\s*(?:,|$)", parameters):
             if re.search(rf"(?<![\w.>]){name}\b[.\w\[\]]*\s*(?:[-+*/&|^]|<<|>>)?=(?!=)", body):
@@ -22,7 +22,7 @@ def changed_parameters(text: str, structs: set[str]) -> Iterator[tuple[str, str]
 
 
 def test_structs_that_come_by_value_are_not_changed() -> None:
-    """Mesa's rusticl (22.3) passes the caller's own."""
+    """Mesa's rusticl (22.3) would modify the caller's struct."""
     assert not [(file, *changed) for file, text in TEXTS.items() for changed in changed_parameters(text, STRUCTS)]
 
 
@@ -47,7 +47,7 @@ DIRECT = re.compile(r"scene->(?!counts\b)(\w+)\s*(?:\[|->|\+)")
 
 
 def test_arrays_of_the_scene_may_be_in_parts() -> None:
-    """So records are found by RECORD or GATHER alone (arrays.cl)."""
+    """Scene arrays may be split, so records must be accessed by RECORD or GATHER only (arrays.cl)."""
     assert not [(file, array) for file, text in TEXTS.items() for array in DIRECT.findall(re.sub(r"//.*", "", text))]
 
 

@@ -1,4 +1,4 @@
-"""Public calls with arguments of any kind and in any order."""
+"""Public calls with arguments of any type and in any order either work or raise a ClrtError."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "InstancedRayQuery": (clrt.InstancedRayQuery, {"meshes": [(np.eye(3), [[0, 1, 2]])], "mesh": [0],
                                                    "transforms": np.eye(3, 4)[None]}),
     "load": (clrt.load, {"path": "nothing.toml"})}
-#: Which files are kept, and what is called back, is no choice among values.
+#: Arguments that are files or callbacks, not values to choose from.
 OTHER = {"on_phase", "before", "checkpoint", "resume"}
 
 
 @pytest.mark.parametrize("name", CALLS)
 def test_any_value_of_an_argument(device: Device, name: str) -> None:
-    """Is taken, or ends in an error of clrt's."""
+    """Any value of an argument is accepted or raises a ClrtError."""
     call, good = CALLS[name]
     good = good | ({} if name == "load" else {"device": device.info.index})
     for argument in inspect.signature(call).parameters.keys() - OTHER:
@@ -61,7 +61,7 @@ def test_any_value_of_a_method(device: Device) -> None:
 
 
 def test_a_sequence_of_calls() -> None:
-    """`python -m tests.misuse` does many."""
+    """One random sequence of calls; `python -m tests.misuse` runs many."""
     fault = outcome(todays_seed())
     assert not fault, fault
 
@@ -89,7 +89,7 @@ clrt.RayQuery([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], builder="ploc").cl
 
 
 def test_a_compiler_that_is_interrupted(tmp_path: Path) -> None:
-    """The exception comes through, and as Python ends the compiler's thread does no harm."""
+    """KeyboardInterrupt propagates from a build, and ending the compiler thread at exit does no harm."""
     caches = os.environ | {"CLRT_CACHE_DIR": str(tmp_path), "POCL_CACHE_DIR": str(tmp_path / "pocl")}
     done = subprocess.run([sys.executable, "-c", INTERRUPTED], env=caches, capture_output=True, text=True, timeout=120)
     assert done.stderr.splitlines()[-1] == "KeyboardInterrupt", done.stderr

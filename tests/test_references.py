@@ -1,4 +1,4 @@
-"""Reference scenes: what the JSON says is what the scene holds."""
+"""Reference scenes: the loaded scene matches the JSON."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_everything_arrives(tmp_path: Path) -> None:
 
 
 def test_metals_and_ggx_mean_what_the_renderer_of_the_pictures_meant(tmp_path: Path) -> None:
-    """F0 is the colour, nothing is diffuse, and alpha is roughness² or as stored."""
+    """F0 is the color, there is no diffuse lobe, and alpha is roughness² or as stored."""
     scene, _ = load_reference(stored(tmp_path))
     for index, f0, alpha in [(1, (0.9, 0.65, 0.35), 0.25), (2, (1, 1, 1), 0.36)]:
         material = scene.spheres[index].material

@@ -1,4 +1,4 @@
-"""RayQuery.refit and InstancedRayQuery.move: the answers of a new query, in the old tree."""
+"""After RayQuery.refit and InstancedRayQuery.move, the old BVH gives the hits of a new query."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .test_instances import LAYOUTS, MESHES, transforms
 Floats = NDArray[np.float32]
 Records = dict[str, NDArray[Any]]
 BALL, BALL_FACES = icosphere(3)
-#: Five balls, so that something is hidden, and flat and equal faces.
+#: Five spheres, which occlude each other, plus duplicate and degenerate faces.
 FACES = np.concatenate([BALL_FACES + i * len(BALL) for i in range(5)] + [BALL_FACES[:50], [[0, 0, 1], [2, 2, 2]]])
 VERTICES = np.concatenate([BALL + np.array([1.2 * i, 0, 0], np.float32) for i in range(5)])
 RNG = np.random.default_rng(17)
@@ -36,12 +36,12 @@ def query(device: Device, vertices: Floats, tree: tuple[str, str]) -> clrt.RayQu
 
 
 def wave(phase: float) -> Floats:
-    """A small smooth motion."""
+    """Return the vertices after a small smooth motion."""
     return (VERTICES + 0.1 * np.sin(2 * VERTICES[:, [1, 2, 0]] + phase)).astype(np.float32)
 
 
 def assert_same_answers(one: clrt.RayQuery, other: clrt.RayQuery, size: float = 1.0) -> None:
-    """To the last bit, for rays that are scaled along."""
+    """Compare hits bit for bit, for rays scaled by `size`."""
     rays = ORIGINS * np.float32(size), DIRECTIONS * np.float32(size)
     hits = one.closest_hit(*rays)
     assert (hits["primitive"] >= 0).mean() > 0.4
@@ -55,7 +55,7 @@ def read(refitted: clrt.RayQuery) -> Records:
 
 @pytest.mark.parametrize("tree", [*TREES, ("cwbvh", "sah"), ("list", "sah")], ids="-".join)
 def test_hits_after_a_refit_are_those_of_a_new_query(device: Device, tree: tuple[str, str]) -> None:
-    """After a small motion, another one, and after all vertices have changed places."""
+    """Holds after a small motion, another one, and a permutation of all vertices."""
     refitted = query(device, VERTICES, tree)
     for moved in (wave(0.0), wave(2.0), SHUFFLED):
         refitted.refit(moved)
@@ -74,7 +74,7 @@ def test_where_nothing_moves_no_bit_changes(device: Device, tree: tuple[str, str
 
 
 def box(triangles: Floats) -> Floats:
-    """(2, 3) around the boxes of triangles (k, 3, 3)."""
+    """Return the (2, 3) bounds of triangles (k, 3, 3)."""
     low, high = edges(triangles)
     return np.stack([low.min(axis=0), high.max(axis=0)])
 
@@ -115,7 +115,7 @@ def test_binary_boxes_are_those_of_what_is_below(device: Device, builder: str) -
 
 @pytest.mark.parametrize("layout", ["bvh8", "bvh2"])
 def test_any_size_after_any_other(device: Device, layout: str) -> None:
-    """A refit between them, or a new tree where that would leave float32's range."""
+    """Works by a refit, or by a rebuild if a refit would exceed float32's range."""
     refitted = query(device, VERTICES, (layout, "sah"))
     plain = query(device, VERTICES, (layout, "sah"))
     expected = plain.closest_hit(ORIGINS, DIRECTIONS)
@@ -138,7 +138,7 @@ def test_vertices_that_no_face_uses_may_be_anywhere(device: Device) -> None:
 
 @pytest.mark.parametrize("layout", ["bvh8", "bvh2"])
 def test_tiny_meshes(device: Device, layout: str) -> None:
-    """None, and one triangle."""
+    """Meshes with no triangle and with one."""
     for faces, hit in (np.zeros((0, 3), int), -1), ([[0, 1, 2]], 0):
         small = clrt.RayQuery(np.zeros((3, 3)), faces, device=device.info.index, layout=layout)
         small.refit([[-1, -1, 0], [1, -1, 0], [0, 1, 0]])
@@ -159,7 +159,7 @@ def test_other_meshes_are_refused(device: Device, vertices: Any, message: str) -
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_moved_instances_are_where_they_are_put(device: Device, layout: str) -> None:
-    """Near, far apart so that the upper level is another one, all in one place, and in a world of another size."""
+    """Moves keep the buffers: near, far apart (another upper level), all in one place, and at another world size."""
     rng = np.random.default_rng(23)
     mesh = rng.integers(0, 3, 50)
     origins, targets = rng.uniform(-4, 4, (2, 1500, 3)).astype(np.float32)

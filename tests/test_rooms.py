@@ -1,4 +1,4 @@
-"""The rooms of the house: who may import whom, who may know of OpenCL, and how long a file may be."""
+"""Package structure: the allowed imports between packages, those that may use OpenCL, and the file length limit."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ NEVER = {"accel": {"scene"}, "output": {"device", "accel", "queries", "trimesh",
 
 
 def room(module: str) -> str:
-    """The room of a module given by its full name."""
+    """Return the package of a module given by its full name."""
     parts = module.split(".")
     return parts[1] if len(parts) > 1 else parts[0]
 
 
 def name(path: Path) -> str:
-    """clrt.scene.model, of clrt/scene/model.py; a package is named like its folder."""
+    """Return the module name, e.g. clrt.scene.model for clrt/scene/model.py; a package is named like its folder."""
     parts = path.relative_to(HOUSE).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
 def imported(path: Path) -> Iterator[str]:
-    """The full name of each module that a file imports anywhere in it; `from . import x` counts as x."""
+    """Yield the full name of each module that a file imports anywhere; `from . import x` counts as x."""
     package = name(path) if path.name == "__init__.py" else name(path).rpartition(".")[0]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -48,7 +48,7 @@ def imported(path: Path) -> Iterator[str]:
 
 
 def may_import(own: str, module: str) -> bool:
-    """Whether a room's files may import a module of clrt or another."""
+    """Return whether the files of package `own` may import a module of clrt or a third party."""
     package = module.split(".")[0]
     if package == "clrt":
         return ROOMS.index(room(module)) <= ROOMS.index(own) and room(module) not in NEVER.get(own, set())
@@ -75,7 +75,7 @@ def test_files_are_short() -> None:
 
 
 def test_scenes_load_without_opencl(tmp_path: Path) -> None:
-    """Files of both kinds are read and validated, and pictures written, where pyopencl cannot be imported."""
+    """Both kinds of scene file are read and validated, and images written, if pyopencl cannot be imported."""
     (tmp_path / "scene.toml").write_text('[materials.red]\ntype = "diffuse"\ncolor = [1, 0, 0]\n'
                                          '[[mesh]]\nfile = "model.obj"\nmaterial = "red"\n'
                                          '[[sphere]]\nmaterial = "red"\n')

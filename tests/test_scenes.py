@@ -1,4 +1,4 @@
-"""The scenes that ship, and the manual of their format."""
+"""The scenes in scenes/, and the manual of their format."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[1]
 SCENES = sorted((ROOT / "scenes").glob("*.toml"))
-#: Those that are rendered by default: the first of the README, and two whose programs other tests need as well.
+#: Scenes rendered by default: the README's first, and two whose programs other tests need as well.
 RENDERED = ("spheres", "cornell", "furnace")
 MANUAL = (ROOT / "docs" / "scene-format.md").read_text(encoding="utf-8")
 #: relMSE of cornell_reference.exr itself: 5.76e-5 at 512x512, a quarter of it for the mean of four pixels.
 REFERENCE_RELMSE = 1.44e-5
 Doubles = NDArray[np.float64]
-#: Keys that are not read as fields.
+#: Keys that are not read as dataclass fields.
 ELSEWHERE = {"[environment]": {"sky"}}
-#: Fields that are no keys.
+#: Fields that are not keys.
 NO_KEYS = {"[animation]": {"keyframes"}}
 
 
 def render(scene: Scene, device: Device, **options: Any) -> tuple[Doubles, Doubles, int]:
-    """The picture, the variance of its pixels' means, both (h, w, 3), and how many samples were dropped."""
+    """Return the image, the variance of its pixel means, both (h, w, 3), and the number of dropped samples."""
     from clrt.rendering.renderer import Renderer
 
     spp = options.pop("spp")
@@ -62,7 +62,7 @@ def test_every_scene_renders(name: str, device: Device) -> None:
     mean, variance, dropped = render(scene, device, size=(64, 64 * height // width), spp=4)
     assert np.isfinite(mean).all() and (mean >= 0).all() and dropped == 0
     assert (mean.mean(axis=(0, 1)) > 0.01).all()
-    assert mean.std() > 0.01 and variance.any()  # something is in view, and light reaches it on random ways
+    assert mean.std() > 0.01 and variance.any()  # something is visible, and light reaches it along random paths
 
 
 def test_readme_names_every_file_and_the_folder_is_small() -> None:
@@ -74,12 +74,12 @@ def test_readme_names_every_file_and_the_folder_is_small() -> None:
 
 
 def test_cornell_box_is_as_far_from_its_reference_as_its_noise(device: Device) -> None:
-    """Against another renderer's picture: the mean of each channel, the mean of 16x16 blocks, and the squared error,
-    whose expectation over pixels is our variance and the reference's. All by z-tests on our sample variance."""
+    """Compare with another renderer's image by z-tests on our sample variance: the mean of each channel, the means of
+    16x16 blocks, and the squared error, whose expectation over pixels is our variance plus the reference's."""
     spp = 64
     reference = read_picture(ROOT / "scenes" / "cornell_reference.exr").astype(np.float64)
     mean, variance, _ = render(load(ROOT / "scenes" / "cornell.toml"), device, spp=spp)
-    # The reference has 4096 stratified samples a pixel; its variance is at most this part of ours.
+    # The reference has 4096 stratified samples per pixel; its variance is at most spp / 4096 of ours.
     difference, total = mean - reference, variance * (1 + spp / 4096)
     channels = mean_test(difference.mean(axis=(0, 1)), total.mean(axis=(0, 1)), 256 * 256, 0.0)
     assert channels.min() > sidak(1e-4, 3), mean.mean(axis=(0, 1)) / reference.mean(axis=(0, 1))
@@ -90,17 +90,17 @@ def test_cornell_box_is_as_far_from_its_reference_as_its_noise(device: Device) -
 
 
 def _blocks(picture: Doubles) -> Doubles:
-    """Means of 16x16 pixels of a (256, 256, 3) picture."""
+    """Return the means of 16x16 pixels of a (256, 256, 3) image."""
     return np.asarray(picture.reshape(16, 16, 16, 16, 3).mean(axis=(1, 3)))
 
 
 def test_furnace(device: Device) -> None:
-    """Each sphere is seen from afar: a place at the part r of its radius has the cosine sqrt(1 − r²) and shows the
-    albedo for it. Diffuse and mirror spheres show 1 up to rounding: no light is sampled, every sample's weight is 1.
+    """Each sphere is seen from afar: a point at the fraction r of its radius has the cosine sqrt(1 − r²) and shows the
+    albedo for it. Diffuse and mirror spheres show 1 up to rounding: no light is sampled, and every sample weighs 1.
 
-    Only the metals, farther back, have a loss. The diffuse sphere shows the side from where none of them is seen; for
-    r < 0.95 the mirror reflects nothing closer than 35° to the way back there. For the metals themselves, all other
-    spheres fill less than 2·sum (1.25/100k)² < 6e-4 of what any point sees.
+    Only the metals, farther back, absorb. The diffuse sphere shows the side from which none of them is visible; for
+    r < 0.95 the mirror reflects no direction closer than 35° to the direction back there. For the metals themselves,
+    all other spheres fill less than 2·sum (1.25/100k)² < 6e-4 of what any point sees.
     """
     scene = load(ROOT / "scenes" / "furnace.toml")
     mean, variance, _ = render(scene, device, size=(96, 64), spp=64)
@@ -123,8 +123,8 @@ def test_furnace(device: Device) -> None:
 
 
 def _radii(sphere: Sphere, camera: Camera) -> Doubles:
-    """How far each of 4x4 places in each pixel is from the sphere's middle, in radii: (64, 4, 96, 4), for a camera far
-    away that looks along −Z."""
+    """Return the distances of 4x4 points in each pixel from the sphere's center, in radii: (64, 4, 96, 4), for a
+    distant camera that looks along −Z."""
     y, x = (np.mgrid[:256, :384] + 0.5) / 256 - np.array([0.5, 0.75])[:, None, None]
     height = 2 * (camera.position[2] - sphere.center[2]) * np.tan(np.radians(camera.fov_degrees) / 2)
     distances = np.hypot(x * height - sphere.center[0], -y * height - sphere.center[1])
@@ -180,7 +180,7 @@ def test_the_manual_has_the_presets_and_the_words_to_come() -> None:
 
 
 def _rows(heading: str, first: str = "key") -> dict[str, tuple[str, str]]:
-    """{key: (second, third column)} of the table below a heading whose first column is headed `first`."""
+    """Return {key: (second, third column)} of the table below a heading whose first column is titled `first`."""
     section = re.split(rf"^##+ `{re.escape(heading)}`$", MANUAL, flags=re.MULTILINE)[1].split("\n#")[0]
     table = section.split(f"| {first} |")[1].split("\n\n")[0].splitlines()[2:]
     cells = [[cell.strip() for cell in line.strip("| ").split(" | ")] for line in table]

@@ -1,4 +1,4 @@
-"""The statistical tests themselves: right p-values under the hypothesis, and power against others."""
+"""The statistical tests have correct p-values under the null hypothesis, and power against alternatives."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_chi2_is_pearsons() -> None:
     ([3, 0, 9, 30, 58], [1, 2, 10, 27, 60], [12, 30, 58], [13, 27, 60]),
     # 2 + 4 is enough by itself, and order does not matter.
     ([60, 3, 30, 7], [64, 4, 30, 2], [10, 30, 60], [6, 30, 64]),
-    # Cells that cannot be met are no evidence.
+    # Cells with expectation and count 0 are no evidence.
     ([40, 0, 60], [50, 0, 50], [40, 60], [50, 50]),
 ])
 def test_chi2_pools_rare_cells(observed: list[int], expected: list[int], pooled_observed: list[int],
@@ -52,7 +52,7 @@ def test_chi2_rejects_another_distribution() -> None:
 
 @pytest.mark.parametrize("cells", [2, 3, 20, 1000, 20000])
 def test_chi2_p_values_over_their_whole_range(cells: int) -> None:
-    """From nearly 1 to 1e-280, with few degrees of freedom and many."""
+    """Covers p-values from nearly 1 to 1e-280, with few and many degrees of freedom; scipy is the reference."""
     expected = np.full(cells, 1000.0)
     for spread in (0.2, 0.7, 0.95, 1.0, 1.05, 1.3, 3.0):
         observed = expected + np.where(np.arange(cells) % 2, 1, -1) * np.sqrt(1000 * spread * (cells - 1) / cells)

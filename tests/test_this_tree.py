@@ -1,4 +1,4 @@
-"""The tests refuse to test another tree."""
+"""pytest refuses to run if the installed clrt comes from another tree."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Threads that wait for each other: what they return and raise, and that an exception at any line lets others go on."""
+"""Waits between threads: results, exceptions, and that an exception at any line does not block other threads."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from .interrupted import Interrupted, run
 
 pytestmark = pytest.mark.processes
 
-#: Seconds that anything has time for which would else last for ever.
+#: Timeout in seconds of anything that would otherwise never end.
 LONG = 60.0
 
 
 def everywhere(prepare: Callable[[], tuple[Callable[[], object], Callable[[], None]]]) -> None:
-    """Interrupts a call at each of its lines, each time one that is prepared anew, and checks what it left."""
+    """Interrupt a newly prepared call at each of its lines in turn, and check the state it left."""
     last = 1
     while True:
         call, check = prepare()
@@ -37,7 +37,7 @@ def everywhere(prepare: Callable[[], tuple[Callable[[], object], Callable[[], No
 
 
 def test_an_event_interrupted_at_any_line_of_set_wakes_others() -> None:
-    """If it was set: whoever waits, and whoever comes later."""
+    """Both current and later waiters return once the event is set again."""
     def prepare() -> tuple[Callable[[], object], Callable[[], None]]:
         event = Event()
         waits = [beside(lambda: event.wait(LONG)) for _ in range(3)]
@@ -68,7 +68,7 @@ def test_a_wait_interrupted_at_any_line_leaves_the_others() -> None:
 
 
 def test_a_lost_wake_up_costs_a_beat() -> None:
-    """Where the notification never comes, those who wait find out themselves."""
+    """Without a notification, waiters notice the change themselves."""
     happened, changed = list[int](), Condition()
     wait = beside(lambda: changed.wait_for(lambda: bool(happened), LONG))
     time.sleep(BEAT)
@@ -92,7 +92,7 @@ def test_a_wait_ends_after_its_time() -> None:
 
 
 def test_an_exception_sent_to_a_thread_ends_its_wait() -> None:
-    """As PyThreadState_SetAsyncExc sends it; others that wait for the same go on."""
+    """Sent by PyThreadState_SetAsyncExc; other waiters continue to wait."""
     event, ident = Event(), list[int]()
 
     def wait() -> bool:
@@ -110,7 +110,7 @@ def test_an_exception_sent_to_a_thread_ends_its_wait() -> None:
 
 
 def test_beside_interrupted_at_any_line_ends() -> None:
-    """Its work is done once or never, and its result can be asked for again."""
+    """The work is done at most once, and its result can be requested again."""
     def prepare() -> tuple[Callable[[], object], Callable[[], None]]:
         done, results = list[int](), list[Callable[[], None]]()
 
@@ -142,7 +142,7 @@ def test_results_come_in_order(count: int) -> None:
 
 
 def test_every_item_is_worked_on_once_by_several_threads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two items that wait for each other end only where they run at the same time, for which one core is enough."""
+    """Two items that wait for each other finish only if they run concurrently, for which one core is enough."""
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
     events = Event(), Event()
 
@@ -154,7 +154,7 @@ def test_every_item_is_worked_on_once_by_several_threads(monkeypatch: pytest.Mon
 
 
 def test_the_first_exception_is_raised_and_no_other_item_begun() -> None:
-    """Of several that fail at random places the first in order, however threads are scheduled."""
+    """If several items fail at random, the first in order is raised, regardless of thread scheduling."""
     rng = np.random.default_rng(3)
     for _ in range(50):
         bad, begun = set(rng.choice(200, 5, replace=False).tolist()), list[int]()
@@ -226,7 +226,7 @@ while not begun:
 
 
 def test_a_process_that_is_taken_apart_waits_for_no_thread() -> None:
-    """None runs any more then: its result is an error."""
+    """No thread can start during interpreter shutdown, so the result is a RuntimeError."""
     program = """
 from clrt.threads import beside
 class Last:

@@ -1,4 +1,4 @@
-"""trimesh's meshes with clrt's rays, against trimesh's own engine in float64 and closed forms."""
+"""trimesh meshes with clrt's rays, compared with trimesh's own float64 engine and closed forms."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def rays(n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def reference(mesh: Any) -> Any:
-    """trimesh's engine in float64."""
+    """Return trimesh's float64 engine."""
     return trimesh.ray.ray_triangle.RayMeshIntersector(mesh)
 
 
@@ -29,7 +29,7 @@ def reference(mesh: Any) -> Any:
                                   trimesh.creation.box(), trimesh.creation.cylinder(1, 2)],
                          ids=["sphere", "icosphere", "box", "cylinder"])
 def test_a_corner_is_one_location(device: Device, mesh: Any) -> None:
-    """trimesh's documented example: two rays, one of which enters and leaves where up to 32 triangles meet."""
+    """trimesh's documented example: two rays, one of which enters and leaves at vertices of up to 32 triangles."""
     mesh.ray = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index)
     two = np.array([[0, 0, -5], [2, 2, -10]]), np.array([[0, 0, 1], [0, 0, 1]])
     locations, index_ray, index_tri = mesh.ray.intersects_location(*two)
@@ -40,7 +40,7 @@ def test_a_corner_is_one_location(device: Device, mesh: Any) -> None:
 
 
 def test_same_answers_as_trimesh(device: Device) -> None:
-    """On a torus inside a box; away from edges, which its engine takes or leaves as rounding falls."""
+    """A torus inside a box, away from edges, where rounding decides whether trimesh's engine hits."""
     mesh = trimesh.util.concatenate([trimesh.creation.torus(0.7, 0.25), trimesh.creation.box((2.5, 2.5, 2.5))])
     own = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index)
     theirs = reference(mesh)
@@ -58,7 +58,7 @@ def test_same_answers_as_trimesh(device: Device) -> None:
 
 
 def test_locations_lie_on_ray_and_plane(device: Device) -> None:
-    """In float64, though the hits are found in float32."""
+    """Locations are accurate to float64, although hits are found in float32."""
     mesh = trimesh.creation.icosphere(subdivisions=4)
     origins, directions = rays(5000)
     locations, index_ray, index_tri = clrt.trimesh.RayMeshIntersector(
@@ -71,7 +71,7 @@ def test_locations_lie_on_ray_and_plane(device: Device) -> None:
 
 
 def test_rays_along_a_plane_are_located_on_the_triangle(device: Device) -> None:
-    """In float64 such rays pass the plane anywhere or nowhere; most of those that float32 lets hit do so inside."""
+    """In float64 such rays intersect the plane anywhere or nowhere; most float32 hits lie inside the triangle."""
     mesh = trimesh.creation.icosphere()
     corners = mesh.triangles[RNG.integers(0, len(mesh.faces), 5000)]
     one, other = (np.einsum("nk,nkj->nj", weights, corners) for weights in RNG.dirichlet([1, 1, 1], (2, 5000)))
@@ -93,7 +93,7 @@ def test_contains_points(device: Device) -> None:
 
 
 def test_a_hundred_shells_hide_none(device: Device) -> None:
-    """The middle of 121 spheres is inside of an odd number, and a ray through them meets each twice."""
+    """The center lies inside all 121 spheres, an odd number; a ray through them hits each twice."""
     shells = [trimesh.creation.icosphere(subdivisions=1, radius=radius) for radius in np.linspace(0.1, 1, 121)]
     ray = clrt.trimesh.RayMeshIntersector(trimesh.util.concatenate(shells), device=device.info.index)
     between = 0.5 * (shells[7].vertices[:1] + shells[8].vertices[:1])
@@ -142,7 +142,7 @@ def test_what_is_no_mesh_is_refused(other: Any) -> None:
 
 
 def test_coincident_surfaces_are_one_place(device: Device) -> None:
-    """A triangle 64 times is one, as for trimesh's engines; a rounding further is another."""
+    """64 coincident triangles count once, as in trimesh's engines; one at a distance of float32 epsilon is separate."""
     corners = np.array([[-1, -1, 0], [3, -1, 0], [-1, 3, 0]], np.float32)
     further = corners + np.array([0, 0, np.finfo(np.float32).eps], np.float32)
     mesh = trimesh.Trimesh(np.concatenate([corners, further]), [[0, 1, 2]] * 64 + [[3, 4, 5]], process=False)
@@ -153,7 +153,7 @@ def test_coincident_surfaces_are_one_place(device: Device) -> None:
 
 
 def test_a_doubled_surface_contains_what_it_did(device: Device) -> None:
-    """Each face of a ball twice: a ray passes one surface, as for trimesh's engines."""
+    """With each face of a sphere doubled, a ray crosses one surface, as in trimesh's engines."""
     ball = trimesh.creation.icosphere()
     double = trimesh.Trimesh(ball.vertices, np.concatenate([ball.faces, ball.faces]), process=False)
     points = RNG.uniform(-1.2, 1.2, (500, 3))
@@ -164,14 +164,14 @@ def test_a_doubled_surface_contains_what_it_did(device: Device) -> None:
 
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e7])
 def test_edges_and_corners_are_one_place(device: Device, scale: float) -> None:
-    """A ray from outside through the inside of a convex mesh enters once and leaves once, wherever it does."""
+    """A ray through a convex mesh enters once and leaves once, also at its edges and corners."""
     for mesh in (trimesh.creation.box(), trimesh.creation.icosphere(subdivisions=2), trimesh.creation.cylinder(1, 2)):
         mesh.apply_transform(trimesh.transformations.random_rotation_matrix(RNG.random(3)))
         mesh.apply_scale(scale)
         mesh.apply_translation(scale * RNG.normal(size=3))
         ends, along = mesh.vertices[mesh.edges_unique], RNG.random((len(mesh.edges_unique), 1))
         met = np.concatenate([mesh.vertices, ends[:, 0] + along * (ends[:, 1] - ends[:, 0]), ends.mean(axis=1)])
-        # Through the middle: half of the others are below the mesh's horizon.
+        # Through the center: half of the other directions would not enter the mesh.
         directions = mesh.center_mass - met
         origins = met - directions * RNG.uniform(0.5, 20, (len(met), 1))
         ray = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index)
@@ -184,7 +184,7 @@ def test_edges_and_corners_are_one_place(device: Device, scale: float) -> None:
 
 @pytest.mark.parametrize("middle", [0.0, 3e5])
 def test_a_surface_that_a_ray_leaves_counts(device: Device, middle: float) -> None:
-    """As for trimesh's engine in float64; a ten-thousandth of the mesh further it does not."""
+    """A ray that starts on a surface hits it, as in trimesh's float64 engine; 1e-4 farther out it does not."""
     mesh = trimesh.creation.icosphere()
     mesh.apply_translation((middle, -middle, middle))
     points, face = trimesh.sample.sample_surface(mesh, 500, seed=1)
@@ -199,7 +199,7 @@ def test_a_surface_that_a_ray_leaves_counts(device: Device, middle: float) -> No
 
 
 def test_what_is_made_when_asked_for(device: Device) -> None:
-    """A primitive has no faces before that; nor has an intersector a tree."""
+    """A primitive's faces and an intersector's BVH are created on first use."""
     box: Any = trimesh.primitives.Box(extents=(2, 2, 2))
     box.ray = clrt.trimesh.RayMeshIntersector(box, False, device=device.info.index)
     box.primitive.extents = (4, 4, 4)
@@ -207,7 +207,7 @@ def test_what_is_made_when_asked_for(device: Device) -> None:
 
 
 def test_arguments_by_place_are_trimeshs(device: Device) -> None:
-    """multiple_hits, max_hits, return_locations, as its default engine has them."""
+    """The order multiple_hits, max_hits, return_locations is that of trimesh's default engine."""
     mesh = trimesh.creation.box()
     ray, through = clrt.trimesh.RayMeshIntersector(mesh, device=device.info.index), ([[0.1, 0.2, -9]], [[0, 0, 1]])
     ours, theirs = (each.intersects_id(*through, True, 1, True) for each in (ray, mesh.ray))

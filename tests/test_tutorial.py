@@ -1,4 +1,4 @@
-"""docs/tutorial.md: each step runs, in order, and writes the files that it names."""
+"""Each step of docs/tutorial.md runs, in order, and writes the files that it names."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WRITTEN = ("spot.png", "converted.toml", "studio.png", "report.json", "error.png
 
 
 def test_every_step_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Commands, the scene file and the Python program as they are printed; behind a print stands its output."""
+    """Runs the commands, scene file and Python program as printed; the comment after a print is its output."""
     monkeypatch.chdir(tmp_path)
     shutil.copy(HOUSE / "scenes" / "models" / "spot.obj", tmp_path)
     text = (HOUSE / "docs" / "tutorial.md").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Whether what the tests import as `clrt` has the files of the tree that they are in."""
+"""Checks that the imported `clrt` has the same files as the tree that contains the tests."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 
 HOUSE = Path(__file__).parents[1]
-#: The folders of each package in the tree, and the endings of what it is made of.
+#: Folder in the tree of each package, and the suffixes of source files.
 PACKAGES = {"clrt": HOUSE / "clrt", "clrt.kernels": HOUSE / "kernels"}
 ENDINGS = (".py", ".cl", ".c")
 
 
 def other_file() -> str | None:
-    """The first file, named within its package, that the imported packages have otherwise than this tree, if any."""
+    """Return the first file, named within its package, that differs between imported packages and tree, or None."""
     for package, folder in PACKAGES.items():
         try:
             imported = files(package)
@@ -25,9 +25,9 @@ def other_file() -> str | None:
 
 
 def differing(one: Traversable, other: Traversable, leave: str = "/") -> str | None:
-    """The first source file below two folders that is in one alone or has another content there.
+    """Return the first source file that only one of two folders has or whose content differs, or None.
 
-    leave: how the names begin of those that do not count; installed, the kernels lie within the package.
+    leave: prefix of names to ignore; once installed, the kernels lie within the package.
     """
     names = sorted(name for name in _sources(one) | _sources(other) if not name.startswith(leave))
     return next((name for name in names if _content(one, name) != _content(other, name)), None)

@@ -1,4 +1,4 @@
-"""Has trimesh's own tests use clrt's rays, in the place of both of its engines. In the folder tests of its source:
+"""Makes trimesh's own tests use clrt in place of both of its engines. In the folder tests of its source:
 
     PYTHONPATH=CLRT/tests python -m pytest -p trimesh_engine test_ray.py test_ray_upstream.py
 """

@@ -1,5 +1,5 @@
-"""How a live session feels: pictures a second while one walks, how long an edit takes to be seen, and how long the
-thread of a window would have to wait for Python while the other one works.
+"""Measures the responsiveness of a live session: frames per second while the camera moves, latency of edits, and how
+long a window's thread would wait for the Python interpreter while the renderer works.
 
     python tests/walk_live.py SCENE --size 1280x720 --seconds 10
 """
@@ -20,7 +20,7 @@ from clrt.scene.editing import materials_of, with_material
 from clrt.scene.materials.material_types import Diffuse
 from clrt.scene.model import Scene
 
-#: Between two of the walker's steps, and two looks of the waiting thread.
+#: Seconds between two camera steps, and between two wake-ups of the waiting thread.
 STEP, LOOK = 1 / 60, 0.002
 
 
@@ -57,7 +57,7 @@ def main() -> None:
 
 
 def tick(waits: list[float], done: threading.Event) -> None:
-    """Notes by how much it is woken too late."""
+    """Record by how many seconds each wake-up is late."""
     last = time.perf_counter()
     while not done.is_set():
         time.sleep(LOOK)
@@ -67,7 +67,7 @@ def tick(waits: list[float], done: threading.Event) -> None:
 
 
 def walk(live: Live, seconds: float) -> list[Snapshot]:
-    """Steps to the side and back; the pictures that were there to be shown between two of them."""
+    """Move the camera sideways and back; return the images that were available between steps."""
     pictures: dict[int, Snapshot] = {}
     scene, first, start = live.scene, live.snapshot().number, time.perf_counter()
     while (now := time.perf_counter() - start) < seconds:
@@ -80,7 +80,7 @@ def walk(live: Live, seconds: float) -> list[Snapshot]:
 
 
 def stepped(scene: Scene, part: float) -> Scene:
-    """The camera moved by a part of its distance to what it looks at."""
+    """Return the scene with its camera moved sideways by a fraction of the distance to its target."""
     camera = scene.camera
     side = np.cross(np.subtract(camera.look_at, camera.position), camera.up) * part
     x, y, z = (np.array(camera.position) + side).tolist()
@@ -88,7 +88,7 @@ def stepped(scene: Scene, part: float) -> Scene:
 
 
 def latencies(live: Live) -> str:
-    """Of some edits of a material: another colour each."""
+    """Return the latencies of some edits of a material, each with another color."""
     took = []
     name, material = next(iter(materials_of(live.scene).items()))
     for i in range(10):

@@ -1,4 +1,4 @@
-"""Triangle soups, kind and nasty, as (m, 3, 3) float32 corners."""
+"""Triangle soups, regular and adversarial, as (m, 3, 3) float32 corners."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from clrt.scene.geometry.scaling import unit_for
 
 
 def soup(count: int, size: float = 0.1, seed: int = 0) -> FloatArray:
-    """Random triangles of about `size` in the unit cube."""
+    """Return random triangles of about `size` in the unit cube."""
     rng = np.random.default_rng(seed)
     corners: FloatArray = (rng.random((count, 1, 3)) + size * (rng.random((count, 3, 3)) - 0.5)).astype(np.float32)
     return corners
 
 
 def edges(triangles: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Low and high corners (m, 3) of the triangles' boxes in a tree: 2^-21 of their longest side larger."""
+    """Return the low and high corners (m, 3) of triangle boxes in a BVH, padded by 2^-21 of their longest side."""
     low, high = triangles.min(axis=1).astype(np.float64), triangles.max(axis=1).astype(np.float64)
     pad = (high - low).max(axis=1, keepdims=True, initial=0).astype(np.float32).astype(np.float64) / 2**21
     return (low - pad).astype(np.float32), (high + pad).astype(np.float32)
 
 
 def spheres(count: int, seed: int = 0) -> FloatArray:
-    """Random spheres, (s, 4) centre and radius, in the unit cube."""
+    """Return random spheres, (s, 4) center and radius, in the unit cube."""
     rng = np.random.default_rng(seed)
     return np.hstack([rng.random((count, 3)), rng.uniform(0.01, 0.1, (count, 1))]).astype(np.float32)
 
 
 def grid(side: int) -> FloatArray:
-    """2·side² triangles that fill the unit square of the plane y = 0."""
+    """Return 2·side² triangles that fill the unit square of the plane y = 0."""
     z, x = np.divmod(np.arange(side * side), side)
     corner = np.stack([x, 0 * x, z], axis=-1)[:, None]
     lower, upper = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1]]), np.array([[0, 0, 0], [1, 0, 1], [0, 0, 1]])
@@ -38,26 +38,26 @@ def grid(side: int) -> FloatArray:
 
 
 def _concentric(count: int) -> FloatArray:
-    """Triangles of all sizes whose boxes have one centre."""
+    """Return triangles of all sizes whose boxes are concentric."""
     size = np.arange(1, count + 1, dtype=np.float32)[:, None, None]
     return size * np.array([[-1, -1, -1], [1, 1, 1], [-1, 1, 0]], np.float32)
 
 
 def _exponential(ratio: float, count: int) -> FloatArray:
-    """Each triangle `ratio` times as far from the origin, and as large, as the one before."""
+    """Return triangles, each `ratio` times as far from the origin and as large as the previous one."""
     size = (ratio ** np.arange(-count / 2, count / 2)).astype(np.float32)[:, None, None]
     return size * np.array([[1, 1, 1], [1.2, 1, 1], [1, 1.2, 1]], np.float32)
 
 
 def _line(count: int) -> FloatArray:
-    """Triangles without area, one point each, along x."""
+    """Return triangles without area, one point each, along x."""
     corners = np.zeros((count, 3, 3), np.float32)
     corners[..., 0] = np.linspace(0, 1, count)[:, None]
     return corners
 
 
 def box(low: ArrayLike, high: ArrayLike) -> FloatArray:
-    """The six sides of a box, two triangles each."""
+    """Return the six sides of a box, two triangles each."""
     sides = []
     for axis in range(3):
         for side in (0, 1):
@@ -87,12 +87,12 @@ NASTY: dict[str, FloatArray] = {
 
 
 def scaled(triangles: FloatArray) -> FloatArray:
-    """As scenes are packed: brought near 1 by a power of two."""
+    """Scale by a power of two to about 1, as scenes are packed."""
     return (triangles * np.float64(unit_for(float(np.abs(triangles).max())))).astype(np.float32)
 
 
 NO_SPHERES = spheres(0)
-#: Triangles and spheres, at least two in all, as a device's builder gets them.
+#: Triangles and spheres, at least two in all, as input of a device's builder.
 SCENES: dict[str, tuple[FloatArray, FloatArray]] = {
     name: (scaled(triangles), NO_SPHERES) for name, triangles in NASTY.items() if len(triangles) > 1}
 SCENES |= {

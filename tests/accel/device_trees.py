@@ -1,4 +1,4 @@
-"""Trees that were built on a device, brought to the host."""
+"""BVHs built on a device and read back to the host."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from .test_cwbvh import boxes_below, children_of, leaves_of
 
 
 def like_gpu(device: Device) -> Device:
-    """The same device, worked with as with a GPU: many work-items, in groups."""
+    """Return the device with the execution settings of a GPU: many work-items, in groups."""
     return replace(device, info=replace(device.info, type="gpu"))
 
 
 @lru_cache(maxsize=None)
 def built(device: Device, layout: str, case: str) -> Layout:
-    """The tree over a scene, with its buffers on the host."""
+    """Return the BVH of a scene, with its buffers on the host."""
     tree = build_tree(device, layout, "ploc", *SCENES[case])
     return replace(tree, buffers={name: on_host(device, array) for name, array in tree.buffers.items()})
 
 
 def wide_tree(device: Device, layout: str, case: str) -> Wide:
-    """Of the layouts bvh8, where a leaf's first lane counts, and cwbvh, where primitives do as the records number them.
+    """Return a BVH8 with leaves numbered by their first lane, or a CWBVH with primitives numbered as in the records.
 
-    Boxes of cwbvh are those of what is below each slot.
+    The boxes of a CWBVH are recomputed from what is below each slot.
     """
     tree, triangle_count = built(device, layout, case), len(SCENES[case][0])
     nodes, order = tree.buffers["nodes"], np.empty(0, np.int32)
@@ -62,7 +62,7 @@ def wide_tree(device: Device, layout: str, case: str) -> Wide:
 
 
 def binary_tree(device: Device, case: str) -> Tree:
-    """Of the layout bvh2; leaves of spheres are as those of triangles, and come after them in `order`."""
+    """Return the BVH2; sphere leaves are stored like triangle leaves, and follow them in `order`."""
     buffers, triangle_count = built(device, "bvh2", case).buffers, len(SCENES[case][0])
     nodes = np.delete(buffers["nodes"], 1)
     shift = np.where(nodes["count"] == 0, -1, np.where(nodes["count"] < 0, triangle_count, 0))
@@ -74,7 +74,7 @@ def binary_tree(device: Device, case: str) -> Tree:
 
 @dataclass(frozen=True)
 class Binary:
-    """A binary tree on the host. Of primitives, (count,): whether they are spheres, and their boxes."""
+    """Binary BVH on the host. Per primitive, (count,): whether it is a sphere, and its box."""
 
     nodes: NDArray[np.void]
     rounds: list[int]
@@ -84,13 +84,13 @@ class Binary:
 
     @property
     def below(self) -> NDArray[np.int64]:
-        """(nodes, 2), children: primitives count from 0, nodes on from there."""
+        """Children, (nodes, 2): primitives are numbered from 0, nodes continue from there."""
         children = np.stack([self.nodes["left"], self.nodes["right"]], axis=1).astype(np.int64)
         return np.where(children < 0, ~children, len(self.sphere) + children)
 
     @property
     def total_area(self) -> float:
-        """Half the area of all nodes."""
+        """Half of the surface area of all nodes."""
         return float(half_area(self.nodes["lo"], self.nodes["hi"]).sum())
 
     @property
@@ -102,7 +102,7 @@ class Binary:
         return int(depth.max())
 
     def check(self) -> None:
-        """Every child has one parent, of a later round, and boxes are tight."""
+        """Assert that every child has one parent, created in a later round, and that boxes are tight."""
         count, below = len(self.sphere), self.below
         np.testing.assert_array_equal(np.sort(below, axis=None), np.arange(2 * count - 2))
         made = np.concatenate([np.full(count, -1), np.repeat(np.arange(len(self.rounds)), self.rounds)])
@@ -113,7 +113,7 @@ class Binary:
 
 
 def binary(device: Device, layout: str, case: str, passes: int = 0) -> Binary:
-    """The binary tree over a scene for a layout, after some passes of reinsertion."""
+    """Return the binary BVH of a scene for a layout, after some passes of reinsertion."""
     triangles, balls = SCENES[case]
     work = Blocks(device, program_source(SHAPES[layout], len(triangles) > 0, len(balls) > 0, passes > 0))
     primitives = sort_primitives(work, triangles, balls)

@@ -1,4 +1,4 @@
-"""Every builder makes a sound tree of any boxes, of bounded depth; `sah` takes the cheapest cut of all."""
+"""Every builder makes a valid BVH of bounded depth from any boxes; `sah` finds the cheapest splits."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CONFIGURATIONS = [("sah", 4, 1), ("sah", 8, 8), ("sah", 1, 1), ("midpoint", 2, 1
 
 
 def check(tree: Tree, low: FloatArray, high: FloatArray, leaf_size: int, free_depth: int = 40) -> None:
-    """The tree is sound over boxes (p, 3), and not too deep."""
+    """Assert that the BVH over boxes (p, 3) is valid and not too deep."""
     count, nodes = len(low), len(tree.count)
     assert nodes <= max(2 * count - 1, 1)
     if not count:
@@ -80,7 +80,7 @@ def test_midpoint_keeps_apart_what_the_middle_of_the_longest_axis_parts() -> Non
 
 @pytest.mark.parametrize("gap, nodes", [(0, 1), (1, 3)])
 def test_a_node_is_cut_where_that_pays(gap: float, nodes: int) -> None:
-    """Two unit cubes, half areas 3 each and 5 + 2·gap together: a leaf costs twice that, a cut once that and 6."""
+    """Two unit cubes, half areas 3 each and 5 + 2·gap together: a leaf costs twice that, a split once that plus 6."""
     x = np.zeros((2, 3), np.float32)
     x[1, 0] = 1 + gap
     assert len(sah(x, x + 1, 2).count) == nodes
@@ -98,7 +98,7 @@ def test_cost_of_a_tree_by_hand() -> None:
 
 
 def sweep_cost(low: NDArray[np.float64], high: NDArray[np.float64], leaf_size: int, pack: int) -> float:
-    """SAH cost, times the half area, of the tree that tries every cut of the sorted centroids on every axis."""
+    """Return SAH cost times half area of the BVH that tries every split of the sorted centroids on every axis."""
     def area(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
         x, y, z = high.max(axis=0) - low.min(axis=0)
         return float(x * y + y * z + z * x)
@@ -138,7 +138,7 @@ def test_joined_trees_keep_their_leaves(triangle_count: int, sphere_count: int) 
     low, high = triangles.min(axis=1), triangles.max(axis=1)
     ball_low, ball_high = balls[:, :3] - balls[:, 3:], balls[:, :3] + balls[:, 3:]
     tree = join(sah(low, high, 4), midpoint(ball_low, ball_high))
-    # Renumber the spheres after the triangles: the joined tree is then a sound tree over both.
+    # With the spheres renumbered after the triangles, the joined BVH is a valid BVH over both.
     both = Tree(tree.aabb_min, tree.aabb_max,
                 np.where(tree.spheres, tree.left_first + triangle_count, tree.left_first).astype(np.int32), tree.count,
                 tree.spheres, np.concatenate([tree.order, tree.sphere_order + triangle_count]).astype(np.int32),

@@ -1,4 +1,4 @@
-"""Compressed nodes: boxes enclose as the device decodes them, every child once, slots in order of octants, stacks."""
+"""Compressed nodes (CWBVH): conservative decoded boxes, each child stored once, octant order of slots, stack bounds."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ CASES = {name: (corners, spheres(0)) for name, corners in NASTY.items() if name 
 
 
 def children_of(node: Any) -> Iterator[tuple[int, int]]:
-    """(slot, node) of the nodes below a record, in the order of the slots."""
+    """Yield (slot, node) of the child nodes of a record, in slot order."""
     slots = [slot for slot in range(8) if node["imask"] >> slot & 1]
     yield from zip(slots, range(int(node["child"]), int(node["child"]) + len(slots)))
 
 
 def leaves_of(node: Any) -> Iterator[tuple[int, int, int]]:
-    """(slot, first primitive, count) of the leaves below a record."""
+    """Yield (slot, first primitive, count) of the leaves of a record."""
     for slot, meta in enumerate(node["meta"].tolist()):
         if meta and not node["imask"] >> slot & 1:
             yield slot, int(node["primitive"]) + (meta & 31), (meta >> 5).bit_count()
 
 
 def boxes_below(layout: Layout) -> tuple[FloatArray, FloatArray]:
-    """(k, 8, 3) the boxes of what is below each slot, from the primitives up; inverted where nothing is."""
+    """Return (k, 8, 3) bounds of what is below each slot, computed bottom-up; inverted for empty slots."""
     low, high = [np.zeros((0, 3), np.float32)], [np.zeros((0, 3), np.float32)]
     if "leaf_triangles" in layout.buffers:
         corners = np.stack([layout.buffers["leaf_triangles"][name] for name in ("p0", "p1", "p2")], axis=1)
@@ -64,9 +64,9 @@ def boxes_below(layout: Layout) -> tuple[FloatArray, FloatArray]:
 
 
 def slab(nodes: Records, origin: FloatArray, direction: np.float32) -> tuple[FloatArray, FloatArray]:
-    """t_near, t_far (k, 3, 8) of one axis at a time, operation by operation what cwbvh.cl does in float32.
+    """Return t_near, t_far (k, 3, 8) per axis, with the same float32 operations as cwbvh.cl.
 
-    origin: (k, 3) the ray's, on each node's axes. Sums of q·step, which is exact, are rounded from float64, as by fma.
+    origin: (k, 3) of the ray, on each node's axes. Sums with q·step (exact) are rounded from float64, as by fma.
     """
     pad, unit = np.float32(6 * 2.0**-24), np.float32(1)
     base = nodes["origin"] - origin
@@ -81,10 +81,10 @@ def slab(nodes: Records, origin: FloatArray, direction: np.float32) -> tuple[Flo
 
 @pytest.mark.parametrize("case", CASES)
 def test_rays_enter_the_boxes_of_what_they_hit(case: str) -> None:
-    """No plane lies on the wrong side of the child's own, in t and in float32, wherever a ray starts.
+    """No decoded plane lies on the wrong side of the child's own plane, in t and in float32, for any ray origin.
 
-    Where rays of float64 precision cross the planes of the children's boxes is what the decoded planes must enclose;
-    beyond the smallest numbers, whose products lose digits. Lengths are in the scene's unit, as they are on devices.
+    The reference is where rays in extended precision cross the planes of the children's boxes; values below 1e-30,
+    whose products lose digits, are excluded. Lengths are in the scene's unit, as on devices.
     """
     triangles, balls = CASES[case]
     unit = np.float64(unit_for(max(np.abs(triangles).max(initial=0), np.abs(balls).max(initial=0))))
@@ -113,7 +113,7 @@ def test_rays_enter_the_boxes_of_what_they_hit(case: str) -> None:
 @given(corners=arrays(np.float32, (2, 8, 3), elements=st.floats(width=32, allow_nan=False, allow_infinity=False)),
        count=st.integers(0, 8), flat=st.booleans())
 def test_quantised_boxes_enclose_and_fit(corners: FloatArray, count: int, flat: bool) -> None:
-    """In exact arithmetic, for any finite boxes: outside the child, within a step of it, and the step not too large."""
+    """In exact arithmetic, for any finite boxes: planes enclose the child within a step, which is not too large."""
     low, high = corners.min(axis=0), corners.max(axis=0)
     if flat:
         low[:, 1] = high[:, 1] = low[0, 1]
@@ -133,7 +133,7 @@ def test_quantised_boxes_enclose_and_fit(corners: FloatArray, count: int, flat: 
 
 
 def check_said_once(layout: Layout, triangle_count: int, sphere_count: int) -> None:
-    """Nodes and primitives, by walking from the root; what the fields say about a slot agrees."""
+    """Assert that each node and primitive is reached once, breadth first, and that the fields of a slot agree."""
     nodes = layout.buffers["nodes"]
     reached, primitives = [0], list[int]()
     for index, node in enumerate(nodes):
@@ -161,7 +161,7 @@ def test_every_child_is_said_once(builder: str, scene: str) -> None:
 @settings(deadline=None)
 @given(offset=arrays(np.float64, (20, 8, 3), elements=st.integers(-9, 9)), used=arrays(np.bool_, (20, 8)))
 def test_no_child_and_slot_prefer_each_other(offset: Doubles, used: NDArray[np.bool_]) -> None:
-    """What taking the best pair first means: any other pair is worth at most what its child or its slot has got."""
+    """Greedy matching by best pair: any other pair is worth at most what its child or its slot has got."""
     slots = octant_slots(offset, used)
     corners = [[1 if slot >> axis & 1 else -1 for axis in range(3)] for slot in range(8)]
     for row, has in zip(slots, used):
@@ -175,7 +175,7 @@ def test_no_child_and_slot_prefer_each_other(offset: Doubles, used: NDArray[np.b
 
 
 def test_a_ray_passes_eight_corners_in_order() -> None:
-    """A child in each corner: whatever the octant, no child comes after one that is behind it on every axis."""
+    """With a child in each corner, for any octant, no child is visited after one that is behind it on every axis."""
     where = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     slots = octant_slots(where[None] * np.array([3.0, 2.0, 1.0]), np.ones((1, 8), bool))[0]
     for direction in where:
@@ -186,7 +186,7 @@ def test_a_ray_passes_eight_corners_in_order() -> None:
 
 
 def fullest(nodes: Records, choose: Callable[[Group], int], enters: Callable[[], bool]) -> int:
-    """The most groups that wait in a traversal that takes `choose` of a group, and enters what `enters` says."""
+    """Return the most groups on the stack of a traversal that visits choose(group) and enters children if enters()."""
     group, waiting, most = [0], list[Group](), 0
     while True:
         node = group.pop(group.index(choose(group)))
@@ -219,7 +219,7 @@ def test_stack_bound_is_what_a_walk_to_some_node_takes(count: int, seed: int, si
 
 @pytest.mark.parametrize("case", ["exponential", "teapot_in_a_stadium", "long_diagonals", "duplicates", "line"])
 def test_no_order_of_visits_passes_the_bound(case: str) -> None:
-    """Whatever is entered, in any order: by slots from either end, and by chance."""
+    """The bound holds for any set of entered nodes in any order: slots from either end, and random ones."""
     corners, rng = NASTY[case], np.random.default_rng(1)
     tree = compress(sah(corners.min(axis=1), corners.max(axis=1), MAX_LEAF))
     orders: list[Callable[[Group], int]] = [min, max, *[lambda group: int(rng.choice(group))] * 8]

@@ -1,4 +1,4 @@
-"""Trees built on every device, layout bvh8: sound, tight, in order, and everywhere the same."""
+"""BVHs built on every device, layout bvh8: valid, tight, ordered, and identical on all devices."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .device_trees import built, like_gpu, wide_tree
 
 
 def records(device: Device, case: str, name: str, dtype: np.dtype[np.void]) -> NDArray[np.void]:
-    """A buffer of the layout bvh8, empty where there is none."""
+    """Return a buffer of the layout bvh8, empty if there is none."""
     return np.asarray(built(device, "bvh8", case).buffers.get(name, np.empty(0, dtype)))
 
 
@@ -81,7 +81,7 @@ def test_boxes_are_tight(device: Device, case: str) -> None:
 
 
 def test_walls_of_a_room_do_not_share_a_leaf(device: Device) -> None:
-    """A leaf of several would be as large as the room, so that every ray would come there."""
+    """A leaf with several walls would be as large as the room, and every ray would enter it."""
     wide = wide_tree(device, "bvh8", "room")
     leaf = wide.child < 0
     size = wide.aabb_max[leaf].astype(np.float64) - wide.aabb_min[leaf]
@@ -90,7 +90,7 @@ def test_walls_of_a_room_do_not_share_a_leaf(device: Device) -> None:
 
 @lru_cache(maxsize=None)
 def first_result(layout: str, case: str) -> list[dict[str, bytes]]:
-    """Of whichever device asks first."""
+    """Hold the result of the device that is tested first."""
     return []
 
 

@@ -1,4 +1,4 @@
-"""The layouts bvh2 and cwbvh, built on every device: sound, and read by numpy as what its packers write."""
+"""The layouts bvh2 and cwbvh built on every device: valid, and in the format of numpy's packers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .test_cwbvh import check_said_once
 
 
 def check_leaf_records(layout: Layout, case: str) -> None:
-    """Every primitive has one record, which holds what the scene does."""
+    """Assert that every primitive has one record, with the scene's data."""
     triangles, balls = SCENES[case]
     if len(triangles):
         records = layout.buffers["leaf_triangles"]
@@ -61,7 +61,7 @@ def test_compressed_nodes(device: Device, case: str) -> None:
 
 @pytest.mark.parametrize("case", SCENES)
 def test_compressed_boxes_enclose_closely(device: Device, case: str) -> None:
-    """Planes are the nearest outside of a child's own, in steps of the smallest power of two that 255 of reach."""
+    """Planes are the nearest outside of the child's own, in steps of the smallest power of two of which 255 reach."""
     layout = built(device, "cwbvh", case)
     nodes, wide = layout.buffers["nodes"], wide_tree(device, "cwbvh", case)
     np.testing.assert_array_equal(nodes["origin"], wide.aabb_min.min(axis=1))
@@ -76,7 +76,7 @@ def test_compressed_boxes_enclose_closely(device: Device, case: str) -> None:
 
 @pytest.mark.parametrize("case", SCENES)
 def test_no_child_and_slot_prefer_each_other(device: Device, case: str) -> None:
-    """As of numpy's slots, in float32."""
+    """Holds as for numpy's slots, but to float32 rounding."""
     wide = wide_tree(device, "cwbvh", case)
     corners = np.array([[1 if slot >> axis & 1 else -1 for axis in range(3)] for slot in range(8)])
     for low, high, child in zip(wide.aabb_min.astype(float), wide.aabb_max.astype(float), wide.child):

@@ -1,4 +1,4 @@
-"""The steps of the builder on every device: sums, sort, curve, clusters, and the plan of the wide tree."""
+"""Steps of the device builder: prefix sums, radix sort, Morton curve, clustering, and wide-BVH plan."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .device_trees import Binary, binary, binary_tree, like_gpu, wide_tree
 
 @pytest.mark.parametrize("case", SCENES)
 def test_clusters_form_a_tree_of_bounded_depth(device: Device, case: str) -> None:
-    """A round that joins fewer than one in SLOW is followed by one that joins half."""
+    """A round that merges fewer than one in SLOW is followed by one that merges half."""
     tree = binary(device, "bvh8", case)
     tree.check()
     most = max(2 * math.log2(len(tree.sphere)), math.log(len(tree.sphere)) / -math.log(1 - 1 / SLOW))
@@ -36,7 +36,7 @@ def test_clusters_form_a_tree_of_bounded_depth(device: Device, case: str) -> Non
 @pytest.mark.parametrize("gpu", [False, True], ids=["alone", "together"])
 def test_the_last_rounds_are_those_of_many(device: Device, case: str, gpu: bool,
                                            monkeypatch: pytest.MonkeyPatch) -> None:
-    """One work-group, of one item or of many, makes the nodes that launches for each round make."""
+    """One work-group, of one item or many, makes the same nodes as one launch per round."""
     device = like_gpu(device) if gpu else device
     few = binary(device, "bvh8", case)
     monkeypatch.setattr(ploc, "FEW", 2)
@@ -46,14 +46,14 @@ def test_the_last_rounds_are_those_of_many(device: Device, case: str, gpu: bool,
 
 
 def chance(low: NDArray[Any], high: NDArray[Any], scene_low: NDArray[Any], scene_high: NDArray[Any]) -> NDArray[Any]:
-    """That a ray which starts inside the scene meets each box: it starts there, or comes that way along its line."""
+    """Return the probability that a ray that starts inside the scene hits each box: starts in it, or reaches it."""
     size = scene_high.astype(np.float64) - scene_low
     volume = np.prod(np.where(size > 0, (high.astype(np.float64) - low) / np.where(size > 0, size, 1), 1), axis=-1)
     return np.asarray(volume + (1 - volume) * half_area(low, high) / half_area(scene_low, scene_high) / 2)
 
 
 def least_work(tree: Binary, shape: Shape) -> float:
-    """Work of the best wide tree that can be cut out of the binary one; a pack is opened only if that saves a fifth."""
+    """Return the cost of the cheapest wide BVH cut from the binary one; a pack is opened only if that saves a fifth."""
     count, low, high = len(tree.sphere), tree.nodes["lo"], tree.nodes["hi"]
     met = chance(np.concatenate([tree.low, low]), np.concatenate([tree.high, high]), low[-1], high[-1])
     size, balls = np.ones(2 * count - 1, np.intp), np.concatenate([tree.sphere, np.zeros(count - 1, np.intp)])
@@ -74,7 +74,7 @@ def least_work(tree: Binary, shape: Shape) -> float:
 
 
 def boxes_and_visits(device: Device, layout: str, case: str) -> tuple[FloatArray, FloatArray, NDArray[Any]]:
-    """(n, 3) boxes of nodes, the root's first, and of leaves; and what each visit costs (n,)."""
+    """Return (n, 3) boxes of nodes, the root's first, and of leaves; and the cost of each visit (n,)."""
     if layout == "bvh2":
         tree = binary_tree(device, case)
         return tree.aabb_min, tree.aabb_max, np.where(tree.leaf, tree.count, 1)

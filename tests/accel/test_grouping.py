@@ -1,4 +1,4 @@
-"""Which triangles are put into packs together, beside what a ray then pays by counting."""
+"""Grouping of triangles into packs, evaluated by counting the cost per ray."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def packs(triangles: Floats) -> list[list[int]]:
 
 
 def paid(triangles: Floats, made: list[list[int]]) -> float:
-    """By a ray through the box of all: boxes, and packs as often as a ray meets theirs."""
+    """Return the cost of a ray through the scene's box: box tests, and packs weighted by hit probability."""
     low, high = (edge.astype(np.float64) for edge in triangle_boxes(triangles))
 
     def area(members: list[int]) -> float:

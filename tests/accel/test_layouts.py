@@ -1,4 +1,4 @@
-"""What the records say is the scene: rays traced through them by the book, in float64, hit what brute force hits."""
+"""Reference traversal of the packed records in float64 hits what brute force hits, for every layout and builder."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Ray = tuple[Doubles, Doubles]
 Hit = tuple[float, int]  # t and primitive
 MISS: Hit = (np.inf, -1)
 Box = tuple[Any, Any]
-Visit = tuple[list[tuple[Box, int]], Hit]  # children with their references, or what a leaf's primitives give
+Visit = tuple[list[tuple[Box, int]], Hit]  # children with their references, or the hit of a leaf's primitives
 
 SCENES = {
     "mixed": (soup(400, 0.2), spheres(40)),
@@ -46,7 +46,7 @@ SCENES = {
 
 
 def rays(count: int = 60) -> list[Ray]:
-    """From around and inside the unit cube; every tenth one runs along an axis."""
+    """Return rays from around and inside the unit cube; every tenth one is parallel to an axis."""
     rng = np.random.default_rng(3)
     origins = rng.uniform(-1, 2, (count, 3))
     directions = rng.random((count, 3)) - origins
@@ -58,7 +58,7 @@ def rays(count: int = 60) -> list[Ray]:
 
 
 def hit_triangles(corners: Doubles, primitive: NDArray[np.int32], ray: Ray) -> Hit:
-    """Möller–Trumbore on (n, 3, 3), component by component: the same bits however many there are. Lowest at a tie."""
+    """Möller–Trumbore on (n, 3, 3) per component, so bits do not depend on n. Ties go to the lowest primitive."""
     (ox, oy, oz), (dx, dy, dz) = ray
     p0x, p0y, p0z, p1x, p1y, p1z, p2x, p2y, p2z = corners.reshape(-1, 9).T
     ax, ay, az, bx, by, bz = p1x - p0x, p1y - p0y, p1z - p0z, p2x - p0x, p2y - p0y, p2z - p0z
@@ -134,7 +134,7 @@ def visit_bvh8(layout: Layout, reference: int, ray: Ray) -> Visit:
 
 
 def visit_cwbvh(layout: Layout, reference: int, ray: Ray) -> Visit:
-    """References >= 0 are nodes, < 0 ~(first << 2 | count) leaves."""
+    """Visit a node; references >= 0 are nodes, < 0 are leaves ~(first << 2 | count)."""
     if reference < 0:
         first, count = ~reference >> 2, ~reference & 3
         triangles = len(layout.buffers.get("leaf_triangles", ()))
@@ -155,7 +155,7 @@ def visit_cwbvh(layout: Layout, reference: int, ray: Ray) -> Visit:
 
 
 def enters(box: Box, ray: Ray) -> bool:
-    """Slabs in float64, near and far plane by the direction's sign, opened by far more than their rounding."""
+    """Float64 slab test, near and far plane by the direction's sign, widened by far more than the rounding error."""
     near, far = 0.0, np.inf
     for low, high, o, d in zip(box[0].tolist(), box[1].tolist(), *ray):
         if d == 0:
@@ -168,7 +168,7 @@ def enters(box: Box, ray: Ray) -> bool:
 
 
 def trace(layout: Layout, ray: Ray) -> Hit:
-    """Closest hit through the records, with a stack that may hold no more than the layout says; groups: test_cwbvh."""
+    """Return the closest hit, with a stack bounded by layout.stack (cwbvh, whose stack holds groups: test_cwbvh)."""
     if layout.name in TREELESS:
         readers = {"leaf_triangles": triangle_records, "packs": packed_records, "leaf_spheres": sphere_records}
         return min([readers[name](records, ray) for name, records in layout.buffers.items()] + [MISS])
@@ -215,7 +215,7 @@ def test_siblings_of_a_binary_tree_share_a_cache_line() -> None:
 
 
 def test_a_tree_of_nothing_cannot_be_entered() -> None:
-    """Neither at its root nor, if the root is not tested, at the root's children."""
+    """Neither the root's box nor, if the root is not tested, its children's can be hit."""
     binary, wide, compressed = (pack(name, "sah", *SCENES["nothing"]).buffers["nodes"]
                                 for name in ("bvh2", "bvh8", "cwbvh"))
     first = binary["left_first"][0]
@@ -239,7 +239,7 @@ COORDINATE = st.floats(width=32, allow_nan=False, allow_infinity=False)
 @settings(deadline=None)
 @given(balls=arrays(np.float32, (5, 4), elements=COORDINATE))
 def test_boxes_of_spheres_contain_them(balls: FloatArray) -> None:
-    """In exact arithmetic, up to the largest float; and within two steps of float32 of the sphere."""
+    """In exact arithmetic, up to the largest float; and within two float32 ulps of the sphere."""
     balls[:, 3] = np.abs(balls[:, 3])
     toward = np.array([np.inf, -np.inf], np.float32)
     far = Fraction(float(np.finfo(np.float32).max))

@@ -1,4 +1,4 @@
-"""Reinsertion on every device: trees stay sound, never get worse, and the best single move is always made."""
+"""Reinsertion on every device keeps BVHs valid, never increases the area, and always makes the best single move."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_trees_stay_sound_and_their_area_never_grows(device: Device, case: str) 
 
 @lru_cache(maxsize=None)
 def first_result(case: str) -> list[bytes]:
-    """Of whichever device asks first."""
+    """Hold the result of the device that is tested first."""
     return []
 
 
@@ -50,7 +50,7 @@ def test_the_same_tree_again_and_everywhere(device: Device, case: str) -> None:
 
 
 def total_area(below: Children, low: FloatArray, high: FloatArray) -> float:
-    """Half the area of all nodes of a tree whose nodes count on from the primitives; its root is the last."""
+    """Return half the area of all nodes of a BVH whose node numbers follow the primitives'; the root is the last."""
     def of(node: int) -> tuple[FloatArray, FloatArray, float]:
         if node < len(low):
             return low[node], high[node], 0.0
@@ -62,7 +62,7 @@ def total_area(below: Children, low: FloatArray, high: FloatArray) -> float:
 
 
 def moves(below: Children, count: int) -> Iterator[Children]:
-    """The trees that moving one subtree makes, to any node that is not above it."""
+    """Yield the BVHs made by moving one subtree to any node that is not its ancestor."""
     parent = {child: count + k for k, children in enumerate(below) for child in children}
     root = count + len(below) - 1
 
@@ -81,7 +81,7 @@ def moves(below: Children, count: int) -> Iterator[Children]:
 
 @pytest.mark.parametrize("seed", [*range(3), *others(*range(3, 10))])
 def test_the_best_move_is_always_made(device: Device, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A tree that joins any two subtrees again and again; a pass gains at least what the best single move does."""
+    """Start from random merges of subtrees; a pass gains at least as much as the best single move."""
     monkeypatch.setattr("clrt.accel.reinsertion.TOPMOST", 1)
     count, rng = 12, np.random.default_rng(seed)
     triangles = soup(count, seed=seed)

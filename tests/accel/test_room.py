@@ -1,4 +1,4 @@
-"""What a tree's builder needs of a device's largest buffer."""
+"""Buffer sizes that the BVH builder requires of a device."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .cases import soup, spheres
 @covering("layout, builder", SHAPES, ["ploc", "reinsertion"])
 def test_no_array_is_larger_than_foretold(device: Device, monkeypatch: pytest.MonkeyPatch, layout: str,
                                           builder: str) -> None:
-    """Of triangles in clumps, of triangles all over the place, and of spheres among them."""
+    """Tests clustered triangles, large overlapping ones, and triangles with spheres."""
     sizes: list[int] = []
     counted = Blocks._counted
 
@@ -45,7 +45,7 @@ def test_where_there_is_no_room_numpy_builds(device: Device) -> None:
 
 
 def test_short_launches_build_the_same_tree(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Cut into launches of few items each."""
+    """The build is split into launches of few items each."""
     triangles = soup(5_000, 0.1)
     trees = [build_tree(device, "bvh8", "reinsertion", triangles)]
     monkeypatch.setattr("clrt.device.launches.data_parallel.LAUNCH_ITEMS", {"cpu": 100, "gpu": 100})

@@ -1,4 +1,4 @@
-"""Two levels in one array: every leaf of every instance is reached, and no stack outgrows what the host computed."""
+"""Two-level BVHs: every leaf of every instance is reached, and stacks stay within the host's bound."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ WORLD = -1
 
 
 def in_a_row(count: int) -> NDArray[np.float64]:
-    """(count, 3, 4): in ever larger steps, which makes the tree above them deep."""
+    """Return (count, 3, 4) transforms in ever larger steps, which make a deep upper level."""
     to_world = np.tile(np.eye(3, 4), (count, 1, 1))
     to_world[:, 0, 3] = 1.3 ** np.arange(count)
     return to_world
 
 
 class Records:
-    """A tree of two levels as its records say; `seen` collects the instance and primitive of each leaf that is met."""
+    """Two-level BVH read from its records; `seen` collects the instance and primitive of each leaf visited."""
 
     def __init__(self, device: Device, tree: Layout) -> None:
         buffers = {name: array.read(device) for name, array in tree.buffers.items()}
@@ -41,12 +41,12 @@ class Records:
         self.seen += [(instance, primitive) for primitive in self.leaves[leaf].tolist() if primitive >= 0]
 
     def instance(self, place: int) -> tuple[int, int]:
-        """The root of its tree and its name."""
+        """Return the root of an instance's BVH and the instance's index."""
         return int(self.instances["root"][place]), int(self.instances["index"][place])
 
 
 def most_bvh2(records: Records, node: int, instance: int, waiting: int) -> int:
-    """The most that waits, whatever the order, if all below a node is entered while so many wait already.
+    """Return the maximum stack size, over all orders, if all nodes below are entered with `waiting` on the stack.
 
     One child waits while the other is visited.
     """
@@ -61,7 +61,7 @@ def most_bvh2(records: Records, node: int, instance: int, waiting: int) -> int:
 
 
 def most_bvh8(records: Records, reference: int, instance: int, waiting: int) -> int:
-    """All children are put on the stack, then one is taken; an instance's root is put there above LEAVE."""
+    """Return the maximum stack size: children are pushed, then one is popped; an instance's root lies above LEAVE."""
     if reference >= 0:
         children = [child for child in records.nodes["child"][reference].tolist() if child != EMPTY]
         below = [most_bvh8(records, child, instance, waiting + len(children) - 1) for child in children]
@@ -73,7 +73,7 @@ def most_bvh8(records: Records, reference: int, instance: int, waiting: int) -> 
 
 
 def most_cwbvh(records: Records, node: int, instance: int, waiting: int) -> int:
-    """What is left of a group of nodes waits; under an instance all nodes beside it, and the group it is of."""
+    """Return the maximum stack size: unvisited nodes of a group wait; in an instance, its outer group and nodes too."""
     record = records.nodes[node]
     inner = [slot for slot in range(8) if record["imask"] >> slot & 1]
     leaves = [meta for slot, meta in enumerate(record["meta"].tolist()) if meta and slot not in inner]
@@ -96,7 +96,7 @@ MOST: dict[str, Callable[[Records, int, int, int], int]] = {"bvh2": most_bvh2, "
 @pytest.mark.parametrize("builder", ["ploc", "sah"])
 @pytest.mark.parametrize("layout", FORMS)
 def test_stacks_hold_and_all_is_reached(device: Device, layout: str, builder: str, kinds: int) -> None:
-    """Of one mesh the bound is tight but for what stays in registers; of several the deepest may not be the lowest."""
+    """For one mesh the bound is tight, up to entries in registers; for several the deepest may not be the lowest."""
     mesh = np.arange(60, dtype=np.int32) % kinds
     tree = TwoLevels(device, layout, builder, MESHES[:kinds], mesh).place(in_a_row(len(mesh)))
     records = Records(device, tree)
@@ -107,7 +107,7 @@ def test_stacks_hold_and_all_is_reached(device: Device, layout: str, builder: st
 
 @pytest.mark.parametrize("layout", FORMS)
 def test_the_upper_level_has_room_wherever_instances_are(layout: str) -> None:
-    """Any number of them, apart, in one place, and nested."""
+    """Any number of instances: apart, in one place, and nested."""
     form = FORMS[layout]
     for count in (0, 1, 2, 3, 8, 9, 70):
         low = np.arange(count, dtype=np.float32)[:, None] * np.ones(3, np.float32)

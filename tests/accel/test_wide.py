@@ -1,4 +1,4 @@
-"""Collapsing keeps the leaves, costs the least that it can, and the stack bounds are exact."""
+"""Collapsing to a wide BVH keeps the leaves and has the least possible cost, and the stack bounds are exact."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ def test_leaves_and_their_boxes_stay(count: int, width: int) -> None:
 
 
 def least_cost(tree: Tree, width: int) -> float:
-    """By trying them all: every set of interior nodes, with the root, that keeps its members to `width` children."""
+    """Return the least cost over all sets of interior nodes, with the root, that have at most `width` children each."""
     area = half_area(tree.aabb_min, tree.aabb_max)
     below = [int(node) for node in np.flatnonzero(~tree.leaf) if node]
 
     def children(node: int, kept: set[int]) -> int:
-        """How many slots the subtree below `node` takes in its wide node."""
+        """Return how many slots the subtree below `node` takes in its wide node."""
         first = int(tree.left_first[node])
         return sum(1 if tree.count[child] or child in kept else children(child, kept) for child in (first, first + 1))
 
@@ -83,7 +83,7 @@ def wide_children(wide: Wide) -> Children:
 
 
 def fullest_stack(children: Children) -> int:
-    """Over all nodes, how full a stack can be when the node has pushed its children: walk straight to it."""
+    """Return the fullest stack over all nodes when the node has pushed its children and was reached directly."""
     parent = {child: node for node, below in enumerate(children) for child in below if child >= 0}
     fullest = 1
     for target in range(len(children)):
@@ -108,7 +108,7 @@ def fullest_stack(children: Children) -> int:
 def test_stack_bounds_are_exact(count: int, seed: int, builder: str, leaf_size: int, size: float) -> None:
     triangles = soup(count, size, seed)
     tree = BUILDERS[builder](triangles.min(axis=1), triangles.max(axis=1), leaf_size, 1)
-    # Leaves of the binary tree have no children to push, so only its interior nodes are walked to.
+    # Leaves of the binary BVH push no children, so only interior nodes are targets.
     inner = np.flatnonzero(~tree.leaf)
     number, below = {int(node): i for i, node in enumerate(inner)}, binary_children(tree)
     children = [[number.get(child, -1) for child in below[node]] for node in inner]

@@ -1,6 +1,6 @@
-"""Kernels that are wrong: a copy of their folder in which a text is replaced.
+"""Broken kernels: a copy of the kernel folder with a text replaced.
 
-They compute what a broken driver might, and everything else is the real thing.
+They compute what a broken driver might; everything else is unchanged.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from clrt.device.programs.kernel_files import kernel_folder
 
 
 def sabotaged(folder: Path, pattern: str, wrong: str, head: str = "") -> Path:
-    """A new folder `folder` of all kernel files, where what `pattern` (a regular expression) matches is `wrong`.
+    """Copy all kernel files to `folder`, with matches of the regular expression `pattern` replaced by `wrong`.
 
     head: a line before every file in which something was replaced.
     """

@@ -1,4 +1,4 @@
-"""A device that computes right passes every part; and what the parts take for exact is."""
+"""A correct device passes every part of the check, and the references of the parts are exact."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_a_device_passes(device: Device, part: str) -> None:
 
 
 def test_fma_of_plain_operations(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What kernels/fma.cl puts in its place is rounded once, too, and so hits have the same bits."""
+    """The replacement in kernels/fma.cl is also rounded once, so hits have the same bits."""
     surface, hits = star.make_star(4), []
     rays = star.rays_from_elsewhere(surface, 1000)
     for fuses in (True, False):
@@ -39,7 +39,7 @@ def test_fma_of_plain_operations(device: Device, monkeypatch: pytest.MonkeyPatch
 
 
 def test_the_nearest_float() -> None:
-    """numpy rounds doubles right; what is no double, beside the middle between floats, only this does."""
+    """numpy is the reference for doubles; values near midpoints of floats are no doubles, so checked by hand."""
     doubles = np.random.default_rng(0).normal(size=1000) * 2.0 ** np.random.default_rng(1).integers(-60, 60, 1000)
     assert [nearest_float32(Fraction(double)) for double in doubles] == list(doubles.astype(np.float32))
     half, ulp, hair = Fraction(1, 1 << 24), Fraction(1, 1 << 23), Fraction(1, 1 << 80)
@@ -54,7 +54,7 @@ def test_units_in_the_last_place() -> None:
 
 
 def test_operands_round_to_all_sides() -> None:
-    """Of sums and of products a tenth goes up, a tenth down, some are halfway, and none leaves the normal range."""
+    """At least 10 % of sums and products round up, 10 % down, 5 % are halfway, and none leaves the normal range."""
     a, b, c = (values.astype(np.float64) for values in operands())
     for exact in (a + b, a * b):
         rounded = exact.astype(np.float32)
@@ -62,11 +62,11 @@ def test_operands_round_to_all_sides() -> None:
         assert np.mean(error > 0) > 0.1 and np.mean(error < 0) > 0.1 and np.mean(np.abs(error) == 0.5) > 0.05
         assert np.all((np.abs(exact) > 2.0**-126) & (np.abs(exact) < 2.0**127))
     separate = (a * b).astype(np.float32) + c
-    assert np.mean(np.abs(separate) < np.abs(a * b) * 2.0**-20) > 0.2     # what fma gives there is all rounding
+    assert np.mean(np.abs(separate) < np.abs(a * b) * 2.0**-20) > 0.2     # there the result of fma is rounding error
 
 
 def test_the_star_is_closed_and_seen_from_inside() -> None:
-    """Every edge is one of two triangles, in opposite directions; all face outwards."""
+    """Every edge belongs to two triangles, in opposite directions, and all triangles face outward."""
     surface = star.make_star()
     edges = {tuple(edge) for a, b in ((0, 1), (1, 2), (2, 0)) for edge in surface.faces[:, [a, b]].tolist()}
     assert len(edges) == 3 * len(surface.faces) and edges == {(b, a) for a, b in edges}
@@ -75,7 +75,7 @@ def test_the_star_is_closed_and_seen_from_inside() -> None:
 
 
 def test_rays_of_both_kinds_agree() -> None:
-    """Rays into triangles from the origin, whose hits follow from their making, against all triangles one by one."""
+    """Rays from the origin, whose hits are known by construction, agree with exact tests of all triangles."""
     surface = star.make_star()
     inside = star.rays_from_inside(surface).take(slice(6, 700, 7))
     t, least, _ = star.meet_planes(surface, np.zeros_like(inside.corners), inside.directions.astype(np.int64))

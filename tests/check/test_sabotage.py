@@ -1,4 +1,4 @@
-"""Whatever is broken, the part of the check whose matter it is says so."""
+"""Each broken kernel is detected by the part of the check that covers it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from clrt.device.programs import program
 from ..covering import others
 from .sabotage import sabotaged
 
-#: The part that must notice, what is replaced in the kernels, by what, and a line before that.
+#: The part that must detect it, the replaced pattern in the kernels, its replacement, and a line before the file.
 SABOTAGES = {
     "roots left out": ("arithmetic", r"\bsqrt\(", "("),
     "an fma that rounds twice": ("arithmetic", r"\bfma\(", "TWICE(",
@@ -43,11 +43,11 @@ SABOTAGES = {
 
 @pytest.fixture(scope="module")
 def best() -> Device:
-    """The device that is used when none is named."""
+    """Return the default device."""
     return open_device()
 
 
-#: Trees and pictures take long to compile.
+#: Parts with BVHs or images, which take long to compile.
 LARGE = ("binary tree", "tree builder", "furnace", "lamp", "ball", "room")
 SMALL = [name for name, (part, *_) in SABOTAGES.items() if part not in LARGE]
 

@@ -1,4 +1,4 @@
-"""`clrt bench`: the fields that other programs read, and the tables."""
+"""`clrt bench`: the JSON fields that other programs read, and the printed tables."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CORNER = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4
 
 
 def bench(*arguments: str, cwd: Path) -> tuple[dict[str, Any], str]:
-    """The figures and what was printed."""
+    """Return the figures and the printed output."""
     (cwd / "corner.obj").write_text(CORNER)
     done = subprocess.run([sys.executable, "-m", "clrt", "bench", *arguments, "--quick", "--json", "out.json"], cwd=cwd,
                           capture_output=True, text=True)
@@ -34,7 +34,7 @@ def bench(*arguments: str, cwd: Path) -> tuple[dict[str, Any], str]:
 
 
 def test_rays_of_a_file(tmp_path: Path) -> None:
-    """From (9, 9, 9) at the corner of a tetrahedron, and away from it."""
+    """Rays from (9, 9, 9) toward the corner of a tetrahedron hit, those away from it miss."""
     origins = np.full((2000, 3), 9, np.float32)
     directions = np.where(np.arange(2000)[:, None] % 4 == 0, -1, 1) * np.array([1, 0.99, 0.98], np.float32)
     np.savez(tmp_path / "rays.npz", origins=origins, directions=directions, t_max=np.full(2000, np.inf, np.float32))
@@ -101,7 +101,7 @@ def test_all_properties_can_be_chosen() -> None:
 
 
 def test_a_violated_property_is_reported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """With its scenes, and by the exit code; the other scene is right."""
+    """The report names the scene and sets the exit code; the other scene is correct."""
     wrong = combinations.Verdict("brightness", "combination-5-0", 0, "2 times the light", len(combinations.ROUNDS),
                                  1e-12, 0.03, 1.02, 0.001, 0)
     monkeypatch.setattr(combinations, "verdicts", lambda *_: iter([wrong, replace(wrong, number=1, p=0.5)]))
@@ -114,7 +114,7 @@ def test_a_violated_property_is_reported(monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 
 def stored(path: Path, **arrays: Any) -> Path:
-    """A file of four rays, with these arrays in place of what `RayQuery` takes."""
+    """Write a file of four rays, with these arrays in place of those that `RayQuery` accepts."""
     np.savez(path, **{"origins": np.zeros((4, 3)), "directions": np.ones((4, 3)), "t_max": np.ones(4)} | arrays)
     return path
 

@@ -1,4 +1,4 @@
-"""Files of experiments: what would be in vain is found out before they begin."""
+"""Output files of experiments are checked before the experiment begins."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CALLED: list[Path | None] = []
 @figures_options
 @click.option("--plot", type=click.Path(path_type=Path))
 def experiment(json_file: Path | None, **others: object) -> None:
-    """One that only notes that it was begun."""
+    """Experiment that only records that it was begun."""
     CALLED.append(json_file)
 
 
@@ -48,7 +48,7 @@ def call(arguments: Iterable[str]) -> Result:
     ("no/such/f.svg", OutputError), (".", OutputError), ("old.svg", OutputError), ("pipe.svg", OutputError),
     ("a.obj", UsageError), ("./a.obj", UsageError)])
 def test_nothing_is_begun_in_vain(option: str, path: str, kind: type[ClrtError]) -> None:
-    """Where the folder is missing, the file is a folder, read-only or a pipe, or one that the experiment reads."""
+    """Refused if the folder is missing, or the file is a folder, read-only, a pipe, or an input of the experiment."""
     result = call(["--mesh", "b.obj", "--mesh", "a.obj", option, path])
     assert type(result.exception) is kind and str(Path(path)) in str(result.exception) and not CALLED
 
@@ -58,7 +58,7 @@ def test_one_file_twice() -> None:
 
 
 def test_what_is_begun(folder: Path) -> None:
-    """Read-only files with --force; folders for pictures are there from the beginning."""
+    """Read-only files are accepted with --force; folders for images are created at the start."""
     for arguments in (["--json", "new.json", "--plot", "new.svg"], ["--json", "old.svg", "--force"],
                       ["--pictures", "some/where"], []):
         result = call(["--mesh", "a.obj", *arguments])
@@ -69,7 +69,7 @@ def test_what_is_begun(folder: Path) -> None:
 
 @pytest.mark.parametrize("name", sorted(bench.commands))
 def test_every_experiment_is_checked(name: str) -> None:
-    """Its options for files have the names that are looked at."""
+    """File options of every experiment have the names that the check knows."""
     each = bench.commands[name]
     options = {option: parameter.name for parameter in each.params for option in parameter.opts}
     assert options["--json"] == "json_file" and "--force" in options

@@ -1,4 +1,4 @@
-"""`clrt render --checkpoint` in real processes: killed, interrupted, and on a disk that is full."""
+"""`clrt render --checkpoint` in real processes: killed, interrupted, and on a full disk."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from clrt.rendering.checkpoint.saved_state import KINDS
 
 from .test_commands import clrt
 
-#: A lamp under a sky between two balls.
+#: A point light and a constant environment between two spheres.
 SCENE = """
 [camera]
 position = [0, 1, 6]
@@ -50,7 +50,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """A checkpoint of one sample a pixel."""
+    """Return a checkpoint with one sample per pixel."""
     folder = tmp_path_factory.mktemp("begun")
     (folder / "ball.toml").write_text(SCENE)
     assert clrt("render", "ball.toml", "--spp", "1", "--checkpoint", "a.ck", cwd=folder).returncode == 0
@@ -58,7 +58,7 @@ def content(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 def started(*options: str, cwd: Path) -> subprocess.Popen[str]:
-    """RENDER, once it says that it renders."""
+    """Start RENDER and return once it reports that it renders."""
     process = subprocess.Popen([sys.executable, "-m", "clrt", *RENDER, *options], cwd=cwd, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
@@ -68,7 +68,7 @@ def started(*options: str, cwd: Path) -> subprocess.Popen[str]:
 
 
 def worker_of(process: subprocess.Popen[bytes] | subprocess.Popen[str]) -> int:
-    """The process that renders."""
+    """Return the id of the child process that renders."""
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
     for _ in range(500):
         if found := children.read_text().split():
@@ -78,14 +78,14 @@ def worker_of(process: subprocess.Popen[bytes] | subprocess.Popen[str]) -> int:
 
 
 def arrays(path: Path) -> dict[str, bytes]:
-    """All that a checkpoint holds but the history, which knows the time."""
+    """Return all arrays of a checkpoint except the history, which contains times."""
     return {name: array.tobytes() for name, array in read_checkpoint(path, KINDS)[1].items() if name != "history"}
 
 
 @pytest.mark.parametrize("kills, options", [(3, ["--spp", "2000"]), (2, ["--spp", "600", "--adaptive"])],
                          ids=["even", "adaptive"])
 def test_killed_at_any_moment_it_ends_as_if_it_were_not(folder: Path, kills: int, options: list[str]) -> None:
-    """Several times, then to the end, against one that was left alone: film, samples and estimate, bit for bit."""
+    """After several kills and resumes, film, samples and estimate equal those of an undisturbed render, bit for bit."""
     left_alone = folder / "alone"
     left_alone.mkdir()
     (left_alone / "ball.toml").write_text(SCENE)
@@ -122,7 +122,7 @@ def test_the_first_signal_keeps_everything(folder: Path, number: signal.Signals)
 
 def test_the_second_signal_ends_it_now(folder: Path) -> None:
     process = started("--time", "600", cwd=folder)
-    for number in (signal.SIGSTOP, signal.SIGINT, signal.SIGTERM, signal.SIGCONT):    # both are there as it goes on
+    for number in (signal.SIGSTOP, signal.SIGINT, signal.SIGTERM, signal.SIGCONT):    # both are pending as it continues
         process.send_signal(number)
     output, messages = process.communicate(timeout=60)
     assert process.returncode == 130 and output == "" and "Traceback" not in messages
@@ -130,8 +130,8 @@ def test_the_second_signal_ends_it_now(folder: Path) -> None:
 
 
 def test_a_full_disk_ends_no_render(folder: Path) -> None:
-    """No file may grow beyond a limit that is set while it renders: one warning, a checkpoint from before stays whole,
-    and pictures that do not fit keep none from being written."""
+    """File sizes are limited during the render: there is one warning, the previous checkpoint stays intact, and images
+    that do not fit do not prevent others from being written."""
     options, limit = ("--size", "512x384", "--spp", "40", "-o", "a.png", "--report", "r.json"), 1_000_000
     assert clrt(*RENDER, "--size", "512x384", "--spp", "1", cwd=folder).returncode == 0
     process = started(*options, cwd=folder)

@@ -1,4 +1,4 @@
-"""The command line from end to end: what it writes, prints and returns."""
+"""The command line end to end: files, output and exit codes."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_interrupt_keeps_the_picture(scene: Path) -> None:
 
 
 def test_caches_that_cannot_be_written_cost_nothing_but_time(scene: Path) -> None:
-    """PoCL hides its device without a cache folder; here the home is a file, so that root meets the same."""
+    """PoCL hides its device without a cache folder; here the home is a file, so that the test also works as root."""
     (scene.parent / "home").write_text("")
     environment = {key: value for key, value in os.environ.items() if key not in ("XDG_CACHE_HOME", "POCL_CACHE_DIR")}
     result = subprocess.run([sys.executable, "-m", "clrt", "render", str(scene), "-q"], cwd=scene.parent, text=True,
@@ -175,7 +175,7 @@ def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], co
     result = clrt(*arguments, cwd=scene.parent)
     assert result.returncode == code and result.stdout == ""
     assert "Traceback" not in result.stderr and all(word in result.stderr for word in words), result.stderr
-    assert "leaked" not in result.stderr    # what OpenImageIO tells at exit of its own that is still there
+    assert "leaked" not in result.stderr    # OpenImageIO reports objects leaked at exit
 
 
 def test_print_kernel_prints_what_the_scene_needs(scene: Path) -> None:
@@ -226,7 +226,7 @@ def test_compare_prints_the_metrics(scene: Path) -> None:
 
 
 def test_bench_rays_counts_the_hits_of_a_file(tmp_path: Path) -> None:
-    """A square of two triangles, and a grid of rays of which a quarter passes through it."""
+    """A square of two triangles, and a grid of rays of which a quarter hits it."""
     (tmp_path / "square.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
     x, y = np.meshgrid((np.arange(32) + 0.5) / 16, (np.arange(32) + 0.5) / 16)
     origins = np.stack([x.ravel(), y.ravel(), np.ones(1024)], axis=1)
@@ -242,7 +242,7 @@ def test_bench_rays_counts_the_hits_of_a_file(tmp_path: Path) -> None:
 
 
 def test_error_is_reached_and_not_far_passed(scene: Path) -> None:
-    """With Sobol's samples it falls in steps, at powers of two by a factor of up to 2."""
+    """With Sobol' samples the error falls in steps, by a factor of up to 2 at powers of two."""
     scene.write_text(SCENE + '[[light]]\ntype = "point"\nposition = [0, 3, 1]\nintensity = [20, 20, 20]\n')
     for error, sampler, least in ((0.035, "independent", 0.85), (0.02, "independent", 0.85), (0.02, "sobol", 0.5)):
         assert clrt("render", scene, "--error", error, "--sampler", sampler, "--report", "e.json",
@@ -257,7 +257,7 @@ def test_a_scene_without_light_says_so(tmp_path: Path) -> None:
 
 
 def test_convert(tmp_path: Path) -> None:
-    """From one folder to another, by paths that hold; nothing is overwritten unasked."""
+    """Converted to another folder, paths stay valid; existing files are not overwritten without --force."""
     (tmp_path / "models").mkdir()
     (tmp_path / "scenes").mkdir()
     (tmp_path / "models" / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")

@@ -1,4 +1,4 @@
-"""`clrt debug`: text and JSON, the options of a render, and mistakes."""
+"""`clrt debug`: text and JSON output, render options, and errors."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def run(*arguments: object) -> Result:
 
 
 def test_it_is_the_pixel_of_the_render(scene: Path) -> None:
-    """With the same options, as `clrt render` writes it."""
+    """The values equal those of `clrt render` with the same options."""
     options = ("--size", "12x10", "--seed", "7", "--depth", "3", "--spp", "16", "--filter", "tent",
                "--sampler", "stratified", "--clamp-direct", "0.5", "--clamp-indirect", "0.1",
                "--back-face-culling", "camera")
@@ -81,7 +81,7 @@ def test_text_lists_the_vertices_and_ends_with_a_summary(scene: Path) -> None:
 
 
 def test_a_shadow_says_what_casts_it(scene: Path) -> None:
-    """Straight below the ball, in its shadow."""
+    """The pixel is straight below the sphere, in its shadow."""
     scene.write_text(SCENE.replace("[0, 1, 4]", "[0, -0.5, 4]\nlook_at = [0, -1, 0]"))
     assert 'all 8 shadowed (by sphere "ball")' in run(scene, "--pixel", "12,8", "--samples", "0", "--depth", "2").stdout
 

@@ -1,4 +1,4 @@
-"""`clrt devices --check` from end to end, with kernels that are right, wrong, crash and never end."""
+"""`clrt devices --check` end to end, with kernels that are correct, wrong, crash or never end."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from ..check.sabotage import sabotaged
 pytestmark = pytest.mark.processes
 
 Broken = tuple[str, ...]
-#: Of kernels/check/floats.cl, whose part of the check is the first.
+#: Start of the kernel in kernels/check/floats.cl, which the first part of the check runs.
 IN_FLOATS = r"kernel void floats\(.*\{"
 
 
 @pytest.fixture(scope="module")
 def best() -> str:
-    """The id of the device that is used when none is named."""
+    """Return the id of the default device."""
     return open_device().info.id
 
 
 def run(folder: Path, *arguments: str, broken: Broken = ()) -> subprocess.CompletedProcess[str]:
-    """`clrt` with a cache in `folder`, and where asked for with a copy of the package whose kernels are `broken`."""
+    """Run `clrt` with a cache in `folder`, optionally with a copy of the package whose kernels are `broken`."""
     environment = {**os.environ, "CLRT_CACHE_DIR": str(folder / "cache")}
     if broken:
         package = Path(clrt.__file__).parent
@@ -50,7 +50,7 @@ def run(folder: Path, *arguments: str, broken: Broken = ()) -> subprocess.Comple
 
 
 def listed(result: subprocess.CompletedProcess[str], device: str) -> dict[str, Any]:
-    """What the JSON on standard output says of the device."""
+    """Return the device's entry in the JSON on standard output."""
     entry: dict[str, Any] = next(entry for entry in json.loads(result.stdout) if entry["id"] == device)
     return entry
 
@@ -70,7 +70,7 @@ def test_a_device_that_computes_right(best: str, tmp_path: Path) -> None:
 
 
 def test_a_device_that_computes_wrong(best: str, tmp_path: Path) -> None:
-    """Exit code 4, the part named, the verdict kept and obeyed, and the right kernels none the worse."""
+    """Exit code 4 and the part are reported, the verdict is stored and obeyed; the correct kernels are unaffected."""
     broken = (r"\batomic_max\(", "SET(", "#define SET(place, value) (*(place) = (value))")
     result = run(tmp_path, "devices", "--check", "--device", best, broken=broken)
     assert result.returncode == 4 and "Traceback" not in result.stderr
@@ -98,7 +98,7 @@ def test_a_driver_that_crashes(best: str, tmp_path: Path) -> None:
 
 
 def test_a_kernel_that_never_ends(best: str, tmp_path: Path) -> None:
-    """Within a limit below the default's that is no verdict: a busy machine may be as slow."""
+    """A limit below the default gives no verdict, since a busy machine may be as slow."""
     broken = (IN_FLOATS, r"\g<0>\n    volatile int ended = 0; while (!ended);")
     result = run(tmp_path, "devices", "--check", "--device", best, "--limit", "6", "--json", broken=broken)
     assert result.returncode == 4 and "Traceback" not in result.stderr
@@ -123,7 +123,7 @@ def test_limits_that_are_none(limit: str, words: str) -> None:
 
 
 def test_the_limit_is_the_one_that_is_enough() -> None:
-    """It is written out so that --help loads nothing."""
+    """The default is written out so that --help loads nothing."""
     assert {option.name: option.default for option in devices.command.params}["limit"] == LIMIT
 
 

@@ -1,4 +1,4 @@
-"""The report pack: everything that helps, nothing that is private."""
+"""`clrt doctor` reports everything useful for diagnosis and nothing private."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SECRET = "hunter2"
 
 
 def clrt(home: Path, *arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
-    """In an environment of jane's, which has a secret."""
+    """Run clrt in the environment of the user jane, which contains a secret."""
     own = {"HOME": str(home), "USER": "jane", "LOGNAME": "jane", "CLRT_CACHE_DIR": str(home / "cache"),
            "AWS_SECRET_ACCESS_KEY": SECRET, "NVIDIA_API_KEY": SECRET}
     return subprocess.run([sys.executable, "-P", "-m", "clrt", *arguments], cwd=home, capture_output=True, text=True,
@@ -30,7 +30,7 @@ def clrt(home: Path, *arguments: str, **more: str) -> subprocess.CompletedProces
 
 @pytest.fixture
 def home(tmp_path: Path) -> Path:
-    """Jane's, with logs that name her and the machine."""
+    """Return jane's home folder, with logs that name her and the machine."""
     home = tmp_path / "homes" / "jane"
     (home / "cache").mkdir(parents=True)
     (home / "vendors").mkdir()

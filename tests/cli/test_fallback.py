@@ -1,4 +1,4 @@
-"""Results whose folder goes away, or cannot be written any more, while they are rendered."""
+"""Results are kept elsewhere if their folder disappears or becomes unwritable during the render."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DEPTH = np.full((6, 8), 2, np.float32)
 
 @pytest.fixture
 def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
-    """The folders that results may be kept in, by preference."""
+    """Return the fallback folders, in order of preference."""
     found = [tmp_path / name for name in ("working", "home", "temporary")]
     for folder in found:
         folder.mkdir()
@@ -33,7 +33,7 @@ def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
 
 
 def outputs_in(folder: Path) -> Outputs:
-    """All that are written of a picture, checked."""
+    """Return the checked outputs of an image, in all formats."""
     folder.mkdir()
     asked = Outputs((), tuple(folder / f"a{suffix}" for suffix in EXTENSIONS), ("depth",), True, "srgb", 0.0,
                     folder / "r.json", None)
@@ -43,7 +43,7 @@ def outputs_in(folder: Path) -> Outputs:
 
 @pytest.mark.parametrize("lost", [0, 1, 2, 3], ids=["none", "working", "home", "all"])
 def test_each_result_is_kept_once(places: list[Path], tmp_path: Path, lost: int) -> None:
-    """In the first place that there is; the error names all of them, and where there is no place, none."""
+    """Results go to the first existing folder, and the error names them; without any folder it names none."""
     asked = outputs_in(tmp_path / "asked")
     for folder in (tmp_path / "asked", *places[:lost]):
         shutil.rmtree(folder)

@@ -1,4 +1,4 @@
-"""`clrt render` where devices are lost, hang or crash in the middle: real drivers, with launches that go wrong."""
+"""`clrt render` with devices that are lost, hang or crash during the render: real drivers with faulty launches."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ ONE, TWO = ("--device", "0"), ("--device", "0", "--device", "0")
 
 @pytest.fixture(scope="module")
 def faulty(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The library of faulty.c."""
+    """Compile faulty.c and return the library."""
     return compile_library(FAULTY, tmp_path_factory.mktemp("faulty") / "libfaulty.so", "-ldl")
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with what one device makes of it that nothing happens to."""
+    """Return a folder with the result of an undisturbed render on one device."""
     folder = tmp_path_factory.mktemp("whole")
     (folder / "ball.toml").write_text(SCENE)
     assert render(folder, *ONE).returncode == 0
@@ -64,14 +64,14 @@ def assert_same(folder: Path, whole: Path) -> None:
 @pytest.mark.parametrize("queue", [0, 1])
 @pytest.mark.parametrize("kind", ["lost", "endless"])
 def test_of_two_devices_one_ends_it_alone(folder: Path, whole: Path, faulty: Path, kind: str, queue: int) -> None:
-    """With the picture of one that was alone all the time, and the exit code of success."""
+    """The image equals that of a single device, and the exit code is that of success."""
     result = render(folder, *TWO, **fault(faulty, kind, queue))
     assert result.returncode == 0 and result.stderr.count("is left out") == 1, result.stderr
     assert_same(folder, whole)
 
 
 def test_of_two_devices_one_never_does_anything(folder: Path, whole: Path, faulty: Path) -> None:
-    """Drivers may compile at the first launch, so that is waited for ten times as long, but not for ever."""
+    """Drivers may compile at the first launch, so its timeout is ten times as long, but finite."""
     result = render(folder, *TWO, **fault(faulty, "endless", 1, after=0) | {"CLRT_HANG_SECONDS": "0.3"})
     assert result.returncode == 0 and "has not ended a launch in 3 s" in result.stderr, result.stderr
     assert_same(folder, whole)
@@ -83,7 +83,7 @@ def test_of_two_devices_one_never_does_anything(folder: Path, whole: Path, fault
     ("crashes", "crashed (SIGABRT)", ONE)])
 def test_it_ends_in_a_message_and_goes_on(folder: Path, whole: Path, faulty: Path, kind: str, words: str,
                                           devices: tuple[str, ...]) -> None:
-    """Where no device is left, or a call does not return: the checkpoint stays, and --resume brings it to its end."""
+    """If no device is left or a call does not return, the checkpoint stays valid and --resume finishes it."""
     result = render(folder, *devices, **fault(faulty, kind))
     assert result.returncode == 4 and words in result.stderr and "--resume goes on" in result.stderr, result.stderr
     assert "Traceback" not in result.stderr and result.stdout == ""

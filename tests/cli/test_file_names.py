@@ -1,4 +1,4 @@
-"""File names that are not UTF-8: read, written and shown by every command, in any locale."""
+"""File names that are not UTF-8 are read, written and shown by every command, in any locale."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LOCALES = {"C": {"LC_ALL": "C"}, "ASCII": {"LC_ALL": "C", "PYTHONUTF8": "0", "PY
            "UTF-8": {"LC_ALL": "C.UTF-8"}}
 MODEL = "mtllib \xe9.mtl\nusemtl \xe9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
 SMALL = ("--size", "8x8", "--spp", "1", "-q")
-#: Calls, and the endings of the files that they write.
+#: Calls, and the suffixes of the files that they write.
 CALLS: dict[str, tuple[tuple[str, ...], set[str]]] = {
     "render": (("render", f"{NAME}.toml", *SMALL, "-o", f"{NAME}1.exr", "-o", f"{NAME}1.png", "-o", f"{NAME}1.hdr",
                 "--aov", "depth", "--report", f"{NAME}1.json", "--plot", f"{NAME}1.svg", "--checkpoint", f"{NAME}1.ck"),
@@ -44,7 +44,7 @@ CALLS: dict[str, tuple[tuple[str, ...], set[str]]] = {
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder of such a name, with a scene, a model with a textured material, and a picture."""
+    """Return a folder with a non-UTF-8 name, with a scene, a textured model, and an image."""
     path = tmp_path / os.fsdecode(b"f\xf6lder")
     try:
         path.mkdir()
@@ -65,20 +65,20 @@ def clrt(*arguments: str, cwd: Path, **variables: str) -> subprocess.CompletedPr
 
 
 def is_text(value: object) -> bool:
-    """Whether all that JSON brought can be written as UTF-8."""
+    """Return whether a parsed JSON value can be written as UTF-8."""
     return bool(json.dumps(value, ensure_ascii=False).encode())
 
 
 @given(st.binary(max_size=20))
 def test_what_is_shown(name: bytes) -> None:
-    """The bytes as Python's own escapes have them; also in a stream that lacks the characters."""
+    """Bytes are shown as Python's escapes, also in streams that cannot encode the characters."""
     shown = name.decode("utf-8", "backslashreplace")
     assert printable(os.fsdecode(name)) == shown
     assert os.fsdecode(name).encode("ascii", SHOWN) == shown.encode("ascii", "backslashreplace")
 
 
 def test_surrogates_that_are_no_bytes() -> None:
-    """As Windows' names may have."""
+    """Such surrogates can occur in Windows file names."""
     assert printable("a\ud800b") == "a\\ud800b"
 
 
@@ -105,7 +105,7 @@ def test_models(folder: Path, suffix: str) -> None:
 @pytest.mark.parametrize(("name", "locale"), [*((name, list(LOCALES)[number % 3]) for number, name in enumerate(CALLS)),
                                               ("by default", "C"), ("by default", "UTF-8")])
 def test_every_command(folder: Path, name: str, locale: str) -> None:
-    """Files have the very names that they were given; JSON is UTF-8."""
+    """Files have exactly the given names; JSON is UTF-8."""
     arguments, endings = CALLS[name]
     before = {*folder.iterdir()}
     done = clrt(*arguments, cwd=folder, **LOCALES[locale])
@@ -132,7 +132,7 @@ def test_messages(folder: Path, locale: str, arguments: tuple[str, ...]) -> None
 
 
 def test_warnings_in_json(folder: Path) -> None:
-    """Each line of progress is an object, also where it names a file."""
+    """Each line of progress is a JSON object, also if it names a file."""
     (folder / os.fsdecode(b"\xe9.png")).unlink()
     done = clrt("render", f"{NAME}.obj", "--size", "8x8", "--spp", "1", "--progress", "json", cwd=folder)
     told = [json.loads(line) for line in done.stderr.decode().splitlines()]

@@ -1,4 +1,4 @@
-"""What the command line never writes over: devices, its inputs, other outputs, others' files; pipes but for images."""
+"""Files the command line never overwrites: devices, inputs, other outputs, unrelated files; only images go to pipes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_devices_are_no_targets(folder: Path) -> None:
 
 
 def test_nothing_replaces_a_pipe_that_comes_later(folder: Path) -> None:
-    """Through a link, too; a scene is not begun where one of its files would be a pipe."""
+    """A pipe is not replaced through a link either; a scene is not written if one of its files would replace a pipe."""
     os.mkfifo(folder / "pipe")
     (folder / "link").symlink_to(folder / "pipe")
     for path in (folder / "pipe", folder / "link"):
@@ -73,7 +73,7 @@ def test_links_to_themselves_are_replaced(folder: Path) -> None:
 @pytest.mark.parametrize(("refusals", "replaced"), [(2, True), (99, False)])
 def test_what_cannot_be_replaced_loses_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch, refusals: int,
                                                replaced: bool) -> None:
-    """Windows replaces no file that a program has open: it is tried for a while, then the new one stays beside it."""
+    """Windows cannot replace a file that a program has open: after retries, the new file stays next to it."""
     path, system, refused = folder / "a.png", os.replace, list[Path]()
     path.write_text("old")
 
@@ -119,7 +119,7 @@ MODEL = "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0
     ("ball.toml", "-o", "b.png", "--plot", "paint.png"), ("ball.toml", "--turntable", "2", "-o", "t_####.png"),
     ("ball.toml", "-o", "b.png", "--checkpoint", "a.obj")], ids=" ".join)
 def test_no_file_of_the_scene_is_replaced(folder: Path, arguments: tuple[str, ...]) -> None:
-    """Models, their libraries, textures and skies, found before the render; a model's name is its texture's, too."""
+    """Scene files (models, .mtl, textures, maps) are checked before the render; a.obj's default output is a texture."""
     (folder / "a.obj").write_text(MODEL)
     (folder / "a.mtl").write_text("newmtl m\nmap_Kd a.png\n")
     textured = 'type = "diffuse"\ncolor = { image = "%s" }\n'
@@ -135,7 +135,7 @@ def test_no_file_of_the_scene_is_replaced(folder: Path, arguments: tuple[str, ..
 
 
 def test_checkpoints_of_any_version_are_replaced(folder: Path) -> None:
-    """Also damaged ones, as far as they can be known."""
+    """Damaged checkpoints are replaced too, as far as they can be recognized."""
     for content in (b"clrt checkpoint 1\nold", b"clrt check", b""):
         (folder / "a.ck").write_bytes(content)
         result = clrt("render", "ball.toml", "--spp", "1", "--checkpoint", "a.ck", cwd=folder)

@@ -1,4 +1,4 @@
-"""`clrt render --frames`: which files, with which pictures; what is left out; what is refused."""
+"""`clrt render --frames`: file names, images, resume, and errors."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ keyframe = [{ time = 0, position = [0, 1, 4] }, { time = 1, position = [3, 2, 3]
 
 @pytest.fixture
 def flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Six frames around a ball."""
+    """Return a scene file with six frames around a sphere."""
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "flight.toml"
     path.write_text(FLIGHT)
@@ -42,7 +42,7 @@ def flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def render(*arguments: str) -> list[str]:
-    """The files that were written."""
+    """Return the files that were written."""
     done = CliRunner().invoke(command, [*arguments, "-q"])
     assert done.exit_code == 0, (done.output, done.exception)
     return done.stdout.splitlines()
@@ -56,7 +56,7 @@ def test_names(name: str, number: int, expected: str) -> None:
 
 
 def test_each_frame_is_what_a_render_of_its_own_gives(flight: Path) -> None:
-    """Bit for bit, by the command and from Python; reports are numbered, too."""
+    """Frames are equal bit for bit by the command and from Python; reports are numbered too."""
     written = render("flight.toml", "--frames", "0,3-5:2", "-o", "f_##.exr", "--report", "f.json")
     assert written == ["f_00.exr", "f_0000.json", "f_03.exr", "f_0003.json", "f_05.exr", "f_0005.json"]
     images = dict(clrt.animate("flight.toml", frames=[0, 3, 5]))
@@ -70,7 +70,7 @@ def test_each_frame_is_what_a_render_of_its_own_gives(flight: Path) -> None:
 
 
 def test_resume_makes_what_is_missing(flight: Path) -> None:
-    """What was made from another scene, or with other settings, or is not there."""
+    """Frames of another scene or with other settings, and missing ones, are rendered again."""
     every = [f"flight_{n:04}.png" for n in range(6)]
     assert render("flight.toml", "--frames", "all") == every
     again = "flight.toml", "--frames", "all", "--resume"
@@ -85,7 +85,7 @@ def test_resume_makes_what_is_missing(flight: Path) -> None:
 
 @pytest.mark.parametrize("suffix", [".gif", ".mp4", ".webm"])
 def test_videos(suffix: str, flight: Path) -> None:
-    """Every frame in its place and time; without .png frames nothing else is told of, or left."""
+    """Every frame has its place and time; without .png outputs no other files are listed or left."""
     from imageio.v3 import imiter, immeta, improps, imread
 
     wanted = "flight.toml", "--turntable", "6", "--fps", "12", "--size", "48x32"
@@ -106,7 +106,7 @@ def test_videos(suffix: str, flight: Path) -> None:
 
 
 def test_a_video_removes_its_own_files_alone(flight: Path) -> None:
-    """Whatever else is in the folder of its frames, whether asked for or somebody's."""
+    """Other files in the folder of its frames stay, whether they are outputs or not."""
     Path("v.gif.frames").mkdir()
     Path("v.gif.frames/notes.txt").write_text("mine")
     assert render("flight.toml", "--frames", "0,1", "-o", "v.gif") == ["v.gif"]
@@ -117,7 +117,7 @@ def test_a_video_removes_its_own_files_alone(flight: Path) -> None:
 
 
 def test_gifs_keep_time(tmp_path: Path) -> None:
-    """Of 24 frames a second no frame is more than half a hundredth early or late, though a frame lasts hundredths."""
+    """At 24 frames per second each frame is within 5 ms of its time, although durations are multiples of 10 ms."""
     paths = [tmp_path / f"{n}.png" for n in range(30)]
     for n, path in enumerate(paths):
         Image.new("RGB", (8, 8), (8 * n, 0, 0)).save(path)

@@ -1,4 +1,4 @@
-"""Files that are replaced: their mode stays, and those that are read-only need --force."""
+"""Replaced files keep their mode, and read-only ones need --force."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def folder(tmp_path: Path) -> Path:
 
 
 def mode(path: Path) -> int:
-    """Its permission bits."""
+    """Return the permission bits of a file."""
     return stat.S_IMODE(path.stat().st_mode)
 
 
 @pytest.mark.parametrize("checkpoint", [False, True], ids=["any", "checkpoint"])
 def test_modes_are_kept(tmp_path: Path, checkpoint: bool) -> None:
-    """All that the user may read; also through a link. A new file has what the user's mask leaves."""
+    """Any mode is kept, also through a link. A new file gets the mode that the umask leaves."""
     random, path, link = Random(5), tmp_path / "a.txt", tmp_path / "link.txt"
     link.symlink_to(path)
     for each in [None, *(random.randrange(0o1000) for _ in range(40))]:
@@ -53,7 +53,7 @@ def test_modes_are_kept(tmp_path: Path, checkpoint: bool) -> None:
 
 
 def test_file_systems_without_modes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Some refuse to set any: the file is written all the same."""
+    """On file systems that refuse to set modes, the file is written nevertheless."""
     path = tmp_path / "a.txt"
     path.touch()
 
@@ -78,7 +78,7 @@ def test_owners_are_kept(tmp_path: Path) -> None:
 
 
 def test_rights_are_not_given_to_another_group(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where the user is not in the file's group."""
+    """If the user is not in the file's group, group permissions are removed."""
     path = tmp_path / "a.txt"
     path.touch(0o600)
     path.chmod(0o664)
@@ -99,7 +99,7 @@ def test_rights_are_not_given_to_another_group(tmp_path: Path, monkeypatch: pyte
 
 
 def _in_group(group: int, path: Path) -> Callable[..., os.stat_result]:
-    """Path.stat, to which one file is of that group."""
+    """Return a replacement of Path.stat that reports another group for one file."""
     known = Path.stat
 
     def found(self: Path, *, follow_symlinks: bool = True) -> os.stat_result:
@@ -122,7 +122,7 @@ def _in_group(group: int, path: Path) -> Callable[..., os.stat_result]:
         ("t_0001.png", ("render", "ball.toml", "--turntable", "2", "-o", "t.png")),
         ("t.gif", ("render", "ball.toml", "--turntable", "2", "-o", "t.gif")), ("d.txt", ("doctor", "-o", "d.txt")))])
 def test_read_only_files(folder: Path, name: str, arguments: tuple[str, ...]) -> None:
-    """Nothing is written, and the file is named; with --force it is replaced, and stays read-only."""
+    """Nothing is written, and the error names the file; with --force it is replaced and stays read-only."""
     (folder / name).touch()
     (folder / name).chmod(0o444)
     before = sorted(folder.iterdir())

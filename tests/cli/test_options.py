@@ -1,4 +1,4 @@
-"""Options that name choices offer those that there are; they are written out so that --help loads nothing."""
+"""Options offer exactly the available choices, which are written out so that --help loads nothing."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ def test_options_offer_what_there_is(command: click.Command, names: Iterable[str
 
 
 def test_what_is_chosen_is_compiled(tmp_path: Path) -> None:
-    """`clrt info` lists its files, and `clrt render --print-kernel` prints them."""
+    """`clrt info` lists the chosen files, and `clrt render --print-kernel` prints them."""
     scene = tmp_path / "ball.toml"
     scene.write_text("[[sphere]]\n[[mesh]]\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\nfaces = [[0, 1, 2]]\n")
     chosen = ["--triangle", "precomputed", "--box", "plain", "--sphere", "textbook", "--offset", "ulp", "--lanes", "1"]
     listed = CliRunner().invoke(info.command, [str(scene), "--json", *chosen], catch_exceptions=False)
     printed = CliRunner().invoke(render.command, [str(scene), "--print-kernel", "-q", *chosen], catch_exceptions=False)
-    logging.disable(logging.NOTSET)   # which -q has switched off
+    logging.disable(logging.NOTSET)   # -q has switched it off
     for file in ("geometry/triangle_precomputed.cl", "geometry/box_plain.cl", "geometry/sphere_textbook.cl",
                  "offset/ulp.cl"):
         assert file in json.loads(listed.stdout)["files"] and f'"{file}"' in printed.stdout
 
 
 def test_info_is_of_the_device_that_would_render(tmp_path: Path) -> None:
-    """Without a device the builder sah stands in for ploc; one that is not there is refused."""
+    """With a device the builder is ploc, for which sah stands in without one; an unknown device is refused."""
     scene = tmp_path / "two.toml"
     scene.write_text("[[mesh]]\nvertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1]]\n"
                      "faces = [[0, 1, 2], [1, 3, 2]]\n")
@@ -56,7 +56,7 @@ def test_info_is_of_the_device_that_would_render(tmp_path: Path) -> None:
 
 
 def test_help_has_whole_sentences() -> None:
-    """Of every command, none cut to a line."""
+    """The summary of every command is a whole sentence, not truncated to a line."""
     _, told = CliRunner().invoke(commands, ["--help"], catch_exceptions=False).output.split("Commands:")
     told = " ".join(told.split())
     assert told.startswith("render Render SCENE, ") and " is reached. view Show SCENE, " in told and "..." not in told

@@ -1,4 +1,4 @@
-"""Commands where Python lacks what it lacks on Windows and macOS, and in locales that are not UTF-8."""
+"""Commands work without the parts of Python that Windows and macOS lack, and in locales that are not UTF-8."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..covering import others
 
 OTHER = Path(__file__).parents[1] / "other_system.py"
 SMALL = ("--size", "16x16", "--spp", "1", "-q")
-#: A call of each command; of those that need a display or other software, what they say of themselves.
+#: A call of each command; only the help of those that need a display or other software.
 CALLS = {"render": ("render", "scene.toml", *SMALL, "-o", "image.png"),
          "debug": ("debug", "scene.toml", "--pixel", "5,5"), "info": ("info", "scene.toml"),
          "convert": ("convert", "model.obj", "other.toml"), "compare": ("compare", "red.png", "red.png"),
@@ -26,7 +26,7 @@ CALLS = {"render": ("render", "scene.toml", *SMALL, "-o", "image.png"),
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """With a scene, which has a name beyond ASCII, a model and an image."""
+    """Return a folder with a scene whose material has a non-ASCII name, a model and an image."""
     import imageio.v3
     import numpy as np
 
@@ -56,7 +56,7 @@ def test_commands_need_nothing_that_another_system_lacks(folder: Path, system: s
 @pytest.mark.parametrize(("system", "number"), [("win32", signal.SIGUSR2), ("darwin", signal.SIGINT),
                                                 ("darwin", signal.SIGHUP)])
 def test_interrupted_it_keeps_the_picture(folder: Path, system: str, number: signal.Signals) -> None:
-    """Ctrl-Break, which is SIGUSR2 here, does what Ctrl-C does."""
+    """Ctrl-Break, simulated by SIGUSR2, works like Ctrl-C."""
     process = subprocess.Popen([sys.executable, str(OTHER), system, "render", "scene.toml", "--size", "16x16", "--time",
                                 "600", "--progress", "json", "-o", "image.png"], cwd=folder, stderr=subprocess.PIPE,
                                text=True)
@@ -70,7 +70,7 @@ def test_interrupted_it_keeps_the_picture(folder: Path, system: str, number: sig
 
 @pytest.mark.parametrize("encoding", ["cp1252", "cp1252:surrogateescape"])
 def test_names_that_the_code_page_lacks(folder: Path, encoding: str) -> None:
-    """Of standard output that goes to a file, for which Windows' Python has the second of these."""
+    """The encoding is that of standard output to a file; Python on Windows has the second of these."""
     done = subprocess.run([sys.executable, "-m", "clrt", "render", "scene.toml", *SMALL, "-o", "ü日.png"], cwd=folder,
                           capture_output=True, env=os.environ | {"PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"})
     assert (done.returncode, done.stdout) == (0, b"\xfc\\u65e5.png\n"), done.stderr
@@ -79,7 +79,7 @@ def test_names_that_the_code_page_lacks(folder: Path, encoding: str) -> None:
 
 @pytest.mark.parametrize("name", ["render", *others("info", "convert")])
 def test_commands_in_the_c_locale(folder: Path, name: str) -> None:
-    """Where Python takes text for ASCII."""
+    """Python treats text as ASCII there."""
     ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
     done = subprocess.run([sys.executable, "-m", "clrt", *CALLS[name]], cwd=folder, capture_output=True,
                           env=os.environ | ascii_only)

@@ -1,4 +1,4 @@
-"""Images to standard output, pipes and devices."""
+"""Images written to standard output, pipes and devices."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def shell(line: str) -> subprocess.CompletedProcess[bytes]:
 
 @pytest.mark.parametrize("name", [*map(str, ITS_NAMES), "/dev/null", "fifo"])
 def test_formats(folder: Path, name: str) -> None:
-    """One that is named before, else that of the extension, else PNG; whatever it is, the path is the pipe's."""
+    """The format is that of the prefix, else of the extension, else PNG; the path is the pipe's."""
     path = STDOUT if Path(name) in ITS_NAMES else Path(name)
     assert pipe_at(Path(name)) == Pipe(path, ".png")
     for form in FORMATS:
@@ -52,7 +52,7 @@ def test_formats(folder: Path, name: str) -> None:
 
 
 def test_what_is_no_pipe(folder: Path) -> None:
-    """Files, also of such names, and those that are not there."""
+    """Regular files, also with such names, and missing ones."""
     (folder / "png:a.png").touch()
     paths = tuple(map(Path, ("ball.toml", "a.png", "png:a.png", "exr:b.exr", ".", "no/such", "-.png")))
     assert split_pipes(paths) == (paths, ())
@@ -70,7 +70,7 @@ def test_a_pipe_takes_one_image(folder: Path) -> None:
     ("exr", "-o exr:fifo & cat fifo > got; wait $!"), ("png", "-o >(cat > got); sleep 0.2"),
     ("png", "-o /dev/fd/1 -o other.exr --report other.json --denoise --progress json > got")])
 def test_images(folder: Path, form: str, redirection: str) -> None:
-    """The image that a file would be, and nothing else."""
+    """The pipe gets the same image as a file, and nothing else."""
     options = "--denoise" if "--denoise" in redirection else ""
     assert shell(f"{CLRT} render ball.toml {SMALL} {options} -q -o file.{form}").returncode == 0
     done = shell(f"{CLRT} render ball.toml {SMALL} {redirection}")
@@ -91,7 +91,7 @@ def test_mistakes(folder: Path, options: str, code: int, told: str) -> None:
 
 @pytest.mark.parametrize("name", ["-", "exr:/dev/stdout", "tty"])
 def test_terminals_show_no_image(folder: Path, name: str) -> None:
-    """Refused in one line before the render."""
+    """Refused with one line before the render."""
     ours, terminal = pty.openpty()
     (folder / "tty").symlink_to(os.ttyname(terminal))
     done = subprocess.run([*CLRT.split(), "render", "ball.toml", "-o", name], stdout=terminal, stderr=subprocess.PIPE)
@@ -102,7 +102,7 @@ def test_terminals_show_no_image(folder: Path, name: str) -> None:
 
 @pytest.mark.parametrize("to", ["a closed pipe", "/dev/full"])
 def test_a_reader_that_has_gone_loses_nothing(folder: Path, to: str) -> None:
-    """One error; the image is in the working folder, and the checkpoint is whole."""
+    """There is one error; the image is in the working folder, and the checkpoint is complete."""
     reading, writing = os.pipe() if to == "a closed pipe" else (os.open(to, os.O_RDONLY), os.open(to, os.O_WRONLY))
     os.close(reading)
     line = [*CLRT.split(), "render", "ball.toml", *SMALL.split(), "-q", "--checkpoint", "a.ck"]
@@ -116,7 +116,7 @@ def test_a_reader_that_has_gone_loses_nothing(folder: Path, to: str) -> None:
 
 
 def test_ctrl_c_that_ends_the_reader_as_well(folder: Path) -> None:
-    """As every program of a pipeline gets it: interrupted, with the image in the working folder."""
+    """Ctrl-C reaches every program of a pipeline: the render is interrupted, with its image in the working folder."""
     reading, writing = os.pipe()
     line = [*CLRT.split(), "render", "ball.toml", "--time", "600", "--progress", "json", "-o", "exr:-"]
     process = subprocess.Popen(line, stdout=writing, stderr=subprocess.PIPE, text=True)

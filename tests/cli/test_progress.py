@@ -1,4 +1,4 @@
-"""What a render tells while it goes on, to people and to programs."""
+"""Progress output of a render, for people and for programs."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ def render(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def state(spp: int, seconds: float, noise: float | None = None) -> State:
-    """Of ten pixels."""
+    """Return the state of a render of ten pixels."""
     pixels = np.zeros((2, 5), PIXEL)
     pixels["count"] = spp
     return State(spp, seconds, noise, None, Film(pixels))
 
 
 def test_the_pace_is_that_of_late() -> None:
-    """A hundred a second at first, then ten."""
+    """The rate is 100 per second at first, then 10; it follows the recent samples."""
     pace, samples = Pace(), 0.0
     for second in range(1, 101):
         samples += 100 if second <= 50 else 10
@@ -44,7 +44,7 @@ def test_the_pace_is_that_of_late() -> None:
 
 
 def test_the_first_pace_is_the_mean_so_far() -> None:
-    """Also where the time did not go on."""
+    """The rate stays the same if the time has not advanced."""
     pace = Pace()
     pace.add(2.0, 400)
     assert pace.rate == 200
@@ -53,7 +53,7 @@ def test_the_first_pace_is_the_mean_so_far() -> None:
 
 
 @pytest.mark.parametrize(("goal", "left"), [
-    (Goal(40, None, None), 15.0),            # ten pixels lack 30 samples each, at 20 a second
+    (Goal(40, None, None), 15.0),            # ten pixels lack 30 samples each, at 20 per second
     (Goal(None, 5.0, None), 2.0),
     (Goal(40, 5.0, None), 2.0),
     (Goal(None, None, 0.1), 15.0),           # half the noise takes four times the samples
@@ -85,7 +85,7 @@ def test_how_much_is_told(tmp_path: Path, options: list[str], shown: list[str], 
 
 
 def test_percentages_are_rounded_down() -> None:
-    """A render that has not ended is never told to be at 100 %."""
+    """An unfinished render is never reported as 100 %."""
     assert Goal(1000, None, None).percent(state(999, 3.0)) == " 99 %  "
     assert Goal(None, None, 0.1).percent(state(10, 3.0, 0.1001)) == " 99 %  "
     assert Goal(1000, None, None).percent(state(1000, 3.0)) == "100 %  "

@@ -1,4 +1,4 @@
-"""`clrt render` that is suspended and goes on, and whose terminal goes away."""
+"""`clrt render` that is suspended and continued, and whose terminal disappears."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def rendering(folder: Path, *options: str, **more: object) -> subprocess.Popen[str]:
-    """One that has begun to render."""
+    """Start a render and return once it has begun."""
     process = subprocess.Popen([*RENDER, *options, "--progress", "json"], cwd=folder, text=True, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, **more)    # type: ignore[call-overload]
     assert process.stderr is not None
@@ -44,7 +44,7 @@ def rendering(folder: Path, *options: str, **more: object) -> subprocess.Popen[s
 
 @pytest.mark.parametrize("who", ["guard", "worker", "both"])
 def test_suspended_it_goes_on(folder: Path, who: str) -> None:
-    """Both processes, or one of them: there is a picture, and the time does not count."""
+    """If one or both processes are suspended, the image is written and the suspended time does not count."""
     goal, pause, start = 2.0, 2.5, time.perf_counter()
     process = rendering(folder, "--time", str(goal), "--report", "r.json", env={**os.environ, VARIABLE: "1"})
     worker = worker_of(process)
@@ -76,13 +76,13 @@ except KeyboardInterrupt:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_interrupted_before_anything_is_loaded(number: signal.Signals) -> None:
-    """All signals are Ctrl-C as soon as they are watched."""
+    """All signals act like Ctrl-C as soon as the guard handles them."""
     done = subprocess.run([sys.executable, "-c", AT_ONCE, str(int(number))], stderr=subprocess.PIPE, text=True)
     assert (done.returncode, done.stderr) == (130, "")
 
 
 def test_nohup_is_heeded(folder: Path) -> None:
-    """A render that is told to ignore SIGHUP does so."""
+    """A render started with SIGHUP ignored keeps ignoring it."""
     process = rendering(folder, "--spp", "4096", preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
     process.send_signal(signal.SIGHUP)
     assert process.wait(60) == 0
@@ -90,7 +90,7 @@ def test_nohup_is_heeded(folder: Path) -> None:
 
 @pytest.mark.parametrize("progress", ["bar", "plain", "json"])
 def test_terminal_goes_away(folder: Path, progress: str) -> None:
-    """What it has is written, though nobody can be told."""
+    """The image so far is written, although nothing can be printed."""
     pid, terminal = pty.fork()
     if not pid:
         os.chdir(folder)

@@ -1,4 +1,4 @@
-"""Standard streams that are closed or full: files are written all the same."""
+"""If standard streams are closed or full, files are written nevertheless."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def shell(arguments: str, redirection: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Runs it with a redirection; of a pipe it is the first part that gives the code."""
+    """Run clrt with a redirection; in a pipe, pipefail preserves its exit code."""
     line = f"{sys.executable} -m clrt {arguments} {redirection}"
     return subprocess.run(["bash", "-o", "pipefail", "-c", line], cwd=folder, capture_output=True, text=True)
 
@@ -49,7 +49,7 @@ def test_progress_into_a_closed_stream(folder: Path) -> None:
 @pytest.mark.parametrize("arguments", ["info ball.toml", "devices --json", "cache", "doctor", "compare a.exr a.exr",
                                        "render ball.toml -q --print-kernel", "--help"])
 def test_results_that_cannot_be_printed(folder: Path, arguments: str) -> None:
-    """One line and 6 where there is no room; nothing where whoever reads has seen enough."""
+    """If there is no space, one error line and exit code 6; if the reader has closed the pipe, no message."""
     if "a.exr" in arguments:
         shell(RENDER, "", folder)
     full = shell(arguments, "> /dev/full", folder)
@@ -61,7 +61,7 @@ def test_results_that_cannot_be_printed(folder: Path, arguments: str) -> None:
 @pytest.mark.parametrize("arguments", ["devices", "info ball.toml", "doctor", "cache", "render ball.toml -q",
                                        "debug ball.toml --pixel 1,1"])
 def test_no_file_can_be_written(folder: Path, arguments: str) -> None:
-    """Nor a temporary one: one error where one is needed, of the loader, or for want of a driver."""
+    """If no file can be written, commands work, or fail with one error: the loader's, or the lack of a driver."""
     (folder / "limited.sh").write_text(f"ulimit -f 0\nexec {sys.executable} -m clrt {arguments}\n")
     result = subprocess.run(["bash", "limited.sh"], cwd=folder, capture_output=True, text=True)
     assert result.returncode in {0, 4} and "Traceback" not in result.stderr
@@ -69,7 +69,7 @@ def test_no_file_can_be_written(folder: Path, arguments: str) -> None:
 
 
 def test_an_interrupt_before_it_has_begun(folder: Path) -> None:
-    """It comes while modules are loaded, of which one raises it itself."""
+    """The interrupt comes while modules are imported; one of them raises it here."""
     (folder / "click.py").write_text("raise KeyboardInterrupt")
     result = shell("cache", "", folder)
     assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
@@ -77,7 +77,7 @@ def test_an_interrupt_before_it_has_begun(folder: Path) -> None:
 
 @pytest.mark.parametrize("change", ["# ü\n", *others("", "\r\n")])
 def test_a_scene_from_standard_input(folder: Path, change: str) -> None:
-    """Its files are named from the working folder."""
+    """Relative file names are resolved from the working folder."""
     write_image(folder / "map.png", np.full((2, 2, 3), 0.5, np.float32))
     text = SCENE.replace("[0.8, 0.1, 0.1]", '{image = "map.png"}') + change
     (folder / "painted.toml").write_text(text, encoding="utf-8", newline="")

@@ -1,4 +1,4 @@
-"""What is shown on terminals of any width and kind, and what is not sent to them."""
+"""Output on terminals of any width and type, and what is never sent to them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TEXT = st.text("ab 7%", max_size=30)
 
 
 class Terminal(io.StringIO):
-    """One that goes on to the next line with the last column, as some do, and knows no escape sequences."""
+    """Fake terminal that wraps right after the last column, as some do, and rejects escape sequences."""
 
     def __init__(self, width: int) -> None:
         super().__init__()
@@ -57,7 +57,7 @@ class Terminal(io.StringIO):
 
 @given(st.integers(2, 100), st.lists(st.lists(TEXT, min_size=1, max_size=5), max_size=6))
 def test_a_status_is_one_line(width: int, statuses: list[list[str]]) -> None:
-    """It replaces the one before, whatever that was, and never wraps; erased it leaves nothing."""
+    """A status replaces the previous one and never wraps; erasing it leaves nothing."""
     terminal = Terminal(width)
     line = StatusLine(terminal)
     with pytest.MonkeyPatch.context() as patch:
@@ -72,7 +72,7 @@ def test_a_status_is_one_line(width: int, statuses: list[list[str]]) -> None:
 
 @given(st.lists(TEXT, max_size=6), st.integers(1, 90))
 def test_parts_that_fit(parts: list[str], room: int) -> None:
-    """All where there is room for all; else the first one, cut, and of the others those that fit behind."""
+    """All parts if they fit; otherwise the first, truncated, and those of the others that fit after it."""
     line, every = fitted(parts, room), "  ".join(filter(None, parts))
     first = next(filter(None, parts), "")
     assert len(line) <= room and line.startswith(first[:room])
@@ -87,7 +87,7 @@ def test_bars_are_full_at_the_end_alone(done: float) -> None:
 @pytest.mark.parametrize("redirected", [False, True])
 @pytest.mark.parametrize("width", [12, 20, 40, 80, 200])
 def test_what_stays(width: int, redirected: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a picture ended with, warnings and names of files, each on its own line; of the bar itself nothing."""
+    """The final status of an image, warnings and file names remain, each on its own line; the bar does not."""
     terminal, stdout = Terminal(width), io.StringIO()
     monkeypatch.setattr("clrt.cli.bar.columns", lambda terminal: width)
     monkeypatch.setattr(sys, "stdout", stdout if redirected else terminal)
@@ -114,7 +114,7 @@ def test_what_stays(width: int, redirected: bool, monkeypatch: pytest.MonkeyPatc
     ({"TERM": "dumb"}, PlainProgress), ({"TERM": "unknown"}, PlainProgress), ({"TERM": ""}, PlainProgress),
     ({}, PlainProgress)])
 def test_who_gets_a_bar(variables: dict[str, str], kind: type, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Who asks for one gets it on every terminal, and none elsewhere."""
+    """A requested bar is shown on every terminal, but never elsewhere."""
     for name in ("TERM", "CI"):
         monkeypatch.delenv(name, raising=False)
     for name, value in variables.items():
@@ -128,7 +128,7 @@ def test_who_gets_a_bar(variables: dict[str, str], kind: type, monkeypatch: pyte
 @pytest.mark.parametrize(("size", "variable", "found"), [
     (40, "", 40), (40, "20", 20), (20, "40", 20), (0, "", 80), (0, "30", 30), (40, "0", 40), (40, "wide", 40)])
 def test_columns(size: int, variable: str, found: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The terminal's, or what COLUMNS makes of them; a terminal without a size has 80."""
+    """The terminal's width or COLUMNS; a terminal without a size has 80."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, size, 0, 0))
     monkeypatch.setenv("COLUMNS", variable)
@@ -139,7 +139,7 @@ def test_columns(size: int, variable: str, found: int, monkeypatch: pytest.Monke
 
 
 def on_terminal(folder: Path, width: int, *arguments: str, **variables: str) -> str:
-    """All that a command sends to a terminal, where it also has its standard output."""
+    """Return everything that a command sends to a terminal, which is also its standard output."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, width, 0, 0))
     process = subprocess.Popen([sys.executable, "-P", "-m", "clrt", *arguments], cwd=folder, stdin=theirs,
@@ -149,7 +149,7 @@ def on_terminal(folder: Path, width: int, *arguments: str, **variables: str) -> 
     try:
         while piece := os.read(ours, 1 << 16):
             sent += piece
-    except OSError:     # Linux' end of it
+    except OSError:     # end of file on Linux
         pass
     os.close(ours)
     assert process.wait() == 0, sent

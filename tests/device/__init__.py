@@ -1,1 +1,1 @@
-"""Tests of the device room."""
+"""Tests of the device package."""

@@ -1,4 +1,4 @@
-"""Drivers made for tests: shared libraries that OpenCL's loader loads, with what is wrong with them compiled in."""
+"""Fake drivers: shared libraries for the OpenCL loader, with faults compiled in."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FAULTS = {"aborts": {"ON_LOAD": "abort()"}, "hangs": {"ON_LOAD": "sleep(1000)"},
 
 
 def make_driver(vendors: Path, name: str, **choices: str) -> Path:
-    """Compiles a driver of that name (see fake_driver.c for the choices), and lists it in the folder `vendors`."""
+    """Compile a driver (choices: see fake_driver.c) and register it in the folder `vendors`."""
     vendors.mkdir(exist_ok=True)
     library = vendors / f"lib{name}.so"
     values = DEFAULTS | {"PLATFORM": f'"{name}"'} | choices
@@ -29,20 +29,20 @@ def make_driver(vendors: Path, name: str, **choices: str) -> Path:
 
 
 def environment(folder: Path, **more: str) -> dict[str, str]:
-    """Drivers of folder/vendors and of pip, a cache in folder/cache, a log of who was loaded in folder/log."""
+    """Return an environment: drivers of folder/vendors and pip, cache in folder/cache, loaded drivers in folder/log."""
     kept = {name: value for name, value in os.environ.items() if name not in ("CLRT_DEVICE", "OCL_ICD_FILENAMES")}
     return kept | {"OCL_ICD_VENDORS": str(folder / "vendors"), "CLRT_CACHE_DIR": str(folder / "cache"),
                    "FAKE_LOG": str(folder / "log")} | more
 
 
 def run(folder: Path, *command: str, **more: str) -> subprocess.CompletedProcess[str]:
-    """Python with these arguments, in such an environment."""
+    """Run Python with these arguments in that environment."""
     return subprocess.run([sys.executable, "-P", *command], capture_output=True, text=True, cwd=folder, timeout=60,
                           env=environment(folder, **more))
 
 
 def listed(folder: Path, **more: str) -> list[dict[str, Any]]:
-    """What `clrt devices --json` prints."""
+    """Return what `clrt devices --json` prints."""
     result = run(folder, "-m", "clrt", "devices", "--json", **more)
     assert result.returncode == 0, result.stderr
     devices: list[dict[str, Any]] = json.loads(result.stdout)
@@ -50,7 +50,7 @@ def listed(folder: Path, **more: str) -> list[dict[str, Any]]:
 
 
 def loads(folder: Path) -> list[str]:
-    """Which drivers were loaded since this was last asked, once for each process."""
+    """Return the drivers loaded since the last call, one entry per process."""
     log = folder / "log"
     names = log.read_text().split() if log.exists() else []
     log.unlink(missing_ok=True)

@@ -1,5 +1,5 @@
-"""Leaves renders and ray queries wherever a signal comes, and forgets all at once; whoever runs it has freed memory
-unmapped, so that a launch that still uses some dies.
+"""Abandons renders and ray queries by a signal at a random point, and releases their arrays at once. Run it with freed
+memory unmapped, so that a launch that still uses such memory crashes.
 
     MALLOC_MMAP_THRESHOLD_=4096 MALLOC_TOP_PAD_=0 python -m tests.device.left_renders DEVICE [unsafe]
 """
@@ -21,7 +21,7 @@ ROUNDS, RAYS = 8, 60_000
 
 
 class Left(Exception):
-    """Out of a signal's handler."""
+    """Exception raised by the signal handler."""
 
 
 def scene() -> clrt.Scene:
@@ -67,7 +67,7 @@ def main(device: int) -> None:
 
 
 def unowned(device: Any, array: Any, access: int) -> cl.Buffer:
-    """What `lend` returns, without an owner of the array."""
+    """Return a buffer like `lend`, but without keeping the array alive."""
     return cl.Buffer(device.context, access | cl.mem_flags.USE_HOST_PTR, hostbuf=array)
 
 

@@ -1,4 +1,4 @@
-"""Compiling in a process of its own: for large data, for PoCL, and with no other outcome."""
+"""Compilation in a separate process, for large data on PoCL, gives the same programs and errors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .test_shared_cache import surroundings
 
 pytestmark = pytest.mark.processes
 
-#: Builds a program of half the renderer for so much data, and tells the peak of memory and how many kernels it has.
+#: Builds a program of half the renderer for given data bytes; prints peak memory, cache use and number of kernels.
 BUILD = """
 import json, sys
 from clrt.accel.device_builder import SHAPES, program_source
@@ -34,8 +34,8 @@ SOURCE = "kernel void add_%d(global float *x) { x[get_global_id(0)] += %d; }"
 
 
 def test_beside_large_data_no_compiler_takes_memory(tmp_path: Path) -> None:
-    """Its 80 MB and more are another process's, and so is its work: the next process finds the program either way."""
-    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # which pip brings
+    """The compiler's 80 MB and more are used by the other process, and the next process finds the program cached."""
+    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # installed by pip
 
     def built(data_bytes: int, kept: str) -> tuple[int, bool, int]:
         folder = str(tmp_path / kept)
@@ -62,7 +62,7 @@ def test_programs_are_refused_as_ever(device: Device) -> None:
 @pytest.mark.parametrize("number, python, seconds", [(1, "/no/such/python", 60.0), (2, sys.executable, 0.0)])
 def test_without_the_other_process_programs_are_compiled_here(device: Device, monkeypatch: pytest.MonkeyPatch,
                                                               number: int, python: str, seconds: float) -> None:
-    """It cannot be started, or is given up at once."""
+    """Compiles in this process if the other cannot be started or times out."""
     source = SOURCE % (number, number)
     monkeypatch.setattr(sys, "executable", python)
     compile_aside(device.info.id, source, OPTIONS, seconds)

@@ -1,4 +1,4 @@
-"""Programs built of what PoCL's front end made of them another time: each of its own, and compiled once."""
+"""Programs built from PoCL's cached bitcode: each from its own, compiled once."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from clrt.output.images import read_image
 
 from .test_shared_cache import RENDER, SCENE, surroundings
 
-#: Builds two programs whose kernels have one name: their keys, whether they were kept, and what they make of 1.
+#: Builds two programs with equal kernel names; prints their keys, whether they were cached, and their results for 1.
 BUILD = """
 import json
 import numpy as np
@@ -40,7 +40,7 @@ def multiplied(factor):
 device = open_device()
 print(json.dumps([multiplied(2), multiplied(3)]))
 """
-POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # which pip brings
+POCL = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # installed by pip
 
 
 def places(folder: Path) -> dict[str, str]:
@@ -55,7 +55,7 @@ def built(folder: Path) -> tuple[list[str], list[bool], list[list[float]]]:
 
 
 def test_a_program_is_built_of_its_bitcode(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From the first time on, so that kernels are compiled once; those of one name are not taken for each other."""
+    """Kernels are compiled only once; kernels of equal name in different programs are not confused."""
     keys, cached, values = built(tmp_path)
     assert cached == [False, False] and values == [[2, 2, 2], [3, 3, 3]]
     kernels = {file: file.stat().st_mtime_ns for file in (tmp_path / "kept").rglob("*.so")}
@@ -73,7 +73,7 @@ def test_a_program_is_built_of_its_bitcode(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_without_pocl_s_files_a_program_is_built_of_its_source(tmp_path: Path) -> None:
-    """Its bitcode is taken from the cache all the same, where it is."""
+    """If PoCL's files are missing, bitcode in clrt's cache is still used."""
     keys, _, values = built(tmp_path)
     (tmp_path / "kept").rename(tmp_path / "away")
     assert built(tmp_path) == (keys, [True, True], values)
@@ -92,7 +92,7 @@ def test_pictures_are_the_same_of_bitcode(tmp_path: Path) -> None:
 @pytest.mark.parametrize("flags", ["avx2 fma bmi1 bmi2 f16c movbe", "sse4_2 popcnt", ""])
 def test_machines_of_other_instructions_have_other_programs(device: Device, monkeypatch: pytest.MonkeyPatch,
                                                             flags: str) -> None:
-    """Though their processors bear one name, as behind hypervisors, and they share a cache."""
+    """Applies even if processors have the same name, as under hypervisors, and share a cache."""
     here, same = program_key(device, ""), best_processor(set(flags.split())) == best_processor(processor_flags())
     monkeypatch.setattr(program, "processor_flags", lambda: frozenset(flags.split()))
     assert (program_key(device, "") == here) == same
@@ -104,7 +104,7 @@ def test_versions_that_crash_on_bitcode_are_given_none() -> None:
 
 
 def test_kernels_are_named() -> None:
-    """Nothing else is, also not what a kernel calls."""
+    """Only kernels are renamed, not the functions that they call."""
     source = "void one() {}\n__attribute__((vec_type_hint(int)))\nkernel void two(int two) { one(); }\nkernel void x()"
     named = source.replace("kernel void two(", "kernel void two_ab(").replace("x()", "x_ab()")
     assert name_kernels(source, "_ab") == named

@@ -1,4 +1,4 @@
-"""Functions that drivers' threads call, and a process that ends meanwhile."""
+"""Callbacks on driver threads: a process that exits waits for them."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from clrt.threads import Event, beside
 
 
 def test_one_that_is_under_way_is_expected(device: Device) -> None:
-    """To its last line: a process that ends before that would be aborted."""
+    """A callback counts as expected until its last line: a process that ends earlier would be aborted."""
     called = list[None]()
 
     def function() -> None:
         called.append(None)
-        sys.setprofile(lambda *_: time.sleep(0.02))     # another thread gets on wherever one can, until this one ends
+        sys.setprofile(lambda *_: time.sleep(0.02))     # lets other threads run at every call
 
     event = cl.UserEvent(device.context)
     event_callbacks.when_complete(event, function)

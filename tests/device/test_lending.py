@@ -1,5 +1,4 @@
-"""Arrays that are lent to a device: they outlive the commands that use them, wherever those who launched these leave.
-"""
+"""Arrays lent to a device outlive the commands that use them, even if the launching code is interrupted."""
 
 from __future__ import annotations
 
@@ -29,12 +28,12 @@ pytestmark = pytest.mark.processes
 RNG = np.random.default_rng(5)
 RAYS = RNG.normal(size=(2, 500, 3)).astype(np.float32)
 MESH = RNG.random((50, 3)).astype(np.float32), RNG.integers(0, 50, (100, 3), dtype=np.int32)
-#: Of clrt's, after a launch: those in which it is noted and waited for.
+#: Number of clrt's lines after a launch, in which it is recorded and waited for.
 LINES = 160
 
 
 class Gate:
-    """Lets no command that is enqueued while it is closed begin before it is opened."""
+    """Blocks commands that are enqueued while it is closed, until it is opened."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.launched = self.closed = False
@@ -59,7 +58,7 @@ class Gate:
         monkeypatch.setattr("clrt.device.launches.launch.LONGEST_LOOK", 1e-3)
 
     def open(self) -> None:
-        """Lets all begin."""
+        """Let all blocked commands begin."""
         self.closed = False
         while self._bars:
             self._bars.pop().set_status(cl.command_execution_status.COMPLETE)
@@ -73,7 +72,7 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
 
 
 def left(references: list[weakref.ref[Any]]) -> int:
-    """How many of these objects there are."""
+    """Return how many of these objects still exist."""
     gc.collect()
     return sum(each() is not None for each in references)
 
@@ -100,7 +99,7 @@ def first_hits(device: Device) -> Callable[[], object]:
     return partial(made.session.first_hits, made.scene, ["depth"])
 
 
-#: What is prepared to run launches when it is called.
+#: Functions that prepare a call that runs launches.
 USES: dict[str, Callable[[Device], Callable[[], object]]] = {
     "closest_hit": lambda device: partial(query(device).closest_hit, *RAYS),
     "any_hit": lambda device: partial(query(device).any_hit, *RAYS),
@@ -111,7 +110,7 @@ USES: dict[str, Callable[[Device], Callable[[], object]]] = {
 
 
 def interrupted(use: Callable[[], object], gate: Gate, line: int) -> None:
-    """Raises KeyboardInterrupt so many lines of clrt's after the first launch."""
+    """Run `use` and raise KeyboardInterrupt `line` lines of clrt after the first launch."""
     passed = 0
 
     def trace(frame: FrameType, event: str, _: object) -> Any:
@@ -134,10 +133,10 @@ def interrupted(use: Callable[[], object], gate: Gate, line: int) -> None:
 
 @pytest.mark.parametrize("name", USES)
 def test_interrupted_at_any_line(device: Device, gate: Gate, name: str) -> None:
-    """Where all is forgotten at once there is still every array that the launch may use, and then none any more."""
+    """After an interrupt, every array that a launch may use survives until it ends, and is then freed."""
     if device.info.type != "cpu":
         pytest.skip("arrays are lent to CPUs alone")
-    USES[name](device)()    # builds its programs
+    USES[name](device)()    # build its programs first
     for line in RNG.permutation(LINES)[:12]:
         gate.launched, gate.lent = False, []
         use = USES[name](device)
@@ -150,7 +149,7 @@ def test_interrupted_at_any_line(device: Device, gate: Gate, name: str) -> None:
 
 
 def test_memory_comes_back_by_itself(device: Device, gate: Gate) -> None:
-    """At once from an idle device, and from a busy one when its launches are done, without another call of clrt's."""
+    """Memory is freed at once from an idle device, and from a busy one when its launches end, without calling clrt."""
     if device.info.type != "cpu":
         pytest.skip("arrays are lent to CPUs alone")
     for busy in (False, True):
@@ -187,7 +186,7 @@ elif sys.argv[2] == "exception":
 
 @pytest.mark.parametrize("how", ["break", "end", "exception"])
 def test_process_lives(device: Device, how: str) -> None:
-    """Also where Python ends with launches in flight, and says nothing of its own then."""
+    """The process survives, also if Python exits with launches in flight, and prints no error of its own."""
     done = subprocess.run([sys.executable, "-c", LEAVING, str(device.info.index), how], capture_output=True, text=True)
     last = ["RuntimeError: as it is meant"] if how == "exception" else []
     assert done.returncode == len(last) and done.stderr.splitlines()[-1:] == last, done.stderr
@@ -195,7 +194,7 @@ def test_process_lives(device: Device, how: str) -> None:
 
 
 def test_nothing_uses_memory_that_was_freed(device: Device) -> None:
-    """Each array of 4 KiB or more is unmapped as it is freed, which kills whatever still uses it."""
+    """Each array of 4 KiB or more is unmapped when it is freed, so a command that still uses it crashes."""
     unmapped = {"MALLOC_MMAP_THRESHOLD_": "4096", "MALLOC_TOP_PAD_": "0"}    # glibc's
     done = subprocess.run([sys.executable, "-m", "tests.device.left_renders", str(device.info.index)], text=True,
                           capture_output=True, env=os.environ | unmapped, cwd=Path(__file__).parents[2])

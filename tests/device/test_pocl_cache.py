@@ -1,4 +1,4 @@
-"""What PoCL keeps, damaged: as by a disk that was full, or power that failed."""
+"""Damaged files in PoCL's cache, as after a full disk or a power failure."""
 
 from __future__ import annotations
 
@@ -21,10 +21,9 @@ GARBAGE = bytes(range(256)) * 4
 
 @pytest.mark.parametrize("name, size", [("program.bc", 0), ("program.bc", 1000), ("*.so", 0), ("*.so", 1000)])
 def test_a_damaged_program_is_compiled_again(tmp_path: Path, name: str, size: int) -> None:
-    """Some are noticed at once; on others PoCL aborts, which is told with what was done about it, and is the last time.
-    """
+    """Some damage is noticed at once; if PoCL aborts on it, the error says so and the damaged files are removed."""
     (tmp_path / "scene.toml").write_text(SCENE)
-    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # which pip brings
+    pocl = next(Path(pyopencl.__file__).parent.glob(".libs/libpocl*"))     # installed by pip
     places = surroundings(HOME=str(tmp_path), CLRT_CACHE_DIR=str(tmp_path / "cache"), OCL_ICD_VENDORS=str(pocl),
                           POCL_CACHE_DIR=str(tmp_path / "kept"))
 
@@ -44,7 +43,7 @@ def test_a_damaged_program_is_compiled_again(tmp_path: Path, name: str, size: in
 
 
 def test_whole_programs_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of files without a home, and of a folder that is not there, nothing is removed."""
+    """Intact programs, files outside a program's folder, and missing folders are left alone."""
     monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path / "absent"))
     assert remove_damaged() == 0
     program = tmp_path / "AB" / "CDE"

@@ -47,7 +47,7 @@ DOUBLE = "kernel void twice(global float *x) { x[get_global_id(0)] *= 2.0f; }"
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Three kernel files that include each other."""
+    """Return a folder of three kernel files that include each other."""
     (tmp_path / "a.cl").write_text('#include "b.cl"\n#include CHOSEN\nint a;\n')
     (tmp_path / "b.cl").write_text("int b;\n")
     (tmp_path / "c.cl").write_text('#include "b.cl"\nint c;\n')
@@ -55,7 +55,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_file_is_included_once(folder: Path) -> None:
-    """Where it is first asked for; #line names the file that follows."""
+    """A file is included at its first mention; #line names the file that follows."""
     text = compose("int first;", "a.cl", {"CHOSEN": ["c.cl", "b.cl"]}, folder)
     assert re.findall(r"int (\w+);", text) == ["first", "b", "c", "a"]
     assert re.findall(r'#line 1 "(.+)"', text) == ["a.cl", "b.cl", "c.cl"]
@@ -74,7 +74,7 @@ def test_unknown_includes_are_errors(folder: Path, choices: dict[str, list[str]]
 
 
 def test_includes_stand_outside_conditions() -> None:
-    """They are resolved before the preprocessor runs, so one inside #if would be there always."""
+    """Includes are resolved before the preprocessor runs, so one inside #if would always take effect."""
     for name in FILES:
         check_includes(name)
 
@@ -98,7 +98,7 @@ def test_a_kernel_file_opens_with_what_it_is() -> None:
 
 
 def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By some scene, with some choice, by ray queries, the builder, to refit, to check a device, or to study it."""
+    """Each file is used by a scene or choice, ray queries, the builder, refits, device checks or studies."""
     corners = np.zeros((3, 3), np.float32)
     monkeypatch.setattr(instancing, "FEW_TRIANGLES", 0)
     used: set[str] = set()
@@ -146,7 +146,7 @@ def test_every_kernel_file_is_used(device: Device, monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize("entry", ["the picture's", *others("guides.cl", "first hits", "debug.cl")])
 def test_programs_build_without_a_warning(device: Device, entry: str, capfd: pytest.CaptureFixture[str],
                                           tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """They would land on the user's terminal, in the middle of the progress bar. What drivers say besides is theirs."""
+    """Warnings would interrupt the progress bar on the terminal. Other messages of drivers are ignored."""
     scene = everything()
     scene.spheres = scene.spheres + [type(scene.spheres[0])(material=material)
                                      for kind in MATERIALS for material in variants(kind)]
@@ -232,7 +232,7 @@ print(query.any_hit([0.2, 0.2, 1], [0, 0, -1]))
 
 
 def test_what_pyopencl_keeps_is_damaged(device: Device, tmp_path: Path) -> None:
-    """It is done without, in silence."""
+    """A damaged cache of pyopencl is ignored silently."""
     for damaged in (False, True):
         done = subprocess.run([sys.executable, "-c", KEPT_CALLS, str(device.info.index)], capture_output=True,
                               text=True, env=os.environ | {"XDG_CACHE_HOME": str(tmp_path)})

@@ -1,4 +1,4 @@
-"""Which device is which, which is best, and what is said of it: with drivers that show devices as wanted."""
+"""Device ids, ranking and descriptions, tested with fake drivers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .fake_drivers import listed, make_driver, run
 
 pytestmark = pytest.mark.needs("gcc")
 
-#: Keeps a speed for devices by their names, and prints what there is then.
+#: Stores a speed for devices by name, and prints the resulting device list.
 MEASURED = """
 import clrt, json, sys
 from clrt.device.discovery.discover import find_devices
@@ -26,7 +26,7 @@ print(json.dumps(clrt.devices()))
 
 
 def measured(folder: Path, **speeds: float) -> list[dict[str, Any]]:
-    """The devices, once these Mrays/s are known of those with such names."""
+    """Return the devices after storing these speeds in Mrays/s by device name."""
     result = run(folder, "-c", MEASURED, json.dumps(speeds))
     assert result.returncode == 0, result.stderr
     rows: list[dict[str, Any]] = json.loads(result.stdout)
@@ -35,7 +35,7 @@ def measured(folder: Path, **speeds: float) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("uuids", ["0", "1"])
 def test_two_equal_gpus(tmp_path: Path, uuids: str) -> None:
-    """Ids of their own; where the driver tells UUIDs, the same ones when it lists them the other way round."""
+    """Equal GPUs have different ids; if the driver reports UUIDs, they stay the same when the order is reversed."""
     ids = []
     for reversed_ in ("0", "1"):
         make_driver(tmp_path / "vendors", "twins", COUNT="2", UUIDS=uuids, REVERSED=reversed_)
@@ -50,7 +50,7 @@ def test_two_equal_gpus(tmp_path: Path, uuids: str) -> None:
 
 
 def test_a_device_through_two_platforms(tmp_path: Path) -> None:
-    """By its UUID where that is told, else by its name; a translation comes after the driver of its own."""
+    """Equal hardware is recognized by UUID, or else by name; a translation layer ranks after the native driver."""
     for name, choices in {"alayer": {"PLATFORM": '"clvk"', "UUIDS": "1"}, "driver": {"UUIDS": "1"},
                           "unlike": {"NAME": '"Other GPU"', "UNITS": "50"}}.items():
         make_driver(tmp_path / "vendors", name, **choices)
@@ -61,7 +61,7 @@ def test_a_device_through_two_platforms(tmp_path: Path) -> None:
 
 
 def test_the_fastest_measured_is_chosen(tmp_path: Path) -> None:
-    """Devices that were measured trade places by speed; one that was not keeps the place that its size gives it."""
+    """Measured devices are reordered by speed; one that was not measured keeps its rank by size."""
     for name, units in {"big": "30", "middle": "20", "small": "10"}.items():
         make_driver(tmp_path / "vendors", name, NAME=f'"{name}"', UNITS=units)
 

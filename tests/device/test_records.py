@@ -1,4 +1,4 @@
-"""Host and device lay every record out alike: the device is asked for its sizes and offsets."""
+"""Host and device use the same layout of every record, by sizes and offsets read on the device."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def offsets(dtype: np.dtype[Any]) -> list[int]:
 
 
 def test_every_record_is_here() -> None:
-    """Those of rendering, of the trees, and of the materials."""
+    """RECORDS has the records of rendering, the BVHs, and the materials."""
     assert len(RECORDS) >= 13 + 6 + len(MATERIALS)
 
 
 def test_device_agrees_with_numpy(device: Device) -> None:
-    """One program with all typedefs; a kernel writes each record's size and the offset of each member."""
+    """A program with all typedefs writes the size of each record and the offset of each member."""
     places, texts = [], []
     for name, dtype in RECORDS.items():
         texts.append(c_typedef(name, dtype))
@@ -55,7 +55,7 @@ def test_device_agrees_with_numpy(device: Device) -> None:
 
 @pytest.mark.combinations
 def test_pyopencl_agrees(device: Device) -> None:
-    """Its own matcher of dtypes to C structs finds no other layout."""
+    """pyopencl's own matching of dtypes to C structs gives the same layout."""
     for name, dtype in RECORDS.items():
         matched, _ = cl.tools.match_dtype_to_c_struct(device.cl, name, dtype)
         assert matched.itemsize == dtype.itemsize
@@ -64,7 +64,7 @@ def test_pyopencl_agrees(device: Device) -> None:
 
 @pytest.mark.parametrize("name", RECORDS)
 def test_records_keep_the_rules(name: str) -> None:
-    """Members aligned as C wants them, without gaps; sizes in steps of 16, but for tables read field by field."""
+    """Members are aligned as in C without gaps; sizes are multiples of 16, except in tables read field by field."""
     dtype = RECORDS[name]
     members = [dtype[field] for field in dtype.names or ()]
     assert sum(member.itemsize for member in members) == dtype.itemsize

@@ -1,4 +1,4 @@
-"""The cache folder between processes, and where there is none to write to."""
+"""The cache folder shared by several processes, and unwritable cache folders."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ pytestmark = pytest.mark.processes
 
 SCENE = "[render]\nsize = [16, 8]\nspp = 2\n[environment]\ncolor = [1, 1, 1]\n[[sphere]]\n"
 RENDER = (sys.executable, "-P", "-m", "clrt", "render", "scene.toml", "-q", "-o")
-DROP_CAPABILITY, CAPABILITIES = 24, 64     # of prctl
+DROP_CAPABILITY, CAPABILITIES = 24, 64     # of prctl(2)
 
 
 def surroundings(**more: str) -> dict[str, str]:
-    """The environment without any variable that says where caches are, and these."""
+    """Return the environment without variables that set cache locations, plus these."""
     named = ("CLRT_CACHE_DIR", "XDG_CACHE_HOME", "POCL_CACHE_DIR", "HOME", "TMPDIR")
     return {name: value for name, value in os.environ.items() if name not in named} | more
 
 
 def no_rights() -> None:
-    """Of root over files that permissions keep from it; for others there is nothing to drop."""
+    """Drop root's capability to bypass file permissions; other users have nothing to drop."""
     for capability in range(CAPABILITIES):
         ctypes.CDLL(None).prctl(DROP_CAPABILITY, capability, 0, 0, 0)
 
@@ -53,7 +53,7 @@ def test_eight_processes_start_on_a_cold_cache(tmp_path: Path) -> None:
 @pytest.mark.parametrize("home", ["a read-only home", "no home", "a home that cannot be told",
                                   "a cache of PoCL's that is read-only"])
 def test_whatever_the_home_is(tmp_path: Path, home: str) -> None:
-    """The picture is written, and nothing into a folder named ~."""
+    """The image is written, and nothing is written into a folder named ~."""
     (tmp_path / "scene.toml").write_text(SCENE)
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o555)

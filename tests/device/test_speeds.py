@@ -1,4 +1,4 @@
-"""Speeds of devices are kept for what was measured, whatever the file holds; `clrt devices --bench` measures them."""
+"""Device speeds are cached per device, driver and kernels, robust to damaged files; `devices --bench` measures them."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ SPEED = Speed(30.0, 10.0, 15.0)
 
 @pytest.fixture
 def info(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> DeviceInfo:
-    """A device of this machine, with a cache of the test's own."""
+    """Return a device of this machine, with a cache of the test's own."""
     monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path))
     return find_devices()[0][0]
 
 
 def test_a_speed_comes_back(info: DeviceInfo, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Until the driver or a kernel changes. As many rays of each kind: 3 / (1/30 + 1/10 + 1/15) = 15."""
+    """A speed is valid until driver or kernels change. With equal ray counts: 3 / (1/30 + 1/10 + 1/15) = 15."""
     assert kept_speed(info) is None and keep_speed(info, SPEED)
     assert kept_speed(info) == SPEED and SPEED.mrays == pytest.approx(15)
     assert kept_speed(replace(info, driver="2")) is None
@@ -36,7 +36,7 @@ def test_a_speed_comes_back(info: DeviceInfo, monkeypatch: pytest.MonkeyPatch) -
 
 @pytest.mark.parametrize("bench", [None, {}, {"mrays_primary": 1}, [1, 2, 3], "", 0.0, -1.0, float("nan"), "x"])
 def test_whatever_the_file_holds(info: DeviceInfo, tmp_path: Path, bench: object) -> None:
-    """Instead of all, or of one of the numbers."""
+    """Replaces all of the figures or one of them by a malformed value."""
     keep_speed(info, SPEED)
     file, = tmp_path.glob("*.bench.json")
     kept = json.loads(file.read_bytes())
@@ -49,7 +49,7 @@ def test_whatever_the_file_holds(info: DeviceInfo, tmp_path: Path, bench: object
 
 @pytest.mark.needs("gcc")
 def test_measuring(tmp_path: Path) -> None:
-    """The best device is measured, and the next list is by its speed; one that cannot compute is told, with code 4."""
+    """The best device is measured and then ranked by its speed; one that cannot compute gives exit code 4."""
     make_driver(tmp_path / "vendors", "fake", TYPE="2", UNITS="1")
     bench = run(tmp_path, "-m", "clrt", "devices", "--bench", "--json")
     assert bench.returncode == 4 and "Fake GPU cannot be measured" in bench.stderr and "Traceback" not in bench.stderr

@@ -1,4 +1,4 @@
-"""What checks found is kept for the device, driver, kernels and version that were checked, and obeyed."""
+"""Verdicts of checks are stored for the device, driver, kernels and version checked, and affect the selection."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FAILED = Verdict(False, ["sums: 3 of 8 wrong", "room: dark"], "2026-11-21T20:00:
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A cache of the test's own."""
+    """Return a cache folder of the test's own."""
     monkeypatch.setenv("CLRT_CACHE_DIR", str(tmp_path))
     monkeypatch.delenv("CLRT_DEVICE", raising=False)
     return tmp_path
@@ -37,7 +37,7 @@ def info() -> DeviceInfo:
 
 
 def test_devices_have_hashes(info: DeviceInfo) -> None:
-    """As keys of a dict they are what they are by comparison, verdict and speed included."""
+    """Hashes agree with equality, verdict and speed included."""
     several = [replace(info, check=check, bench=bench) for check in (None, PASSED, FAILED)
                for bench in (None, Speed(1, 2, 3))]
     copies = [copy.deepcopy(each) for each in several]
@@ -95,7 +95,7 @@ def test_a_folder_that_cannot_be_used(info: DeviceInfo, folder: Path, monkeypatc
 
 
 def test_a_device_that_failed_is_used_only_if_named(info: DeviceInfo, caplog: pytest.LogCaptureFixture) -> None:
-    """Without another to take, the error says what to do."""
+    """If no other device is available, the error says what to do."""
     for other, _ in find_devices():
         keep_verdict(other, FAILED)
     failed = find_devices()[0][0]
@@ -112,7 +112,7 @@ def test_a_device_that_failed_is_used_only_if_named(info: DeviceInfo, caplog: py
 
 
 def test_the_next_best_is_used(info: DeviceInfo, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of three devices, all alike, the first failed: the second is used, also where only the kind is said."""
+    """If the first of three equal devices failed, the second is used, also if only the type is given."""
     own = next(device for each, device in find_devices() if each.id == info.id)
     monkeypatch.setattr(discover, "load_platforms", lambda again: ([None], {}))
     monkeypatch.setattr(discover, "devices_of", lambda platform: 3 * [own])

@@ -1,4 +1,4 @@
-"""What differs on Windows: where the loader's functions are, and drivers that pip does not list in the registry."""
+"""Specifics of Windows: the loader's location, and drivers from pip that are not in the registry."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from clrt.device.discovery.windows_drivers import installed_in, not_loaded, pip_
 
 
 def test_the_loader_that_the_wheel_bundles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Beside pyopencl, with a digest in its name; without it, as in conda's environments, the system's."""
+    """The loader lies next to pyopencl, with a digest in its name; without it, as in conda, the system's is used."""
     own = next((Path(cl.__file__).parent / ".libs").glob("libOpenCL*"))
     (tmp_path / "pyopencl.libs").mkdir()
     bundled = tmp_path / "pyopencl.libs" / "opencl-0123.dll"
@@ -31,7 +31,7 @@ def test_the_loader_that_the_wheel_bundles(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_drivers_of_pip(tmp_path: Path) -> None:
-    """In Python's prefix and the user's, which may be the same."""
+    """Drivers are found in Python's prefix and the user's, which may be the same."""
     own, user = str(tmp_path / "own"), str(tmp_path / "user")
     path = tmp_path / "user" / "Library" / "bin" / "intelocl64.dll"
     path.parent.mkdir(parents=True)
@@ -41,7 +41,7 @@ def test_drivers_of_pip(tmp_path: Path) -> None:
 
 
 def test_a_driver_that_is_not_loaded() -> None:
-    """With the line that lists it, to be copied."""
+    """The message contains the registry command that lists the driver."""
     told = not_loaded(Driver(r"C:\py\Library\bin\intelocl64.dll", "pip"))
     assert told.endswith(r'reg add HKLM\SOFTWARE\Khronos\OpenCL\Vendors /v "C:\py\Library\bin\intelocl64.dll" '
                          "/t REG_DWORD /d 0")
@@ -49,7 +49,7 @@ def test_a_driver_that_is_not_loaded() -> None:
 
 @pytest.mark.parametrize("named", [None, "three"])
 def test_added_to_all_others(monkeypatch: pytest.MonkeyPatch, named: str | None) -> None:
-    """To those that the user named; then the variable is as it was. (Not all loaders on Linux read it.)"""
+    """Drivers are added to those of the user; then the variable is restored. (Not all Linux loaders read it.)"""
     if named:
         monkeypatch.setenv(loader.FILENAMES, named)
     else:

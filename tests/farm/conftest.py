@@ -1,4 +1,4 @@
-"""What tests of a farm have in common; each has scheduler and workers of its own, `processes`."""
+"""Shared fixtures of the farm tests; each module defines its own scheduler and workers, `processes`."""
 
 from __future__ import annotations
 

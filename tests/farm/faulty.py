@@ -1,4 +1,4 @@
-"""Loaded by workers that are to be broken: CLRT_TEST_FAULT says how."""
+"""Preload module of faulty workers: CLRT_TEST_FAULT selects the fault."""
 
 from __future__ import annotations
 
@@ -16,26 +16,26 @@ _first: list[Worker] = []
 
 
 def another_version() -> dict[str, str]:
-    """What a worker with an older clrt would say."""
+    """Report the identity of a worker with an older clrt."""
     return {**_identity(), "version": "0.0.1"}
 
 
 def share_of_nans(*arguments: Any) -> Any:
-    """What a device with broken memory might give."""
+    """Return NaN pixels, as a device with broken memory might."""
     answer = _share(*arguments)
     answer.value[0]["sum"][0, 0, 0] = float("nan")
     return answer
 
 
 def share_that_crashes(*arguments: Any) -> Any:
-    """What a driver that cannot bear some tile does."""
+    """Kill the process at tile 0, as a driver that crashes on some tile."""
     if 0 in arguments[1]:
         os.kill(os.getpid(), 9)
     return _share(*arguments)
 
 
 def ended_of_a_lost_device(self: Worker) -> Share | None:
-    """The process's first device is gone once it has rendered something for the picture."""
+    """Lose the process's first device after it has rendered more than 4096 samples."""
     _first[:] = _first or [self]
     if self is _first[0] and self.samples > 4096:
         raise DeviceError("the device is lost")

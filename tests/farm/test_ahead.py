@@ -1,4 +1,4 @@
-"""Samples of the next pass come early, and nothing shows them."""
+"""Samples of the next pass may be rendered early without being visible in the film."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ TILES = (4, 9)
 
 @pytest.mark.parametrize("seed", range(6))
 def test_every_pass_ends_as_if_all_had_waited(seed: int) -> None:
-    """Tasks of all sizes end in any order, some are given back; the third pass turns out to be another one than that
-    which was begun."""
+    """Tasks of random sizes end in any order and some are returned; the third pass differs from the one that was begun
+    early."""
     rng = np.random.default_rng(seed)
     work, ahead = Work(np.zeros(TILES, np.int64)), Ahead(np.zeros((36, TILE_PIXELS), PIXEL))
     in_flight: list[tuple[Work, Part]] = []

@@ -1,4 +1,4 @@
-"""What is sent to workers and heard of them, without any rendering."""
+"""Messages to and from workers, without rendering."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def processes(tmp_path: Path) -> Iterator[Processes]:
 
 
 def addresses(cluster: Cluster, count: int) -> list[str]:
-    """Of so many workers, once they are there."""
+    """Wait for `count` workers and return their addresses."""
     while len(found := cluster.workers()) < count:
         time.sleep(0.05)
     return list(found)
 
 
 def heard(cluster: Cluster, keys: set[str], seconds: float = 30) -> set[str]:
-    """Which of the keys have been heard of by then."""
+    """Return which of the keys have been heard of within `seconds`."""
     found, end = set[str](), time.monotonic() + seconds
     while not keys <= found and time.monotonic() < end:
         found |= {key for key, _ in cluster.hear(0.1)}
@@ -39,7 +39,7 @@ def heard(cluster: Cluster, keys: set[str], seconds: float = 30) -> set[str]:
 
 
 def test_who_hangs_keeps_no_other_result_back(processes: Processes) -> None:
-    """One has said that it is done, and then sleeps: what others have comes all the same."""
+    """A worker that is suspended after it reported its result does not delay results of others."""
     with connect(processes.address) as cluster:
         one, other = addresses(cluster, 2)
         pids = {address: cluster._submit(address, f"pid-{address}", os.getpid).result() for address in (one, other)}
@@ -56,7 +56,7 @@ def test_who_hangs_keeps_no_other_result_back(processes: Processes) -> None:
 
 
 def test_those_that_are_there_are_seen(processes: Processes) -> None:
-    """At every look, also while Dask's client keeps itself informed without them."""
+    """Workers are listed at every call, also while Dask's client updates its own information."""
     with dask.config.set({"distributed.client.scheduler-info-interval": "1ms"}), connect(processes.address) as cluster:
         addresses(cluster, 2)
         assert {len(cluster.workers()) for _ in range(300)} == {2}

@@ -1,4 +1,4 @@
-"""The command on a cluster of this machine: the same files as without, nothing that others can connect to."""
+"""The command on a local cluster writes the same files, and opens no ports to other machines."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CORNELL = Path(__file__).parents[2] / "scenes" / "cornell.toml"
 
 
 def command(folder: Path, *arguments: str) -> list[str]:
-    """What it writes to standard output, in lines."""
+    """Return the words that it writes to standard output."""
     done = subprocess.run([sys.executable, "-m", "clrt", "render", str(CORNELL), "--size", "32x24", "--spp", "4", "-q",
                            *arguments], cwd=folder, capture_output=True, text=True, timeout=280)
     assert done.returncode == 0, done.stderr
@@ -31,7 +31,7 @@ def command(folder: Path, *arguments: str) -> list[str]:
 
 
 def test_frames_of_a_turntable(tmp_path: Path) -> None:
-    """Those that are there are not made again, whoever made them."""
+    """Existing frames are not rendered again, whether or not a farm rendered them."""
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()
     there.mkdir()
@@ -46,8 +46,8 @@ def test_frames_of_a_turntable(tmp_path: Path) -> None:
 
 
 def test_nothing_listens_to_others() -> None:
-    """Two workers on this machine: all their ports, and the scheduler's, are of the loopback interface, and no picture
-    can be had of them without the certificate."""
+    """All ports of two workers and the scheduler are on the loopback interface, and connecting without the certificate
+    fails."""
     with local_cluster(2) as cluster:
         found = FarmRenderer(room(), cluster, size=(32, 24), spp=8)
         found.session.dispatch.wait_for(2)

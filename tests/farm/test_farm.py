@@ -1,6 +1,6 @@
-"""A farm's picture is one machine's to the last bit, whoever renders it, dies, sleeps or lies meanwhile.
+"""A farm's image equals that of one machine bit for bit, also if workers die, sleep or return wrong results.
 
-Scheduler and workers are processes of their own, started once; what a test kills it replaces.
+Scheduler and workers are separate processes, started once; tests replace those that they kill.
 """
 
 from __future__ import annotations
@@ -56,19 +56,19 @@ def small_tasks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def alone(scene: Scene, **options: Any) -> Renderer:
-    """One process; twice the same device, so that it has the program that workers have, which is compiled once."""
+    """Return a renderer in one process; the device is listed twice so that it uses the same program as the workers."""
     return Renderer(scene, device=[0, 0], **{"size": SIZE, "seed": 1, "spp": 24, **options})
 
 
 def together(cluster: Cluster, scene: Scene, count: int = 4, **options: Any) -> FarmRenderer:
-    """Once so many workers are ready."""
+    """Return a farm renderer once `count` workers are ready."""
     made = FarmRenderer(scene, cluster, **{"device": 0, "size": SIZE, "seed": 1, "spp": 24, **options})
     made.session.dispatch.wait_for(count)
     return made
 
 
 def at_pass(running: Renderer, number: int, event: Callable[[], Any], **stops: float) -> None:
-    """Renders to the end; the event comes in the middle of a pass."""
+    """Render to the end; call `event` in the middle of pass `number`."""
     passes, work = 0, running.session._work
 
     def disturbed() -> Iterator[None]:
@@ -87,7 +87,7 @@ def at_pass(running: Renderer, number: int, event: Callable[[], Any], **stops: f
 @pytest.mark.parametrize("scene", [clamped(room(), 0.5, 0.05), clrt.load(SCENES / "cornell.toml"),
                                    clrt.load(SCENES / "spheres.toml")], ids=lambda scene: scene.name)
 def test_same_picture(cluster: Cluster, small_tasks: None, scene: Scene) -> None:
-    """Film, estimate and history; all four took part."""
+    """Film, estimate and history are equal, and all four workers took part."""
     expected = alone(scene)
     run(expected, spp=40)
     found = together(cluster, scene)
@@ -105,7 +105,7 @@ def test_it_ends_at_the_same_error(cluster: Cluster, small_tasks: None, adaptive
 
 
 def test_pictures_beside_it(cluster: Cluster) -> None:
-    """AOVs and guides come from a worker."""
+    """AOVs and guides are rendered by a worker."""
     names = ["direct", "albedo", "depth"]
     expected, found = alone(room(), aovs=names), together(cluster, room(), 1, aovs=names)
     for name, picture in expected.aovs(run(expected, spp=4)).items():
@@ -115,7 +115,7 @@ def test_pictures_beside_it(cluster: Cluster) -> None:
 
 
 def test_workers_that_are_killed(processes: Processes, cluster: Cluster, small_tasks: None) -> None:
-    """Two of four, in the middle of a pass, and another joins: nothing is lost, or counted twice."""
+    """Two of four workers die during a pass and two join: no sample is lost or counted twice."""
     def event() -> None:
         for _ in range(2):
             processes.kill(processes.workers[0])
@@ -128,7 +128,7 @@ def test_workers_that_are_killed(processes: Processes, cluster: Cluster, small_t
 
 
 def test_one_that_sleeps(processes: Processes, cluster: Cluster, small_tasks: None) -> None:
-    """Its tasks are done by others; it wakes up, and its late results count for nothing."""
+    """Others do the tasks of a suspended worker; its late results after it wakes up are ignored."""
     expected, found = alone(room()), together(cluster, room())
     run(expected, spp=128)
     sleeper = processes.workers[-1]
@@ -142,7 +142,7 @@ def test_one_that_sleeps(processes: Processes, cluster: Cluster, small_tasks: No
 
 def test_those_that_lie_are_left_out(processes: Processes, cluster: Cluster, small_tasks: None,
                                      caplog: pytest.LogCaptureFixture) -> None:
-    """One with another version, one whose pixels are NaN: both are named with what is wrong."""
+    """A worker with another version and one that returns NaN are named with the fault."""
     processes.add_workers(1, FAULTS, CLRT_TEST_FAULT="version")
     processes.add_workers(1, FAULTS, CLRT_TEST_FAULT="nan")
     liars = processes.workers[-2:]
@@ -160,7 +160,7 @@ def test_those_that_lie_are_left_out(processes: Processes, cluster: Cluster, sma
 @pytest.mark.parametrize("devices", [1, 2])
 def test_a_device_that_is_lost(processes: Processes, cluster: Cluster, small_tasks: None, devices: int,
                                caplog: pytest.LogCaptureFixture) -> None:
-    """Its worker goes on with the other that it has, or is left out."""
+    """The worker continues with its other device, or is left out if it has none."""
     processes.add_workers(1, FAULTS, CLRT_TEST_FAULT="lost")
     expected, found = alone(room()), together(cluster, room(), 5, device=[0] * devices)
     run(expected, spp=40)
@@ -173,7 +173,7 @@ def test_a_device_that_is_lost(processes: Processes, cluster: Cluster, small_tas
 
 def test_a_device_that_failed_its_check(processes: Processes, cluster: Cluster, device: Device, tmp_path: Path,
                                         monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
-    """A worker without any other is left out."""
+    """A worker without another device is left out."""
     with monkeypatch.context() as there:
         there.setenv("CLRT_CACHE_DIR", str(tmp_path))
         assert keep_verdict(device.info, Verdict(False, ["it adds wrong"], "2026-01-01T00:00:00", 1.0, kernel_digest()))
@@ -189,7 +189,7 @@ def test_a_device_that_failed_its_check(processes: Processes, cluster: Cluster, 
 
 
 def test_frames(cluster: Cluster) -> None:
-    """24 of them, each by one worker, are those of one process, and all four took part."""
+    """24 frames, each rendered by one worker, equal those of one process, and all four workers took part."""
     def frame(name: str) -> PictureOrder:
         scene = room()
         moved = replace(scene.camera, position=tuple(np.add(scene.camera.position, (0, 0, int(name) / 100)).tolist()))
@@ -208,7 +208,7 @@ def test_frames(cluster: Cluster) -> None:
 
 
 def test_bands(cluster: Cluster, tmp_path: Path) -> None:
-    """Interrupted, with one band damaged since, a picture in bands is that of one process, in a file of any kind."""
+    """After an interrupt and damage to one band, an image in bands equals that of one process, in every file format."""
     order = PictureOrder(room(), {"size": (90, 100), "device": 0, "seed": 3}, spp=4)
     banded = Banded(order, tmp_path / "a.bands", band_pixels=90 * 16)
     for done, _ in banded.render(cluster):
@@ -232,7 +232,7 @@ def test_bands(cluster: Cluster, tmp_path: Path) -> None:
 
 def test_a_scheduler_that_comes_back(processes: Processes, cluster: Cluster, small_tasks: None,
                                      caplog: pytest.LogCaptureFixture) -> None:
-    """In the middle of a pass, with other workers: the render goes on with what it has."""
+    """The scheduler restarts during a pass with other workers: the render continues with its samples."""
     def event() -> None:
         processes.kill(processes.scheduler)
         for worker in list(processes.workers):
@@ -249,7 +249,7 @@ def test_a_scheduler_that_comes_back(processes: Processes, cluster: Cluster, sma
 
 def test_a_scheduler_that_is_killed(processes: Processes, cluster: Cluster, small_tasks: None, tmp_path: Path,
                                     monkeypatch: pytest.MonkeyPatch) -> None:
-    """The render ends with what it has in its checkpoint, which one machine goes on with."""
+    """The render ends with its samples in the checkpoint, which one machine resumes."""
     monkeypatch.setattr(dispatch, "GONE", 1.0)
     found = together(cluster, room(), 2, checkpoint=tmp_path / "a.ck", checkpoint_seconds=1e6)
     with pytest.raises(DeviceError, match="has not answered for 1 s"):
@@ -262,7 +262,7 @@ def test_a_scheduler_that_is_killed(processes: Processes, cluster: Cluster, smal
 
 
 def test_a_task_that_kills(processes: Processes, small_tasks: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another scheduler at the same place is found, and what ends two workers is given up, and named."""
+    """A new scheduler at the same address is used, and a task that ends two workers is given up and named."""
     monkeypatch.setattr(dispatch, "MOST_DEATHS", 2)
     for worker in list(processes.workers):
         processes.kill(worker)

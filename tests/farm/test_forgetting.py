@@ -1,6 +1,6 @@
-"""Workers that forget a scene, or go while they are asked for something: others are, and the render goes on.
+"""Workers that forget a scene or leave during a request are replaced by others, and the render continues.
 
-They only sleep where a device would work.
+They are simulated: they sleep instead of rendering.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def test_a_scene_that_was_forgotten(cluster: Cluster, monkeypatch: pytest.Monkey
 
 
 def slowly_or_not(pid: int) -> Answer:
-    """A function of a worker that does not come back in one process."""
+    """Return the process id, but hang in the process `pid`."""
     if os.getpid() == pid:
         time.sleep(60)
     return Answer(os.getpid())
@@ -61,7 +61,7 @@ def slowly_or_not(pid: int) -> Answer:
 
 def test_one_that_goes_while_it_is_asked(processes: Processes, cluster: Cluster,
                                          monkeypatch: pytest.MonkeyPatch) -> None:
-    """The next one answers."""
+    """The next worker answers."""
     renderer, leaver = sleeper(cluster, 0), processes.workers[0]
     processes.add_simulated(1)
     dispatch = renderer.session.dispatch
@@ -84,7 +84,7 @@ def test_one_that_goes_while_it_is_asked(processes: Processes, cluster: Cluster,
 
 
 def test_an_interrupt_before_any_sample(cluster: Cluster, capsys: pytest.CaptureFixture[str]) -> None:
-    """Is told like any other."""
+    """An interrupt before the first sample is reported like any other."""
     renderer = sleeper(cluster, 0, speed=100.0)
     state = renderer.state()
     assert state.film.samples == 0
@@ -99,14 +99,14 @@ def test_a_checkpoint_is_of_one_camera(cluster: Cluster, tmp_path: Path) -> None
 
 
 def band(**differs: Any) -> dict[str, Any]:
-    """The report of one band of half a picture, as far as it counts for the whole."""
+    """Return the report of one band of half an image, with the fields that count for the whole."""
     return {"samples": 6144, "spp": 4, "rays": 10, "nonfinite_samples": 0, "noise": 0.1, "seconds": 1.0,
             "stop_reason": "spp", "kernel": {"features": ["LIGHTS"]}, "brightest": 1.0, "warnings": ["of the scene"],
             **differs}
 
 
 def test_what_bands_say_together(tmp_path: Path) -> None:
-    """Nothing of one band is told of all."""
+    """Figures of a single band are not reported for the whole."""
     banded = Banded(PictureOrder(room(), {"size": SIZE}, spp=4), tmp_path / "a.bands")
     banded.reports = {name: band(device="one", seconds=seconds, samples_per_second=6144 / seconds, rays_per_second=1.0,
                                  stop_reason="error", tile_noise=0.02) for name, seconds in (("a", 1.0), ("b", 9.0))}
@@ -118,7 +118,7 @@ def test_what_bands_say_together(tmp_path: Path) -> None:
 
 
 def test_bands_warn_of_the_whole_picture(tmp_path: Path) -> None:
-    """Samples that any of them dropped, all together, what biases them all, and a picture that is black everywhere."""
+    """Warnings cover the samples dropped in all bands, the bias of all, and an image that is black everywhere."""
     banded = Banded(PictureOrder(room(), {"size": SIZE, "clamp_direct": 1.0}, spp=4), tmp_path / "a.bands")
     banded.reports = {"a": band(samples=100, nonfinite_samples=3, brightest=0.0),
                       "b": band(samples=100, nonfinite_samples=4)}

@@ -1,4 +1,4 @@
-"""What is sent to workers: everything that a scene is, each array once, and nothing that could open a file."""
+"""Scenes are sent to workers completely, with each array once, and cannot make the receiver open a file."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_what_arrives_is_what_was_sent(name: str) -> None:
 
 
 def test_an_array_travels_once() -> None:
-    """However many meshes share it, and however many frames: another camera makes no other arrays."""
+    """Meshes and frames share arrays: another camera adds no arrays."""
     rng = np.random.default_rng(1)
     vertices = rng.random((LARGE, 3), np.float32)
     faces = rng.integers(0, LARGE, (LARGE, 3), np.int32)
@@ -52,7 +52,7 @@ def test_an_array_travels_once() -> None:
 
 
 class Escape:
-    """Has its reader call something."""
+    """Object whose unpickling calls a function."""
 
     def __init__(self, function: Any, *arguments: Any) -> None:
         self.called = function, arguments
@@ -65,16 +65,16 @@ class Escape:
     Escape(open, "/etc/passwd"), Escape(os.system, "true"), Escape(eval, "1"), Escape(clrt.load, "x.toml"),
     Escape(np.load, "x.npy"), Escape(pickle.loads, b"N.")], ids=lambda escape: escape.called[0].__name__)
 def test_a_text_calls_nothing(escape: Escape) -> None:
-    """It names the classes of scenes, and arrays; whatever else it names is refused before it is called."""
+    """Only the classes of scenes and arrays may be named; anything else is refused before it is called."""
     with pytest.raises(SceneError, match="no scene is made of"):
         unpack(pickle.dumps(escape), {})
 
 
 def test_reading_a_parcel_opens_no_file() -> None:
-    """Not even those that the scene was made of: their pictures and meshes are in what was sent."""
+    """Files of the scene are not opened either: their textures and meshes are in the parcel."""
     parcel = pack(clrt.load(SCENES / "materials.toml"))
     text, arrays = parcel.text, parcel.arrays
-    unpack(text, arrays)     # modules are loaded
+    unpack(text, arrays)     # load the modules
     opened: list[str] = []
     listening = [True]
     sys.addaudithook(lambda event, arguments: opened.append(event) if listening and event in ("open", "os.open")

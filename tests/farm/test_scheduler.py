@@ -1,4 +1,4 @@
-"""Addresses at which something else than a scheduler answers, or nothing does: an error in time, that names them."""
+"""Connecting to an address without a scheduler raises an error in time that names the address."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from clrt.farm.cluster import connect
 from clrt.farm.local_processes import Processes
 from clrt.threads import Event, beside
 
-#: Seconds to answer in.
+#: Timeout in seconds.
 SHORT = 1.5
 
 
 @contextmanager
 def server(answer: bytes | None) -> Iterator[str]:
-    """The address of one that answers each connection so, and closes it; None: it never says anything."""
+    """Yield the address of a server that sends `answer` and closes each connection; with None it never answers."""
     with socket.create_server(("127.0.0.1", 0)) as listening:
         kept = []
 
@@ -44,7 +44,7 @@ def server(answer: bytes | None) -> Iterator[str]:
 
 
 def refused(address: str) -> str:
-    """What is said of an address that does not do; it is named in it, once."""
+    """Return the error message for an address; it must name the address once."""
     with pytest.raises(DeviceError) as error:
         connect(address)
     assert str(error.value).count(address) == 1 and "name the address that it prints" in str(error.value)
@@ -66,7 +66,7 @@ def test_other_servers(answer: bytes | None, scheme: str) -> None:
 
 
 def test_ports_that_drop_connections() -> None:
-    """Its queue of connections is full: what else comes gets no answer from the system."""
+    """The listen queue is full, so the system does not answer further connections."""
     with ExitStack() as stack:
         full = stack.enter_context(socket.create_server(("127.0.0.1", 0), backlog=0))
         for _ in range(4):
@@ -89,7 +89,7 @@ def test_a_lookup_that_hangs(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_worker_is_no_scheduler(tmp_path: Path) -> None:
     with Processes(tmp_path) as processes:
         processes.add_workers(1)
-        cluster.ANSWER = 10.0    # restored with the fixture
+        cluster.ANSWER = 10.0    # restored by the fixture
         with connect(processes.address) as connected:
             while not (workers := connected.workers()):
                 pass

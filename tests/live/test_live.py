@@ -1,4 +1,4 @@
-"""A live session shows what a render shows, whatever was edited before, and makes no more anew than it must."""
+"""A live session shows the same image as a render after any edits, and rebuilds no more than necessary."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SECONDS = 250.0
 
 
 def room() -> Scene:
-    """A ball and a mesh of more triangles than do without a tree, over a floor, under a lamp, a light and a sky."""
+    """Return a scene with spheres, a mesh large enough for a BVH, a floor, emitters, and an environment map."""
     vertices, faces = icosphere(2)
     floor = quad([(-4, -1, 4), (4, -1, 4), (4, -1, -4), (-4, -1, -4)], Diffuse(color=(0.7, 0.6, 0.5)))
     sky = np.random.default_rng(0).random((4, 8, 3), np.float32)
@@ -48,13 +48,13 @@ def room() -> Scene:
 
 @pytest.fixture
 def live(device: Device) -> Iterator[Live]:
-    contexts.share_no_more()    # one that tests before wore out would be left in the middle, and its programs with it
+    contexts.share_no_more()    # a context worn out by other tests would be replaced midway
     with Live(room(), device=device.info.index) as live:
         yield live
 
 
 def whole(live: Live) -> Snapshot:
-    """What was asked for last, with all its samples."""
+    """Return the snapshot of the last request, with all its samples."""
     seen = live.wait(lambda now: now.asked == live.asked and (now.error is not None or is_whole(now)), SECONDS)
     assert seen.asked == live.asked
     return seen
@@ -65,7 +65,7 @@ def is_whole(seen: Snapshot) -> bool:
 
 
 def check_as_rendered(live: Live, device: Device) -> Snapshot:
-    """Bit for bit what is rendered of the same scene."""
+    """Assert that the snapshot equals a render of the same scene bit for bit, and return it."""
     seen = whole(live)
     expected = clrt.render(live.scene, device=device.info.index, spp=SPP, **live.settings.tracing)
     assert seen.error is None and np.array_equal(seen.pixels, expected.pixels)
@@ -81,7 +81,7 @@ def moved(scene: Scene) -> Scene:
 
 
 def values(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Edits of values alone."""
+    """Yield edits that change values only, not the scene's structure."""
     blue = Diffuse(color=(0.1, 0.2, 0.9))
     lamp = PointLight(position=(-1.0, 2.0, 2.0), intensity=(1.0, 5.0, 5.0))
     yield "camera", moved(scene)
@@ -93,7 +93,7 @@ def values(scene: Scene) -> Iterator[tuple[str, Scene]]:
 
 
 def test_edits_of_values_build_nothing_and_show_what_a_render_shows(live: Live, device: Device) -> None:
-    """Neither program nor tree; one after another, so each meets what those before it left."""
+    """Neither program nor BVH is rebuilt; edits follow each other, so each starts from the state left by the last."""
     first = check_as_rendered(live, device)
     for name, _ in values(live.scene):
         live.edit(dict(values(live.scene))[name])
@@ -110,7 +110,7 @@ def test_edits_of_values_build_nothing_and_show_what_a_render_shows(live: Live, 
 
 
 def test_what_is_seen_at_a_place(live: Live) -> None:
-    """While it is rendered, and at rest; what was removed is seen no more, and a picture that went wrong stays."""
+    """Works during a render and at rest; removed objects are not picked, and after an error the last image counts."""
     ball, mesh = live.scene.spheres[0], live.scene.meshes[1]
     places = {(0.5, 0.5): mesh, (0.74, 0.5): ball, (0.5, 0.97): live.scene.meshes[0], (0.02, 0.02): None}
     for _ in range(2):
@@ -125,7 +125,7 @@ def test_what_is_seen_at_a_place(live: Live) -> None:
 
 
 def test_moved_instances_keep_the_trees_of_their_meshes(device: Device) -> None:
-    """The upper level alone is made anew; the picture is that of a fresh render."""
+    """Only the upper level is rebuilt; the image equals that of a new render."""
     vertices, faces = icosphere(6)
     assert len(faces) > FEW_TRIANGLES
     ball = Mesh(vertices, faces, Diffuse())
@@ -142,7 +142,7 @@ def test_moved_instances_keep_the_trees_of_their_meshes(device: Device) -> None:
 
 
 def test_movements_are_shown_in_time_and_then_whole(live: Live, device: Device) -> None:
-    """Small at first, as large as there is time for; nothing is small once it rests."""
+    """Images are reduced while the camera moves, as large as time allows, and have full size at rest."""
     whole(live)
     live.choose(replace(live.settings, frame_rate=1000.0))
     whole(live)
@@ -166,8 +166,8 @@ def test_mistakes_are_told_and_the_last_picture_stays(live: Live, device: Device
 
 
 def test_after_many_programs_the_device_is_opened_anew(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And not before all that belonged to it has ended: PoCL's compiler is one for all contexts that there are."""
-    contexts.share_no_more()    # as the tests' own device is in use
+    """The old context must be released completely first: PoCL's compiler is shared by all contexts."""
+    contexts.share_no_more()    # the tests' own device is in use
     with Live(room(), device=device.info.index) as live:
         whole(live)
         before = weakref.ref(live._renderer._devices[0].shared)
@@ -185,7 +185,7 @@ def test_after_many_programs_the_device_is_opened_anew(device: Device, monkeypat
 
 
 def test_the_newest_edit_wins(live: Live, device: Device) -> None:
-    """A hundred at once are not rendered one by one."""
+    """A hundred edits at once are not rendered one by one."""
     number = whole(live).number
     for _ in range(100):
         live.edit(moved(live.scene))
@@ -201,10 +201,10 @@ def test_steps_are_undone_and_what_is_no_step_stays() -> None:
         history.record(scene, after, goes_on)
         return after
 
-    for x in (1.0, 2.0, 3.0):   # dragged
+    for x in (1.0, 2.0, 3.0):   # a dragged value
         scene = step(replace(scene, spheres=[replace(scene.spheres[0], radius=x)]), goes_on=x < 3)
     scene = step(replace(scene, lights=[]))
-    scene = moved(scene)        # walked
+    scene = moved(scene)        # a camera movement
     before = history.undo(scene)
     assert before.lights is first.lights and before.spheres is scene.spheres and before.camera is scene.camera
     assert history.undo(before).spheres is first.spheres and not history.can_undo
@@ -213,7 +213,7 @@ def test_steps_are_undone_and_what_is_no_step_stays() -> None:
 
 
 def test_pace() -> None:
-    """Pictures that take a microsecond a sample and 10 ms to prepare: the largest that come in time, if any do."""
+    """If a sample takes 1 µs per pixel and preparation 10 ms, the largest size in time is chosen, or the smallest."""
     pace, full = Pace(), (1600, 900)
     for _ in range(20):
         pace.note(pace.size(full, 1, 0.1), 1, 0.01, 1e-6 * np.prod(pace.size(full, 1, 0.1)))
@@ -230,7 +230,7 @@ def test_settings_have_limits(wrong: dict[str, Any]) -> None:
 
 
 def test_picks_that_nobody_waits_for() -> None:
-    """One that was given up keeps no other from its answer, nor does an error of any kind; after the end none waits."""
+    """A cancelled pick or an error of any type does not affect other picks; after the end, picks are cancelled."""
     picks = Picks()
     given_up, wrong, last = (picks.ask(x, 0.0) for x in (0.1, 0.2, 0.3))
     given_up.cancel()

@@ -1,4 +1,4 @@
-"""The measures against sums done by hand."""
+"""Image metrics agree with sums computed by hand and with closed forms of FLIP."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def test_nonfinite_values_are_counted_and_left_out() -> None:
     reference = picture((1, 1, math.inf), (1, 1, 2))
     result = compare(image, reference)
     assert (result["nonfinite"], result["nonfinite_reference"]) == (3, 1)
-    # Left: 2 against 1 in green, 4 against 2 in blue.
+    # What remains: 2 against 1 in green, 4 against 2 in blue.
     assert result["relmse"] == pytest.approx((1 / 1.01 + 4 / 4.01) / 2, rel=1e-12)
     assert result["mean_ratio"] == [None, 2, 2]
     nothing = compare(image, np.full_like(reference, np.nan))
@@ -62,7 +62,7 @@ def test_nonfinite_values_are_counted_and_left_out() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_sums_are_float64() -> None:
-    """1e38² is beyond float32; so is a part in 1e8 of the sum of four million pixels."""
+    """1e38² exceeds float32's range; a part in 1e8 of the sum of four million pixels exceeds its precision."""
     assert compare(picture((1e38, 0, 0)), picture((0, 0, 0)))["rmse"] == pytest.approx(1e38 / math.sqrt(3), rel=1e-6)
     reference = np.ones((2048, 2048, 3), np.float32)
     image = reference.copy()
@@ -80,16 +80,16 @@ def test_flip_depends_on_how_much_is_wrong() -> None:
 
 @needs_flip
 def test_ldr_flip_of_black_and_white_is_one() -> None:
-    """FLIP scales the largest difference of colours to 1 (Andersson et al. 2020), and black and white come close."""
+    """FLIP scales the largest color difference to 1 (Andersson et al. 2020); black and white are close to it."""
     white = np.ones((64, 64, 3), np.float32)
     assert compare(0 * white, white, hdr=False)["flip"] == pytest.approx(1, abs=0.05)
     assert compare(5 * white, white, hdr=False)["flip"] == 0
 
 
 def flip_of_colors(x: Floats64, r: Floats64) -> float:
-    """LDR-FLIP of two even pictures of linear Rec. 709 colours in [0, 1] (Andersson et al. 2020, sections 4.1 and 4.3).
+    """LDR-FLIP of two uniform images of linear Rec. 709 colors in [0, 1] (Andersson et al. 2020, sections 4.1 and 4.3).
 
-    Nothing is filtered there and no feature seen, so it is the HyAB distance in Hunt-adjusted L*a*b*, redistributed.
+    Filters and features have no effect on them, so it is the HyAB distance in Hunt-adjusted L*a*b*, redistributed.
     """
     to_xyz = np.array([[0.41239079926595934, 0.357584339383878, 0.1804807884018343],
                        [0.21263900587151027, 0.715168678767756, 0.07219231536073371],
@@ -111,7 +111,7 @@ def flip_of_colors(x: Floats64, r: Floats64) -> float:
 
 
 def aces(x: Floats64) -> Floats64:
-    """The tone mapper of HDR-FLIP (Andersson et al. 2021, section 4)."""
+    """Tone mapper of HDR-FLIP (Andersson et al. 2021, section 4)."""
     return np.asarray((0.36 * 2.51 * x**2 + 0.6 * 0.03 * x) / (0.36 * 2.43 * x**2 + 0.6 * 0.59 * x + 0.14))
 
 
@@ -121,7 +121,7 @@ COLORS = [(0.2, 0.5, 0.1), (0.21, 0.5, 0.1), (0.9, 0.1, 0.4), (0.02, 0.02, 0.03)
 @needs_flip
 @pytest.mark.parametrize("image, reference", [(a, b) for a in COLORS for b in COLORS if a != b], ids=str)
 def test_flip_of_even_pictures_has_a_closed_form(image: Color, reference: Color) -> None:
-    """Also of a high range: there is one exposure then, which brings the reference to where aces is 0.85."""
+    """For HDR-FLIP there is then one exposure, which maps the reference's luminance to where aces is 0.85."""
     x, r = np.array(image), np.array(reference)
     pictures = [np.full((32, 32, 3), color, np.float32) for color in (x, r)]
     assert compare(*pictures, hdr=False)["flip"] == pytest.approx(flip_of_colors(x, r), abs=2e-4)

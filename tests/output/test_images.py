@@ -1,4 +1,4 @@
-"""Pictures written and read back, and what happens where they can't be."""
+"""Images are written and read back exactly, and write failures leave the old file."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ LAYOUTS: dict[str, Callable[[FloatArray], FloatArray]] = {
 
 
 def noise(seed: int = 0) -> FloatArray:
-    """(21, 34, 3): many magnitudes, both signs."""
+    """Return (21, 34, 3) noise of many magnitudes and both signs."""
     rng = np.random.default_rng(seed)
     return (rng.normal(size=(21, 34, 3)) * 10.0 ** rng.uniform(-6, 6, (21, 34, 1))).astype(np.float32)
 
@@ -69,7 +69,7 @@ def test_png_is_srgb_unless_told_otherwise(tmp_path: Path) -> None:
 
 
 def png_samples(path: Path) -> NDArray[np.uint8]:
-    """Decode an 8-bit RGB PNG by hand (RFC 2083): no decoder that might share the writer's mistakes."""
+    """Decode an 8-bit RGB PNG by hand (RFC 2083), independently of any library that might share the writer's errors."""
     data, at, body = path.read_bytes(), 8, b""
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     while at < len(data):
@@ -95,8 +95,8 @@ def png_samples(path: Path) -> NDArray[np.uint8]:
 
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_hdr_is_the_nearest_rgbe(tmp_path: Path, layout: str) -> None:
-    """A pixel whose maximum is in [2^(e-1), 2^e) is stored in steps of 2^(e-8); at nearest that is half a step, or
-    half of the next exponent's step where the maximum rounds up to 2^e. Either way at most max/255."""
+    """A pixel whose maximum is in [2^(e-1), 2^e) is stored in steps of 2^(e-8), so the nearest value is within half a
+    step, or half of the next exponent's step if the maximum rounds up to 2^e: in either case at most max/255."""
     picture = LAYOUTS[layout](abs(noise()))
     write_image(tmp_path / "a.hdr", picture)
     error = abs(read_image(tmp_path / "a.hdr").astype(np.float64) - picture)
@@ -107,7 +107,7 @@ def test_hdr_is_the_nearest_rgbe(tmp_path: Path, layout: str) -> None:
 
 
 def test_hdr_does_not_darken(tmp_path: Path) -> None:
-    """Rounding errors are symmetric: over 30 000 values in [0.5, 1) in steps of 1/256 their mean is within 5 sigma."""
+    """Rounding errors are symmetric: the mean over 30 000 values in [0.5, 1) in steps of 1/256 is within 5 sigma."""
     picture = np.random.default_rng(4).uniform(0.5, 0.99, (100, 100, 3)).astype(np.float32)
     write_image(tmp_path / "a.hdr", picture)
     mean_error = np.mean(read_image(tmp_path / "a.hdr").astype(np.float64) - picture)
@@ -199,7 +199,7 @@ except OutputError as error:
 
 @pytest.mark.parametrize("extension", ["exr", "hdr", "png"])
 def test_a_failing_write_leaves_the_old_picture(tmp_path: Path, extension: str) -> None:
-    """Files end after 20 kB, as on a full disk; the picture needs more in every format."""
+    """Files are limited to 20 kB, as on a full disk; the image needs more in every format."""
     path = tmp_path / f"a.{extension}"
     path.write_text("the old picture")
     (tmp_path / "elsewhere").mkdir()
@@ -237,7 +237,7 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name, told", [("a.png", True), ("a.hdr", True), ("a.exr", False)])
 def test_values_that_are_no_light_are_counted(tmp_path: Path, caplog: pytest.LogCaptureFixture, name: str,
                                               told: bool) -> None:
-    """An .exr keeps them."""
+    """They are replaced and counted in .png and .hdr files; an .exr keeps them."""
     flawed = np.array([[[math.nan, math.nan, -1], [-math.inf, math.inf, 0.5], [0, -0.0, 3e38]]], np.float32)
     write_image(tmp_path / name, flawed)
     message = (f"{tmp_path / name}: of the picture's values 2 are NaN and 2 negative, written as 0, and 1 infinite, "

@@ -1,4 +1,4 @@
-"""AOVs in files, read back by the OpenEXR library itself, and as they are drawn."""
+"""AOVs written to files, read back by the OpenEXR library, and their display colors."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ material = "red"
 
 
 def layers(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """An .exr's header and channels."""
+    """Return the header and channels of an .exr file."""
     with OpenEXR.File(str(path), separate_channels=True) as file:
         return dict(file.header()), {name: channel.pixels for name, channel in file.channels().items()}
 
@@ -50,7 +50,7 @@ def test_every_aov_can_be_written() -> None:
 
 
 def test_an_exr_has_all_layers_and_what_made_them(tmp_path: Path) -> None:
-    """Exactly as they are in Python, under the names that compositors look for."""
+    """Layers equal the Python arrays exactly, under the names that compositing software expects."""
     (tmp_path / "ball.toml").write_text(SCENE)
     image = clrt.render(tmp_path / "ball.toml", spp=4, aovs=AOVS)
     image.save(tmp_path / "all.exr")
@@ -80,7 +80,7 @@ def test_numbers_that_float32_has_not_are_told(tmp_path: Path, caplog: pytest.Lo
 
 
 def test_the_command_writes_them(tmp_path: Path) -> None:
-    """Layers of an .exr, files beside a .png, nothing beside an .hdr."""
+    """They become layers of an .exr, separate files next to a .png, and are omitted for an .hdr."""
     result = run(tmp_path, "--aov", "albedo,depth", "--aov", "object", "-o", "a.exr", "-o", "b.png", "-o", "c.hdr")
     written = ["a.exr", "b.png", "b.albedo.png", "b.depth.png", "b.object.png", "c.hdr"]
     assert (result.returncode, result.stdout.split()) == (0, written), result.stderr
@@ -112,7 +112,7 @@ def test_mistakes(tmp_path: Path, arguments: list[str], message: str) -> None:
 
 
 def test_how_they_are_drawn() -> None:
-    """By hand: signs around a half, the nearest white, misses black, numbers in colours of their own."""
+    """Checked by hand: signed values are centered at 0.5, near is white, misses are black, ids have distinct colors."""
     vectors = np.array([[[0, 1, -1], [0, 0, 0]]], np.float32)
     assert drawn("normal", vectors, "srgb", 0).tolist() == [[[128, 255, 0], [0, 0, 0]]]
     depth = np.array([[2, 4, np.inf]], np.float32)
@@ -129,6 +129,6 @@ def test_how_they_are_drawn() -> None:
 
 
 def test_nothing_to_see_is_black() -> None:
-    """Not a warning of numpy's."""
+    """Images without valid pixels are black and cause no numpy warning."""
     empty = np.full((2, 2), np.inf, np.float32)
     assert not drawn("depth", empty, "srgb", 0).any() and not drawn("samples", 0 * np.ones((2, 2), int), "raw", 0).any()

@@ -1,4 +1,4 @@
-"""Plots: what stands in the file is the curve, on axes that make powers of time straight lines."""
+"""Plots show the curve, on log-log axes where powers of time are straight lines."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from clrt.formats.images.image_reader import linear_from_srgb
 from clrt.output.error_plots import check_plot, plot_errors, plot_history
 from clrt.output.images import read_image
 
-#: The first and second colour of matplotlib's cycle.
+#: The first two colors of matplotlib's cycle.
 BLUE, ORANGE = (0x1f, 0x77, 0xb4), (0xff, 0x7f, 0x0e)
 TIMES = [1.0, 3.0, 10.0, 30.0, 100.0]
 
 
 def curve_pixels(path: Path, colour: tuple[int, int, int]) -> NDArray[np.int64]:
-    """(n, 2) row and column of the pixels of a curve, without the legend's sample of it on the right of the top."""
+    """Return (n, 2) rows and columns of a curve's pixels, without the legend at the top right."""
     pixels = read_image(path)
     wanted = linear_from_srgb(np.array(colour, np.float32) / np.float32(255))
     near = np.abs(np.subtract(pixels, wanted)).max(-1) < 0.02
@@ -33,7 +33,7 @@ def curve_pixels(path: Path, colour: tuple[int, int, int]) -> NDArray[np.int64]:
 
 @pytest.mark.parametrize(("power", "bend"), [(0.5, False), (0.9, False), (0.5, True)])
 def test_powers_of_time_are_straight_lines(tmp_path: Path, power: float, bend: bool) -> None:
-    """Straight to the width of the line and its marks; a curve that stays above an error bends by far more."""
+    """Straight up to the width of line and markers; a curve that levels off at a bias bends far more."""
     errors = [0.1 * seconds**-power + 0.02 * bend for seconds in TIMES]
     plot_errors(tmp_path / "a.png", {"scene": {"one": list(zip(TIMES, errors))}})
     rows, columns = curve_pixels(tmp_path / "a.png", BLUE).T
@@ -44,7 +44,7 @@ def test_powers_of_time_are_straight_lines(tmp_path: Path, power: float, bend: b
 
 
 def test_history_has_an_estimate_and_true_errors(tmp_path: Path) -> None:
-    """The true ones four times the estimated: above them in the picture, everywhere."""
+    """The true error, four times the estimated one, lies above it everywhere."""
     history: list[dict[str, Any]] = [{"spp": 1, "seconds": 0.5, "noise": None, "relmse": 4.0}]
     history += [{"spp": 2, "seconds": seconds, "noise": 0.1 / seconds, "relmse": (0.4 / seconds) ** 2}
                 for seconds in TIMES]

@@ -1,4 +1,4 @@
-"""Reports are valid JSON, whole or absent."""
+"""Reports are valid JSON, written completely or not at all."""
 
 from __future__ import annotations
 

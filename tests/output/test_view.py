@@ -1,4 +1,4 @@
-"""View transforms against the published curves, in float64 and by known values, and against OpenColorIO itself."""
+"""View transforms match the published curves in float64, known values, and OpenColorIO."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from clrt.output.ocio import ACES, ocio_view
 from clrt.output.view_transform import VIEWS, to_display, view_called
 
 
-#: Views in which grey is not quite: the rows of their matrices add up to 1 in the fourth place.
+#: Views that tint gray slightly: the rows of their matrices sum to 1 only to about 1e-4.
 TINTED = ("agx", "aces")
-#: All views of linear light that need no config of the user's.
+#: All views of linear light that need no user config.
 ALL_VIEWS = (*VIEWS, "aces")
 
 
 def shown(values: list[float], view: str = "srgb", exposure: float = 0.0) -> list[int]:
-    """What grey pixels of these values become; all three channels must agree, as far as the view leaves grey grey."""
+    """Return display values of gray pixels; all channels must agree, up to 1 for the tinted views."""
     grey = np.array(values, np.float32).reshape(1, -1, 1).repeat(3, axis=2)
     display = to_display(grey, view, exposure)
     assert display.dtype == np.uint8 and display.shape == grey.shape
@@ -32,7 +32,7 @@ def shown(values: list[float], view: str = "srgb", exposure: float = 0.0) -> lis
 
 
 def srgb_float64(linear: NDArray[np.float64]) -> NDArray[np.float64]:
-    """IEC 61966-2-1, as printed."""
+    """Return the sRGB transfer function of IEC 61966-2-1."""
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
@@ -45,7 +45,7 @@ def test_known_values() -> None:
     ("srgb", 1.055 * 0.18 ** (1 / 2.4) - 0.055), ("raw", 0.18), ("pbr_neutral", 1.055 * 0.14 ** (1 / 2.4) - 0.055),
     ("agx", 0.5), ("aces", 0.349188)])
 def test_grey_card(view: str, signal: float) -> None:
-    """0.18: by sRGB's curve; that of 0.14, which Khronos's offset of 0.04 leaves; AgX's pivot; by OpenColorIO."""
+    """Values: sRGB of 0.18; sRGB of 0.14, which Khronos's offset of 0.04 leaves; AgX's pivot; OpenColorIO's."""
     card = np.full((1, 1, 3), 0.18, np.float32)
     assert view_called(view)(card)[0, 0] == pytest.approx([signal] * 3, abs=5e-5)
 
@@ -54,7 +54,7 @@ def test_srgb_follows_the_closed_form_everywhere() -> None:
     linear = np.linspace(0, 1, 300_001, dtype=np.float32)
     exact = 255 * srgb_float64(linear.astype(np.float64))
     display = to_display(linear.reshape(1, -1, 1).repeat(3, axis=2))[0, :, 0]
-    # Where the curve crosses a half, float32 may fall on either side: 1e-4 is 1e-6 of full scale in units of 1/255.
+    # Near a rounding boundary float32 may fall on either side: 1e-4 is within 1e-6 of full scale, in units of 1/255.
     clear = np.abs(exact - np.floor(exact) - 0.5) > 1e-4
     assert clear.mean() > 0.999
     assert np.array_equal(display[clear], np.floor(exact + 0.5)[clear])
@@ -89,7 +89,7 @@ def test_more_light_never_looks_darker(view: str) -> None:
 @pytest.mark.parametrize("view", ALL_VIEWS)
 @pytest.mark.filterwarnings("error")
 def test_every_colour_has_a_signal(view: str) -> None:
-    """Of any brightness in each channel, also where a channel is dark and others are as bright as can be."""
+    """Any brightness per channel gives a finite signal, also with one dark channel and others at maximum."""
     levels = np.array([0, 1e-45, 1e-20, 1e-4, 0.05, 0.18, 0.76, 1, 5, 1e4, 1e15], np.float32)
     colors = np.stack(np.meshgrid(levels, levels, levels), axis=-1).reshape(1, -1, 3)
     signal = view_called(view)(colors)
@@ -103,7 +103,7 @@ def test_exposure_counts_stops() -> None:
 
 
 def test_reinhard_is_equation_4() -> None:
-    """White is L = 16, so L = 1 becomes (1 + 1/256)/2; a coloured pixel keeps the ratios of its channels."""
+    """White is L = 16, so L = 1 becomes (1 + 1/256)/2; a colored pixel keeps the ratios of its channels."""
     greys = np.array([0.18, 1, 4, 16])
     exact = srgb_float64(greys * (1 + greys / 256) / (1 + greys))
     assert shown(greys.tolist(), "reinhard") == np.floor(255 * exact + 0.5).tolist()
@@ -115,7 +115,7 @@ def test_reinhard_is_equation_4() -> None:
 
 
 def khronos(color: list[float]) -> list[float]:
-    """PBRNeutralToneMapping of the specification, statement by statement, for one colour."""
+    """Return PBRNeutralToneMapping of the specification, statement by statement, for one color."""
     start, desaturation = 0.8 - 0.04, 0.15
     x = min(color)
     offset = x - 6.25 * x * x if x < 0.08 else 0.04
@@ -137,8 +137,8 @@ def test_pbr_neutral_is_khronos_s() -> None:
 
 
 def test_agx_is_the_published_table() -> None:
-    """Entries of AgX_Default_Contrast.spi1d in github.com/sobotka/AgX, of 4096 from 2^-12.47393 to 2^4.026069, for what
-    the published matrix makes of a colour."""
+    """Entries of AgX_Default_Contrast.spi1d in github.com/sobotka/AgX, of 4096 from 2^-12.47393 to 2^4.026069, applied
+    to colors after the published matrix."""
     table = {300: 0.0054006, 819: 0.024569, 1365: 0.0810636, 2000: 0.271826, 2400: 0.4600463,
              2482: 0.5000888, 2600: 0.5577078, 3000: 0.7468467, 3500: 0.9180099, 4000: 0.9925869}
     inset = np.array([[0.842479062253094, 0.0784335999999992, 0.0792237451477643],
@@ -166,7 +166,7 @@ def test_aces_is_opencolorio_s() -> None:
 
 @pytest.fixture
 def own_config(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A user's config, named by $OCIO, with a view of its own: the cube root."""
+    """Return the path of a user config, named by $OCIO, with its own views: square root and cube root."""
     config = PyOpenColorIO.Config()
     config.setVersion(2, 0)
     for name, power in (("Linear Rec.709", 1.0), ("cube root", 1 / 3), ("square root", 1 / 2)):

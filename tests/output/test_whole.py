@@ -1,4 +1,4 @@
-"""Images of which the system refuses any part, as on a full disk, do not pass for written."""
+"""Images whose writing fails at any part, as on a full disk, are reported and do not replace the old file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ import resource    # noqa: E402
 
 @contextmanager
 def at_most(size: int) -> Iterator[None]:
-    """No file of this process, or of those that it starts, may be longer."""
+    """Limit the size of files written by this process and its children."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
     try:
@@ -35,7 +35,7 @@ def at_most(size: int) -> Iterator[None]:
 
 
 def noise(height: int, width: int) -> NDArray[np.float32]:
-    """Pixels that hardly pack."""
+    """Return pixels that hardly compress."""
     return np.random.default_rng(height).random((height, width, 3)).astype(np.float32)
 
 
@@ -43,7 +43,7 @@ def noise(height: int, width: int) -> NDArray[np.float32]:
 @pytest.mark.parametrize("size", [(1, 1), (16, 24), (64, 80)], ids=str)
 @pytest.mark.parametrize("suffix", EXTENSIONS)
 def test_any_part_may_be_missing(tmp_path: Path, suffix: str, size: tuple[int, int], by_rows: bool) -> None:
-    """From the last byte to all: within a buffer of the C library, too, and the file before stays."""
+    """The missing part ranges from one byte, in the C library's buffer, to the whole file; the old file stays."""
     path, pixels = tmp_path / f"a{suffix}", noise(*size)
 
     def write(values: NDArray[np.float32]) -> None:
@@ -78,7 +78,7 @@ def test_files_that_are_cut(tmp_path: Path, suffix: str) -> None:
 @pytest.mark.needs("imageio_ffmpeg")
 @pytest.mark.parametrize("suffix", VIDEOS)
 def test_videos(tmp_path: Path, suffix: str, capfd: pytest.CaptureFixture[str]) -> None:
-    """One error, and nothing else is printed."""
+    """There is one error, and nothing else is printed."""
     frames = [tmp_path / f"{number}.png" for number in range(3)]
     for number, frame in enumerate(frames):
         write_image(frame, noise(32 + number, 48)[:32])

@@ -1,1 +1,1 @@
-"""Tests of the study room."""
+"""Tests of the study package."""

@@ -1,4 +1,4 @@
-"""Renderers and a reference whose errors are known."""
+"""Contestants and a reference with known errors."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from clrt.bench.convergence.reference import Reference
 TRUTH = np.random.default_rng(3).uniform(0, 2, (48, 64, 3))
 MEANS = np.tile(TRUTH.mean((0, 1)), (2, 1))
 EXACT = Reference(MEANS, 2 * TRUTH, 2 * TRUTH**2)
-#: relMSE of pictures of variance 1.
+#: relMSE of images with variance 1.
 UNIT = float(np.mean(1 / (TRUTH**2 + 0.01)))
 
 
 def sampler(variance: float, seconds: float, power: float = 1.0, gain: float = 1.0,
             told: float | None = None) -> Contestant:
-    """Pictures of this variance over samples**power, and of seconds a sample.
+    """Return a contestant whose images have this variance over samples**power, at `seconds` per sample.
 
-    gain: by how much they are too bright; told: the noise that they tell, over the root of their expected relMSE.
+    gain: brightness factor, 1 if unbiased; told: the reported noise over the root of the expected relMSE.
     """
     def render(spp: int, seed: int) -> Picture:
         square = variance / spp**power

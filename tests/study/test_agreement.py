@@ -1,4 +1,4 @@
-"""Whether pictures of the same mean are told from others, with errors of known kinds."""
+"""Images with equal means are distinguished from others, tested with errors of known distribution."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SEEDS = range(16)
 
 def renderer(first: int, change: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda mean: mean,
              spread: float = 0.3) -> Callable[[int, int], Picture]:
-    """Draws SCENE with exponential errors, of one sign in rows of pixels, as samplers' errors go together."""
+    """Return a renderer of SCENE with exponential errors, correlated along rows of pixels as samplers' errors are."""
     def draw(spp: int, seed: int) -> Picture:
         errors = np.random.default_rng([first, seed]).exponential(size=(64, 12, 3)).repeat(8, axis=1) - 1
         return Picture(spp, 0.0, 0.0, (change(SCENE) * (1 + spread * errors / np.sqrt(spp))).astype(np.float32))
@@ -39,7 +39,7 @@ def test_blocks_are_means_of_their_pixels() -> None:
 
 
 def test_pictures_of_one_mean_agree_as_often_as_they_should() -> None:
-    """In 200 comparisons the least p, corrected, is below a tenth about 20 times: 36 is beyond four deviations."""
+    """In 200 comparisons the smallest corrected p is below 0.1 about 20 times; 36 is beyond 4 standard deviations."""
     p = [compared(means(2 * i), means(2 * i + 1))["p"] for i in range(200)]
     assert np.count_nonzero(np.array(p) < 0.1) < 36
     assert min(p) > sidak(FAMILY, len(p))
@@ -61,7 +61,7 @@ def test_what_differs_is_found(change: Callable[[NDArray[np.float64]], NDArray[n
 
 
 def test_small_differences_of_the_mean_are_no_matter_of_blocks() -> None:
-    """One per cent in all, where the blocks' own errors are ten: found by the picture's mean alone."""
+    """A difference of 1 %, with block errors of 10 %, is found only by the mean of the image."""
     noisy = compared(means(1, lambda mean: mean * 1.01, spread=3), means(2, spread=3))
     assert noisy["rejected"] == 0 and noisy["mean_ratio"] == pytest.approx([1.01] * 3, abs=5 * max(noisy["mean_error"]))
 

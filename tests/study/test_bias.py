@@ -1,4 +1,4 @@
-"""Whether bias is found where there is some and nowhere else, with few seeds and noisy references too."""
+"""Bias is found if and only if there is some, also with few seeds and noisy references."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RNG = np.random.default_rng(11)
 
 @pytest.mark.parametrize(("seeds", "steps", "noise"), [(5, 32, 0.1), (5, 3, 3.0), (64, 8, 1.0)])
 def test_families_without_bias_are_rarely_rejected(seeds: int, steps: int, noise: float) -> None:
-    """In 2000 runs of one mean each p is below 0.05 in one of twenty; Welch's p-values are nearly exact."""
+    """Over 2000 runs without bias, p is below 0.05 in one of twenty; Welch's p-values are nearly exact."""
     below = 0
     for _ in range(2000):
         reference = 1 + 1e-3 * noise * RNG.normal(size=(steps, 1))
@@ -46,7 +46,7 @@ def test_one_percent_is_found_and_none_is_not(spp: int) -> None:
 
 
 def test_the_references_error_is_no_bias() -> None:
-    """Its steps differ by a tenth, so its mean is known to 6 %, for which no contestant must be blamed."""
+    """Steps differ by a tenth, so the reference's mean is known to 6 %; no contestant must be called biased for it."""
     steps = [gain * TRUTH for gain in (1.0, 1.1, 1.2)]
     reference = Reference(np.zeros((0, 3)), np.zeros_like(TRUTH), np.zeros_like(TRUTH))
     for step in steps:
@@ -57,7 +57,7 @@ def test_the_references_error_is_no_bias() -> None:
 
 
 def test_what_is_exact_is_unbiased_and_black_channels_say_nothing() -> None:
-    """Float32's rounding is no bias; a tenth of a per mille without noise is one. One seed tells no error."""
+    """Float32 rounding is no bias; 1e-4 without noise is one. A single seed gives no error estimate."""
     steps = np.ones((8, 3)) * (1.0, 0.5, 0.0)
     exact = np.tile([1 + 6e-8, 1 - 1e-7, math.nan], (16, 1))
     rows = mean_tests({"exact": exact, "off": exact + 1e-4, "one": exact[:1]}, steps)

@@ -1,4 +1,4 @@
-"""What `clrt bench blender` does without Blender: its error, the ratios, and what is made for Blender and from it."""
+"""`clrt bench blender` without Blender: errors, ratios, and conversions to and from Blender."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_materials_are_of_objects_that_there_are() -> None:
 
 
 def test_ratios_are_of_means_over_each_region() -> None:
-    """The scatter over seeds is (1, −1, 1, −1)/10 around ours alone: the mean's standard error is √(4/3)/√4/10."""
+    """Over seeds only our image varies, by (1, −1, 1, −1)/10: the mean's standard error is √(4/3)/√4/10."""
     left = np.tile(np.arange(6) < 2, (4, 1))
     theirs = np.where(left[..., None], 0.5, 2.0) * np.ones((4, 1, 1, 3))
     ours = theirs * np.where(left, 1.5, 0.75)[..., None] + 0.1 * np.array([1, -1, 1, -1])[:, None, None, None]
@@ -44,8 +44,8 @@ def test_ratios_are_of_means_over_each_region() -> None:
 
 
 def test_area_lights_keep_their_power_place_and_side() -> None:
-    """A light at Blender's (1, 2, 3) that looks along −z: clrt's (1, 3, −2), along −y. A Lambertian emitter of radiance
-    L and area A sends πLA."""
+    """A light at Blender's (1, 2, 3) facing −z is at clrt's (1, 3, −2) facing −y. A Lambertian emitter of radiance L
+    and area A emits the power πLA."""
     frame = np.eye(4)
     frame[:3, 3] = 1, 2, 3
     mesh = emissive_square(SimpleNamespace(matrix_world=frame, name="area", data=SimpleNamespace(size=0.5, energy=60)))
@@ -57,7 +57,7 @@ def test_area_lights_keep_their_power_place_and_side() -> None:
 
 
 def test_normal_map_is_that_of_a_surface() -> None:
-    """Unit normals, whose slopes are a gradient: mixed derivatives of the height agree, by periodic differences."""
+    """Normals have unit length, and their slopes are a gradient: mixed periodic differences of the height agree."""
     normal = 2 * bumps() - 1
     np.testing.assert_allclose(np.linalg.norm(normal, axis=2), 1)
     slope = -normal[..., :2] / normal[..., 2:]

@@ -1,4 +1,4 @@
-"""The grid of materials that every test of BSDFs and `clrt bench numerics` go through."""
+"""The grid of materials used by all tests of BSDFs and by `clrt bench numerics`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from clrt.scene.validation.limits import Ge, Le
 
 @dataclass(frozen=True, kw_only=True)
 class Glass(Material):
-    """A material as a later version may have it, with a field of each kind."""
+    """Material as a later version may define it, with a field of each kind."""
 
     kernel: ClassVar[str] = "glass"
     tint: Albedo = (1.0, 1.0, 1.0)

@@ -1,4 +1,4 @@
-"""The study of building: figures that follow from others, rays by size, and new processes."""
+"""`clrt bench build`: consistent figures, rays by mesh size, and fresh processes."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_a_new_process_finds_the_same_hits(device: Device, tmp_path: Path) -> No
 
 
 def test_peak_of_memory_is_what_was_touched_at_a_time() -> None:
-    """In a process of its own: 200 MB twice, one after the other."""
+    """In a separate process: allocates 200 MB twice, one after the other."""
     program = """
 import numpy
 from clrt.bench.rays.cold_start import peak_bytes

@@ -1,4 +1,4 @@
-"""Whether what renderers tell of their errors is judged right: by ones that tell a known part of it."""
+"""The calibration of error estimates is correct for contestants that report a known fraction of their error."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .known import EXACT, TRUTH, UNIT, sampler
     (0.2, 0.04, 0.0, 1.0), (0.3, 0.04, 0.0, 1.5), (0.2, 0.05, 0.01, 1.0),
     (0.1, 0.02, 0.01, nan), (0.1, 0.0, 0.0, nan), (nan, 0.04, 0.0, nan)])
 def test_the_references_error_is_none_of_the_pictures(noise: float, error: float, own: float, ratio: float) -> None:
-    """Nor is there a true error where it does not stand out of the reference's own."""
+    """The reference's own error is subtracted; an error that does not exceed it gives no ratio."""
     assert noise_ratio(noise, error, own) == pytest.approx(ratio, nan_ok=True)
 
 
 def test_what_is_told_is_compared_with_what_is_true() -> None:
-    """Normal errors of 9216 values: the true √relMSE of a picture is within some percent of the expected one."""
+    """For normal errors of 9216 values, the true √relMSE is within a few percent of the expected one."""
     contestants = {"right": sampler(0.5, 0.1, told=1.0), "high": sampler(0.5, 0.1, told=1.4),
                    "low": sampler(0.5, 0.1, told=0.7), "mute": sampler(0.5, 0.1)}
     rng = np.random.default_rng(1)

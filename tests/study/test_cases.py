@@ -1,4 +1,4 @@
-"""Hard cases of geometry by the defaults: nothing is wrong; by the textbooks' ways the same cases find what is."""
+"""Hard cases of geometry: the default tests make no errors; textbook methods fail the same cases."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_other_trees_let_nothing_out_of_slivers(device: Device, layout: str) -> 
 
 
 def many_are_wrong(rows: Iterable[Row], count: int) -> bool:
-    """Whether more than `count` are, of as many rows as it takes to know."""
+    """Return whether more than `count` are wrong, reading only as many rows as necessary."""
     wrong = 0
     return any((wrong := wrong + row.wrong) > count for row in rows)
 
@@ -64,7 +64,7 @@ def test_textbook_spheres_are_found_out(device: Device) -> None:
 
 
 def test_fixed_offsets_are_found_out(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where float32 is coarse."""
+    """Fixed offsets fail where float32 is coarse."""
     monkeypatch.setattr(departures, "PLACES", [place for place in departures.PLACES if place[1] > 1e5])
     subject = Subject(device.info.index, offset="fixed")
     assert many_are_wrong(departures.measure_departures(subject, quick=True), 100)
@@ -79,7 +79,7 @@ def test_pictures_off_by_a_hundredth_are_found_out(device: Device, monkeypatch: 
 
 
 def test_exact_hits_of_a_sphere() -> None:
-    """A 3-4-5 triangle: a line that passes the centre by 3 is inside radius 5 for 4 on either side of the foot."""
+    """3-4-5 triangle: a line at distance 3 from the center is inside radius 5 for 4 on either side of the foot."""
     sphere = np.array([0, 0, 0, 5], np.longdouble)
     origin = np.array([[-10, 3, 0], [0, 3, 0], [4.5, 3, 0], [-10, 6, 0]], np.longdouble)
     direction = np.tile(np.array([2, 0, 0], np.longdouble), (4, 1))
@@ -89,7 +89,7 @@ def test_exact_hits_of_a_sphere() -> None:
 
 
 def test_exact_distances(device: Device) -> None:
-    """Straight onto a triangle from far away t is the distance, to the rounding of its inputs."""
+    """For a ray perpendicular to a triangle far away, t is the distance up to the rounding of its inputs."""
     t, exact, sure = distances(Subject(device.info.index), 1e3, 0.0, 1000)
     np.testing.assert_allclose(exact, 1e3, rtol=1e-6)
     assert sure.mean() > 0.9 and ulps(t[sure], exact[sure]).max() < 5
@@ -102,7 +102,7 @@ def test_ulps() -> None:
 
 
 def test_lit_scenes_fill_the_picture(device: Device) -> None:
-    """And a lamp behind the surfaces leaves them dark, so that pixels can be wrong both ways."""
+    """A light behind the surfaces leaves them dark, so pixels can be wrong both ways."""
     subject = Subject(device.info.index)
     for scene in lit_scenes(np.zeros(3), 1.0, level_only=False).values():
         small = replace(scene, render=replace(scene.render, size=(16, 16)))

@@ -1,4 +1,4 @@
-"""Random scenes of everything there is, and the identities that their pictures obey."""
+"""Random scenes with all features, and the identities that their images obey."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from clrt.scene.materials.textures import Texture
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 from clrt.scene.validation.validate import scene_problems
 
-#: Other scenes every day, or those of the seed in this environment variable.
+#: Environment variable of the seed; the default is the date, so that the scenes change every day.
 VARIABLE = "CLRT_COMBINATIONS_SEED"
 TODAY = int(os.environ.get(VARIABLE, date.today().toordinal()))
-#: In the suite, of one batch, which shares programs.
+#: Scenes of the test suite, from one batch, which shares programs.
 SCENES = range(2)
 
 
@@ -50,7 +50,7 @@ def test_pictures_of_random_scenes_obey(device: Device, name: str) -> None:
 
 
 def three_lights() -> Scene:
-    """A ball on a floor below a lamp, a point light and a sky."""
+    """Return a sphere on a floor under an emissive sphere, a point light and a constant environment."""
     lamp = Diffuse(emission=(9.0, 9.0, 9.0))
     return Scene(spheres=[Sphere(), Sphere(center=(0.0, -100.0, 0.0), radius=99.0),
                           Sphere(center=(2.0, 3.0, 0.0), radius=0.5, material=lamp)],
@@ -60,7 +60,7 @@ def three_lights() -> Scene:
 
 
 def pixels(device: Device, side: Side) -> NDArray[np.float64]:
-    """The picture of a side's first scene by few samples, with the same random numbers for all sides."""
+    """Return the image of a side's first scene with few samples, with the same random numbers for all sides."""
     scene = side.scenes[0]
     compiled = compile_scene(scene, choices(device))
     compiled = replace(compiled, chosen_files={**compiled.chosen_files, **side.files})
@@ -87,7 +87,7 @@ def test_a_lost_light_is_found(device: Device) -> None:
 
 
 def test_a_light_too_small_for_bsdf_sampling_is_not_off(device: Device) -> None:
-    """That finds it in no sample, of which deviations over the seeds tell nothing."""
+    """BSDF sampling finds that light in no sample, so the deviations over seeds say nothing."""
     scene = three_lights()
     small = replace(scene.spheres[-1], center=(200.0, 300.0, 0.0), radius=0.1)
     dark = replace(scene, spheres=[*scene.spheres[:-1], small], lights=[], environment=Environment())
@@ -99,14 +99,14 @@ def test_a_light_too_small_for_bsdf_sampling_is_not_off(device: Device) -> None:
 
 @pytest.mark.parametrize("name", ["strategies", "choice"])
 def test_other_strategies_draw_other_noise(device: Device, name: str) -> None:
-    """So the kernels' files were replaced."""
+    """Different noise shows that the kernel files were replaced."""
     first, *others = PROPERTIES[name](three_lights(), Draws(0, 0, 0))
     assert all(np.any(pixels(device, first) != pixels(device, other)) for other in others)
 
 
 def test_scenes_have_everything() -> None:
-    """Every material and light with each of its fields off its default and, if it may be one, as a texture, in valid
-    scenes; of a film and fibres also what bends it, and roughnesses from textures."""
+    """Valid scenes cover every field of every material and light off its default and, if allowed, as a texture; also
+    normal maps on clearcoats, and roughness textures of layered materials."""
     varied, textured, features = set[tuple[Any, str]](), set[tuple[Any, str]](), set[str]()
     for batch in range(300):
         scene = random_scene(3, batch * BATCH)
@@ -124,7 +124,7 @@ def test_scenes_have_everything() -> None:
 
 
 def test_scenes_have_instances(device: Device) -> None:
-    """Which do not become meshes."""
+    """Instances stay instances instead of becoming meshes."""
     scene = next(scene for batch in range(99) if (scene := random_scene(3, batch * BATCH)).instances)
     assert "INSTANCES" in compile_scene(scene, choices(device), device=device).features
 
@@ -137,7 +137,7 @@ def test_scenes_of_a_batch_share_programs(device: Device) -> None:
 
 
 def test_single_lights_share_out_all_lights() -> None:
-    """Each light, sky and emissive material is in one of them, and in no other."""
+    """Each light, environment and emissive material is in exactly one of the scenes."""
     for number in range(0, 20 * BATCH, BATCH):
         scene = random_scene(4, number)
         parts = list(single_lights(scene))
@@ -151,7 +151,7 @@ def test_single_lights_share_out_all_lights() -> None:
 
 
 def test_scenes_that_are_off_are_kept(device: Device, tmp_path: Path) -> None:
-    """As files that draw the same picture."""
+    """The stored files render the same image."""
     seed = next(seed for seed in range(99) if not random_scene(seed, 0).instances)
     found = next(verdicts(device, ["brightness"], seed, [0]))
     kept = keep_scenes(found, seed, tmp_path)

@@ -1,4 +1,4 @@
-"""Convergence: figures of errors that are known, references kept between runs, and the command."""
+"""Convergence: figures for known errors, cached references, and the command."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ material = "lamp"
 
 
 def test_figures_are_those_of_known_errors() -> None:
-    """relMSE = variance/n · mean(1/(r² + 0.01)); of 9216 values it is known to 1.5 %, one standard deviation."""
+    """relMSE = variance/n · mean(1/(r² + 0.01)); with 9216 values its standard deviation is 1.5 %."""
     contestants = {"first": sampler(0.5, 0.01), "twice as slow": sampler(0.5, 0.02), "steep": sampler(0.5, 0.02, 1.5)}
     points = take_turns(contestants, EXACT, Effort(seconds=0.7, seeds=5, steps=2))
     rows = figures(points, EXACT)
@@ -71,7 +71,7 @@ def test_figures_are_those_of_known_errors() -> None:
 
 
 def test_relmse_against_a_reference_with_noise_of_its_own() -> None:
-    """16 steps of variance 1: it estimates its error as 1/16 · mean(1/(r² + 0.01)), which is then subtracted."""
+    """16 steps of variance 1: the reference's error estimate, 1/16 · mean(1/(r² + 0.01)), is subtracted."""
     rng = np.random.default_rng(7)
     steps = [TRUTH + rng.normal(size=TRUTH.shape) for _ in range(16)]
     reference = Reference(np.zeros((0, 3)), np.zeros_like(TRUTH), np.zeros_like(TRUTH))
@@ -87,7 +87,7 @@ def test_relmse_against_a_reference_with_noise_of_its_own() -> None:
 
 
 def test_figures_end_where_errors_no_longer_stand_out() -> None:
-    """Above the reference's own error; and with the samples that every seed has reached."""
+    """Figures include only errors above the reference's own, and sample counts that every seed has reached."""
     reference = Reference(MEANS, 2 * TRUTH, 2 * TRUTH**2 + 1e-3 * (TRUTH**2 + 0.01))
     own = reference.relmse
     assert own == pytest.approx(5e-4)
@@ -116,13 +116,13 @@ def test_other_scenes_are_noticed() -> None:
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Scene:
-    """A ball on a floor, under a lamp that is not seen."""
+    """Return a sphere on a floor under an emissive sphere out of view."""
     (tmp_path / "ball.toml").write_text(SCENE)
     return load(tmp_path / "ball.toml")
 
 
 def rendered(scene: Scene, steps: int, device: Device) -> tuple[Reference, list[int]]:
-    """The reference, and which of its steps were rendered for it."""
+    """Return the reference, and which of its steps were rendered for it."""
     heard: list[int] = []
     return render_reference(scene, steps, device=device.info.index, on_step=heard.append), heard
 
@@ -161,7 +161,7 @@ def test_damaged_references_are_rendered_anew(damage: str, scene: Scene, device:
 
 
 def test_renderers_choices_are_taken(scene: Scene, device: Device) -> None:
-    """Eight lanes and one are the same numbers; another sampler is other numbers of the same mean."""
+    """Eight lanes and one give the same numbers; another sampler gives other numbers with the same mean."""
     assert {"clrt", "clrt, independent", "clrt, lanes 1"} <= set(CHOICES) and next(iter(CHOICES)) == "clrt"
     contestants = choices_on(scene, [device.info.index])
     assert list(choices_on(scene, [0, 1], {"x": {}})) == ["x (device 0)", "x (device 1)"]
@@ -214,8 +214,8 @@ main(["bench", "converge", "ball.toml", "--quick", "--time", "0.004", "--peers",
 
 
 def test_command_does_what_is_asked(tmp_path: Path) -> None:
-    """Numbers of samples, seeds, size, choices and reference; independent samples have errors as they are told, once
-    there are enough to tell how fast these fall."""
+    """Sample counts, seeds, size, choices and reference are used; independent samples have the estimated errors, once
+    there are enough to estimate how fast these fall."""
     (tmp_path / "ball.toml").write_text(SCENE)
     asked = ["--choice", "independent", "--choice", "unplanned", "--spp", "32", "--spp", "3", "--seeds", "4",
              "--size", "32x16", "--reference-spp", "2000", "--quick", "--json", str(tmp_path / "c.json")]
@@ -235,7 +235,7 @@ def test_command_does_what_is_asked(tmp_path: Path) -> None:
 
 
 def test_each_integrator_has_a_reference_of_its_own(tmp_path: Path) -> None:
-    """Fewer edges, and no light from other surfaces: their pictures differ, and each agrees with its own."""
+    """Path depths differ, so the images differ, and each agrees with its own reference."""
     (tmp_path / "ball.toml").write_text(SCENE)
     asked = ["--integrator", "path", "--integrator", "direct", "--choice", "clrt", "--spp", "64", "--seeds", "3",
              "--reference-spp", "512", "--quick", "--json", str(tmp_path / "c.json"), "--plot", str(tmp_path / "c.svg")]

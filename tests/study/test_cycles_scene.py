@@ -1,4 +1,4 @@
-"""What Blender is told of a scene: the parts that can be known without it."""
+"""Conversion of scenes for Blender, as far as it can be tested without Blender."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bounds on closest hits, against Möller–Trumbore in float64; and that they catch answers that are wrong."""
+"""Bounds on closest hits agree with Möller–Trumbore in float64 and detect wrong answers."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def rays_at(mesh: Mesh, count: int = 400) -> Rays:
 
 @pytest.mark.parametrize("name", MESHES)
 def test_bounds_hold_the_exact_hits(name: str) -> None:
-    """Where they name one triangle it is the exact one, of copies the lowest; elsewhere t is between them."""
+    """A decided triangle is the exact one, the lowest of copies; elsewhere t is within the bounds."""
     vertices, faces = MESHES[name]
     rays = rays_at((vertices, faces))
     bounds = closest_bounds(vertices, faces, rays)
@@ -69,8 +69,7 @@ def test_answers_are_not_wrong_until_they_are_changed(device: Device) -> None:
 
 
 def test_rays_along_planes_are_left_open_and_flat_triangles_never_met() -> None:
-    """Flat: with its corners in a line, or two in one place.
-    """
+    """Degenerate triangles have collinear corners, or two in one place."""
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]], np.float32)
     origin, direction = np.array([[0.5, 0.0, 1.0]]), np.array([[0.0, 0, -1]])
     down = (origin.astype(np.float32), direction.astype(np.float32), np.array([np.inf], np.float32))

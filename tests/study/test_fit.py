@@ -1,4 +1,4 @@
-"""The fitted curve: exact for points on it, scipy's for others."""
+"""The fitted curve is exact for points on it, and agrees with scipy for others."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_points_on_a_curve_give_it_back() -> None:
 
 
 def test_noise_is_fitted_as_scipy_does() -> None:
-    """Of the size of a ray's seconds, where sums of squares are near 1e-16."""
+    """Values are of the size of seconds per ray, with sums of squares near 1e-16."""
     seconds = 2e-8 + 1e-8 * np.log2(SIZES) + RNG.normal(0, 3e-8, len(SIZES))
     expected = linregress(np.log2(SIZES), seconds)
     fit = fit_logarithm(SIZES, seconds)

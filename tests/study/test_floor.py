@@ -1,4 +1,4 @@
-"""The plastic floor: its float64 model beside closed forms and the oracle's material, and clrt beside the model."""
+"""The plastic floor: its float64 model agrees with closed forms, the oracle's material, and clrt."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..oracle.surface import Surface
 
 
 def directions(count: int) -> np.ndarray:
-    """Upwards."""
+    """Return random upward directions."""
     found = np.random.default_rng(2).normal(size=(count, 3))
     found[:, 1] = np.abs(found[:, 1]) + 0.05
     return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
@@ -27,7 +27,7 @@ def directions(count: int) -> np.ndarray:
 
 @pytest.mark.parametrize("roughness", [0.5, 0.8, 1.0])
 def test_model_is_the_oracles(roughness: float) -> None:
-    """Two integrations of the directional albedos, and two programs for the rest; the oracle's +z is up."""
+    """Directional albedos and BSDFs were implemented independently; the oracle's +z is up."""
     wo, wi = directions(400), directions(800)[400:]
     up, flat = np.tile([0.0, 0.0, 1.0], (400, 1)), np.zeros((400, 3))
     surface = Surface(flat, up, up, np.ones(400, np.bool_), np.zeros((400, 2, 2)), np.ones((400, 4)))
@@ -43,7 +43,7 @@ def white_sky(scene: Scene) -> Scene:
 @pytest.mark.parametrize("name", ["model", "Fresnel"])
 @pytest.mark.parametrize("material", [*MATERIALS])
 def test_models_keep_the_energy_of_a_white_sky(name: str, material: str) -> None:
-    """By reciprocity and energy conservation a white floor has the sky's radiance from every view."""
+    """By reciprocity and energy conservation, a white floor has the environment's radiance from every view."""
     found = floor_radiance(white_sky(floor_scene("point", "75°", material)), MODELS[name])
     assert found.mean == pytest.approx(2, abs=4 * found.error + 2e-3)
 
@@ -57,7 +57,7 @@ def test_layering_by_the_view_keeps_energy_but_is_not_reciprocal() -> None:
 
 
 def test_matte_floors_have_closed_forms() -> None:
-    """Sun: cos/π. Lamp: the irradiance of a polygon (Lambert 1760) at the floor's middle."""
+    """Sun: cos/π. Area light: the irradiance of a polygon (Lambert 1760) at the floor's center."""
     assert floor_radiance(floor_scene("sun at 60°", "75°", "Lambert")).mean == pytest.approx(0.5 / np.pi, rel=1e-6)
     mesh = lights()["low lamp"]["meshes"][0]
     corners = mesh.vertices.astype(float)[::-1] / np.linalg.norm(mesh.vertices, axis=1)[::-1, None]
@@ -71,7 +71,7 @@ def test_matte_floors_have_closed_forms() -> None:
 
 
 def test_lamps_are_hit_as_densely_as_they_are_drawn() -> None:
-    """The density integrates to the solid angle's part that is drawn: 1."""
+    """The pdf over solid angle integrates to 1."""
     lamp, rng = Lamp(lights()["low lamp"]["meshes"][0]), np.random.default_rng(3)
     p = np.tile([0.3, 0.0, 0.2], (1 << 18, 1))
     wi = rng.normal(size=p.shape)

@@ -1,4 +1,4 @@
-"""The study of hits on small cases: every way is there, nothing differs; and what is not so is counted."""
+"""`clrt bench hits` on small cases: all layouts and builders are covered, nothing differs, and errors are counted."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_nothing_differs_and_every_way_is_taken(device: Device, name: str) -> No
 
 
 def test_hits_through_holes_are_counted(device: Device) -> None:
-    """Said to be closed, but every other triangle is missing; the vertices and edges are all there."""
+    """A mesh declared closed lacks every other triangle, but has all vertices and edges."""
     vertices, faces = icosphere(2)
     result = measure_case(Case("sieve", (vertices, faces[::2]), True), [device.info.index], EFFORT)
     kinds = rays_of_kinds(vertices, faces[::2], EFFORT.rays)

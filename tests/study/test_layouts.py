@@ -1,4 +1,4 @@
-"""Layouts side by side: all of them, on the same rays, with the same answers."""
+"""All layouts are measured with the same rays and give the same answers."""
 
 from __future__ import annotations
 

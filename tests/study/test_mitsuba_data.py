@@ -1,4 +1,4 @@
-"""Mitsuba's tests of pictures: a checkout of our own with closed forms as its references, and Mitsuba beside clrt."""
+"""Mitsuba's image tests: a fake checkout with closed forms as references, and Mitsuba compared with clrt."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from clrt.formats.mitsuba.reader import read_mitsuba
 from clrt.output.image import Image
 
 SIZE = 16
-#: A wall that faces the camera and a lamp at the camera's place, or a sky; its radiance is known at every point.
+#: A wall facing the camera, with a directional light along the view; its radiance is known at every point.
 SCENE = """<scene version="3.0.0"><default name="integrator" value="path"/>
 <integrator type="moment"><integrator type="$integrator"><integer name="max_depth" value="2"/></integrator></integrator>
 <sensor type="perspective"><float name="fov" value="90"/><film type="hdrfilm"><rfilter type="box"/>
@@ -32,12 +32,12 @@ SCENE = """<scene version="3.0.0"><default name="integrator" value="path"/>
 <emitter type="directional"><vector name="direction" value="0, 0, 1"/><rgb name="irradiance" value="2"/></emitter>{}
 </scene>"""
 RADIANCE = 2 / pi * np.array([0.5, 0.25, 0.75])
-#: A rough ball that clrt has no material for, in the middle of the picture.
+#: A small sphere in the center of the image, whose BSDF clrt does not support.
 BALL = '<shape type="sphere"><float name="radius" value="0.1"/><point name="center" value="0, 0, 0.5"/>{}</shape>'
 
 
 def checkout(folder: Path, mean: NDArray[np.float64], more: str = "") -> Path:
-    """A folder laid out as mitsuba-data is, whose reference is `mean`, of noise-free samples."""
+    """Create a folder laid out like mitsuba-data, with `mean` as its noise-free reference."""
     scenes = folder / "tests" / "scenes" / "wall"
     (scenes / "refs").mkdir(parents=True)
     (scenes / "test_wall_path.xml").write_text(SCENE.format(more))
@@ -61,7 +61,7 @@ def samples(spp: int) -> int:
 
 
 def test_what_others_stand_in_for_is_left_out(tmp_path: Path) -> None:
-    """Where a ball of an unknown material and its shadow are, the reference may be anything; elsewhere it is tested."""
+    """Pixels of a sphere with an unsupported material and of its shadow are not tested; the others are."""
     mean = np.tile(RADIANCE, (SIZE, SIZE, 1))
     mean[6:10, 6:10] = 7
     folder = checkout(tmp_path, mean, BALL.format('<bsdf type="hair"/>'))
@@ -85,12 +85,12 @@ def test_a_folder_without_references_is_refused(tmp_path: Path) -> None:
 
 
 def noisy(mean: NDArray[np.float64], spp: int, seeds: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Pictures whose samples have a variance of mean²."""
+    """Return images whose samples have a variance of mean²."""
     return np.asarray(mean * rng.gamma(spp, 1 / spp, (seeds, *mean.shape)))
 
 
 def test_both_tests_reject_as_often_as_they_should() -> None:
-    """200 pictures of the true mean, none rejected by Mitsuba's rule, and by blocks about one in 1000 of families."""
+    """Mitsuba's rule rejects none of 200 images with the true mean, and the block test about 1 in 1000 families."""
     rng = np.random.default_rng(7)
     mean = np.random.default_rng(1).uniform(0.2, 2, (16, 16, 3))
     told = [(pixel_test(64 * 16, pictures.mean(0).reshape(-1, 3), mean.reshape(-1, 3), mean.reshape(-1, 3)**2),
@@ -101,7 +101,7 @@ def test_both_tests_reject_as_often_as_they_should() -> None:
 
 @pytest.mark.parametrize("bias", [0.9, 1.1])
 def test_blocks_find_what_pixels_hide(bias: float) -> None:
-    """One block of four off by a tenth is within the noise of a pixel, 13 %, and not of the block's mean."""
+    """A bias of 10 % in one of four blocks is within a pixel's noise of 13 %, but not within that of a block's mean."""
     mean = np.random.default_rng(1).uniform(0.2, 2, (16, 16, 3))
     wrong = mean.copy()
     wrong[:8, :8] *= bias
@@ -110,7 +110,7 @@ def test_blocks_find_what_pixels_hide(bias: float) -> None:
     assert block_test(pictures, mean, mean**2)["blocks_rejected"] == 1
 
 
-#: A bit of everything that is read.
+#: A scene with one of each feature that the reader supports.
 MANY = """<scene version="3.0.0"><integrator type="path"><integer name="max_depth" value="4"/></integrator>
 <sensor type="perspective"><float name="fov" value="50"/><transform name="to_world">
 <lookat origin="1, -7, 3" target="0, 0, 1" up="0, 0, 1"/></transform><film type="hdrfilm"><rfilter type="box"/>
@@ -141,7 +141,7 @@ MANY = """<scene version="3.0.0"><integrator type="path"><integer name="max_dept
 
 @pytest.mark.needs("mitsuba")
 def test_mitsuba_reads_the_same_scene(tmp_path: Path) -> None:
-    """Its own pictures of the file have the same means, block by block."""
+    """Mitsuba's own images of the file have the same block means."""
     mitsuba = import_module("mitsuba")
     (tmp_path / "many.xml").write_text(MANY)
     mitsuba.set_variant("scalar_rgb")
@@ -159,7 +159,7 @@ def test_mitsuba_reads_the_same_scene(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("change", "code"), [(1.0, 0), (1.2, 1)])
 def test_the_command_fails_where_a_scene_does(tmp_path: Path, change: float, code: int) -> None:
-    """And says so in a line, in the figures, and in a picture."""
+    """The failure is also in the printed table, the figures, and an image."""
     folder = checkout(tmp_path / "data", np.tile(RADIANCE * change, (SIZE, SIZE, 1)))
     done = CliRunner().invoke(mitsuba_data_command, [
         str(folder), "--samples", str(samples(16)), "--json", str(tmp_path / "told.json"), "--pictures", str(tmp_path)])

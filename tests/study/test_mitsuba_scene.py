@@ -1,4 +1,4 @@
-"""What Mitsuba is told of a scene, by its documented meaning; Mitsuba itself is not needed."""
+"""Conversion of scenes for Mitsuba, checked against its documentation; Mitsuba itself is not needed."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def ball(material: Material) -> Scene:
 
 
 def bsdf(material: Material) -> Any:
-    """The plugin inside of `twosided`."""
+    """Return the plugin inside `twosided`."""
     plugin = mitsuba_scene(ball(material))["sphere0"]["bsdf"]
     assert plugin["type"] == "twosided"
     return plugin["front"]
 
 
 def test_camera_looks_where_it_should_with_its_left_to_the_left() -> None:
-    """Mitsuba's perspective camera looks along +z, +y is up in the picture and +x left."""
+    """Mitsuba's perspective camera looks along +z, with +y up in the image and +x left."""
     camera = Camera(position=(1, 2, 5), look_at=(1, 2, -5), fov_degrees=30)
     sensor = mitsuba_scene(replace(ball(Diffuse()), camera=camera, render=RenderSettings(size=(64, 48))))["sensor"]
     np.testing.assert_allclose(sensor["to_world"], [[-1, 0, 0, 1], [0, 1, 0, 2], [0, 0, -1, 5], [0, 0, 0, 1]])
@@ -101,7 +101,7 @@ def test_settings_without_a_counterpart_are_refused(scene: Scene, words: str) ->
 
 
 def test_other_gloss_is_a_plugin_of_our_own() -> None:
-    """Of all values by which the formula of docs/scene-format.md goes."""
+    """The plugin gets all parameters of the formula in docs/scene-format.md."""
     plastic = bsdf(MetallicRoughness(preset="plastic_high", color=(0.1, 0.2, 0.3), roughness=0.4))
     assert plastic == {"type": "gltf", "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}, "metallic": 0,
                        "roughness": 0.4, "f0": {"type": "rgb", "value": [0.05, 0.05, 0.05]},
@@ -130,7 +130,7 @@ PICTURE = Picture(np.array([[[0, 51, 102, 255], [255, 153, 204, 0]]], np.uint8))
 
 
 def test_textures_are_linear_pictures_with_their_factors() -> None:
-    """sRGB's curve by its formula for colours, none for numbers, which are grey; their places by the transform."""
+    """Colors are decoded by the sRGB formula, scalars are not and are gray; UVs are mapped by the transform."""
     paint = Texture(picture=PICTURE, factor=(0.5, 1, 1), scale=(2, 3), offset=(0.25, 0), wrap=("clamp", "clamp"))
     told = bsdf(Diffuse(color=paint))["reflectance"]
     assert (told["type"], told["raw"], told["wrap_mode"], told["filter_type"]) == ("bitmap", True, "clamp", "bilinear")
@@ -143,7 +143,7 @@ def test_textures_are_linear_pictures_with_their_factors() -> None:
 
 
 def test_cuts_are_made_between_texels() -> None:
-    """From 1 to 0 over the width of a texel: a threshold of a quarter is passed three quarters of the way."""
+    """Alpha falls from 1 to 0 over one texel, so a threshold of 0.25 is crossed after three quarters."""
     leaf = Texture(picture=PICTURE, channel="alpha", wrap=("clamp", "clamp"))
     told = mitsuba_scene(ball(Diffuse(opacity=leaf, alpha_cutoff=0.25)))["sphere0"]["bsdf"]
     assert (told["type"], told["opacity"]["filter_type"]) == ("mask", "nearest")
@@ -154,7 +154,7 @@ def test_cuts_are_made_between_texels() -> None:
 
 
 def test_glass_that_absorbs_has_a_medium_inside() -> None:
-    """exp(−sigma·distance) is the attenuation colour."""
+    """exp(−sigma·distance) is the attenuation color."""
     told = mitsuba_scene(ball(Dielectric(attenuation_color=(0.25, 0.5, 1), attenuation_distance=2)))
     assert told["integrator"]["type"] == "volpath"
     inside = told["sphere0"]["interior"]
@@ -164,14 +164,14 @@ def test_glass_that_absorbs_has_a_medium_inside() -> None:
 
 
 def test_spots_throw_their_falloff() -> None:
-    """At an angle of which the cosine is half way between the cones' f is ½, and the light f²."""
+    """At the angle whose cosine is halfway between those of the cones, f is ½ and the intensity f²."""
     light = SpotLight(position=(0, 3, 0), direction=(0, -2, 0), intensity=(1, 2, 3), inner_degrees=20,
                       outer_degrees=60)
     told = mitsuba_scene(Scene(lights=[light]))["light0"]
     np.testing.assert_allclose(told["to_world"][:3, [2, 3]], [[0, 0], [-1, 3], [0, 0]], atol=1e-12)
     assert (told["cutoff_angle"], told["beam_width"]) == (60, 60)
     half = (np.cos(np.radians(20)) + 0.5) / 2
-    across = np.tan(np.arccos(half)) / np.tan(np.radians(60))     # of the picture's half width
+    across = np.tan(np.arccos(half)) / np.tan(np.radians(60))     # in half widths of the texture
     row = told["texture"]["bitmap"][len(told["texture"]["bitmap"]) // 2, :, 0]
     middles = (np.arange(len(row)) + 0.5) / len(row) * 2 - 1
     assert np.interp(across, middles, row) == pytest.approx(0.25, abs=1e-3)
@@ -207,7 +207,7 @@ def test_lights_keep_their_units() -> None:
 
 @pytest.mark.parametrize("direction", [(0.0, -1.0, 0.0), (-3.0, 1.0, 2.0)])
 def test_suns_are_far_discs(direction: tuple[float, float, float]) -> None:
-    """Seen from where the camera looks, of their angle, their normal towards it, with the radiance of a cone."""
+    """The disc faces the camera's target, with the light's angular diameter and the radiance of that cone."""
     sun = DirectionalLight(direction=direction, irradiance=(3, 2, 1), angle_degrees=0.53)
     told = mitsuba_scene(Scene(lights=[sun], camera=Camera(position=(1, 2, 8), look_at=(1, 2, 3))))["light0"]
     place, half = told["to_world"], np.radians(0.53) / 2
@@ -232,7 +232,7 @@ def test_skies_turn_counter_clockwise_seen_from_above() -> None:
 
 @pytest.mark.parametrize("height", [1, 2, 5])
 def test_rows_at_poles_are_the_same_sky(height: int) -> None:
-    """Interpolated as each reads its rows: ours at (row + ½)/h, held beyond the ends, Mitsuba's at row/(H − 1)."""
+    """Both interpolate to the same values: ours at (row + ½)/h, clamped at the ends, Mitsuba's at row/(H − 1)."""
     image = RNG.uniform(size=(height, 3, 3)).astype(np.float32)
     rows = rows_at_poles(image)
     v = np.linspace(0, 1, 1001)

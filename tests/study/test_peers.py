@@ -1,4 +1,4 @@
-"""Peers: Embree's records are laid out right, libraries and clrt agree, and what is missing is said, not raised."""
+"""Embree's record layout is correct, all libraries agree with clrt, and missing ones are reported without an error."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from ..rendering.rays import hit_triangles
 pytestmark = pytest.mark.needs("embreex")
 RNG = np.random.default_rng(17)
 BALL = bumpy_ball(3)
-#: Not a whole number of packets, chunks or blocks.
+#: Number of rays that is no multiple of the packet, chunk and block sizes.
 COUNT = 4096 + 128 + 13
 MODULES = {"embreex": "embreex", "trimesh + embreex": "embreex", "trimesh + rtree": "rtree", "open3d": "open3d",
            "warp": "warp"}
 
 
 def rays(count: int = COUNT) -> Rays:
-    """From around the ball: a third of them miss; every other one has an end, near where it would hit."""
+    """Return rays from around the sphere: a third of them misses; every other one has a t_max near its hit."""
     origins = RNG.uniform(-2, 2, (count, 3)).astype(np.float32)
     directions = RNG.normal(size=(count, 3)).astype(np.float32) - origins
     t_max = np.where(np.arange(count) % 2, np.inf, RNG.uniform(0, 2, count)).astype(np.float32)
@@ -42,7 +42,7 @@ def rays(count: int = COUNT) -> Rays:
 
 
 def brute_force(some: Rays) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.bool_]]:
-    """t (inf: none), triangle of the ball (−1: none), and whether rounding cannot change them, in float64."""
+    """Return float64 t (inf: miss), triangle (−1: miss), and whether the result is insensitive to rounding."""
     corners = BALL[0][BALL[1]].astype(np.float64)
     parts = zip(*(np.array_split(array.astype(np.float64), 20) for array in some[:2]))
     t, triangle, margin = map(np.concatenate, zip(*(hit_triangles(corners, *part) for part in parts if len(part[0]))))
@@ -53,7 +53,7 @@ def brute_force(some: Rays) -> tuple[NDArray[np.float64], NDArray[np.int64], NDA
 @pytest.mark.needs("cc")
 @pytest.mark.parametrize("count", [COUNT, 3])
 def test_embree_finds_what_brute_force_finds(count: int) -> None:
-    """In all its modes, all rays, those of the last packet too, and again when traced again."""
+    """Holds in all modes, for all rays including the last packet, and when they are traced again."""
     some = rays(count)
     t, triangle, clear = brute_force(some)
     assert clear.mean() > 0.9
@@ -90,7 +90,7 @@ def test_every_library_is_known() -> None:
 
 
 def test_agreement_counts_rays_not_edges(device: Device) -> None:
-    """Hits at the same t agree though they name the triangle next door; other t, and misses, do not."""
+    """Hits at the same t agree even if the triangle is a neighbor; other t and misses do not agree."""
     some = rays(100)
     ours = clrt.RayQuery(*closed_room(*BALL), device=device.info.index).closest_hit(some[0], some[1])
     primitive, t = ours["primitive"].copy(), ours["t"].copy()

@@ -1,4 +1,4 @@
-"""Plots of studies: nothing of them is cut off, and no two labels lie on each other."""
+"""Plots of studies have no clipped legends and no overlapping labels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ pytest.importorskip("matplotlib")
 @pytest.mark.parametrize("longest", [0.3, 1.0, 3.0, 300.0])
 @pytest.mark.parametrize("scenes", [1, 2])
 def test_convergence_is_legible(monkeypatch: pytest.MonkeyPatch, scenes: int, longest: float) -> None:
-    """Of the contestants that there are by default; over less than a decade of time, and over four."""
+    """Tests the default contestants over less than a decade of time, and over four."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""Khronos' scenarios beside other path tracers: a made-up suite whose images are known, or clrt's own."""
+"""Khronos' fidelity scenarios and other path tracers, tested on a fake suite whose images are known."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from ..scene.glb import Gltf
 
 pytestmark = pytest.mark.needs("flip_evaluator")
 SIZE = 32
-#: A black wall that fills the image's left half, and the radiance that it emits.
+#: A black wall that fills the left half of the image, and the radiance that it emits.
 COLOR = [0.5, 0.25, 0.75]
 WALL = np.array([[-9, -9, 0], [0, -9, 0], [0, 9, 0], [-9, 9, 0]], np.float32)
 
 
 def suite(folder: Path, skybox: bool = False) -> Path:
-    """A checkout with one scenario: an emissive wall before a sky of radiance 1."""
+    """Create a checkout with one scenario: an emissive wall in front of an environment of radiance 1."""
     generator = folder / GENERATOR
     for place in ("test", "environments", "models"):
         (generator / place).mkdir(parents=True)
@@ -49,7 +49,7 @@ def suite(folder: Path, skybox: bool = False) -> Path:
 
 
 def expected(skybox: bool) -> NDArray[np.float32]:
-    """The display's light at twice the size: the wall, then white or the sky."""
+    """Return the displayed linear image at twice the size: the wall, then white or the environment."""
     wall, sky = tone_mapped(np.array([[COLOR, [1.0, 1.0, 1.0]]]))[0]
     image = np.broadcast_to(sky if skybox else 1.0, (2 * SIZE, 2 * SIZE, 3)).astype(np.float32)
     image[:, :SIZE] = wall
@@ -57,7 +57,7 @@ def expected(skybox: bool) -> NDArray[np.float32]:
 
 
 def write(folder: Path, renderer: str, image: NDArray[np.float32], website: bool = False) -> None:
-    """As the suite's own PNG, or as the website's WebP."""
+    """Write an image as the suite's own PNG or as the website's WebP."""
     place = (folder / "public" / "thumbnails" if website else folder / GENERATOR / "test") / "goldens" / "wall"
     place.mkdir(parents=True, exist_ok=True)
     path = place / f"{renderer}-golden.png"
@@ -70,7 +70,7 @@ def write(folder: Path, renderer: str, image: NDArray[np.float32], website: bool
 @pytest.mark.parametrize("skybox", [False, True])
 @pytest.mark.parametrize("change", [1.0, 0.7])
 def test_what_is_inside_of_the_spread(tmp_path: Path, skybox: bool, change: float) -> None:
-    """Two path tracers whose walls differ slightly; clrt's is like theirs, or theirs are both darker."""
+    """Two path tracers have slightly different walls; clrt's is between them, or both others are darker."""
     folder = suite(tmp_path, skybox)
     for renderer, factor, website in (("stellar", 0.95 * change, False), ("three-gpu-pathtracer", 1.05 * change, True)):
         image = expected(skybox)
@@ -107,7 +107,7 @@ def test_an_image_alone_and_what_is_missing(tmp_path: Path) -> None:
 
 
 def test_a_texture_that_is_missing_is_no_difference(tmp_path: Path) -> None:
-    """A model is read without it, but the picture is another: nothing is judged."""
+    """The model is read without its texture, but the image would differ, so nothing is judged."""
     folder = suite(tmp_path)
     write(folder, "stellar", expected(False))
     models = folder / GENERATOR / "models"
@@ -118,7 +118,7 @@ def test_a_texture_that_is_missing_is_no_difference(tmp_path: Path) -> None:
 
 
 def test_the_camera_is_on_its_orbit() -> None:
-    """theta turns from +Z towards +X, phi is measured from +Y (three.js' spherical coordinates)."""
+    """theta turns from +Z toward +X, phi is measured from +Y (spherical coordinates of three.js)."""
     target = {"x": 1.0, "y": 2.0, "z": 3.0}
     camera = orbit_camera(target, {"theta": 90, "phi": 90, "radius": 2}, 45)
     assert camera.position == pytest.approx((3, 2, 3)) and camera.look_at == pytest.approx((1, 2, 3))
@@ -144,7 +144,7 @@ def test_reduction_keeps_means() -> None:
 
 
 def shrunk_by_pillow(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
-    """(h, w, c) by Pillow's Lanczos kernel, which has three lobes as well."""
+    """Resize (h, w, c) with Pillow's Lanczos kernel, which has three lobes as well."""
     return np.stack([np.asarray(PIL.Image.fromarray(channel).resize(size, PIL.Image.Resampling.LANCZOS))
                      for channel in pixels.transpose(2, 0, 1)], axis=2)
 
@@ -156,7 +156,7 @@ def test_the_lanczos_kernel_is_pillow_s(size: tuple[int, int]) -> None:
 
 
 def test_transparency_is_shrunk_before_the_white_is_laid_under_it() -> None:
-    """Half of a pixel's width is covered by encoded 0.2: half of its light is that, half is white."""
+    """A pixel half covered by an encoded value of 0.2: half of its light is that color, half is white."""
     rgba = np.full((8, 24, 4), 0.2, np.float32)
     rgba[..., 3] = np.arange(24) < 13
     light, covered = over_white(shrunk(rgba, (12, 4)))
@@ -168,7 +168,7 @@ def test_transparency_is_shrunk_before_the_white_is_laid_under_it() -> None:
 
 
 def test_clrt_s_image_is_shrunk_as_the_website_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The website's image of the same wall, with its alpha, is the same image, at the wall's edge as well."""
+    """The website's image of the same wall, with alpha, equals clrt's, at the wall's edge as well."""
     folder = suite(tmp_path)
     (entry,) = json.loads((folder / GENERATOR / "test" / "config.json").read_text())["scenarios"]
     entry["target"] = {"x": 0.04}
@@ -188,7 +188,7 @@ def test_clrt_s_image_is_shrunk_as_the_website_s(tmp_path: Path, monkeypatch: py
 
 
 def test_images_are_decoded_as_they_were_encoded(tmp_path: Path) -> None:
-    """Cycles' by a power, others by the sRGB curve; transparency is over white; other shapes are left out."""
+    """Cycles' images use a power curve, others sRGB; transparency is over white; other aspect ratios are ignored."""
     import imageio.v3 as imageio
     texels = np.full((4, 4, 4), 51, np.uint8)
     texels[..., 3] = 255
@@ -203,7 +203,7 @@ def test_images_are_decoded_as_they_were_encoded(tmp_path: Path) -> None:
 
 
 def test_one_of_the_others_may_be_far_off() -> None:
-    """clrt may be as far from the rest as the furthest of them, but no further; means within their range and 5 %."""
+    """clrt may differ from the others as much as the most distant of them; means within their range and 5 %."""
     images = {name: np.full((32, 32, 3), value, np.float32)
               for name, value in {"clrt": 0.3, "a": 0.5, "b": 0.5, "c": 0.2}.items()}
     means = {"": {name: float(image.mean()) for name, image in images.items()}}

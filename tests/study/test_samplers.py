@@ -1,4 +1,4 @@
-"""The hard cases of light and samples that users can run."""
+"""Hard cases of light sampling and samplers that users can run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from clrt.device.open import Device
 
 @pytest.fixture(scope="module")
 def rows(device: Device) -> list[Row]:
-    """The quick ones, of fewer materials still: rendering/test_bsdf.py has them all."""
+    """Return the quick cases with still fewer materials; rendering/test_bsdf.py covers all."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(samplers, "QUICK", samplers.QUICK._replace(step=31))
         return list(samplers.measure_samplers(device, quick=True))

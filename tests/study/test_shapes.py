@@ -1,4 +1,4 @@
-"""Meshes of the studies and their sizes: closed where they should be, with the copies and flat triangles they claim."""
+"""Meshes of the studies: sizes, closedness, and the duplicates and degenerate triangles they are documented to have."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_soup_has_copies_and_triangles_without_area() -> None:
 
 @pytest.mark.parametrize("triangles", [2000, 9000, 12288, 30_000])
 def test_resized_mesh_is_of_the_size_and_shape(triangles: int) -> None:
-    """Little more triangles; the surface of a ball of radius near 1; no triangle has two corners in one place."""
+    """Slightly more triangles than requested, on the surface of a sphere of radius near 1, without repeated corners."""
     vertices, faces = resized(*bumpy_ball(5), triangles)
     assert triangles <= len(faces) < 1.2 * triangles
     assert np.isin(np.arange(len(vertices)), faces).all()

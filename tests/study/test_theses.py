@@ -1,4 +1,4 @@
-"""The theses' experiments: their figures and scenes, and what is told of them."""
+"""The theses' experiments: figures, scenes, and output."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ FIGURES = {"dragon": (dragon(), 19_332), "wood": (tree()[0], 84), "leaves": (tre
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_figures_are_closed_and_face_outward(name: str) -> None:
-    """Every edge has two triangles that run along it in opposite ways; the volume inside is above 0."""
+    """Every edge has two triangles with opposite orientation; the enclosed volume is positive."""
     (vertices, faces), count = FIGURES[name]
     assert len(faces) == count and faces.min() == 0 and faces.max() == len(vertices) - 1
     edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64)
@@ -38,7 +38,7 @@ def test_figures_are_closed_and_face_outward(name: str) -> None:
 
 
 def test_a_straight_tube_is_a_prism() -> None:
-    """Its volume by the area of its regular polygon, and two flat pyramids at its ends."""
+    """The volume follows from the area of the regular polygon and two flat pyramids at the ends."""
     (vertices, faces), sides = tube([(0, 0, 0), (0, 0, 4)], [0.5, 0.5], 9, 12), 12
     a, b, c = vertices[faces].astype(np.float64).transpose(1, 0, 2)
     volume = np.einsum("ij,ij->", a, np.cross(b, c)) / 6
@@ -67,7 +67,7 @@ def test_scenes_are_of_the_size_that_the_theses_name() -> None:
 
 
 def test_mirrors_show_more_by_depth_and_ever_less_of_it(device: Device) -> None:
-    """Each edge more adds rays, fewer than the one before it added: those that are still between the mirrors."""
+    """Each further bounce adds rays, but fewer than the previous one: only those still between the mirrors."""
     rays = []
     for depth in (1, 2, 4, 7, 12):
         scene = hall(1, mirrors=True, figure=GLASS)
@@ -79,7 +79,7 @@ def test_mirrors_show_more_by_depth_and_ever_less_of_it(device: Device) -> None:
 
 
 def test_every_row_of_the_theses_is_there() -> None:
-    """Their own figures as mission and tables have them, by the name of the experiment."""
+    """The theses' published figures are included, by the name of the experiment."""
     found: dict[str, list[float]] = {
         experiment.name: [1 / variant.theirs for variant in experiment.variants if variant.theirs]
         for experiment in experiments(QUICK)}
@@ -92,7 +92,7 @@ def test_every_row_of_the_theses_is_there() -> None:
 
 
 def test_figures_of_frames(device: Device) -> None:
-    """Of a small dragon's: rays are counted for the whole picture, wherever only a part was rendered."""
+    """Figures of a small dragon scene: rays are scaled to the whole image if only a part was rendered."""
     effort = QUICK._replace(smaller=40, rounds=2)
     result = next(measure_theses(effort, device=device.info.index))
     rows = result["rows"]

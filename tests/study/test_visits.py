@@ -1,4 +1,4 @@
-"""Visits that rays count are those that the tree's boxes ask for."""
+"""The counted node visits and tests per ray follow from the BVH's boxes."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from clrt.device.open import Device
 
 RNG = np.random.default_rng(2)
 BALL = icosphere(3)
-#: Nearer to the edge of a box than this a ray is not asked for: kernels pad boxes, by less.
+#: Rays nearer than this to a box's edge are excluded: kernels pad boxes, by less.
 MARGIN = 1e-4
 
 
 def past_the_ball(count: int) -> Rays:
-    """Rays at a distance of 1 to 1.2 from the middle: they meet boxes but no triangle, so that none hides another."""
+    """Return rays at a distance of 1 to 1.2 from the center: they hit boxes but no triangle, so none ends early."""
     across, other = RNG.normal(size=(2, count, 3))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     direction = np.cross(across, other)
@@ -33,7 +33,7 @@ def past_the_ball(count: int) -> Rays:
 
 
 def entered(low: NDArray[Any], high: NDArray[Any], rays: Rays, margin: float) -> NDArray[np.bool_]:
-    """(rays, boxes): whether a ray meets a box that is larger by `margin`, by slabs in float64."""
+    """Return (rays, boxes): whether a ray hits a box enlarged by `margin`, by the slab test in float64."""
     origins, directions = (array[:, None].astype(np.float64) for array in rays[:2])
     one, other = (low - margin - origins) / directions, (high + margin - origins) / directions
     near, far = np.minimum(one, other).max(axis=2), np.maximum(one, other).min(axis=2)
@@ -41,7 +41,7 @@ def entered(low: NDArray[Any], high: NDArray[Any], rays: Rays, margin: float) ->
 
 
 def boxes(query: clrt.RayQuery) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """low, high (b, 3), and what entering each costs: nodes and tests (b,)."""
+    """Return low, high (b, 3), and the cost of entering each box: nodes and tests (b,)."""
     array = query.tree.buffers["nodes"]
     nodes = array.read(query.device) if isinstance(array, DeviceArray) else array
     if query.tree.name == "bvh2":
@@ -63,14 +63,14 @@ def test_rays_that_hit_nothing_visit_what_they_enter(device: Device, layout: str
     clear = (small == large).all(axis=1) & (query.closest_hit(*rays)["primitive"] < 0)
     assert clear.sum() > 1000
     visits = visits_a_ray(query, (rays[0][clear], rays[1][clear], rays[2][clear]), any_hit=any_hit)
-    root = 1 if layout == "bvh8" else 0    # whose own box is not in it
+    root = 1 if layout == "bvh8" else 0    # the root's own box is not included
     assert visits["nodes"] == pytest.approx(root + (large[clear] @ nodes.astype(int)).mean())
     assert visits["tests"] == pytest.approx((large[clear] @ tests.astype(int)).mean())
     assert visits["tests"] > 0.05
 
 
 def test_lists_test_all_up_to_the_first_that_blocks(device: Device) -> None:
-    """Three triangles over each other, seen from both sides: the list's order counts, not the ray's."""
+    """Three stacked triangles seen from both sides: the order of the list counts, not that along the ray."""
     vertices = np.array([[x, y, z] for x, y in ((-1, -1), (1, -1), (0, 1)) for z in range(3)])
     faces = np.arange(9).reshape(3, 3).T
     origins = np.array([[0, 0, 5], [0, 0, -5], [3, 3, 5]], np.float32)

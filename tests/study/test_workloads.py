@@ -1,4 +1,4 @@
-"""Scenes and rays of the studies: closed, of the right area and shape; where rays start, point and end."""
+"""Scenes and rays of the studies: closed meshes, areas and shapes; origins, directions and ends of rays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..rendering.rays import icosphere
 
 Doubles = NDArray[np.float64]
 RNG = np.random.default_rng(11)
-#: A tetrahedron with a corner cut at the origin: of volume 1/6 · 1·2·3, no two edges alike.
+#: A tetrahedron with a right-angled corner at the origin, volume 1/6 · 1·2·3, and all edges of different length.
 TETRAHEDRON = (np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], np.float32),
                np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], np.int32))
 
@@ -34,12 +34,12 @@ def area(vertices: Floats, faces: Faces) -> float:
 
 
 def volume(vertices: Floats, faces: Faces) -> float:
-    """By the divergence theorem: of a closed mesh whose triangles all face outwards."""
+    """Return the volume by the divergence theorem, for a closed mesh with outward-facing triangles."""
     return float(np.linalg.det(corners(vertices, faces)).sum() / 6)
 
 
 def assert_closed(faces: Faces) -> None:
-    """Every edge is there once in each direction."""
+    """Assert that every edge occurs once in each direction."""
     edges = Counter(map(tuple, faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).tolist()))
     assert set(edges.values()) == {1} and all((b, a) in edges for a, b in edges)
 
@@ -95,7 +95,7 @@ def test_copies_are_turned_not_bent() -> None:
 
 
 def test_camera_rays_go_through_the_pixels_row_by_row() -> None:
-    """From +z at the origin: y falls from row to row, the field of view is 45 degrees from the top to the bottom."""
+    """Looking at the origin from +z: y decreases from row to row, and the vertical field of view is 45 degrees."""
     origins, directions, t_max = camera_rays(np.array([0.0, 0.0, 4.0]), np.zeros(3), (60, 40))
     assert np.isinf(t_max).all() and (origins == [0, 0, 4]).all()
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=1e-6)
@@ -108,7 +108,7 @@ def test_camera_rays_go_through_the_pixels_row_by_row() -> None:
 
 
 def test_surface_points_are_where_rays_meet_planes(device: Device) -> None:
-    """The planes' own intersections in float64; normals face where the rays come from; misses are left out."""
+    """Points agree with ray–plane intersections in float64; normals face the ray origins; misses are excluded."""
     vertices, faces = icosphere(3)
     origins = RNG.uniform(-1.5, 1.5, (4000, 3)).astype(np.float32)
     directions = RNG.normal(size=(4000, 3)).astype(np.float32)
@@ -129,7 +129,7 @@ def test_surface_points_are_where_rays_meet_planes(device: Device) -> None:
 
 
 def test_bounces_are_cosine_distributed() -> None:
-    """cos²θ and the azimuth are uniform; all are on the normal's side, for normals all around."""
+    """cos²θ and the azimuth are uniform, and all rays are on the normal's side, for normals in all directions."""
     count = 100_000
     normals = on_the_sphere(count)
     _, directions, t_max = bounce_rays(RNG.uniform(-1, 1, (count, 3)), normals, seed=3)

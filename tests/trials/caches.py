@@ -1,4 +1,4 @@
-"""Eight processes on a cold cache, several times; caches of garbage, read-only ones, no home: one picture always."""
+"""Starts eight processes on a cold cache, and uses damaged, read-only and missing caches: the image must not change."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def trial() -> Iterator[str]:
 
 
 def pictures(folder: Path, cache: str | None, count: int) -> set[str]:
-    """Digests of the pictures of so many processes that start together."""
+    """Return the digests of the images of `count` processes that start together."""
     named = {} if cache is None else {"HOME": str(folder), "CLRT_CACHE_DIR": str(folder / cache),
                                       "POCL_CACHE_DIR": str(folder / cache / "pocl")}
     command = (sys.executable, "-P", "-m", "clrt", "render", str(CORNELL), "--size", "64x64", "--spp", "4", "-q", "-o")

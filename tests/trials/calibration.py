@@ -1,4 +1,4 @@
-"""The estimated error over the true one, of pictures of each scene of the gallery at several numbers of samples."""
+"""Ratio of estimated to true error for each scene of the gallery at several sample counts."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from clrt.rendering.renderer import Renderer
 from .references import true_relmse, with_references
 
 LEVELS = (2, 4, 8, 16, 32, 64, 128, 256)
-#: Pictures of fewer samples are left out of what is told last. Of two, all that is known is one difference.
+#: Images of fewer samples are left out of the last lines: two samples give a single difference.
 FEWEST = (4, 8)
-#: Others than those of the pictures by which the estimate's constants were chosen.
+#: Other seeds than those by which the estimator's constants were chosen.
 SEEDS = range(100, 103)
 
 

@@ -1,4 +1,4 @@
-"""Checkpoints cut, with a bit flipped, of another version, of another scene, and on a disk that fills up."""
+"""Checkpoints truncated, with a flipped bit, of another version or scene, and on a disk that fills up."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TIMES = 100
 DISKS = 20
 SIZE, SPP = (48, 48), 8
 Damage = Callable[[bytes, random.Random], bytes]
-#: What is done to the newest of two generations, or to both.
+#: Damage applied to the newer of two generations, or to both.
 DAMAGES: dict[str, Damage] = {
     "cut": lambda content, rng: content[:rng.randrange(len(content))],
     "a bit flipped": lambda content, rng: _flipped(content, rng.randrange(len(content)), 1 << rng.randrange(8)),
@@ -36,7 +36,7 @@ def _flipped(content: bytes, place: int, bit: int) -> bytes:
 
 
 def trial() -> Iterator[str]:
-    logging.disable(logging.WARNING)    # of each damage
+    logging.disable(logging.WARNING)    # one per damage
     rng = random.Random(3)
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "a.ck"
@@ -66,7 +66,7 @@ def ended(path: Path, resume: bool, scene: Path = CORNELL) -> bytes:
 
 
 def outcome(path: Path, whole: bytes, scene: Path = CORNELL) -> str:
-    """What becomes of a render that is to go on from it."""
+    """Return the outcome of resuming from the checkpoint."""
     try:
         return "went on to the same film" if ended(path, True, scene) == whole else "WENT ON TO ANOTHER FILM"
     except CheckpointError:
@@ -74,7 +74,7 @@ def outcome(path: Path, whole: bytes, scene: Path = CORNELL) -> str:
 
 
 def filled_up(rng: random.Random) -> bool:
-    """Whether a render whose files may not grow beyond some size warned, ended, and kept a whole checkpoint."""
+    """Return whether a render with limited file sizes warned, ended, and kept a valid checkpoint."""
     name = tempfile.mkdtemp()
     folder, limit = Path(name), rng.randrange(200_000, 3_000_000)
     options = (CORNELL, "--size", "256x192", "--checkpoint", "a.ck", "--checkpoint-every", 0, "--progress", "json")

@@ -1,4 +1,4 @@
-"""Drivers that abort, hang, crash, refuse, are empty or missing, none at all, and two PoCLs: `clrt devices` in 10 s."""
+"""Runs `clrt devices` with drivers that abort, hang, crash, refuse, are empty or missing, and two PoCLs: limit 10 s."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""`--error` over the gallery: it ends, and how the true error is beside the one that was asked for.
+"""Renders the gallery with `--error`: each render ends, and its true error is compared with the requested one.
 
-Pictures are small, as a reference takes four times the samples of the longest of them.
+Images are small, since a reference takes four times the samples of the longest of them.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""White furnaces: energy of surfaces with interpolated normals or normal maps, beside the same surfaces without.
+"""White furnace tests: energy of surfaces with interpolated normals or normal maps, compared with flat ones.
 
-Environment light of radiance 1 from everywhere, so what reflects all light has 1 in every pixel.
+The environment has radiance 1, so a surface that reflects all light has 1 in every pixel.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def sphere() -> Mesh:
 
 
 def vase(around: int = 24) -> Mesh:
-    """A surface of revolution whose normals are the area-weighted means of those of the adjacent triangles."""
+    """Return a surface of revolution with area-weighted vertex normals."""
     turn = 2 * np.pi * np.arange(around) / around
     rings = [np.stack([r * np.cos(turn), np.full(around, y), r * np.sin(turn)], axis=1) for r, y in PROFILE]
     vertices = np.concatenate(rings)
@@ -54,7 +54,7 @@ def vase(around: int = 24) -> Mesh:
 
 
 def dome() -> Mesh:
-    """A square with the normal map of a hemisphere."""
+    """Return a square with the normal map of a hemisphere."""
     x, y = np.meshgrid(*[(np.arange(256) + 0.5) / 128 - 1] * 2)
     inside = np.hypot(x, y) < 0.95
     slope = np.stack([np.where(inside, x, 0), np.where(inside, -y, 0)], axis=-1)
@@ -73,7 +73,7 @@ SHAPES = {"sphere of 80 triangles": (sphere(), Camera(position=(0, 0, 5), fov_de
 
 
 def covered(mesh: Mesh, camera: Camera, material: Material) -> Doubles:
-    """Radiance of the pixels that the mesh covers."""
+    """Return the radiance of the pixels that the mesh covers."""
     def pixels(of: Material) -> Doubles:
         scene = Scene(meshes=[replace(mesh, material=of)], camera=camera, environment=Environment(color=WHITE),
                       render=SETTINGS)

@@ -1,4 +1,4 @@
-"""Ctrl-C at 20 random moments: how long until picture and checkpoint are there, and until the process has ended."""
+"""Interrupts a render at 20 random moments: time until image and checkpoint are written and the process ends."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def trial() -> Iterator[str]:
 
 
 def interrupted(size: tuple[int, int], moment: float) -> tuple[float, float]:
-    """Seconds until both files were in their places, and until the process had ended."""
+    """Return the seconds until both files were in place, and until the process had ended."""
     width, height = size
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -1,4 +1,4 @@
-"""kill -9 at 100 random moments, then --resume: film, samples and estimate, bit for bit."""
+"""kill -9 at 100 random moments, then --resume: film, samples and estimate are equal bit for bit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..cli.test_checkpoints import arrays
 from .renders import ALL_THE_TIME, CORNELL, await_rendering, finish, start
 
 KILLS = 100
-#: The second takes longer for the same number: rounds of some tiles each.
+#: Adaptive sampling takes longer for the same number, in rounds of some tiles each.
 MODES = {"even": ("--spp", 320), "adaptive": ("--spp", 192, "--adaptive")}
 
 
@@ -47,7 +47,7 @@ def render(folder: Path, mode: str) -> subprocess.Popen[str]:
 
 
 def left_alone(mode: str) -> tuple[dict[str, bytes], float]:
-    """What the checkpoint of a render holds in the end that nobody killed, and the seconds that it rendered."""
+    """Return the final checkpoint of an undisturbed render, and the seconds that it rendered."""
     with tempfile.TemporaryDirectory() as name:
         process = render(Path(name), mode)
         await_rendering(process)

@@ -1,4 +1,4 @@
-"""What a process pays for a model of 1.6 million triangles, in processor time and memory, and for compiling."""
+"""CPU time and memory of a process for a model of 1.6 million triangles, and for compilation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from clrt.bench.rays.resize import resized
 from clrt.bench.rays.workloads import bumpy_ball
 
 TRIANGLES = 1_600_000
-#: What is done first is measured with what came before.
+#: Each part includes the work since the previous one.
 PARTS = ("import", "load", "tree, records", "program, upload", "a sample")
 
 
@@ -36,7 +36,7 @@ def trial() -> Iterator[str]:
 
 
 def write_ply(file: Path, triangles: int) -> None:
-    """A binary .ply of little more than so many triangles."""
+    """Write a binary .ply with slightly more than this number of triangles."""
     vertices, corners = resized(*bumpy_ball(), triangles)
     faces = np.zeros(len(corners), [("count", "u1"), ("corners", "<i4", 3)])
     faces["count"], faces["corners"] = 3, corners
@@ -47,7 +47,7 @@ def write_ply(file: Path, triangles: int) -> None:
 
 
 def measure(model: str) -> Iterator[tuple[float, int | None]]:
-    """Of each of PARTS the seconds, and the process' peak until then."""
+    """Yield for each of PARTS its seconds of CPU time and the peak memory of the process so far."""
     begun = 0.0
 
     def lap() -> tuple[float, int | None]:

@@ -1,7 +1,7 @@
-"""The longest launch of any kernel over the gallery, on every device that the environment has.
+"""The longest launch of any kernel over the gallery, on every device in the environment.
 
-For rusticl set RUSTICL_ENABLE=llvmpipe; for Intel's runtime run it in an environment that has it. A scene on a device
-is a process: `python -m tests.trials.launches SCENE DEVICE` prints its figures as JSON. Simulators are left out.
+For rusticl set RUSTICL_ENABLE=llvmpipe; for Intel's runtime use an environment that has it. Each scene and device is
+a separate process: `python -m tests.trials.launches SCENE DEVICE` prints its figures as JSON. Simulators are skipped.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import Any
 
 from .renders import GALLERY
 
-#: Samples a pixel and seconds, whatever comes first.
+#: Samples per pixel and seconds, whichever comes first.
 SPP, SECONDS = 32, 20.0
-#: The kernels that make pictures.
+#: The kernels that render images.
 INTEGRATORS = ("wave", "integrate", "raster")
-#: Seconds that no launch on a CPU should take longer.
+#: Limit in seconds for a launch on a CPU.
 LIMIT = 0.2
 
 
@@ -44,9 +44,9 @@ def trial() -> Iterator[str]:
 
 
 def measured(scene: str, device: str) -> dict[str, Any]:
-    """Of one render: launches of its integrator, their median and longest, and the longest of all other kernels.
+    """Return the launches of the integrator, their median and longest, and the longest of other kernels, of one render.
 
-    By the device's own clock; where that says nothing, the longest is as seen from the host, and the median 0.
+    Times are from the device's clock; if it is unusable, the longest is measured on the host, and the median is 0.
     """
     import pyopencl as cl
 

@@ -1,4 +1,4 @@
-"""Scenes of the gallery at a small size, with references that say how noisy they are themselves."""
+"""Gallery scenes at a small size, with references that estimate their own noise."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ STEPS, STEP_SPP = 8, 256
 
 
 def small(path: Path, side: int = SIDE) -> clrt.Scene:
-    """The scene with so many pixels along the longer side."""
+    """Return the scene with `side` pixels along the longer side."""
     scene = clrt.load(path)
     width, height = (round(extent * side / max(scene.render.size)) for extent in scene.render.size)
     return replace(scene, render=replace(scene.render, size=(width, height)))
 
 
 def with_references() -> Iterator[tuple[Path, clrt.Scene, Reference]]:
-    """Each scene; references of 2048 samples a pixel are kept in the cache."""
+    """Yield each scene with its reference of 2048 samples per pixel, which is cached."""
     for path in GALLERY:
         scene = small(path)
         print(f"    {path.stem}", file=sys.stderr, flush=True)
@@ -35,5 +35,5 @@ def with_references() -> Iterator[tuple[Path, clrt.Scene, Reference]]:
 
 
 def true_relmse(state: State, reference: Reference) -> float:
-    """Of the state's picture, without what is the reference's own."""
+    """Return the relMSE of the state's image, minus the reference's own."""
     return max(0.0, (relmse(state.pixels, reference.pixels) or 0.0) - reference.relmse)

@@ -1,4 +1,4 @@
-"""Renders in processes of their own, as users start them."""
+"""Starts renders in separate processes, as users do."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ CLRT = ("-P", "-m", "clrt")
 
 def start(folder: Path, *options: object, program: tuple[str, ...] = CLRT,
           environment: Mapping[str, str] | None = None) -> subprocess.Popen[str]:
-    """`clrt render` with these options, in the folder."""
+    """Start `clrt render` with these options in the folder."""
     return subprocess.Popen([sys.executable, *program, "render", *map(str, options)], cwd=folder, text=True,
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment)
 
 
 def finish(process: subprocess.Popen[str], code: int = 0) -> str:
-    """What it wrote to standard error, once it has ended with that exit code."""
+    """Wait for the process to end with this exit code and return its standard error."""
     _, messages = process.communicate(timeout=600)
     assert process.returncode == code and "Traceback" not in messages, (process.returncode, messages)
     return messages
 
 
 def await_rendering(process: subprocess.Popen[str]) -> None:
-    """Returns once a render with `--progress json` says that it renders."""
+    """Return once a render with `--progress json` reports that it renders."""
     assert process.stderr is not None
     while (line := process.stderr.readline()) and '"render"' not in line:
         assert process.poll() is None

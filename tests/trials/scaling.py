@@ -1,7 +1,7 @@
-"""One device of one thread, then two of one thread each: same picture, and how much faster; one killed on the way.
+"""One device with one thread compared with two: same image, and the speedup; also with one failing during the render.
 
-POCL_MAX_PTHREAD_COUNT=1 makes one thread of a PoCL, however many devices it has: there must be two, pip's and the
-system's. Means nothing but on a machine with two idle cores.
+POCL_MAX_PTHREAD_COUNT=1 gives a PoCL one thread, however many devices it has, so two are needed: pip's and the
+system's. The figures are meaningful only on a machine with two idle cores.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .renders import CORNELL, GALLERY, finish, start
 TURNS, FAILURES = 5, 20
 SCENES = [scene for scene in GALLERY if scene.stem in ("cornell", "glass", "spheres", "spot")]
 POCL = "Portable Computing Language"
-#: The options of "one" and "two", once it is known which devices there are.
+#: The options of "one" and "two", set once the devices are known.
 RENDERS: dict[str, tuple[str, ...]] = {}
 
 
@@ -56,7 +56,7 @@ def trial() -> Iterator[str]:
 
 
 def failing() -> int:
-    """How often two devices, of which one is lost or never ends a launch, made the picture of one."""
+    """Return how often two devices, of which one is lost or hangs, rendered the image of one device."""
     moments, options = random.Random(2), (CORNELL, "--size", "256x256", "--spp", "64", "-o")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

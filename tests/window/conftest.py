@@ -1,5 +1,5 @@
-"""A display without a screen, on which Mesa draws in software. Where Xvfb is missing, no test of the window runs, and
-test_display.py says so."""
+"""Headless display with software rendering by Mesa. If Xvfb is missing, no window test runs, and test_display.py
+reports it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ collect_ignore_glob = [] if which("Xvfb") else ["test_[!d]*.py"]
 
 @pytest.fixture(scope="session")
 def display() -> Iterator[str]:
-    """The name of a new one."""
+    """Start a display and yield its name."""
     read, write = os.pipe()
     server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x800x24", "-nolisten", "tcp"],
                               pass_fds=[write], stderr=subprocess.DEVNULL)
@@ -28,7 +28,7 @@ def display() -> Iterator[str]:
 
 @pytest.fixture(autouse=True)
 def window_environment(display: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Windows go there, whatever display there is."""
+    """Open windows on that display instead of the one in the environment."""
     monkeypatch.setenv("DISPLAY", display)
     monkeypatch.setenv("LIBGL_ALWAYS_SOFTWARE", "1")
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

@@ -1,4 +1,4 @@
-"""Hands and eyes of the window's tests: ImGui's test engine drives it, pictures of it are read back."""
+"""Driver of the window tests: ImGui's test engine operates the window, and screenshots are read back."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from clrt.scene.model import Scene
 from clrt.window.app import App
 
 Levels = NDArray[np.int16]
-#: Seconds that anything may take on a busy machine.
+#: Timeout in seconds of any action, on a busy machine.
 PATIENCE = 60.0
 
 
 class Driver:
-    """A window while a test runs in it. Items are named as in ImGui's test engine: PANEL/ITEM."""
+    """Window under test. Items are named as in ImGui's test engine: PANEL/ITEM."""
 
     def __init__(self, app: App, context: imgui.test_engine.TestContext, folder: Path) -> None:
         self.app, self.live, self.context, self._folder = app, app.live, context, folder
         self._pictures = 0
 
     def until(self, holds: Callable[[], bool], what: str) -> None:
-        """Lets the window run until that holds."""
+        """Run the window until the condition holds."""
         end = time.monotonic() + PATIENCE
         while not holds():
             assert time.monotonic() < end, f"{what}: not in {PATIENCE:g} s"
@@ -40,7 +40,7 @@ class Driver:
             self.context.yield_()
 
     def rest(self) -> Snapshot:
-        """The picture with all samples of what was asked for last, once that is in the window."""
+        """Wait until the complete image of the last request is shown, and return its snapshot."""
         live, viewport = self.live, self.app.viewport
 
         def shown() -> bool:
@@ -54,18 +54,18 @@ class Driver:
         return live.snapshot()
 
     def panel(self, name: str) -> None:
-        """Brings a panel to the front; items without a panel are its own from now on."""
+        """Bring a panel to the front; later items without a panel name refer to it."""
         self.context.window_focus(f"//{name}")
         self.context.set_ref(f"//{name}")
 
     def choose(self, item: str, choice: str) -> None:
-        """Opens a list and takes one of its lines."""
+        """Open a list and select one of its lines."""
         self.context.item_click(item)
         popup = self.context.get_window_by_ref("//$FOCUSED").name
         self.context.item_click(f"//{popup}/**/{choice}")
 
     def window(self) -> Levels:
-        """(height, width, 3): what the whole window looks like, the mouse out of the way."""
+        """Return a screenshot of the window, (height, width, 3), with the mouse moved away."""
         path = self._folder / f"{self._pictures:02}.png"
         self._pictures += 1
         self.context.mouse_move_to_pos((1, 1))
@@ -75,33 +75,33 @@ class Driver:
         return read_texels(path)[..., :3].astype(np.int16)
 
     def picture(self) -> Levels:
-        """The part of the window that is the picture."""
+        """Return the part of the screenshot that shows the image."""
         (x, y), (width, height) = self.app.viewport.corner, self.app.viewport.size
         return self.window()[y:y + height, x:x + width]
 
 
 def changed(before: Levels, after: Levels) -> NDArray[np.bool_]:
-    """(height, width): where two pictures differ by more than the rounding of a level."""
+    """Return a mask, (height, width), of the pixels where two images differ by more than one level."""
     return np.asarray(np.abs(before - after).max(axis=2) > 1)
 
 
 def halves(mask: NDArray[np.bool_]) -> tuple[float, float]:
-    """The part of the left half that is set, and that of the right half."""
+    """Return the fractions of the left and the right half that are set."""
     middle = mask.shape[1] // 2
     return float(mask[:, :middle].mean()), float(mask[:, middle:].mean())
 
 
 def at(picture: Levels, x: float, y: float) -> list[int]:
-    """The colour at a point of the 160 x 120 pixels that were rendered."""
+    """Return the color at a point, given in the 160 x 120 rendered pixels."""
     height, width = picture.shape[:2]
     return [int(level) for level in picture[int(y / 120 * height), int(x / 160 * width)]]
 
 
 def drive(scene: Scene, test: Callable[[Driver], None], folder: Path, settings: Settings = Settings()) -> None:
-    """Opens a window on the scene, runs the test in it, and closes it. Pictures of the window go to the folder."""
+    """Open a window on the scene, run the test in it, and close it. Screenshots go to the folder."""
     app = App(scene, settings)
     app.params.ini_disable = True
-    # The engine takes this signal for a crash. Python ignores it, and has an error for it.
+    # The test engine treats this signal as a crash; Python ignores it and raises an error instead.
     app.params.callbacks.before_imgui_render = lambda: _ignore(signal.SIGPIPE)
 
     def run(context: imgui.test_engine.TestContext) -> None:

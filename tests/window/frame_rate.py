@@ -1,4 +1,4 @@
-"""How smooth a walk through a scene is. On a machine with nothing else to do, with a display (or Xvfb's):
+"""Measures how smoothly the camera moves through a scene. On an idle machine with a display (or Xvfb's):
 
     python -c "from tests.window.frame_rate import main; main('scenes/spheres.toml')"
 """
@@ -23,14 +23,14 @@ from .driver import Driver, drive
 
 
 def main(scene: str, seconds: float = 10.0, frame_rate: float = 20.0) -> dict[str, Any]:
-    """Prints and returns, of a walk of so many seconds: latency, from the key to a picture that it changed, in ms;
-    pictures and frames of the window a second; the pictures' median width and height; of the scene's size."""
+    """Print and return, for a camera movement of `seconds`: latency from a key press to a changed image in ms; images
+    and window frames per second; median width and height of the images; and the scene's size."""
     figures: dict[str, Any] = {}
 
     def test(window: Driver) -> None:
         window.rest()
         window.panel("Picture")
-        window.context.yield_(30)   # the window comes to rest, too
+        window.context.yield_(30)   # let the window come to rest, too
         figures.update(_walk(window, seconds))
 
     content = load(Path(scene))
@@ -43,7 +43,7 @@ def main(scene: str, seconds: float = 10.0, frame_rate: float = 20.0) -> dict[st
 
 
 def _walk(window: Driver, seconds: float) -> dict[str, Any]:
-    """S and W in turns, each for half a second, so that the scene stays in sight."""
+    """Press S and W alternately for half a second each, so that the scene stays in view."""
     seen: dict[int, Snapshot] = {}
     latencies: list[float] = []
     frames, start = 0, time.perf_counter()

@@ -1,4 +1,4 @@
-"""A scene for the window's tests: a red ball on the left, a golden one on the right, a floor, a light, a sky."""
+"""Scene of the window tests: a red sphere on the left, a gold one on the right, a floor, a light, an environment."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SKY = (0.2, 0.4, 0.8)
 
 
 def two_balls(**render: Any) -> Scene:
-    """160 x 120 pixels; the balls' middles are at (40.4, 60) and (119.6, 60)."""
+    """Return the scene at 160 x 120 pixels; the spheres' centers are at (40.4, 60) and (119.6, 60)."""
     red, gold = Diffuse(color=(0.8, 0.1, 0.1)), MetallicRoughness(preset="gold", roughness=0.5)
     floor = Mesh([[-50, 0, -50], [-50, 0, 50], [50, 0, 50], [50, 0, -50]], [[0, 1, 2], [0, 2, 3]],  # type: ignore
                  Diffuse(), name="floor")

@@ -1,4 +1,4 @@
-"""`clrt view`: what is missing or wrong is said, and it ends when it is told to."""
+"""`clrt view` reports what is missing or wrong, and ends on an interrupt."""
 
 from __future__ import annotations
 

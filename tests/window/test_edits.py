@@ -1,4 +1,4 @@
-"""Spheres and lights, edited as a user would: what changes in the picture, and what does not."""
+"""Spheres and lights edited as by a user change the expected parts of the image and no others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the window writes and reads."""
+"""Files that the window writes and reads."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from .scenes import two_balls
 
 
 def test_what_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The picture of an edited scene is to the last bit what `clrt render` makes of the scene that was saved with it,
-    with as many samples."""
+    """The saved image of an edited scene equals, bit for bit, that of `clrt render` for the saved scene at the same
+    number of samples."""
     monkeypatch.chdir(tmp_path)
 
     def test(window: Driver) -> None:

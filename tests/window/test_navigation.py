@@ -1,4 +1,4 @@
-"""How cameras move: by geometry, not by the code that moves them."""
+"""Camera movements, checked by geometry, independently of their implementation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from clrt.scene.model import Camera
 from clrt.window.navigation import approached, around, distance, orbited, shifted, turned, walked
 
-#: None of its axes is one of the world's.
+#: None of its axes is parallel to a world axis.
 CAMERA = Camera(position=(3, 2, 5), look_at=(1, 0.5, -1), up=(0.1, 1, -0.2), fov_degrees=30)
 
 
@@ -32,7 +32,7 @@ def test_walks_are_along_the_axes() -> None:
 
 @pytest.mark.parametrize("swing, fixed", [(turned, "position"), (orbited, "look_at")])
 def test_turns(swing: object, fixed: str) -> None:
-    """A turn keeps one end and the distance; there and back, and all the way round, end where they began."""
+    """A rotation keeps one end and the distance; back and forth or full circle, it ends where it began."""
     assert callable(swing)
     moved = swing(CAMERA, 0.4, 0.2)
     assert getattr(moved, fixed) == getattr(CAMERA, fixed) and distance(moved) == pytest.approx(distance(CAMERA))
@@ -48,7 +48,7 @@ def test_turns(swing: object, fixed: str) -> None:
 
 
 def test_which_way() -> None:
-    """From (0, 0, 5) at the origin: to look right is +x, down is -y; what is orbited turns with the hand."""
+    """From (0, 0, 5) toward the origin: right is +x, down is −y; orbiting follows the hand."""
     camera = Camera()
     assert turned(camera, 0.1, 0.1).look_at[0] > 0 > turned(camera, 0.1, 0.1).look_at[1]
     assert orbited(camera, 0.1, 0.1).position[0] < 0 < orbited(camera, 0.1, 0.1).position[1]
@@ -59,7 +59,7 @@ def test_which_way() -> None:
 
 
 def test_circles() -> None:
-    """A point goes round the upright axis through what the camera looks at, counter-clockwise from above."""
+    """A point moves around the vertical axis through the camera's target, counter-clockwise seen from above."""
     camera = Camera(look_at=(1, 0, 0))
     assert around((3, 2, 0), camera, pi / 2) == pytest.approx((1, 2, -2))
     assert around((3, 2, 0), camera, pi) == pytest.approx((-1, 2, 0))

@@ -1,4 +1,4 @@
-"""What is clicked in the picture is what the panels edit."""
+"""Clicking an object in the image selects it in the panels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .scenes import two_balls
 
 
 def click(window: Driver, x: float, y: float, dragged: float = 0.0) -> None:
-    """At a point of the 160 x 120 pixels that were rendered; dragged: so many of the window's to the right."""
+    """Click at a point of the 160 x 120 rendered pixels, or drag by `dragged` window pixels to the right."""
     (left, top), (width, height) = window.app.viewport.corner, window.app.viewport.size
     window.context.mouse_move_to_pos((left + width * x / 160, top + height * y / 120))
     if dragged:

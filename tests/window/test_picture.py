@@ -1,4 +1,4 @@
-"""What the window shows, and from where: the picture, and a camera that walks and looks around."""
+"""The window shows the rendered image, and the camera moves and looks around."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .scenes import two_balls
 
 
 def test_it_shows_what_is_rendered(tmp_path: Path) -> None:
-    """In the middle of each pixel its own colour, everywhere else one between its neighbours'."""
+    """The center of each pixel has its own color, other places one between its neighbors'."""
     def test(window: Driver) -> None:
         levels = to_display(window.rest().pixels).astype(np.int16)
         picture = window.picture()

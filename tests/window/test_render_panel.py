@@ -1,4 +1,4 @@
-"""How the picture is rendered, and on what, is switched while it runs."""
+"""Integrator, depth, exposure and device are changed while the window runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""For a process of its own, in which PoCL has two devices: a window changes its device.
+"""Window test of changing the device, run in a process in which PoCL has two devices.
 
     POCL_DEVICES="pthread basic" python -c "from tests.window.two_devices import main; main('folder')"
 """
@@ -12,7 +12,7 @@ from .scenes import two_balls
 
 
 def main(folder: str) -> None:
-    """Raises AssertionError where something is not as it should be."""
+    """Run the test; raises AssertionError if it fails."""
     def test(window: Driver) -> None:
         first = window.rest()
         before, devices = window.picture(), [info for info in window.app.editor.devices if info.type == "cpu"]
