@@ -48,8 +48,8 @@ _HOME = {
     "rendering.renderer": ("Renderer", "State"),
     "scene.animation": ("Animation", "Keyframe", "frames", "turntable"),
     "scene.lights": ("DirectionalLight", "PointLight", "SpotLight"),
-    "scene.materials.material_types": ("BlinnPhong", "Conductor", "Dielectric", "Diffuse", "MetallicRoughness", "Mirror",
-                                       "Phong"),
+    "scene.materials.material_types": ("BlinnPhong", "Conductor", "Dielectric", "Diffuse", "MetallicRoughness",
+                                       "Mirror", "Phong"),
     "scene.model": ("Camera", "Environment", "Instance", "Mesh", "RenderSettings", "Scene", "Sphere"),
     "scene.materials.textures": ("Picture", "Texture"),
 }

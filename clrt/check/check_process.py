@@ -1,4 +1,4 @@
-"""`python -m clrt.check.check_process ID`: check one device, and print a JSON object per line for each part of the check.
+"""`python -m clrt.check.check_process ID`: check one device, and print JSON lines for each part of the check.
 
 {"begins": NAME} precedes a part, {"failures": […], "figures": {…}} follows it. This is a separate process because a
 broken driver can crash or hang it; see run_check.py. Output of drivers goes to standard error.

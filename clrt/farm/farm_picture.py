@@ -3,8 +3,8 @@
 A task has some tiles, their current pixels, and the samples to add: the same as a device of a crew gets
 (rendering/accumulation/device_pool.py), only larger. A tile is in one task at a time, and the returned pixels replace
 the film's. So each pixel's samples are added one after another in a fixed order: the result does not depend on which
-worker did what, or when, the sums are bit-identical to those of one machine, and repeated tasks count once. Tiles that have all samples of
-a pass get those of the next while the others catch up (next_pass.py).
+worker did what, or when, the sums are bit-identical to those of one machine, and repeated tasks count once. Tiles that
+have all samples of a pass get those of the next while the others catch up (next_pass.py).
 """
 
 from __future__ import annotations
