@@ -46,7 +46,7 @@ def main() -> None:
         waits.clear()
         pictures = walk(live, given.seconds)
         sizes = np.array([each.pixels.shape[1] for each in pictures])
-        print(f"walking: {len(pictures) / given.seconds:.1f} pictures a second, {np.median(sizes):.0f} of {width} wide "
+        print(f"walking: {len(pictures) / given.seconds:.1f} images per second, {np.median(sizes):.0f} of {width} wide "
               f"({sizes.min()} to {sizes.max()})")
         live.wait(lambda now: now.pixels.shape[1] == width and now.spp >= 2)
         print(f"edits at rest, seconds to the first picture, small or whole: {latencies(live)}")

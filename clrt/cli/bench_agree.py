@@ -16,8 +16,8 @@ from .options import Size
 @click.command("agree")
 @click.argument("scenes", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SCENE...")
 @click.option("--size", type=Size(), help="Picture size in pixels; default: the scene's.")
-@click.option("--depth", type=click.IntRange(1, 1024), help="Most edges of a path; default: the scene's.")
-@click.option("--spp", type=click.IntRange(min=1), default=64, show_default=True, help="Samples a pixel of a picture.")
+@click.option("--depth", type=click.IntRange(1, 1024), help="Maximum path depth; default: the scene's.")
+@click.option("--spp", type=click.IntRange(min=1), default=64, show_default=True, help="Samples per pixel.")
 @click.option("--seeds", type=click.IntRange(min=2), default=16, show_default=True, help="Pictures of each renderer.")
 @click.option("--device", metavar="SEL", help="See `clrt devices`.")
 @figures_options

@@ -20,9 +20,9 @@ from .tables import race_legend, race_table
 def build_command(mesh: Path | None, device: str | None, quick: bool, json_file: Path | None) -> None:
     """Trees over 10 thousand to 10 million triangles: the mesh in a closed room, simplified or subdivided.
 
-    What builders take and what their trees cost a ray (Embree beside them, where pip's embreex is installed); then rays
-    a second by size, with the line a + b·log2(triangles) that fits the time of a ray; then what a new process takes
-    from arrays to first answers.
+    Time and memory of the builders and the cost of their trees per ray (and Embree's, if pip's embreex is installed);
+    then rays per second by size, with the line a + b·log2(triangles) fitted to the time per ray; then the time of a new
+    process from arrays to first answers.
     """
     from ..bench.rays.build_speed import measure_build
     from ..bench.rays.ray_speed import load_triangles

@@ -35,10 +35,10 @@ INTEGRATORS = ["path", "direct", "local", "raster"]
 @click.option("--time", "seconds", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
               help="That a picture may take; default: 10, with --quick 1, with --spp any.")
 @click.option("--spp", multiple=True, type=click.IntRange(min=1),
-              help="Samples a pixel, instead of 1, 2, 4 ...; may be repeated.")
+              help="Samples per pixel, instead of 1, 2, 4 ...; may be repeated.")
 @click.option("--seeds", type=click.IntRange(min=1), help="Pictures of each; default: 5, with --quick 3.")
 @click.option("--reference-spp", type=click.IntRange(min=2),
-              help="Samples a pixel of the reference; default: 4096, with --quick 256.")
+              help="Samples per pixel of the reference; default: 4096, with --quick 256.")
 @click.option("--quick", is_flag=True, help="Fewer seeds and a rougher reference.")
 @figures_options
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
@@ -47,8 +47,9 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
                      plot: Path | None, **asked: Any) -> None:
     """How fast pictures of each SCENE come near a reference of many samples, which is rendered once and kept.
 
-    Pictures of 1, 2, 4 ... samples a pixel by all contestants in turns, with several seeds. Also whether the error that
-    clrt estimates is the true one, and whether a contestant is biased (ask for many seeds of one number of samples).
+    Images of 1, 2, 4 ... samples per pixel by all contestants, interleaved, with several seeds. Also whether the error
+    that clrt estimates is the true one, and whether a contestant is biased (ask for many seeds of one number of
+    samples).
     """
     from ..bench.convergence.calibration import calibrations
     from ..bench.convergence.contestants import CHOICES, MORE_CHOICES

@@ -18,7 +18,7 @@ SCENES = Path(__file__).parents[2] / "scenes"
 @click.argument("trials", nargs=-1, type=click.Choice(TRIALS))
 @click.option("--scene", "scenes", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
               help="Scenes; default: cornell, glass and materials, where they are.")
-@click.option("--spp", type=click.IntRange(min=1), help="Samples a pixel; default: 64, of kills 1024, of huge 1.")
+@click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel; default: 64, of kills 1024, of huge 1.")
 @click.option("--every", default=4.0, show_default=True, metavar="SECONDS", help="Of kills: between two.")
 @click.option("--workers", default=64, show_default=True, type=click.IntRange(min=1),
               help="Of overhead: workers that only sleep; their client's memory is told.")

@@ -25,7 +25,7 @@ from .options import box_option, triangle_option
 @click.option("--quick", is_flag=True, help="Fewer rays, and a smaller ball.")
 @figures_options
 def rays_command(mesh: Path | None, rays: Path | None, quick: bool, json_file: Path | None, **options: Any) -> None:
-    """Rays a second through a mesh, in kernels alone and in whole calls from Python.
+    """Rays per second through a mesh, in kernels alone and in whole calls from Python.
 
     With --rays, those of the file: for their closest hits and for any hit. Without, from a camera, on from their hits
     and to two lights, by every tree layout in turns.

@@ -18,7 +18,7 @@ def scene_lines(result: Mapping[str, Any], on_cpu: bool) -> list[str]:
 
     (width, height), reference, rows = result["size"], result["reference"], result["contestants"]
     lines = [f"{result['scene']}: {width}x{height}, {result['max_depth']} path edges; reference of {reference['spp']} "
-             f"samples a pixel, relMSE {reference['relmse']:.1e}",
+             f"samples per pixel, relMSE {reference['relmse']:.1e}",
              f"  {'':28}{'spp':>7}{'seconds':>9}{'Msamples/s':>12}{'relMSE':>10}{'relMSE·s':>10}{'ratio':>7}"
              + " (  CPU)" * on_cpu + f"{'slope':>7}  {'mean ratio':20}      z"]
     lines += [_line(name, row, on_cpu) for name, row in rows.items()]
@@ -46,7 +46,7 @@ def _noise_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
                  for spp, ratios in zip(row["spp"], row["noise_ratio"])]
         lines += [f"  {name:28}" + " ".join(f"{spp}: {median(ratios):.2f}" for spp, ratios in known if ratios)
                   for _ in range(any(ratios for _, ratios in known))]
-    return ["  estimated error over the true one, by samples a pixel, median of seeds:", *lines] if lines else []
+    return ["  estimated error over the true one, by samples per pixel, median of seeds:", *lines] if lines else []
 
 
 def calibration_lines(told: Mapping[str, Mapping[str, Any]]) -> list[str]:

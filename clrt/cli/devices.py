@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON list.")
 @click.option("--check", is_flag=True, help="Check each against known answers, and keep what is found.")
-@click.option("--bench", is_flag=True, help="Measure how many rays a second each follows, and rank them by that.")
+@click.option("--bench", is_flag=True, help="Measure how many rays per second each follows, and rank them by that.")
 @click.option("--device", "selectors", multiple=True, metavar="SEL", help="Only this one; may be repeated.")
 @click.option("--limit", type=Finite(1.0), default=300.0, show_default=True, metavar="SECONDS",
               help="What a check or measurement of a device may take.")

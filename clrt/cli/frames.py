@@ -41,7 +41,7 @@ def frame_options(command: F) -> F:
     """Add the options that select frames; without --frames and --turntable a still image is rendered."""
     for option in [
         click.option("--fps", type=click.FloatRange(min=0, min_open=True),
-                     help="Frames a second; default: the scene's."),
+                     help="Frames per second; default: the scene's."),
         click.option("--turntable", type=click.IntRange(min=1), metavar="N",
                      help="Go once around what the camera looks at, in N frames."),
         click.option("--frames", type=Numbers(),

@@ -44,7 +44,7 @@ RIGHT = 1.2
               help="Image to write: .png, .exr or .hdr; may be repeated. - is standard output as PNG, exr:- as "
                    "OpenEXR. Default: <scene>.png here.")
 @picture_options
-@click.option("--spp", type=click.IntRange(min=1), help="Stop at this many samples a pixel.")
+@click.option("--spp", type=click.IntRange(min=1), help="Stop at this many samples per pixel.")
 @click.option("--time", "seconds", type=float, metavar="SECONDS", help="Stop after this time.")
 @click.option("--error", type=float, help="Stop at this estimated error (root of relMSE).")
 @click.option("--error-percentile", type=click.FloatRange(0, 100, min_open=True), metavar="PERCENT",

@@ -21,8 +21,9 @@ from .options import Size
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("--camera", metavar="NAME", help="A camera in the model file; see `clrt info`.")
 @click.option("--size", type=Size(), help="Picture size in pixels.")
-@click.option("--spp", type=click.IntRange(min=1), help="Rest at this many samples a pixel.")
-@click.option("--depth", "max_depth", type=click.IntRange(1, 1024), help="Path edges.")
+@click.option("--spp", type=click.IntRange(min=1), help="Rest at this many samples per pixel.")
+@click.option("--depth", "max_depth", type=click.IntRange(1, 1024),
+              help="Maximum path depth: 1 emission only, 2 direct light, 3 one bounce.")
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers.")
 @click.option("--device", "devices", multiple=True, metavar="SEL", help="See `clrt devices`. Given twice, both render.")
 @click.option("--integrator", help="What to compute.")

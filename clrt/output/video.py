@@ -44,8 +44,8 @@ def check_video(path: Path, size: tuple[int, int], fps: float) -> None:
     width, height = size
     if path.suffix.lower() == ".gif":
         if fps > FASTEST_GIF:
-            raise UsageError(f"{path}: {fps:g} frames a second are more than the {FASTEST_GIF:g} that a .gif is shown "
-                             "with; write an .mp4, or lower --fps")
+            raise UsageError(f"{path}: {fps:g} frames per second are more than the {FASTEST_GIF:g} that a .gif is "
+                             "shown with; write an .mp4, or lower --fps")
         if 1 / fps > LONGEST_GIF:
             raise UsageError(f"{path}: {1 / fps:g} s are more than the {LONGEST_GIF:g} that a frame of a .gif can "
                              "last; write an .mp4, or raise --fps")

@@ -87,7 +87,7 @@ class App:
         snapshot = self.editor.snapshot
         shown = self.viewport.shown
         trouble = self.editor.message or snapshot.error or (shown and shown.error)
-        progress = f"{snapshot.spp} samples a pixel, {snapshot.phase}, {snapshot.device}"
+        progress = f"{snapshot.spp} samples per pixel, {snapshot.phase}, {snapshot.device}"
         imgui.text(trouble or f"{snapshot.scene.name}: {progress}")
 
 

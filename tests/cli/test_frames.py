@@ -152,7 +152,7 @@ def test_interrupted_frames_are_not_written_and_resume_ends_it(flight: Path) -> 
     (["--frames", "all", "--checkpoint", "c"], 2, "--checkpoint is for one picture"),
     (["--fps", "3"], 2, "--turntable"), (["--turntable", "2", "-o", "a.gif", "--aov", "depth"], 2, "as a video does"),
     (["--frames", "0", "-o", "a.mp4", "--size", "25x16"], 2, "26x16"), (["-o", "a.gif"], 6, ".gif"),
-    (["--frames", "0", "-o", "a.gif", "--fps", "60"], 2, "60 frames a second"),
+    (["--frames", "0", "-o", "a.gif", "--fps", "60"], 2, "60 frames per second"),
     (["--frames", "0", "-o", "a.gif", "--fps", "0.0015"], 2, "666.667 s are more than the 655.35"),
     (["--turntable", "4", "-o", "a.gif", "--fps", "nan"], 2, "fps is nan; it must be above 0 and finite"),
     (["--turntable", "4", "-o", "a.gif", "--fps", "inf"], 2, "fps is inf; it must be above 0 and finite"),

@@ -20,7 +20,7 @@ SEEDS = range(100, 103)
 
 def trial() -> Iterator[str]:
     every: dict[int, list[float]] = {spp: [] for spp in LEVELS}
-    yield f"{'scene':18}" + "".join(f"{spp:>7}" for spp in LEVELS) + f"  samples a pixel; medians of {len(SEEDS)} seeds"
+    yield f"{'scene':18}" + "".join(f"{spp:>7}" for spp in LEVELS) + f"  samples per pixel; median of {len(SEEDS)}"
     for path, scene, reference in with_references():
         medians = []
         for spp in LEVELS:

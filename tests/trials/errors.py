@@ -22,7 +22,7 @@ SIDE = 96
 
 def trial() -> Iterator[str]:
     ratios: dict[float, list[float]] = {asked: [] for asked in ASKED}
-    yield f"{'scene':18}{'asked':>6}  samples a pixel, and true error over the one asked for, of {SEEDS} seeds"
+    yield f"{'scene':18}{'asked':>6}  samples per pixel, and true error over the one asked for, of {SEEDS} seeds"
     for path in GALLERY:
         scene = small(path, SIDE)
         for asked, found in ratios.items():

@@ -56,7 +56,7 @@ def plot_convergence(path: Path, results: Sequence[Mapping[str, Any]], devices: 
     axes = figure.subplots(2, len(results), squeeze=False, sharey="col")
     names = list(dict.fromkeys(name for result in results for name in result["contestants"]))
     for result, column in zip(results, axes.T):
-        for axis, (key, label) in zip(column, (("seconds", "seconds"), ("spp", "samples a pixel"))):
+        for axis, (key, label) in zip(column, (("seconds", "seconds"), ("spp", "samples per pixel"))):
             _draw_convergence(axis, result, names, key)
             axis.set(xscale="log", yscale="log", xlabel=label)
             low, high = axis.get_xlim()
@@ -105,7 +105,7 @@ def plot_theses(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:
             start = dict(points).get(4, points[0][1]) if points else 0.0
             curves.plot([depth for depth, _ in points], [start / seconds for _, seconds in points], style, color=color,
                         markersize=4, label=result["name"] + (f", {result['thesis']}" if key == "theirs" else ""))
-    curves.set(xscale="log", xlabel="depth of mirrors", ylabel="frames a second, over those at depth 4", ylim=(0, None))
+    curves.set(xscale="log", xlabel="mirror depth", ylabel="frames per second over those at depth 4", ylim=(0, None))
     curves.set_xticks(ticks := [1, 2, 4, 10, 25, 40], [str(tick) for tick in ticks])
     curves.minorticks_off()
     curves.grid(linewidth=0.4, alpha=0.4)
