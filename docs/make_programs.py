@@ -1,4 +1,4 @@
-"""Writes docs/programs.md, what is compiled for each scene of scenes/: python docs/make_programs.py"""
+"""Generate docs/programs.md, the table of what is compiled for each scene of scenes/: python docs/make_programs.py"""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-#: Of every scene, or said by its files already.
+#: Features that every scene has, or that the list of its files already shows.
 EVERYWHERE = {"PRIMITIVES", "IN_TREE", "TRIANGLES", "SPHERES", "LIGHTS"}
 
 TEXT = """# What is compiled for each scene
 
-The program of a scene contains what that scene uses and nothing else. `clrt info SCENE` lists its features and files,
-and `clrt render SCENE --print-kernel` prints it. For the scenes of this repository, in waves for CPUs (`python
-docs/make_programs.py` wrote this):
+The OpenCL program of a scene contains only the code that the scene uses. `clrt info SCENE` lists its features and source files,
+and `clrt render SCENE --print-kernel` prints its source. The table lists the scenes of this repository, compiled as wavefront
+kernels for CPUs. `python docs/make_programs.py` generates this page.
 
-| scene | kB of text | files | features |
+| scene | source (kB) | source files | features |
 |---|---|---|---|
 """
 
