@@ -30,7 +30,7 @@ def check_device(info: DeviceInfo, limit: float, on_part: Callable[[str], None] 
     clock, kernels = AwakeClock(), kernel_digest()
     part, failures, figures = "starting", list[str](), dict[str, float | str]()
     with tempfile.TemporaryFile() as errors:
-        child = start_child(f"{__package__}.child", info.id, subprocess.PIPE, errors)
+        child = start_child(f"{__package__}.check_process", info.id, subprocess.PIPE, errors)
         try:
             for told in _told(child, clock, limit):
                 if "begins" in told:
