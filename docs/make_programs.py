@@ -13,9 +13,9 @@ EVERYWHERE = {"PRIMITIVES", "IN_TREE", "TRIANGLES", "SPHERES", "LIGHTS"}
 
 TEXT = """# What is compiled for each scene
 
-The OpenCL program of a scene contains only the code that the scene uses. `clrt info SCENE` lists its features and source files,
-and `clrt render SCENE --print-kernel` prints its source. The table lists the scenes of this repository, compiled as wavefront
-kernels for CPUs. `python docs/make_programs.py` generates this page.
+The OpenCL program of a scene contains only the code that the scene uses. `clrt info SCENE` lists its features and
+source files, and `clrt render SCENE --print-kernel` prints its source. The table lists the scenes of this repository,
+compiled as wavefront kernels for CPUs. `python docs/make_programs.py` generates this page.
 
 | scene | source (kB) | source files | features |
 |---|---|---|---|
