@@ -17,7 +17,7 @@ def scene_lines(result: Mapping[str, Any], on_cpu: bool) -> list[str]:
     from ..bench.convergence.converge import AGREES
 
     (width, height), reference, rows = result["size"], result["reference"], result["contestants"]
-    lines = [f"{result['scene']}: {width}x{height}, {result['max_depth']} path edges; reference of {reference['spp']} "
+    lines = [f"{result['scene']}: {width}x{height}, max_depth {result['max_depth']}; reference of {reference['spp']} "
              f"samples per pixel, relMSE {reference['relmse']:.1e}",
              f"  {'':28}{'spp':>7}{'seconds':>9}{'Msamples/s':>12}{'relMSE':>10}{'relMSE·s':>10}{'ratio':>7}"
              + " (  CPU)" * on_cpu + f"{'slope':>7}  {'mean ratio':20}      z"]

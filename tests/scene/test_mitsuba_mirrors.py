@@ -38,3 +38,26 @@ def test_a_mirror_turns_spheres_inside_out(tmp_path: Path) -> None:
                              triangles.mean(axis=1))
         assert outwards.max() <= 1e-9 > outwards.min()
         assert mesh.normals is not None and np.allclose(mesh.normals, -mesh.vertices / 2, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "disk", "cube", "cylinder"])
+def test_a_mirror_leaves_other_shapes(tmp_path: Path, kind: str) -> None:
+    """They emit from the side of their own normals, which in Mitsuba 3.9 a mirror leaves outside."""
+    plain, mirrored = (scene(tmp_path, f'<shape type="{kind}"><transform name="to_world"><scale x="{x}"/></transform>'
+                                       '<emitter type="area"/></shape>').meshes[0] for x in (1, -1))
+    assert plain.normals is not None and mirrored.normals is not None
+    np.testing.assert_allclose(mirrored.normals, plain.normals * (-1, 1, 1), atol=1e-6)
+    for mesh in (plain, mirrored):
+        corners = mesh.vertices[mesh.faces].astype(np.float64)
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        solid = np.linalg.norm(cross, axis=1) > 1e-9
+        assert mesh.normals is not None
+        assert (np.einsum("ij,ij->i", cross, mesh.normals[mesh.faces].sum(1))[solid] > 0).all()
+
+
+def test_mirrored_instances_keep_their_spheres(tmp_path: Path) -> None:
+    """An instance transforms normals, so glass stays glass."""
+    read = scene(tmp_path, """
+        <shape type="shapegroup" id="group"><shape type="sphere"><bsdf type="dielectric"/></shape></shape>
+        <shape type="instance"><ref id="group"/><transform name="to_world"><scale x="-1"/></transform></shape>""")
+    assert len(read.spheres) == 1 and not read.meshes

@@ -291,38 +291,3 @@ def test_the_tree_keeps_names_and_ids(folder: Path) -> None:
     root = read_xml(folder / "scene.xml")
     assert [child.where for _, child in root.children] == ['bsdf "a"', "shape[0]"]
     assert root.children[1][1].all("bsdf") == [root.children[0][1]]
-
-
-@pytest.mark.parametrize(("shape", "turned"), [
-    ('type="ply"><string name="filename" value="bare.ply"/>', True),
-    ('type="ply"><string name="filename" value="bare.ply"/><boolean name="face_normals" value="true"/>', True),
-    ('type="ply"><string name="filename" value="normals.ply"/>', False),
-    ('type="rectangle">', False), ('type="disk">', False), ('type="cube">', False), ('type="sphere">', True),
-    ('type="cylinder">', False)])
-@pytest.mark.parametrize("mirrored", [False, True])
-def test_sides_under_a_transform_that_mirrors(folder: Path, shape: str, turned: bool, mirrored: bool) -> None:
-    """Which side emits, as Mitsuba 3.9 has it: that of the shape's normals, or of the corners' order in the world."""
-    bare = PLY.replace("property float u\nproperty float v\n", "").replace("property float weight_0\n", "")
-    head, body = bare.split("end_header\n")
-    head = "".join(line for line in head.splitlines(keepends=True) if "color" not in line)
-    vertices, faces = [line.split()[:3] for line in body.splitlines()[:4]], "3 0 1 2\n3 0 2 3\n"
-    for name, normal in (("bare", ""), ("normals", " 0 0 1")):
-        rows = "".join(f"{' '.join(vertex)}{normal}\n" for vertex in vertices)
-        own = "property float nx\nproperty float ny\nproperty float nz\n" if normal else ""
-        (folder / f"{name}.ply").write_text(head.replace("element face", f"{own}element face") + "end_header\n"
-                                            + rows + faces)
-    scale = -1 if mirrored else 1
-    read = scene(folder, f'<shape {shape}<transform name="to_world"><scale x="{scale}"/></transform>'
-                         '<emitter type="area"/></shape>')
-    if read.spheres:
-        assert not mirrored and not read.meshes
-        return
-    mesh, = read.meshes
-    corners = mesh.vertices[mesh.faces].astype(np.float64)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    solid = np.linalg.norm(cross, axis=1) > 1e-9
-    middle = np.array([0.0, 0.0, -1.0]) if "ply" in shape or "rectangle" in shape or "disk" in shape else np.zeros(3)
-    outward = np.einsum("ij,ij->i", cross, corners.mean(axis=1) - middle)[solid] > 0
-    assert (outward != (turned and mirrored)).all()
-    if mesh.normals is not None:
-        assert (np.einsum("ij,ij->i", cross, mesh.normals[mesh.faces].sum(1))[solid] > 0).all()

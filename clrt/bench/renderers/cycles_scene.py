@@ -53,7 +53,7 @@ def check_scene(scene: Scene) -> None:
     if biases := biased_by(scene.render):
         raise UsageError(f"{scene.name}: clamps are not exported to Cycles; leave out {' and '.join(biases)}")
     if scene.render.filter != "box" or scene.render.max_depth < 2:
-        raise UsageError(f'{scene.name}: Cycles is compared with filter = "box", and two path edges or more')
+        raise UsageError(f'{scene.name}: Cycles is compared with filter = "box" and max_depth of 2 or more')
 
 
 def blender_scene(data: Any, scene: Scene, folder: Path, bsdfs: Mapping[type[Material], Bsdf] | None = None) -> Any:

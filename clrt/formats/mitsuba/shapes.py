@@ -12,7 +12,7 @@ from ...errors import SceneError
 from ...scene.geometry.normals import smooth_normals
 from ...scene.geometry.transform import transform_mesh, unit
 from ...scene.materials.material import Material
-from ...scene.materials.material_types import Dielectric, Diffuse
+from ...scene.materials.material_types import Diffuse
 from ...scene.model import FloatArray, Instance, Mesh, Sphere
 from ...scene.validation.validate import index_problems
 from ..models import read_model
@@ -69,7 +69,6 @@ class ShapeReader:
                 return
         elif plugin.kind == "cylinder":
             to_world = to_world @ _between(plugin)
-        mirrored = float(np.linalg.det(to_world[:3, :3])) < 0
         if plugin.kind in PRIMITIVES:
             mesh = PRIMITIVES[plugin.kind]()
             turns = mirrored and plugin.kind == "sphere"
@@ -153,17 +152,11 @@ def _between(plugin: Plugin) -> Doubles:
 
 
 def _sphere(to_world: Doubles, look: Look, name: str) -> Sphere | None:
-    """Return the transformed sphere of radius 1; None if it becomes an ellipsoid, or if it is textured.
-
-    Also if a mirroring transform turns it inside out and its sides differ.
-    """
+    """Return the transformed sphere of radius 1; None if it becomes an ellipsoid, or if it is textured."""
     linear = to_world[:3, :3]
     squares = linear.T @ linear
     radius = float(np.cbrt(abs(np.linalg.det(linear))))
-    sided = any(look.material.radiance) or isinstance(look.material, Dielectric)
-    if np.linalg.det(linear) < 0 and sided or look.material.textures():
-        return None
-    if np.abs(squares - radius**2 * np.eye(3)).max() > UNEVEN * radius**2:
+    if look.material.textures() or np.abs(squares - radius**2 * np.eye(3)).max() > UNEVEN * radius**2:
         return None
     x, y, z = to_world[:3, 3].tolist()
     return Sphere(center=(x, y, z), radius=radius, material=look.material, name=name)
