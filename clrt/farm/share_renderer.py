@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rendering.accumulation.launch_plan import depth_of
 from ..rendering.accumulation.multi_device import Crew, make_team
-from ..rendering.accumulation.single_device import depth_of
 from ..rendering.accumulation.work_queue import Part, Work
 from ..rendering.compile.choices import choices_on
 from ..rendering.compile.scene_compiler import Compiler
