@@ -15,7 +15,7 @@ from ..rendering.compile.choices import choices_on
 from ..rendering.compile.scene_compiler import Compiler
 from ..rendering.film.tiles import TILE_PIXELS, scattered
 from .orders import Order
-from .worker_tasks import about, opened
+from .worker_devices import about, opened
 
 #: The devices do one thing at a time.
 _at_work = Lock()
