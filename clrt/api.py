@@ -24,7 +24,8 @@ from .scene.model import Scene
 @with_default_errors
 def load(path: str | Path, camera: str | None = None) -> Scene:
     """Load the scene in a .toml file or a bare model (.glb .gltf .obj .ply .stl .off). camera: the name of one of the
-    model file's cameras to use. Raises SceneError, which lists all problems."""
+    file's cameras to use, or for a bare model "front", "right", "back" or "left". Raises SceneError, which lists all
+    problems."""
     return _load(path, camera)
 
 

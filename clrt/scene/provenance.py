@@ -48,10 +48,11 @@ class Source:
         return next((path for each, path in self.files if each is content), None)
 
 
-def source_of_model(path: Path, model: Model) -> Source:
-    """Return the source of a bare model."""
+def source_of_model(path: Path, model: Model, placing: Mapping[str, Any]) -> Source:
+    """Return the source of a bare model, to which the transform keys `placing` of a [[mesh]] were applied."""
     parts = parts_of(model)
-    return Source([Origin({"file": path.resolve()}, parts, list(map(material_of, parts)))], cameras=model.cameras)
+    origin = Origin({"file": path.resolve(), **placing}, parts, list(map(material_of, parts)))
+    return Source([origin], cameras=model.cameras)
 
 
 def parts_of(model: Model) -> list[Mesh | Instance]:
