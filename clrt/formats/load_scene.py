@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SceneError
+from ..file_names import StrPath
 from ..scene.default_sky import SUN, default_sky
 from ..scene.geometry.transform import rotation, transform_light, transform_mesh
 from ..scene.model import Scene
@@ -28,7 +29,7 @@ STDIN = Path("-")
 Z_UP, UPRIGHT = (".stl",), (-90.0, 0.0, 0.0)
 
 
-def load(path: str | Path, camera: str | None = None) -> Scene:
+def load(path: StrPath, camera: str | None = None) -> Scene:
     """Load a scene from a .toml file, a Mitsuba .xml file, a model file (whose meshes get a sky, a sun and a camera),
     or from standard input for "-".
 
