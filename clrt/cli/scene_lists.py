@@ -9,7 +9,7 @@ from typing import Any
 
 from ..scene.editing import materials_of
 from ..scene.materials.textures import Texture
-from ..scene.model import Environment, Scene, Sphere
+from ..scene.model import Environment, Instance, Mesh, Scene, Sphere
 from ..scene.provenance import material_of
 
 #: Most lines per list; --json has all.
@@ -30,10 +30,11 @@ def materials_in(scene: Scene) -> list[dict[str, Any]]:
 
 def lights_in(scene: Scene) -> list[dict[str, Any]]:
     """Return the scene's lights, its environment unless black, and each emissive object with its radiance."""
-    rows: list[dict[str, Any]] = [{"type": light.kernel, **{each.name: getattr(light, each.name)
-                                                           for each in fields(light)}} for light in scene.lights]
+    rows = [{"type": light.kernel, **{each.name: getattr(light, each.name) for each in fields(light)}}
+            for light in scene.lights]
     rows += _environment(scene.environment)
-    for each in (*scene.meshes, *scene.instances, *scene.spheres):
+    objects: list[Mesh | Instance | Sphere] = [*scene.meshes, *scene.instances, *scene.spheres]
+    for each in objects:
         material = each.material if isinstance(each, Sphere) else material_of(each)
         if any(material.radiance):
             rows.append({"type": type(each).__name__.lower(), "name": each.name, "radiance": material.radiance})
