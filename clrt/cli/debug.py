@@ -32,8 +32,8 @@ SETTINGS = ("size", "spp", "seed", "integrator", "sampler", "back_face_culling",
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @picture_options
 @tracing_options
-def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: str | None, as_json: bool, camera: str | None,
-            depth: int | None, pixel_filter: str | None, lanes: int | None, **given: Any) -> None:
+def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: str | None, as_json: bool,
+            camera: str | None, depth: int | None, pixel_filter: str | None, lanes: int | None, **given: Any) -> None:
     """Show the paths of one pixel's samples in SCENE, and what they found: why the pixel is black, or where its light
     comes from. With the options of a render they are the very samples of that render."""
     if click.get_current_context().obj == PROGRAM:
