@@ -27,7 +27,7 @@ UNSEEN = {"name", "render", "cameras", "animation", "materials", "source"}
 ENDS = {"spp"}
 ROUNDING = {"lanes", "layout", "builder", "paths", "tree", "first_hits"}
 NAMES = {"name", "material_name"}
-#: Folders of clrt whose Python code determines samples: how scenes are packed, what is sampled and summed. (What readers
+#: Folders whose Python code determines samples: how scenes are packed, what is sampled and summed. (What the readers
 #: of files return is part of the scene, but textures are decoded when they are packed.)
 CODE = ("rendering", "scene", "formats/images")
 
