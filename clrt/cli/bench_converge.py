@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..errors import UsageError
 from .bench_files import figures_options, write_figures
 from .options import Size
 
@@ -37,6 +38,8 @@ INTEGRATORS = ["path", "direct", "local", "raster"]
 @click.option("--spp", multiple=True, type=click.IntRange(min=1),
               help="Samples per pixel, instead of 1, 2, 4 ...; may be repeated.")
 @click.option("--seeds", type=click.IntRange(min=1), help="Pictures of each; default: 5, with --quick 3.")
+@click.option("--reference", type=click.Path(path_type=Path), metavar="FILE",
+              help="Image to measure the error by, taken as exact; for one SCENE. Default: rendered and cached.")
 @click.option("--reference-spp", type=click.IntRange(min=2),
               help="Samples per pixel of the reference; default: 4096, with --quick 256.")
 @click.option("--quick", is_flag=True, help="Fewer seeds and a rougher reference.")
@@ -44,8 +47,9 @@ INTEGRATORS = ["path", "direct", "local", "raster"]
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
 def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrators: tuple[Integrator, ...], peers: bool,
                      selectors: tuple[str, ...], size: tuple[int, int] | None, json_file: Path | None,
-                     plot: Path | None, **asked: Any) -> None:
-    """How fast pictures of each SCENE come near a reference of many samples, which is rendered once and kept.
+                     plot: Path | None, reference: Path | None, **asked: Any) -> None:
+    """How fast pictures of each SCENE come near a reference of many samples, which is rendered once and kept, or an
+    image that --reference names.
 
     Images of 1, 2, 4 ... samples per pixel by all contestants, interleaved, with several seeds. Also whether the error
     that clrt estimates is the true one, and whether a contestant is biased (ask for many seeds of one number of
@@ -54,10 +58,12 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
     from ..bench.convergence.calibration import calibrations
     from ..bench.convergence.contestants import CHOICES, MORE_CHOICES
     from ..bench.convergence.converge import measure_convergence
+    from ..bench.convergence.reference import Reference
     from ..bench.numerics.plots import plot_convergence
     from ..device.discovery.discover import choose
     from ..formats.load_scene import load
     from .converge_tables import calibration_lines, scene_lines
+    from .render import read_reference
 
     devices = [choose(selector)[0] for selector in selectors or (None,)]
     named = [f"device {device.index}: {device.name} ({device.platform}, {device.driver})" for device in devices]
@@ -68,10 +74,16 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
     if integrators:
         loaded = [replace(scene, name=f"{scene.name}, {name}", render=replace(scene.render, integrator=name))
                   for scene in loaded for name in integrators]
+    given = None
+    if reference is not None:
+        if len(loaded) > 1 or asked["reference_spp"]:
+            raise UsageError(f"{reference}: is the reference of one image; name one SCENE, at most one --integrator, "
+                             "and leave out --reference-spp")
+        given = Reference.exact(read_reference(reference, loaded[0].render.size))
     chosen = [name if name == "clrt" else f"clrt, {name}" for name in names] or list(CHOICES)
     results = []
     for result in measure_convergence(
-            loaded, [device.index for device in devices], _effort(**asked), peers=peers,
+            loaded, [device.index for device in devices], _effort(**asked), peers=peers, given=given,
             choices={name: (CHOICES | MORE_CHOICES)[name] for name in chosen}, say=partial(click.echo, err=True)):
         click.echo("\n".join(scene_lines(result, all(device.type == "cpu" for device in devices))) + "\n")
         results.append(result)

@@ -87,11 +87,16 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
         return os.WEXITSTATUS(status)
     name = signal.Signals(os.WTERMSIG(status)).name
     if name in CRASHES:
+        from ..device.discovery.driver_caches import no_room
         from ..device.pocl.kernel_cache import kept_programs, remove_damaged
 
         damaged = remove_damaged()
-        cause = (f"since PoCL keeps programs in {kept_programs()}, of which {damaged} were damaged: they are removed, "
-                 "so run it again" if damaged else "most likely in the device's driver: see `clrt devices --check`")
+        cause = "most likely in the device's driver: see `clrt devices --check`"
+        if damaged:
+            cause = (f"since PoCL keeps programs in {kept_programs()}, of which {damaged} were damaged: they are "
+                     "removed, so run it again")
+        if full := no_room():
+            cause = f"since {full}"
         _say(f"the render crashed ({name}), {cause}", advice)
         return DEVICE
     known = "; by SIGKILL systems end what uses too much memory" if name == "SIGKILL" else ""
