@@ -37,7 +37,7 @@ def agree_command(scenes: tuple[Path, ...], size: tuple[int, int] | None, depth:
         settings = scene.render
         settings = replace(settings, size=size or settings.size, max_depth=depth or settings.max_depth)
         result = agreement(replace(scene, render=settings), spp, seeds, device)
-        for line in ([] if number else HEAD) + [_line(result)]:
+        for line in ([] if number else HEAD) + [agreement_line(result)]:
             click.echo(line)
         results.append(result)
     write_figures(json_file, {"scenes": results})
@@ -51,7 +51,8 @@ HEAD = [f"{'':22}{'pixels':>10}  {'mean over Mitsuba’s, ± standard error':48}
         "  p: of the least likely block and channel, corrected for their number"]
 
 
-def _line(result: Mapping[str, Any]) -> str:
+def agreement_line(result: Mapping[str, Any]) -> str:
+    """Return the table row of a result of `agreement`."""
     means = " ".join(f"{ratio:.5f}±{error:.5f}" for ratio, error in zip(result["mean_ratio"], result["mean_error"]))
     return (f"{result['scene']:22}{'x'.join(map(str, result['size'])):>10}  {means:48}{result['blocks']:7}"
             + "".join(f"{value:9.3%}" for value in (*result["noise"], result["difference"]))
