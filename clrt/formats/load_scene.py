@@ -32,7 +32,7 @@ def load(path: str | Path, camera: str | None = None) -> Scene:
     instead. Raises one SceneError with all problems of the file, each as "FILE: object: value is wrong; remedy".
     """
     if not isinstance(path, (str, PathLike)):
-        raise SceneError(f"{path!r} is no path of a scene; name a file, such as \"scene.toml\"")
+        raise SceneError(f"{path!r} is not the path of a scene; give a file name, such as \"scene.toml\"")
     path = Path(path)
     check_scene(path)
     reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower(), _load_model)

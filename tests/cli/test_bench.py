@@ -56,7 +56,7 @@ def test_rays_of_four_kinds(tmp_path: Path) -> None:
         assert not any(row["differ"] for row in rows.values()) and f"{kind}: " in printed
     assert all({"build_seconds", "tree_seconds", "bytes_per_triangle", "sah_cost", "builder"} <= set(tree)
                for tree in figures["trees"].values())
-    assert "time, CPU time (of the processor): of a ray, over the first line's" in printed
+    assert "time, CPU time (processor time): per ray, over the first line's" in printed
 
 
 def test_trees_by_size(tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_hits_that_must_be_the_same(tmp_path: Path) -> None:
     for mesh in figures["meshes"]:
         assert {way["layout"] for way in mesh["ways"]} >= {"bvh8", "bvh2", "cwbvh", "packs", "list"}
         assert all(list(way["differ"]) == mesh["kinds"] for way in mesh["ways"]) and mesh["rays"] == 4 * 4096
-        assert f"float64: {mesh['exact']['wrong']} of {mesh['exact']['rays']} answers impossible" in printed
+        assert f"float64: {mesh['exact']['wrong']} of {mesh['exact']['rays']} hits impossible" in printed
     assert [mesh["escaped"] for mesh in figures["meshes"]] == [0, 0, None]
     assert {"index", "platform", "driver"} <= set(figures["devices"][0])
 

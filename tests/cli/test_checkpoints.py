@@ -108,7 +108,7 @@ def test_the_first_signal_keeps_everything(folder: Path, number: signal.Signals)
     process.send_signal(number)
     output, messages = process.communicate(timeout=60)
     assert output.split() == ["a.exr", "r.json"] and process.returncode == 130
-    assert "ball: interrupted; --resume goes on from a.ck" in messages
+    assert "ball: interrupted; run it with --resume to continue from a.ck" in messages
     report = json.loads((folder / "r.json").read_text())
     assert report["stop_reason"] == "interrupted" and read_image(folder / "a.exr").shape == (64, 96, 3)
     film = read_checkpoint(folder / "a.ck", KINDS)[1]["film"]

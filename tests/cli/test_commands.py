@@ -152,7 +152,7 @@ file = "nowhere.ply"
     (("render", "x.png"), 3, ["x.png: a scene must be one of .toml"]),
     (("render", "."), 3, [".: is a folder, not a scene"]),
     (("convert", "nope.obj", "z.toml"), 3, ["nope.obj: no such model file"]),
-    (("render", "ball.toml", "--reference", "ball.toml"), 3, ["ball.toml: cannot be decoded as a picture"]),
+    (("render", "ball.toml", "--reference", "ball.toml"), 3, ["ball.toml: cannot be decoded as an image"]),
     (("render", "ball.toml", "-o", "no/such/folder/x.png"), 6, ["no/such/folder"]),
     (("render", "ball.toml", "-o", "x.pgn"), 6, [".pgn", "did you mean", ".png"]),
     (("render", "ball.toml", "--device", "nonesuch"), 4, ["nonesuch"]),
@@ -269,7 +269,7 @@ def test_convert(tmp_path: Path) -> None:
                     cwd=tmp_path).returncode == 0
     np.testing.assert_array_equal(read_image(tmp_path / "obj.exr"), read_image(tmp_path / "toml.exr"))
     done = clrt("convert", "models/a.obj", "scenes/a.toml", cwd=tmp_path)
-    assert done.returncode == 2 and "exists already" in done.stderr and "--force" in done.stderr
+    assert done.returncode == 2 and "already exists" in done.stderr and "--force" in done.stderr
     assert clrt("convert", "models/a.obj", "scenes/a.toml", "--force", cwd=tmp_path).returncode == 0
     assert clrt("convert", "scenes/a.toml", "b.toml", cwd=tmp_path).returncode == 2
     assert clrt("convert", "models/a.obj", "b.obj", cwd=tmp_path).returncode == 2

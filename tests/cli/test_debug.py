@@ -102,4 +102,4 @@ def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], ki
 def test_a_pixel_is_two_numbers(scene: Path) -> None:
     for wrong in ("5", "5;6", "a,b", "-1,0"):
         result = run(scene, f"--pixel={wrong}")
-        assert result.exit_code == 2 and f"'{wrong}' is no pixel; write X,Y" in result.stderr
+        assert result.exit_code == 2 and f"'{wrong}' is not a pixel; write X,Y" in result.stderr

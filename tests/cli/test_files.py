@@ -130,7 +130,7 @@ def test_no_file_of_the_scene_is_replaced(folder: Path, arguments: tuple[str, ..
         write_image(folder / name, np.ones((4, 8, 3), np.float32))
     before = {path: path.read_bytes() for path in folder.iterdir()}
     result = clrt("render", *arguments, "--spp", "1", cwd=folder)
-    assert (result.returncode, result.stdout) == (2, "") and "is a file of the scene and" in result.stderr
+    assert (result.returncode, result.stdout) == (2, "") and "is both a file of the scene and" in result.stderr
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 

@@ -101,9 +101,9 @@ def test_a_denoised_picture_has_them_and_the_raw_one_not(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("arguments, message", [
     (["--aov", "dept"], "no AOV 'dept'; there are albedo, .*did you mean depth"),
-    (["--aov", "depth", "-o", "a.hdr"], "an .hdr holds the picture alone"),
-    (["--aov", "depth", "-o", "a.png", "--reference", "a.depth.png"], "a.depth.png: is the reference and where an AOV"),
-    (["--aov", "depth", "-o", "a.png", "-o", "a.depth.png"], "a.depth.png: is a picture .* where an AOV")], ids=str)
+    (["--aov", "depth", "-o", "a.hdr"], "an .hdr file, a video .* cannot store AOVs"),
+    (["--aov", "depth", "-o", "a.png", "--reference", "a.depth.png"], "a.depth.png: is both the reference and an AOV"),
+    (["--aov", "depth", "-o", "a.png", "-o", "a.depth.png"], "a.depth.png: is both an image .* an AOV")], ids=str)
 def test_mistakes(tmp_path: Path, arguments: list[str], message: str) -> None:
     result = run(tmp_path, *arguments)
     assert result.returncode == 2 and len(result.stderr.splitlines()) == 1
