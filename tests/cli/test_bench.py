@@ -132,19 +132,19 @@ def test_files_without_rays_are_refused(tmp_path: Path) -> None:
     (tmp_path / "cut.npz").write_bytes(stored(tmp_path / "whole.npz").read_bytes()[:300])
     np.savez(tmp_path / "unlimited.npz", origins=np.zeros((4, 3)), directions=np.ones((4, 3)))
     for file, words in {
-            tmp_path / "one.npy": "no .npz", tmp_path / "text.npz": "no .npz", tmp_path / "cut.npz": "no .npz",
+            tmp_path / "one.npy": "not an .npz", tmp_path / "text.npz": "not a .npz", tmp_path / "cut.npz": "not a .npz",
             tmp_path / "none.npz": "No such file", tmp_path: "directory", tmp_path / "unlimited.npz": "t_max is not",
             stored(tmp_path / "a.npz", origins=np.zeros((0, 3)), directions=np.ones(3), t_max=1): "no rays",
             stored(tmp_path / "b.npz", directions=np.ones((3, 4))): r"directions \(3, 4\) must",
             stored(tmp_path / "c.npz", t_max=np.ones(5)): r"t_max \(5,\): there are 4 origins",
-            stored(tmp_path / "d.npz", origins=np.array([None])): "no .npz"}.items():
+            stored(tmp_path / "d.npz", origins=np.array([None])): "not an .npz"}.items():
         with pytest.raises(SceneError, match=f"^{re.escape(str(file))}: .*{words}"):
             load_rays(file)
 
 
 @pytest.mark.parametrize(("arguments", "code", "words"), [
     (("rays", "--rays", "r.npz"), 2, ["--rays", "--mesh"]),
-    (("rays", "--json", "."), 6, [".: is a folder; name a file in it\n"]),
+    (("rays", "--json", "."), 6, [".: is a folder; choose a file in it\n"]),
     (("build", "--mesh", "missing.ply"), 3, ["missing.ply"]),
     (("hits", "--device", "nonesuch"), 4, ["nonesuch"]),
     (("build", "--json", "no/such/b.json"), 6, ["no/such"]),

@@ -86,7 +86,7 @@ def test_warnings_are_json_where_progress_is(scene: Path) -> None:
     lines = [json.loads(line) for line in result.stderr.splitlines()]
     assert all("phase" in line for line in lines)
     assert [line["warning"] for line in lines if "warning" in line] == [
-        "ball: the picture is black: nothing in this scene emits light"]
+        "ball: the image is black: nothing in this scene emits light"]
 
 
 def test_time_and_error_end_a_render(scene: Path) -> None:
@@ -158,7 +158,7 @@ file = "nowhere.ply"
     (("render", "ball.toml", "--device", "nonesuch"), 4, ["nonesuch"]),
     (("render", "ball.toml", "--size", "0x4"), 2, ["0x4"]),
     (("render", "ball.toml", "--view", "srbg"), 2, ["srbg"]),
-    (("render", "ball.toml", "-q", "--view", "ocio:Nope"), 2, ["no view 'Nope'"]),
+    (("render", "ball.toml", "-q", "--view", "ocio:Nope"), 2, ["view 'Nope' is unknown"]),
     (("render", "ball.toml", "--exposure", "nan"), 2, ["exposure is nan", "finite"]),
     (("render", "ball.toml", "--spp", "0"), 2, ["--spp"]),
     (("render", "ball.toml", "--time", "-1"), 2, ["time", "-1"]),

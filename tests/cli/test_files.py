@@ -144,7 +144,7 @@ def test_checkpoints_of_any_version_are_replaced(folder: Path) -> None:
 
 def test_lists_of_bands_replace_their_own_kind_alone(tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("somebody's file")
-    with pytest.raises(CheckpointError, match="mine: is there and is no checkpoint"):
+    with pytest.raises(CheckpointError, match="mine: exists and is not a checkpoint"):
         Manifest(tmp_path / "mine", {}, resume=False)
     assert (tmp_path / "mine").read_text() == "somebody's file"
     for _ in range(2):

@@ -120,7 +120,7 @@ KEY = Keyframe(time=0, position=(0, 0, 5))
     (Animation(), "has no keyframes and no turntable_seconds"), (Animation(keyframes=(KEY,)), "has 1 keyframe and"),
     (Animation(turntable_seconds=0), "turntable_seconds: is 0; write"),
     (Animation(turntable_seconds=1, keyframes=(KEY, KEY)), "keep one"),
-    (Animation(keyframes=(KEY, KEY)), "keyframe[1].time: 0 is not after 0"),
+    (Animation(keyframes=(KEY, KEY)), "keyframe[1].time: 0 is not after the previous one, 0"),
     (Animation(keyframes=(KEY, Keyframe(time=1e9))), "more than 1000000"),
     (Animation(fps=4, keyframes=(KEY, Keyframe(time=2, position=(0, 0, -5)))), "in frame 4, 1 s after the first"),
     (Animation(keyframes=(KEY, Keyframe(time=2, position=(0, 5, 0)))), "frame 48, 2 s after the first, the camera has "
@@ -128,7 +128,7 @@ KEY = Keyframe(time=0, position=(0, 0, 5))
     (Animation(fps=1e30, turntable_seconds=1e30), "would have 1e+60 frames, more than 1000000"),
     (Animation(fps=0), "animation.fps: 0 is not above 0"),
     (Animation(keyframes=(KEY, Keyframe(time=1, fov_degrees=200))), "animation.keyframes[1].fov_degrees: 200"),
-    (Animation(keyframes=(KEY, 3)), "animation.keyframes[1]: 3 is no Keyframe")])  # type: ignore[arg-type]
+    (Animation(keyframes=(KEY, 3)), "animation.keyframes[1]: 3 is not of type Keyframe")])  # type: ignore[arg-type]
 def test_what_cannot_be_shown_is_refused(animation: Animation, words: str) -> None:
     problems = scene_problems(Scene(animation=animation))
     assert len(problems) == 1 and words in problems[0]
@@ -155,7 +155,7 @@ def test_a_turntable_without_frames(count: int) -> None:
 
 
 @pytest.mark.parametrize(("scene", "chosen", "kind", "words"), [
-    (Scene(name="still"), None, SceneError, "still: nothing moves"),
+    (Scene(name="still"), None, SceneError, "still: has no animation"),
     (turntable(Scene(), 8), [3, 8], UsageError, "scene has no frame 8; its frames are 0 to 7")])
 def test_frames_that_are_not_there(scene: Scene, chosen: Any, kind: type[ClrtError], words: str) -> None:
     with pytest.raises(kind, match=words):

@@ -82,7 +82,7 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "no list": (set_scene(spheres=Sphere()), "is not a list; write spheres=[...]"),
     "no mesh": (set_scene(meshes=["ball"]), 'mesh[0]: "ball" is not a Mesh'),
     "material": (set_mesh(material=Diffuse(color=(0, 1.5, 0))), "mesh[0].material.color[1]: 1.5 is above 1"),
-    "no material": (set_mesh(material="gold"), 'mesh[0].material: "gold" is no Material; write a clrt.Diffuse or'),
+    "no material": (set_mesh(material="gold"), 'mesh[0].material: "gold" is not of type Material; write a clrt.Diffuse or'),
     "emission": (set_mesh(material=Diffuse(emission=(0, -1, 0))), "mesh[0].material.emission[1]: -1 is below 0"),
     "radius": (set_scene(spheres=[Sphere(), Sphere(radius=0)]), "sphere[1].radius: 0 is not above 0"),
     "sphere type": (set_scene(spheres=[Sphere(radius="1")]), 'sphere[0].radius: "1" is not a number'),  # type: ignore
@@ -96,8 +96,8 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "instance mesh": (place(np.eye(3, 4), mesh=Mesh(TRIANGLE.vertices, TRIANGLE.faces + 1)),
                       'instance[0].mesh "mesh": faces[0] uses vertex 3'),
     "instance no mesh": (place(np.eye(3, 4), mesh="ball"), 'instance[0].mesh: "ball" is not a Mesh'),
-    "instance material": (place(np.eye(3, 4), material="gold"), 'instance[0].material: "gold" is no Material'),
-    "no instance": (set_scene(instances=["ball"]), 'instance[0]: "ball" is no Instance; write a clrt.Instance'),
+    "instance material": (place(np.eye(3, 4), material="gold"), 'instance[0].material: "gold" is not of type Material'),
+    "no instance": (set_scene(instances=["ball"]), 'instance[0]: "ball" is not of type Instance; write a clrt.Instance'),
     "light": (set_scene(lights=[light((0, 0, 0))]), "light[0].direction: [0, 0, 0] is not a direction"),
     "light nan": (set_scene(lights=[light((0, NAN, 0))]), "light[0].direction[1]: nan is not a finite number"),
     "light text": (set_scene(lights=[light("up")]), 'light[0].direction: "up" is not a list; write the numbers'),
@@ -107,7 +107,7 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "up": (set_scene(camera=Camera(up=(0, 0, 2e-9))), "camera.up: [0, 0, 2e-09] is parallel to the view"),
     "no up": (set_scene(camera=Camera(up=(0, 0, 0))), "camera.up: [0, 0, 0] is not a direction"),
     "fov": (set_scene(camera=Camera(fov_degrees=180)), "camera.fov_degrees: 180 is not below 180"),
-    "huge": (set_scene(camera=Camera(position=(1e39, 0, 0))), "camera.position: [1e+39, 0, 0] is beyond"),
+    "huge": (set_scene(camera=Camera(position=(1e39, 0, 0))), "camera.position: [1e+39, 0, 0] is outside"),
     "bool": (set_scene(camera=Camera(fov_degrees=True)), "camera.fov_degrees: true is not a number"),
     "size": (set_scene(render=RenderSettings(size=(0, 5))), "render.size[0]: 0 is below 1; write at least 1"),
     "spp": (set_scene(render=RenderSettings(spp=2.5)), "render.spp: 2.5 is not an integer"),  # type: ignore

@@ -85,9 +85,9 @@ def test_materials_are_told_by_what_they_reflect() -> None:
     (MetallicRoughness(transmission=0.5), "with transmission"),
     (MetallicRoughness(smith="schlick"), 'smith = "separable"'),
     (MetallicRoughness(clearcoat=0.5, coupling="fresnel"), 'coupling = "albedo"'),
-    (Dielectric(roughness=0.2), "multiple_scattering = false"), (Diffuse(one_sided=True), "one side")])
+    (Dielectric(roughness=0.2), "multiple_scattering = false"), (Diffuse(one_sided=True), "one-sided")])
 def test_what_has_no_counterpart_is_refused_by_name(material: Material, words: str) -> None:
-    with pytest.raises(UsageError, match=f"the ball: Mitsuba cannot draw .*{words}"):
+    with pytest.raises(UsageError, match=f"the ball: Mitsuba does not support .*{words}"):
         mitsuba_scene(ball(material))
 
 

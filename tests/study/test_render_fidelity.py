@@ -99,7 +99,7 @@ def test_an_image_alone_and_what_is_missing(tmp_path: Path) -> None:
     assert next(judge(scenarios(folder), SIZE, 1)).row["problems"] == [
         str(folder / GENERATOR / "environments" / "sky.hdr")]
     (folder / GENERATOR / "test" / "config.json").write_text('{"scenarios": [7]}')
-    with pytest.raises(UsageError, match="is no list of scenarios"):
+    with pytest.raises(UsageError, match="is not a list of scenarios"):
         scenarios(folder)
     shutil.rmtree(folder / GENERATOR)
     with pytest.raises(UsageError, match="--recurse-submodules"):

@@ -106,7 +106,7 @@ def agreement(scene: Scene, spp: int, seeds: int, device: str | int | None = Non
     """
     if min(scene.render.size) < BLOCK:
         width, height = scene.render.size
-        raise UsageError(f"pictures of {width}x{height} pixels have no block of {BLOCK}x{BLOCK}; write a larger --size")
+        raise UsageError(f"images of {width}x{height} pixels have no block of {BLOCK}x{BLOCK}; use a larger --size")
     scene = single_bounces(scene)
     try:
         from .mitsuba_renderer import contestants

@@ -35,7 +35,7 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
     """Return the plugin of the owner's material, with vertex colors. Raises UsageError for an unsupported feature."""
     material = owner.material
     if type(material) not in BSDFS:
-        raise UsageError(f"{owner.name}: Mitsuba is not told of {material.kernel} yet")
+        raise UsageError(f"{owner.name}: {material.kernel} is not exported to Mitsuba yet")
     try:
         plugin = BSDFS[type(material)](material)
         if isinstance(owner, Mesh) and owner.colors is not None:
@@ -49,11 +49,11 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
                       "use_shadowing_function": isinstance(material, Diffuse), "flip_invalid_normals": False}
         plugin = plugin if isinstance(material, Dielectric) else {"type": "twosided", "front": plugin}
         if material.one_sided:
-            raise ValueError("surfaces with one side")
+            raise ValueError("one-sided surfaces")
         if material.opacity != 1:
             plugin = {"type": "mask", "opacity": _opacity(material), "bsdf": plugin}
     except ValueError as error:
-        raise UsageError(f"{owner.name}: Mitsuba cannot draw {error}") from None
+        raise UsageError(f"{owner.name}: Mitsuba does not support {error}") from None
     return plugin
 
 
@@ -117,7 +117,7 @@ def _bend(texture: Texture) -> Plugin:
     """Return a linear normal map that includes the factor, in the frame of u and v."""
     axes = texture.image_axes   # Mitsuba bends along u and v, however to_uv turns the image
     if np.abs(np.abs(axes) - 0.5).max() < 0.499:
-        raise ValueError(f"the normal map {texture.picture.name}, which is not turned by quarters")
+        raise ValueError(f"the normal map {texture.picture.name}, which is not rotated by a multiple of 90 degrees")
     xyz = _channels(texture, "red", "green", "blue")
     xyz[..., :2] = 0.5 + (xyz[..., :2] - 0.5) @ axes * np.max(texture.factor)
     return _bitmap(texture, xyz)
@@ -125,7 +125,7 @@ def _bend(texture: Texture) -> Plugin:
 
 def _bitmap(texture: Texture, texels: Any) -> Plugin:
     if texture.wrap[0] != texture.wrap[1]:
-        raise ValueError("a texture that wraps in two ways")
+        raise ValueError("a texture with two wrap modes")
     to_picture = np.eye(4)
     to_picture[:2][:, [0, 1, 3]] = texture.to_picture
     return {"type": "bitmap", "bitmap": np.asarray(texels, np.float32), "raw": True, "to_uv": to_picture,
@@ -135,7 +135,7 @@ def _bitmap(texture: Texture, texels: Any) -> Plugin:
 def _painted(plugin: Plugin, material: Material) -> Plugin:
     """Replace a white color by vertex colors."""
     if not isinstance(material, Diffuse) or material.color != (1.0, 1.0, 1.0):
-        raise ValueError("vertex colours but of diffuse, whose color is [1, 1, 1]")
+        raise ValueError("vertex colours except of diffuse with color [1, 1, 1]")
     return plugin | {"reflectance": {"type": "mesh_attribute", "name": "vertex_color"}}
 
 
@@ -152,7 +152,7 @@ def _metallic_roughness(material: MetallicRoughness) -> Plugin:
     if material.features() & {"THROUGH", "SPECULAR"}:
         raise ValueError("metallic_roughness with transmission or specular")
     if material.smith not in ("separable", "height_correlated"):
-        raise ValueError('metallic_roughness but with smith = "separable" or "height_correlated"')
+        raise ValueError('metallic_roughness except with smith = "separable" or "height_correlated"')
     values, multiple = material.parameters(), "MULTIPLE_SCATTERING" in material.features()
     if "LAYERS" in material.features():
         return _layers(material) | {"multiple": multiple}
@@ -166,7 +166,7 @@ def _metallic_roughness(material: MetallicRoughness) -> Plugin:
 
 def _layers(material: MetallicRoughness) -> Plugin:
     if material.textures() or material.smith != "height_correlated" or material.coupled_by != "albedo":
-        raise ValueError('layers but without textures, over smith = "height_correlated" and coupling = "albedo"')
+        raise ValueError('layers except untextured ones over smith = "height_correlated" and coupling = "albedo"')
     values = material.parameters()
     return {"type": "gltf_layers", "color": color(values["color"]), "f0": rgb(values["f0"]),
             "metallic": number(values["metallic"]), "roughness": number(material.roughness),
@@ -176,11 +176,11 @@ def _layers(material: MetallicRoughness) -> Plugin:
 
 def _dielectric(material: Dielectric) -> Plugin:
     if material.thin and material.rough:
-        raise ValueError("glass that is thin and rough")
+        raise ValueError("thin rough glass")
     if material.scatters_again:
-        raise ValueError("rough glass's further bounces; set multiple_scattering = false")
+        raise ValueError("multiple scattering in rough glass; set multiple_scattering = false")
     if material.thin and untextured(material.color) != (1.0, 1.0, 1.0):
-        raise ValueError("thin glass in color: its own is not crossed again by what bounces inside")
+        raise ValueError("coloured thin glass: its model does not absorb internal reflections again")
     plugin = {"type": "thindielectric" if material.thin else "dielectric", "int_ior": material.ior, "ext_ior": 1.0,
               "specular_transmittance": color(material.color)}
     return _rough(plugin | {"type": "roughdielectric"}, material.roughness) if material.rough else plugin

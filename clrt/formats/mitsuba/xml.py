@@ -56,7 +56,7 @@ class Plugin:
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
             value = float(value)
         if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
-            raise SceneError(f'{self.where}: "{name}" is not a {kind.__name__}; write one')
+            raise SceneError(f'{self.where}: "{name}" is not of type {kind.__name__}; write one')
         return value
 
     def color(self, name: str, default: float) -> float | Color | Spectrum:

@@ -105,7 +105,8 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
         yield f'{path}: {show(value)} is not a texture; write {{ image = "FILE" }}'
     elif isinstance(hint, type) and is_dataclass(hint):
         yield from (field_problems(hint, {field.name: getattr(value, field.name) for field in fields(hint)}, path)
-                    if isinstance(value, hint) else [f"{path}: {show(value)} is not a {hint.__name__}; write one"])
+                    if isinstance(value, hint) else
+                    [f"{path}: {show(value)} is not of type {hint.__name__}; write one"])
     elif origin is Literal:
         if not (isinstance(value, str) and value in parts):
             yield f"{path}: {show(value)} {unknown(value, parts)}"

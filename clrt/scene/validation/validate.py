@@ -168,7 +168,7 @@ def _object_problems(value: object, kind: type, where: str) -> list[str]:
     """Return problems unless `value` is a `kind` whose fields are within their limits."""
     if not isinstance(value, kind):
         names = [each.__name__ for each in MATERIALS] if kind is Material else [kind.__name__]
-        return [f"{where}: {show(value)} is not a {kind.__name__}; write a clrt.{' or clrt.'.join(names)}"]
+        return [f"{where}: {show(value)} is not of type {kind.__name__}; write a clrt.{' or clrt.'.join(names)}"]
     values = {field.name: getattr(value, field.name) for field in fields(type(value))}  # type: ignore[arg-type]
     return field_problems(type(value), values, where)
 
