@@ -132,7 +132,8 @@ def test_files_without_rays_are_refused(tmp_path: Path) -> None:
     (tmp_path / "cut.npz").write_bytes(stored(tmp_path / "whole.npz").read_bytes()[:300])
     np.savez(tmp_path / "unlimited.npz", origins=np.zeros((4, 3)), directions=np.ones((4, 3)))
     for file, words in {
-            tmp_path / "one.npy": "not an .npz", tmp_path / "text.npz": "not a .npz", tmp_path / "cut.npz": "not a .npz",
+            tmp_path / "one.npy": "not an .npz", tmp_path / "text.npz": "not an .npz",
+            tmp_path / "cut.npz": "not an .npz",
             tmp_path / "none.npz": "No such file", tmp_path: "directory", tmp_path / "unlimited.npz": "t_max is not",
             stored(tmp_path / "a.npz", origins=np.zeros((0, 3)), directions=np.ones(3), t_max=1): "no rays",
             stored(tmp_path / "b.npz", directions=np.ones((3, 4))): r"directions \(3, 4\) must",

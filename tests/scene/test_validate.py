@@ -82,7 +82,7 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
     "no list": (set_scene(spheres=Sphere()), "is not a list; write spheres=[...]"),
     "no mesh": (set_scene(meshes=["ball"]), 'mesh[0]: "ball" is not a Mesh'),
     "material": (set_mesh(material=Diffuse(color=(0, 1.5, 0))), "mesh[0].material.color[1]: 1.5 is above 1"),
-    "no material": (set_mesh(material="gold"), 'mesh[0].material: "gold" is not of type Material; write a clrt.Diffuse or'),
+    "no material": (set_mesh(material="gold"), 'mesh[0].material: "gold" is not of type Material; write a clrt.'),
     "emission": (set_mesh(material=Diffuse(emission=(0, -1, 0))), "mesh[0].material.emission[1]: -1 is below 0"),
     "radius": (set_scene(spheres=[Sphere(), Sphere(radius=0)]), "sphere[1].radius: 0 is not above 0"),
     "sphere type": (set_scene(spheres=[Sphere(radius="1")]), 'sphere[0].radius: "1" is not a number'),  # type: ignore
@@ -97,7 +97,7 @@ MISTAKES: dict[str, tuple[Callable[[Scene], None], str]] = {
                       'instance[0].mesh "mesh": faces[0] uses vertex 3'),
     "instance no mesh": (place(np.eye(3, 4), mesh="ball"), 'instance[0].mesh: "ball" is not a Mesh'),
     "instance material": (place(np.eye(3, 4), material="gold"), 'instance[0].material: "gold" is not of type Material'),
-    "no instance": (set_scene(instances=["ball"]), 'instance[0]: "ball" is not of type Instance; write a clrt.Instance'),
+    "no instance": (set_scene(instances=["ball"]), 'instance[0]: "ball" is not of type Instance; write a clrt'),
     "light": (set_scene(lights=[light((0, 0, 0))]), "light[0].direction: [0, 0, 0] is not a direction"),
     "light nan": (set_scene(lights=[light((0, NAN, 0))]), "light[0].direction[1]: nan is not a finite number"),
     "light text": (set_scene(lights=[light("up")]), 'light[0].direction: "up" is not a list; write the numbers'),
