@@ -118,7 +118,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         if fps is not None:
             raise UsageError("--fps is the frame rate of an animation; add --frames or --turntable")
         if resume and checkpoint is None:
-            raise UsageError("--resume needs a checkpoint; name its file with --checkpoint")
+            raise UsageError("--resume needs a checkpoint; give its file with --checkpoint")
         results.check(checkpoint)
         results.check_unprotected(checkpoint)
     check_stops(spp, seconds, error)
