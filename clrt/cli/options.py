@@ -101,7 +101,7 @@ def tracing_options(command: F) -> F:
         click.option("--lanes", type=click.Choice(["1", "8", "16"]), help="SIMD width: paths per work-item.",
                      callback=lambda context, parameter, value: int(value) if value else None),
         click.option("--paths", type=click.Choice(["lanes", "waves"]),
-                     help="lanes: megakernel; waves: wavefront with compaction (needs 8 lanes). Default: the faster."),
+                     help="lanes: megakernel; waves: wavefront with compaction (needs 8 lanes). Default: by device."),
         triangle_option,
         box_option,
         click.option("--sphere", type=click.Choice(["robust", "textbook"]), default="robust", show_default=True,
