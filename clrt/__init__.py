@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from .queries.instanced import InstancedRayQuery as InstancedRayQuery
     from .queries.mesh import RayQuery as RayQuery
     from .rendering.renderer import Renderer as Renderer, State as State
-    from .scene.animation import (Animation as Animation, Keyframe as Keyframe, frames as frames,
-                                  turntable as turntable)
+    from .scene.animation import Animation as Animation, Keyframe as Keyframe
+    from .scene.camera_path import frames as frames, turntable as turntable
     from .scene.lights import (DirectionalLight as DirectionalLight, PointLight as PointLight,
                                SpotLight as SpotLight)
     from .scene.materials.material_types import (BlinnPhong as BlinnPhong, Conductor as Conductor,
@@ -46,7 +46,7 @@ _HOME = {
     "output.image": ("Image",),
     "queries.mesh": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
-    "scene.animation": ("Animation", "Keyframe", "frames", "turntable"),
+    "scene.animation": ("Animation", "Keyframe"), "scene.camera_path": ("frames", "turntable"),
     "scene.lights": ("DirectionalLight", "PointLight", "SpotLight"),
     "scene.materials.material_types": ("BlinnPhong", "Conductor", "Dielectric", "Diffuse", "MetallicRoughness",
                                        "Mirror", "Phong"),

@@ -17,7 +17,7 @@ from .output.image import Image
 from .rendering.render_report import render_report
 from .rendering.renderer import Renderer
 from .rendering.stop_conditions import planned_spp
-from .scene.animation import frames as _frames
+from .scene.camera_path import frames as _frames
 from .scene.model import Scene
 
 

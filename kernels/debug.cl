@@ -105,7 +105,7 @@ static inline void note_light(const Scene *scene, const Path *path, const Surfac
     ireal sent = aim_at_light(scene, path, surface, shading, active, sampler, &shadow);
     v->sent = flag(sent);
     if (!ANY(sent)) return;
-    v->unshadowed = choose(sent, shadow.light, splat(ZERO));
+    v->unshadowed = choose(sent, shadow.contribution, splat(ZERO));
     v->direct = light_along(scene, &shadow, sent);
     ireal stopped = sent & carries_light(v->unshadowed) & !carries_light(v->direct);
     if (!ANY(stopped)) return;

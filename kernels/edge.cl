@@ -103,14 +103,14 @@ static inline real3 escaped_light(const Scene *scene, const Path *path, ireal es
 // A shadow ray to a sampled point on a light, and its contribution if it is unoccluded.
 typedef struct {
     real3 origin, target, wi;
-    ireal infinite;
-    real3 light;
+    ireal infinite, light;
+    real3 contribution;
 } ShadowRay;
 
 // 2. Next-event estimation: sample a light and the shadow ray to it. Returns the lanes that need a shadow ray.
 static inline ireal aim_at_light(const Scene *scene, const Path *path, const Surface *surface, const Shading *shading,
                                  ireal active, Sampler *sampler, ShadowRay *ray) {
-    LightSample light = light_sample(scene, surface->p, choosing_normal(shading), sampler);
+    LightSample light = light_sample(scene, surface->p, choosing_normal(shading), sampler, &ray->light);
     BsdfValue bsdf = shading_eval(shading, surface, light.wi);
     real3 contribution = mul(bsdf.value, light.radiance);
     ireal useful = active & !(light.pdf <= 0.0f) & carries_light(contribution);
@@ -125,14 +125,14 @@ static inline ireal aim_at_light(const Scene *scene, const Path *path, const Sur
     contribution = mul(contribution, attenuated(absorption, distance));
 #endif
     real weight = (light.delta ? ONE : light_sample_weight(light.pdf, bsdf.pdf)) / light.pdf;
-    ray->light = at_eye(path, scale(contribution, weight));
+    ray->contribution = at_eye(path, scale(contribution, weight));
     return useful;
 }
 
 // Trace the shadow rays of the lanes `sent`; return their contributions.
 static inline real3 light_along(const Scene *scene, const ShadowRay *ray, ireal sent) {
-    real visible = transmittance(scene, ray->origin, ray->target, ray->wi, ray->infinite, sent);
-    return choose(visible > 0.0f, scale(ray->light, visible), splat(ZERO));
+    real visible = transmittance(scene, ray->origin, ray->light, ray->target, ray->wi, ray->infinite, sent);
+    return choose(visible > 0.0f, scale(ray->contribution, visible), splat(ZERO));
 }
 #endif
 

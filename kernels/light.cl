@@ -38,11 +38,11 @@ static inline ireal chosen_light(const Scene *scene, real3 p, real3 n, Sampler *
 }
 
 // Choose a light and sample a direction towards it.
-static inline LightSample light_sample(const Scene *scene, real3 p, real3 n, Sampler *sampler) {
+static inline LightSample light_sample(const Scene *scene, real3 p, real3 n, Sampler *sampler, ireal *light) {
     real probability;
     real2 u;
-    ireal light = chosen_light(scene, p, n, sampler, &u, &probability);
-    LightSample sample = sample_of_light(scene, light, p, u);
+    *light = chosen_light(scene, p, n, sampler, &u, &probability);
+    LightSample sample = sample_of_light(scene, *light, p, u);
     sample.pdf *= probability;
     return sample;
 }

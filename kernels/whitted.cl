@@ -45,7 +45,7 @@ static inline real3 light_of_one(const Scene *scene, int light, const Surface *s
 #else
     real3 origin = offset_origin(surface->p, surface->p_error, surface->ng, sample.wi);
     *rays += useful ? (ureal)(1) : (ureal)(0);
-    real visible = transmittance(scene, origin, sample.target, sample.wi, sample.infinite, useful);
+    real visible = transmittance(scene, origin, (ireal)(light), sample.target, sample.wi, sample.infinite, useful);
     return choose(visible > 0.0f, scale(contribution, visible), splat(ZERO));
 #endif
 }

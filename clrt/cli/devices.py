@@ -13,7 +13,7 @@ from .logs import verbose_option
 from .options import Finite
 
 if TYPE_CHECKING:
-    from ..device.discovery.check_results import Verdict
+    from ..device.discovery.device_info import Verdict
     from ..device.discovery.device_info import DeviceInfo
 
 

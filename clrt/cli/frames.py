@@ -67,7 +67,8 @@ class Sequence:
         writable."""
         from ..output.atomic_files import check_unprotected
         from ..output.video import check_video
-        from ..scene.animation import Animation, frames, turntable as turned
+        from ..scene.animation import Animation
+        from ..scene.camera_path import frames, turntable as turned
 
         if turntable is not None:
             scene = turned(scene, turntable, fps or Animation.fps)

@@ -14,8 +14,8 @@ from ..device.open import Device
 from ..device.programs.program import make_kernel
 from ..errors import UsageError
 from ..rendering.accumulation.checked_loops import check_paths
+from ..rendering.accumulation.launch_plan import depth_of, first_launch, first_launch_samples
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
-from ..rendering.accumulation.single_device import depth_of, first_launch, first_launch_samples
 from ..rendering.compile.choices import Choices, choices_on
 from ..rendering.compile.compile_scene import CompiledScene, compile_scene
 from ..rendering.compile.features import WITH_LIGHT

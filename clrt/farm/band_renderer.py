@@ -11,9 +11,9 @@ from ..output.denoise import Denoiser, denoised
 from ..output.image import Image
 from ..rendering.accumulation.accumulation import Accumulation
 from ..rendering.accumulation.device_pool import Team
+from ..rendering.accumulation.launch_plan import depth_of
 from ..rendering.accumulation.multi_device import Crew, make_team
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
-from ..rendering.accumulation.single_device import depth_of
 from ..rendering.film.tiles import TILE, tiles_of
 from ..rendering.render_report import render_report
 from ..rendering.renderer import Renderer

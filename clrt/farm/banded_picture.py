@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..errors import OutputError
 from ..output.row_writer import BLOCK_ROWS, write_rows
 from ..rendering.checkpoint.identity import facts_of
+from ..rendering.compile.features import biased_by
 from ..rendering.film.tiles import TILE, tiles_of
 from ..rendering.render_warnings import DARK, bias_warnings, black_warnings, nonfinite_warnings
 from ..rendering.renderer_options import beyond
@@ -36,7 +37,8 @@ HUGE = 1 << 23
 BAND_PIXELS = 1 << 20
 BYTES = 12
 #: Fields of a band's report that do not apply to the image.
-OF_ONE = {"seconds", "samples_per_second", "rays_per_second", "stop_reason", "tile_noise", "clamped_part", "brightest"}
+OF_ONE = {"seconds", "samples_per_second", "rays_per_second", "stop_reason", "tile_noise", "clamped_part", "brightest",
+          "light"}
 #: Fields of an order that are separate facts, or differ from band to band.
 COMMON = {"scene", "options", "camera", "band"}
 
@@ -108,6 +110,8 @@ class Banded:
         reasons = {report["stop_reason"] for report in reports}
         if len(reasons) == 1:
             first["stop_reason"] = reasons.pop()
+        if biased_by(self.order.settled.render):
+            first["clamped_part"] = _clamped_part(reports)
         if len(reports) > 1:
             first["warnings"] = [*first["warnings"], *self._warnings(reports)]
         return {**first, "width": self.size[0], "height": self.size[1], "bands": len(reports),
@@ -119,7 +123,8 @@ class Banded:
         """Return warnings about the whole image; each band's report already has those about the scene."""
         settings = self.order.settled.render
         dropped, samples = (sum(report[name] for report in reports) for name in ("nonfinite_samples", "samples"))
-        return [*nonfinite_warnings(dropped, samples), *bias_warnings(settings, None),
+        return [*nonfinite_warnings(dropped, samples),
+                *bias_warnings(settings, _clamped_part(reports)),
                 *black_warnings(settings, reports[0]["kernel"]["features"],
                                 max(report["brightest"] for report in reports), DARK)]
 
@@ -156,6 +161,7 @@ class Banded:
             raise OutputError(f"{self.rows_path}: cannot be written ({error.strerror})") from error
         report = {key: value for key, value in result["report"].items() if key != "history"}
         report["brightest"] = float(np.max(result["pixels"]))
+        report["light"] = float(np.sum(result["pixels"], dtype=np.float64))
         manifest.add(name, {"sha256": hashlib.sha256(content).hexdigest(), "report": report})
         self.reports[name] = report
 
@@ -171,3 +177,11 @@ class Banded:
             for band in self._bands().values():
                 content = file.read(self._span(band)[1])
                 yield np.frombuffer(content, np.float32).reshape(-1, width, 3)
+
+
+def _clamped_part(reports: list[dict[str, Any]]) -> float:
+    """Return the fraction of all light that clamping removed, from the bands' fractions and remaining light."""
+    removed = sum(report["light"] * part / (1 - part) for report in reports
+                  if (part := report.get("clamped_part", 0.0)))
+    light = sum(report["light"] for report in reports)
+    return removed / (removed + light) if removed else 0.0

@@ -21,8 +21,8 @@ from ..device.launches.memory_plan import check_host
 from ..device.open import Device
 from ..errors import ClrtError
 from ..rendering.accumulation.accumulation import Accumulation
+from ..rendering.accumulation.launch_plan import FEWEST_TILES
 from ..rendering.accumulation.scene_on_device import SceneOnDevice
-from ..rendering.accumulation.single_device import FEWEST_TILES
 from ..rendering.accumulation.work_queue import Work
 from ..rendering.film.film import Film
 from ..rendering.film.tiles import TILE_PIXELS, row_by_row, tile_by_tile

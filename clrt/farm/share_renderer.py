@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..rendering.accumulation.launch_plan import depth_of
 from ..rendering.accumulation.multi_device import Crew, make_team
-from ..rendering.accumulation.single_device import depth_of
 from ..rendering.accumulation.work_queue import Part, Work
 from ..rendering.compile.choices import choices_on
 from ..rendering.compile.scene_compiler import Compiler
 from ..rendering.film.tiles import TILE_PIXELS, scattered
 from .orders import Order
-from .worker_tasks import about, opened
+from .worker_devices import about, opened
 
 #: The devices do one thing at a time.
 _at_work = Lock()

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..bench.rays.cold_start import peak_bytes
 from ..rendering.renderer import Renderer, State
-from ..scene.animation import frames, turntable
+from ..scene.camera_path import frames, turntable
 from ..scene.model import RenderSettings, Scene
 from .banded_picture import Banded
 from .cluster import connect, local_cluster

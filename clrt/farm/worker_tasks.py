@@ -9,18 +9,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, wraps
+from functools import wraps
 from threading import Lock
 from typing import TYPE_CHECKING, Any, NamedTuple, ParamSpec
 
 from .. import errors
 from ..errors import DeviceError
 from .serialization import unpack
+from .worker_devices import about, opened
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ..device.open import Device
     from .orders import Order
     from .share_renderer import ShareRenderer
     from .simulated_workers import Simulation
@@ -135,20 +135,6 @@ def render_whole(client: dict[str, str], key: str, text: bytes, part: bytes, dig
         camera, band = unpack(part, {})
         order = replace(unpack(text, dict(zip(digests, arrays))), camera=camera, band=band)
         return render(key, order), time.perf_counter() - start
-
-
-@cache
-def opened(selectors: tuple[str | int, ...]) -> list[Device]:
-    """Return this worker's selected devices, opened once."""
-    from ..device.open import open_devices
-
-    return open_devices(selectors or None)
-
-
-def about(devices: list[Device]) -> dict[str, Any]:
-    """Return the devices' distinct names, platforms and drivers."""
-    return {name: " + ".join(dict.fromkeys(getattr(device.info, name) for device in devices))
-            for name in ("name", "platform", "platform_version", "driver")}
 
 
 def _made(order: Order) -> ShareRenderer | Simulation:

@@ -25,12 +25,12 @@ def nonfinite_warnings(dropped: int, samples: int) -> list[str]:
             "for extreme values in lights, textures and materials"] if dropped else []
 
 
-def bias_warnings(settings: RenderSettings, removed: float | None) -> list[str]:
-    """Return one warning if a setting biases the image, else none. removed: the fraction of the light, if known."""
+def bias_warnings(settings: RenderSettings, removed: float) -> list[str]:
+    """Return one warning if a setting biases the image, else none. removed: the fraction of the light."""
     if not (names := biased_by(settings)):
         return []
-    part = "" if removed is None else f": {removed:.2%} of the light was removed"
-    return [f"the image is biased by {' and '.join(names)}{part}; the estimated error does not include this bias"]
+    return [f"the image is biased by {' and '.join(names)}: {removed:.2%} of the light was removed; the estimated "
+            "error does not include this bias"]
 
 
 def black_warnings(settings: RenderSettings, features: Iterable[str], brightest: float, cause: str) -> list[str]:

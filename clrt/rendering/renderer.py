@@ -20,9 +20,9 @@ from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validation.validate import check_is_scene, validate
 from ..threads import Event
 from .accumulation.accumulation import Accumulation
+from .accumulation.launch_plan import depth_of
 from .accumulation.multi_device import make_picture
 from .accumulation.scene_on_device import SceneOnDevice
-from .accumulation.single_device import depth_of
 from .aovs import Aovs
 from .checkpoint.checkpoints import check_of_none, open_checkpoints
 from .checkpoint.saved_state import Kept

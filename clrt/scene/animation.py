@@ -1,27 +1,16 @@
-"""Camera animation by keyframes or turntable, and the static scene of each frame."""
+"""Animation of the camera, by keyframes or as a turntable."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from dataclasses import dataclass
+from typing import Annotated
 
-import numpy as np
-
-from ..errors import SceneError, UsageError
 from .materials.material import tuples_for_lists
 from .materials.textures import NonNegative
-from .splines import Doubles, smooth
-from .validation.field_types import field_problems
 from .validation.limits import Gt, Lt
-
-if TYPE_CHECKING:
-    from .model import Camera, Scene
 
 Vector = tuple[float, float, float]
 Positive = Annotated[float, Gt(0)]
-#: Upper limit on the number of frames; more are assumed to be a typing error.
-MOST_FRAMES = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,99 +59,3 @@ class Animation:
         if self.turntable_seconds is not None:
             return max(1, round(self.seconds * self.fps))
         return 1 + int(self.seconds * self.fps * (1 + 1e-9))
-
-
-def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
-    """Return the scene with the camera going once around in this number of frames. Raises UsageError unless `frames`
-    is at least 1 and `fps` is above 0 and finite."""
-    if not frames >= 1:
-        raise UsageError(f"frames is {frames}; it must be at least 1")
-    if not 0 < fps < np.inf:
-        raise UsageError(f"fps is {fps}; it must be above 0 and finite")
-    return replace(scene, animation=Animation(fps=fps, turntable_seconds=frames / fps))
-
-
-def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[int, Scene]]:
-    """Return the number and the static scene of all frames, or of the `chosen` ones. The scenes differ in their camera
-    alone. Raises SceneError if the scene has no animation or an invalid one, UsageError for an invalid number.
-    """
-    if scene.animation is None:
-        raise SceneError(f"{scene.name}: has no animation; write [[keyframe]] tables, or use a turntable (--turntable, "
-                         "clrt.turntable)")
-    if problems := (field_problems(Animation, vars(scene.animation), "animation")
-                    or animation_problems(scene.camera, scene.animation)):
-        raise SceneError(problems)
-    count = scene.animation.frames
-    numbers = range(count) if chosen is None else list(chosen)
-    for number in numbers:
-        if not 0 <= number < count:
-            raise UsageError(f"{scene.name} has no frame {number}; its frames are 0 to {count - 1}")
-    cameras = _cameras(scene.camera, scene.animation, np.array(numbers, np.float64))
-    return ((number, replace(scene, camera=camera, animation=None)) for number, camera in zip(numbers, cameras))
-
-
-def animation_problems(camera: Camera, animation: Animation) -> list[str]:
-    """Return what is wrong with an animation whose fields are within their limits, one sentence per problem."""
-    keys, around = animation.keyframes, animation.turntable_seconds
-    if around is not None and keys:
-        return ["animation: has both turntable_seconds and keyframes; keep one of them"]
-    if around is None and len(keys) < 2:
-        return [f"animation: has {len(keys) or 'no'} keyframe{'s' * (not keys)} and no turntable_seconds; write two or "
-                "more [[keyframe]] tables"]
-    if around == 0:
-        return ["animation.turntable_seconds: is 0; write the duration of one turn"]
-    times = [key.time for key in keys]
-    problems = [f"keyframe[{i + 1}].time: {times[i + 1]:g} is not after the previous one, {times[i]:g}; write them "
-                "in ascending order" for i in range(len(times) - 1) if times[i + 1] <= times[i]]
-    if not problems and animation.seconds * animation.fps >= MOST_FRAMES:
-        problems = [f"animation: would have {animation.seconds * animation.fps:.9g} frames, more than {MOST_FRAMES}; "
-                    "check the times, in seconds, and fps"]
-    return problems or _view_problems(camera, animation)
-
-
-def _view_problems(camera: Camera, animation: Animation) -> list[str]:
-    """Return a problem for the first frame whose camera has no valid view direction."""
-    moving = _moving(camera, animation, np.arange(animation.frames, dtype=np.float64))
-    position, look_at, up = (moving.get(name, np.array([getattr(camera, name)], np.float64))
-                             for name in ("position", "look_at", "up"))
-    forward = look_at - position
-    length, height = np.linalg.norm(forward, axis=1), np.linalg.norm(up, axis=1)
-    bad = np.linalg.norm(np.cross(forward, up), axis=1) <= 1e-6 * length * height
-    if not bad.any():
-        return []
-    frame = int(bad.argmax())
-    what = "look_at equals its position" if not length[frame % len(length)] else "it looks along its up vector"
-    return [f"animation: in frame {frame}, {frame / animation.fps:g} s after the first, the camera has no orientation: "
-            f"{what}; move a keyframe, or add one in between"]
-
-
-def _cameras(camera: Camera, animation: Animation, numbers: Doubles) -> Iterator[Camera]:
-    moving = {name: rows.tolist() for name, rows in _moving(camera, animation, numbers).items()}
-    for i in range(len(numbers)):
-        values: dict[str, Any] = {name: rows[i] if len(rows[i]) > 1 else rows[i][0] for name, rows in moving.items()}
-        yield replace(camera, **values)
-
-
-def _moving(camera: Camera, animation: Animation, numbers: Doubles) -> dict[str, Doubles]:
-    """Compute the animated fields: name to an array with a row per frame."""
-    if animation.turntable_seconds is not None:
-        turn = np.copysign(2 * np.pi / animation.frames, animation.turntable_seconds)
-        return {"position": _around(camera, turn * numbers)}
-    keys, moving = animation.keyframes, {}
-    at = keys[0].time + numbers / animation.fps
-    for name in [field.name for field in fields(Keyframe) if field.name != "time"]:
-        known = [(key.time, np.atleast_1d(getattr(key, name))) for key in keys if getattr(key, name) is not None]
-        if known:
-            times, values = zip(*known)
-            moving[name] = smooth(times, values, at)
-    return moving
-
-
-def _around(camera: Camera, angles: Doubles) -> Doubles:
-    """Compute (n, 3) positions of the camera rotated by these angles about the axis `up` through its look_at point."""
-    center, axis = np.array(camera.look_at, np.float64), np.array(camera.up, np.float64)
-    axis /= np.linalg.norm(axis)
-    arm = camera.position - center
-    along = axis * (axis @ arm)
-    cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
-    return np.asarray(center + along + cos * (arm - along) + sin * np.cross(axis, arm))

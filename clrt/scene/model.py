@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +19,6 @@ from .materials.material_types import Diffuse, Material
 from .materials.textures import NonNegative
 from .validation.limits import Ge, Gt, Le, Lt
 from .validation.number_arrays import real_array, whole_array
-
-if TYPE_CHECKING:
-    from .provenance import Source
 
 Vector = tuple[float, float, float]
 FloatArray = NDArray[np.float32]
@@ -143,6 +142,37 @@ class Environment:
     image: FloatArray | None = None
     strength: NonNegative = 1.0
     rotation_degrees: float = 0.0
+
+
+@dataclass(eq=False)
+class Origin:
+    """A [[mesh]] or [[instance]] table, with the file's absolute path. parts: what it showed; own: the materials of
+    these without the table's."""
+
+    table: Mapping[str, Any]
+    parts: Sequence[Mesh | Instance]
+    own: Sequence[Material | None]
+
+
+@dataclass(eq=False)
+class Source:
+    """Sources of a scene. meshes, instances: tables in their order. files: textures' pictures and environment maps,
+    each with its file. cameras: those of model files."""
+
+    meshes: list[Origin] = field(default_factory=list)
+    instances: list[Origin] = field(default_factory=list)
+    files: list[tuple[object, Path]] = field(default_factory=list)
+    cameras: dict[str, Camera] = field(default_factory=dict)
+
+    @property
+    def paths(self) -> list[Path]:
+        """Return the files of meshes, textures and environment maps."""
+        return [*(origin.table["file"] for origin in self.meshes if "file" in origin.table),
+                *(path for _, path in self.files)]
+
+    def file_of(self, content: object) -> Path | None:
+        """Return the file that this very picture or image object was read from."""
+        return next((path for each, path in self.files if each is content), None)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,47 +5,13 @@ Parts are compared by identity: an array that was changed, or made in Python, ha
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from .materials.material import Material
-from .model import Camera, Instance, Mesh, Model
+from .model import Instance, Mesh, Model, Origin, Source
 
 #: Arrays that define a mesh's shape.
 ARRAYS = ("vertices", "faces", "normals", "uv", "uv1", "colors", "tangents")
-
-
-@dataclass(eq=False)
-class Origin:
-    """A [[mesh]] or [[instance]] table, with the file's absolute path. parts: what it showed; own: the materials of
-    these without the table's."""
-
-    table: Mapping[str, Any]
-    parts: Sequence[Mesh | Instance]
-    own: Sequence[Material | None]
-
-
-@dataclass(eq=False)
-class Source:
-    """Sources of a scene. meshes, instances: tables in their order. files: textures' pictures and environment maps,
-    each with its file. cameras: those of model files."""
-
-    meshes: list[Origin] = field(default_factory=list)
-    instances: list[Origin] = field(default_factory=list)
-    files: list[tuple[object, Path]] = field(default_factory=list)
-    cameras: dict[str, Camera] = field(default_factory=dict)
-
-    @property
-    def paths(self) -> list[Path]:
-        """Return the files of meshes, textures and environment maps."""
-        return [*(origin.table["file"] for origin in self.meshes if "file" in origin.table),
-                *(path for _, path in self.files)]
-
-    def file_of(self, content: object) -> Path | None:
-        """Return the file that this very picture or image object was read from."""
-        return next((path for each, path in self.files if each is content), None)
 
 
 def source_of_model(path: Path, model: Model) -> Source:

@@ -17,7 +17,7 @@ typedef struct {
     real3 wi;
     real3 radiance;     // along wi, unoccluded; the irradiance perpendicular to wi if `delta`
     real pdf;           // per solid angle; 1 if `delta`
-    real3 target;       // end of the shadow ray, just before the light; undefined if `infinite`
+    real3 target;       // end of the shadow ray, see shadow_target; undefined if `infinite`
     ireal infinite, delta;
 } LightSample;
 
@@ -29,9 +29,14 @@ static inline real within_range(real d2, real per_range2) {
 }
 #endif
 
-// A point q on a light's surface, moved towards p by more than its rounding error and that of a ray between the two.
-// size: |a| + |b| if q = a + b, since the rounding error of terms that cancel remains.
+// A point q on a light's surface, moved towards p by more than its rounding error and that of a ray between the two, so
+// that the ray ends before the light. With OPACITY it is moved away from p, as the ray ends where it hits the light:
+// surfaces that coincide with the light come before or after it in the order of hits. size: |a| + |b| if q = a + b,
+// since the rounding error of terms that cancel remains.
 static inline real3 shadow_target(real3 p, real3 q, real3 size, real3 n) {
     real distance = dot3(absolute3(n), scale(add(absolute3(p), size), (real)(GAMMA(16))));
+#if OPACITY
+    distance = -distance;
+#endif
     return mad3(n, dot3(sub(p, q), n) < 0.0f ? -distance : distance, q);
 }

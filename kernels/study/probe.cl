@@ -253,7 +253,8 @@ kernel void probe_light_probability(SCENE_PARAMETERS, uint n, global const float
 kernel void probe_light_sample(SCENE_PARAMETERS, uint n, global const float *in, global float *out, uint seed) {
     ELEMENTS
     Sampler sampler = sampler_at(element, (ureal)(0), seed, 32);
-    LightSample light = light_sample(&scene, ROW3(in, 0), ROW3(in, 3), &sampler);
+    ireal number;
+    LightSample light = light_sample(&scene, ROW3(in, 0), ROW3(in, 3), &sampler, &number);
     put3(out, n, 0, light.wi);
     put3(out, n, 3, light.radiance);
     put(out, n, 6, light.pdf);

@@ -37,8 +37,10 @@ static inline Hits first_surface(const Scene *scene, real3 origin, real3 directi
     return first_surface_from(scene, &closest, origin, direction, from_camera, active, sampler, surface);
 }
 
-// The transmittance to `origin` from a target, or from infinity along wi.
-static inline real transmittance(const Scene *scene, real3 origin, real3 target, real3 wi, ireal infinite, ireal active) {
+// The transmittance to `origin` from the target on a light, or from infinity along wi. The ray ends where it hits that
+// light.
+static inline real transmittance(const Scene *scene, real3 origin, ireal light, real3 target, real3 wi, ireal infinite,
+                                 ireal active) {
     real3 direction = choose(infinite, wi, sub(target, origin));
     real left = active ? ONE : ZERO, t_max = infinite ? (real)(INFINITY) : ONE;
     Hits hits = closest_hit(scene, origin, direction, t_max, active);
@@ -46,6 +48,7 @@ static inline real transmittance(const Scene *scene, real3 origin, real3 target,
         ireal hit = (left > 0.0f) & (hits.primitive >= 0);
         if (!ANY(hit)) return left;
         Surface surface = surface_at(scene, origin, direction, &hits);
+        hit = hit & (surface.light != light);
         left = hit ? left * (1.0f - opacity_at(scene, &surface, direction, false)) : left;
         hits = next_hit(scene, origin, direction, t_max, hit & (left > 0.0f), &hits);
     }

@@ -17,8 +17,9 @@ static inline Hits first_surface(const Scene *scene, real3 origin, real3 directi
     return first_surface_from(scene, &closest, origin, direction, from_camera, active, sampler, surface);
 }
 
-// The transmittance to `origin` from a target, or from infinity along wi.
-static inline real transmittance(const Scene *scene, real3 origin, real3 target, real3 wi, ireal infinite, ireal active) {
+// The transmittance to `origin` from the target on a light, or from infinity along wi.
+static inline real transmittance(const Scene *scene, real3 origin, ireal light, real3 target, real3 wi, ireal infinite,
+                                 ireal active) {
     real3 direction = choose(infinite, wi, sub(target, origin));
     ireal blocked = any_hit(scene, origin, direction, infinite ? (real)(INFINITY) : ONE, active);
     return (active & !blocked) ? ONE : ZERO;

@@ -19,7 +19,7 @@ from clrt.cli.frames import numbered
 from clrt.cli.render import command
 from clrt.output.images import read_image
 from clrt.output.video import write_video
-from clrt.scene.animation import frames
+from clrt.scene.camera_path import frames
 
 FLIGHT = """
 camera = { fov_degrees = 50 }

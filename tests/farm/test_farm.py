@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 import clrt
-from clrt.device.discovery.check_results import Verdict, keep_verdict
+from clrt.device.discovery.check_results import keep_verdict
+from clrt.device.discovery.device_info import Verdict
 from clrt.device.open import Device
 from clrt.device.programs.kernel_files import kernel_digest
 from clrt.errors import DeviceError
@@ -209,7 +210,7 @@ def test_frames(cluster: Cluster) -> None:
 
 def test_bands(cluster: Cluster, tmp_path: Path) -> None:
     """After an interrupt and damage to one band, an image in bands equals that of one process, in every file format."""
-    order = PictureOrder(room(), {"size": (90, 100), "device": 0, "seed": 3}, spp=4)
+    order = PictureOrder(room(), {"size": (90, 100), "device": 0, "seed": 3, "clamp_direct": 0.5}, spp=4)
     banded = Banded(order, tmp_path / "a.bands", band_pixels=90 * 16)
     for done, _ in banded.render(cluster):
         if done >= 3:
@@ -221,13 +222,15 @@ def test_bands(cluster: Cluster, tmp_path: Path) -> None:
     again = Banded(order, tmp_path / "a.bands", band_pixels=90 * 16)
     counts = [done for done, _ in again.render(cluster, resume=True)]
     assert counts[0] < kept and counts[-1] == 7
-    expected = clrt.render(room(), size=(90, 100), seed=3, spp=4, device=0)
+    expected = clrt.render(room(), size=(90, 100), seed=3, clamp_direct=0.5, spp=4, device=0)
     for name in ("a.exr", "b.hdr", "c.png"):
         expected.save(tmp_path / name)
         again.save(tmp_path / f"of_{name}", "srgb", 0.0, {})
         np.testing.assert_array_equal(read_image(tmp_path / f"of_{name}"), read_image(tmp_path / name))
     assert again.summary()["samples"] == 4 * 90 * 100
     assert again.summary()["noise"] == pytest.approx(expected.report["noise"], rel=0.1)
+    assert 0 < again.summary()["clamped_part"] == pytest.approx(expected.report["clamped_part"], rel=1e-5)
+    assert again.summary()["warnings"] == expected.report["warnings"] != []
 
 
 def test_a_scheduler_that_comes_back(processes: Processes, cluster: Cluster, small_tasks: None,

@@ -101,8 +101,8 @@ def test_a_checkpoint_is_of_one_camera(cluster: Cluster, tmp_path: Path) -> None
 def band(**differs: Any) -> dict[str, Any]:
     """Return the report of one band of half an image, with the fields that count for the whole."""
     return {"samples": 6144, "spp": 4, "rays": 10, "nonfinite_samples": 0, "noise": 0.1, "seconds": 1.0,
-            "stop_reason": "spp", "kernel": {"features": ["LIGHTS"]}, "brightest": 1.0, "warnings": ["of the scene"],
-            **differs}
+            "stop_reason": "spp", "kernel": {"features": ["LIGHTS"]}, "brightest": 1.0, "light": 1.0,
+            "warnings": ["of the scene"], **differs}
 
 
 def test_what_bands_say_together(tmp_path: Path) -> None:
@@ -112,7 +112,7 @@ def test_what_bands_say_together(tmp_path: Path) -> None:
                                  stop_reason="error", tile_noise=0.02) for name, seconds in (("a", 1.0), ("b", 9.0))}
     told = banded.summary()
     assert told["worker_seconds"] == 10 and told["samples"] == 2 * 6144 and told["stop_reason"] == "error"
-    assert not {"seconds", "samples_per_second", "rays_per_second", "tile_noise", "brightest"} & set(told)
+    assert not {"seconds", "samples_per_second", "rays_per_second", "tile_noise", "brightest", "light"} & set(told)
     banded.reports["b"]["stop_reason"] = "time"
     assert "stop_reason" not in banded.summary() and banded.summary()["warnings"] == ["of the scene"]
 
@@ -120,11 +120,11 @@ def test_what_bands_say_together(tmp_path: Path) -> None:
 def test_bands_warn_of_the_whole_picture(tmp_path: Path) -> None:
     """Warnings cover the samples dropped in all bands, the bias of all, and an image that is black everywhere."""
     banded = Banded(PictureOrder(room(), {"size": SIZE, "clamp_direct": 1.0}, spp=4), tmp_path / "a.bands")
-    banded.reports = {"a": band(samples=100, nonfinite_samples=3, brightest=0.0),
-                      "b": band(samples=100, nonfinite_samples=4)}
+    banded.reports = {"a": band(samples=100, nonfinite_samples=3, brightest=0.0, light=3.0, clamped_part=0.25),
+                      "b": band(samples=100, nonfinite_samples=4, light=1.0, clamped_part=0.5)}
     first, dropped, biased = banded.summary()["warnings"]
     assert first == "of the scene" and dropped.startswith("7 of 200 samples were not finite")
-    assert biased.startswith("the image is biased by clamp_direct; the estimated error does not include")
+    assert biased.startswith("the image is biased by clamp_direct: 33.33% of the light was removed; the")
     banded.reports["b"]["brightest"] = 0.0
     assert banded.summary()["warnings"][3:] == ["the image is black: no light reaches what the camera sees; "
                                                 "`clrt debug SCENE --pixel 32,24` shows why"]

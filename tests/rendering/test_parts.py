@@ -9,7 +9,8 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clrt.device.launches.memory_plan import OVERLAP, VARIABLE, largest_buffer, part_count, part_records, parts
+from clrt.device.launches.buffer_limit import VARIABLE, largest_buffer
+from clrt.device.launches.memory_plan import OVERLAP, part_count, part_records, parts
 from clrt.device.open import Device
 from clrt.errors import NoRoomError, UsageError
 from clrt.rendering.accumulation.denoiser_guides import render_guides

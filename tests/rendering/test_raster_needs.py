@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from clrt.device.launches.buffer_limit import VARIABLE
 from clrt.device.launches.device_arrays import on_device
-from clrt.device.launches.memory_plan import VARIABLE
 from clrt.device.open import Device
 from clrt.errors import DeviceError, NoRoomError, SceneError, UsageError
+from clrt.rendering.accumulation.launch_plan import first_launch
 from clrt.rendering.accumulation.multi_device import Crew
 from clrt.rendering.accumulation.raster_bins import Bins
-from clrt.rendering.accumulation.single_device import first_launch
 from clrt.rendering.compile.choices import Choices
 from clrt.rendering.compile.compile_scene import compile_scene
 from clrt.rendering.renderer import Renderer

@@ -16,7 +16,7 @@ from clrt.bench.numerics.bsdf_cases import variants
 from clrt.bench.numerics.kernel_probe import choices
 from clrt.device.open import Device
 from clrt.errors import UsageError
-from clrt.rendering.accumulation import single_device as session_module
+from clrt.rendering.accumulation import launch_plan
 from clrt.rendering.compile import pack_scene as pack_module
 from clrt.rendering.compile.choices import LANES, OFFSETS, Choices
 from clrt.rendering.compile.compile_scene import compile_scene
@@ -172,7 +172,7 @@ def test_pictures_do_not_depend_on_passes_and_launches(device: Device, monkeypat
     scene = replace(everything(), render=RenderSettings(size=(64, 48), spp=8, seed=2))
     films = []
     for passes, first_launch in (([8], 1 << 15), ([8], 1), ([1] * 8, 1 << 20), ([3, 5], 1), ([8], 1 << 15)):
-        monkeypatch.setattr(session_module, "FIRST_LAUNCH_SAMPLES", first_launch)
+        monkeypatch.setattr(launch_plan, "FIRST_LAUNCH_SAMPLES", first_launch)
         running = session(device, scene)
         for samples in passes:
             for _ in running.render(samples):

@@ -12,7 +12,8 @@ from scipy.interpolate import CubicHermiteSpline
 
 from clrt.errors import ClrtError, SceneError, UsageError
 from clrt.formats.load_scene import load
-from clrt.scene.animation import Animation, Keyframe, frames, turntable
+from clrt.scene.animation import Animation, Keyframe
+from clrt.scene.camera_path import frames, turntable
 from clrt.scene.model import Camera, Scene
 from clrt.scene.splines import smooth
 from clrt.scene.validation.validate import scene_problems

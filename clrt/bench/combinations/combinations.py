@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from ...device.open import Device
 from ...output.scenes import save_scene
-from ...rendering.accumulation.single_device import Session, depth_of
+from ...rendering.accumulation.launch_plan import depth_of
+from ...rendering.accumulation.single_device import Session
 from ...rendering.compile.compile_scene import compile_scene
 from ..numerics.kernel_probe import choices
 from ..renderers.agreement import block_means

@@ -14,8 +14,8 @@ from ...device.open import Device
 from ...device.programs.preamble import typedefs
 from ...device.programs.program import build, make_kernel
 from ...device.programs.struct_types import record
+from ...rendering.accumulation.launch_plan import first_launch
 from ...rendering.accumulation.raster_bins import Bins
-from ...rendering.accumulation.single_device import first_launch
 from ...rendering.compile.compile_scene import compile_scene
 from ...rendering.film.tiles import TILE_PIXELS, tiles_of
 from ...scene.model import Scene

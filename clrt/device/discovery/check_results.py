@@ -8,34 +8,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..programs import cache_files
 from ..programs.kernel_files import kernel_digest
-
-if TYPE_CHECKING:
-    from .device_info import DeviceInfo
+from .device_info import DeviceInfo, Verdict
 
 #: Suffix of the files.
 KIND = "check.json"
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """The result of a device check. failures: one sentence each, empty if it passed. figures: measurements by name.
-
-    when: the time of the check in UTC (ISO 8601); seconds: its duration. kernels: digest of the kernels that were
-    checked (sources.py).
-    """
-
-    passed: bool
-    failures: list[str] = field(hash=False)     # lists and dicts are unhashable; equality still implies equal hashes
-    when: str
-    seconds: float
-    kernels: str
-    figures: dict[str, float | str] = field(default_factory=dict, hash=False)
 
 
 def keep_verdict(info: DeviceInfo, verdict: Verdict) -> bool:

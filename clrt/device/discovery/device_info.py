@@ -4,20 +4,48 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import pyopencl as cl
 
-from ..launches.memory_plan import largest_buffer
+from ..launches.buffer_limit import largest_buffer
 from ..pocl.linker import lacks_linker
-from .check_results import Verdict
 from .drivers import Driver
 from .hardware_id import hardware
-from .measured_speeds import Speed
 
 MINIMUM_ALLOCATION = 16 << 20
 #: Layers that translate OpenCL to another API: part of the platform's or device's name, and the API.
 TRANSLATIONS = {"clvk": "Vulkan", "zink": "Vulkan", "openclon12": "Direct3D 12"}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The result of a device check. failures: one sentence each, empty if it passed. figures: measurements by name.
+
+    when: the time of the check in UTC (ISO 8601); seconds: its duration. kernels: digest of the kernels that were
+    checked (sources.py).
+    """
+
+    passed: bool
+    failures: list[str] = field(hash=False)     # lists and dicts are unhashable; equality still implies equal hashes
+    when: str
+    seconds: float
+    kernels: str
+    figures: dict[str, float | str] = field(default_factory=dict, hash=False)
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Throughput of the kernels alone, in millions of rays per second."""
+
+    mrays_primary: float
+    mrays_bounce: float
+    mrays_shadow: float
+
+    @property
+    def mrays(self) -> float:
+        """Return the throughput for equal numbers of rays of each kind."""
+        return 3 / (1 / self.mrays_primary + 1 / self.mrays_bounce + 1 / self.mrays_shadow)
 
 
 @dataclass(frozen=True)

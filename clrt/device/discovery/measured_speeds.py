@@ -6,33 +6,16 @@ A speed is valid for one device and driver, and for the kernels and version of c
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from math import isfinite
-from typing import TYPE_CHECKING
 
 from ..programs import cache_files
 from ..programs.kernel_files import kernel_digest
 from .check_results import identity_of
-
-if TYPE_CHECKING:
-    from .device_info import DeviceInfo
+from .device_info import DeviceInfo, Speed
 
 #: Suffix of the files.
 KIND = "bench.json"
-
-
-@dataclass(frozen=True)
-class Speed:
-    """Throughput of the kernels alone, in millions of rays per second."""
-
-    mrays_primary: float
-    mrays_bounce: float
-    mrays_shadow: float
-
-    @property
-    def mrays(self) -> float:
-        """Return the throughput for equal numbers of rays of each kind."""
-        return 3 / (1 / self.mrays_primary + 1 / self.mrays_bounce + 1 / self.mrays_shadow)
 
 
 def keep_speed(info: DeviceInfo, speed: Speed) -> bool:

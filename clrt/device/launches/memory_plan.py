@@ -3,33 +3,18 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import NoRoomError, UsageError
+from ...errors import NoRoomError
+from ..discovery.device_info import DeviceInfo
+from .buffer_limit import VARIABLE
 
-if TYPE_CHECKING:
-    from ..discovery.device_info import DeviceInfo
-
-#: For developers: an upper bound on a device's largest buffer, such as 1M.
-VARIABLE = "CLRT_MAX_ALLOC"
-UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
 #: Records that a part shares with the next one, so that a leaf's records are never in two parts (kernels/arrays.cl).
 OVERLAP = 16
-
-
-def largest_buffer(allowed: int) -> int:
-    """Return the device's limit, or that of VARIABLE if it is lower."""
-    asked = os.environ.get(VARIABLE)
-    if not asked:
-        return allowed
-    if not (match := re.fullmatch(r"([1-9]\d*)([KMG]?)", asked)):
-        raise UsageError(f"{VARIABLE} is {asked!r}; it must be a number of bytes, like 65536, 512K, 64M or 1G")
-    return min(allowed, int(match[1]) * UNITS[match[2]])
 
 
 def part_records(itemsize: int, part_bytes: int) -> int:

@@ -15,7 +15,8 @@ from ...scene.lights import LIGHTS, Light
 from ...scene.materials.material_types import MATERIALS, Diffuse, Material
 from ...scene.materials.textures import WHITE, Texture
 from ...scene.model import Camera, Environment, Instance, Model, RenderSettings, Scene, Sphere
-from ...scene.provenance import Origin, Source, material_of, parts_of
+from ...scene.model import Origin, Source
+from ...scene.provenance import material_of, parts_of
 from ...scene.validation.field_types import field_problems, show, unknown, usable
 from ..images.image_reader import read_picture
 from ..referenced_files import name_of

@@ -23,7 +23,8 @@ from ...scene.materials.material import Material
 from ...scene.materials.material_types import Diffuse
 from ...scene.materials.textures import Picture, Texture
 from ...scene.model import Environment, Instance, Mesh, Scene
-from ...scene.provenance import Origin, Source, material_of, shape_of
+from ...scene.model import Origin, Source
+from ...scene.provenance import material_of, shape_of
 from ...scene.validation.field_types import plain_value
 from ..gltf.glb_writer import mesh_glb
 from .texture_table import TextureTable

@@ -180,23 +180,17 @@ class Accumulation(ABC):
         """Return what each of several devices rendered, for the report."""
         return []
 
+    @abstractmethod
     def machine(self, devices: Sequence[Device]) -> dict[str, Any]:
         """Return the report's fields on these devices, and on the programs and BVHs built for them."""
-        from .device_report import machine_report    # needs the complete Accumulation class, like the next two
 
-        return machine_report(devices, self)
-
+    @abstractmethod
     def guides(self) -> dict[str, NDArray[np.float32]]:
         """Return the guides for a denoiser, see `render_guides`."""
-        from .denoiser_guides import render_guides
 
-        return render_guides(self)
-
+    @abstractmethod
     def first_hits(self, scene: Scene, names: Collection[str]) -> dict[str, NDArray[np.generic]]:
         """Return AOVs of the first hits in the scene being rendered, see `first_hits`."""
-        from .first_hits import first_hits
-
-        return first_hits(self, scene, names)
 
     @property
     def device(self) -> Device:

@@ -25,8 +25,8 @@ from ...errors import DeviceError, KernelError
 from ..compile.compile_scene import CompiledScene
 from ..film.tiles import TILE_PIXELS
 from .device_worker import Share, Worker
+from .launch_plan import FEWEST_TILES
 from .scene_on_device import SceneOnDevice
-from .single_device import FEWEST_TILES
 from .work_queue import Work
 
 #: Divisor that gives the smallest share from the size of a full launch.

@@ -16,8 +16,8 @@ from ...device.open import Device
 from ...errors import NoRoomError
 from ..compile.compile_scene import CompiledScene
 from ..film.tiles import TILE_PIXELS
+from .launch_plan import FEWEST_TILES, first_launch_samples
 from .scene_on_device import WINDOW, SceneOnDevice, largest_film
-from .single_device import FEWEST_TILES, first_launch_samples
 from .work_queue import Part
 
 

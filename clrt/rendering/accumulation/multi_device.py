@@ -14,19 +14,20 @@ from ...errors import NoRoomError
 from ..compile.compile_scene import CompiledScene
 from ..film.film import Film
 from ..film.tiles import TILE_PIXELS, row_by_row, tile_by_tile, tiles_of
-from .accumulation import Accumulation
 from .checked_loops import check_samples
 from .device_pool import Team
 from .device_worker import Worker
+from .launch_plan import first_launch
+from .local import LocalAccumulation
 from .scene_on_device import SceneOnDevice
-from .single_device import Session, first_launch
+from .single_device import Session
 from .work_queue import Work
 
 #: Approximate number of launches per pass and device: at the end of a pass some devices wait for others.
 PASS_LAUNCHES = 12
 
 
-class Crew(Accumulation):
+class Crew(LocalAccumulation):
     """Accumulation of the image of a team's scene, or of a band of it: then `size` is the band's, as wide as the image,
     and `first_tile` is its first tile."""
 
@@ -107,7 +108,7 @@ def make_team(devices: Sequence[Device], compiled: Sequence[CompiledScene], size
 
 
 def make_picture(devices: Sequence[Device], compiled: Sequence[CompiledScene], size: tuple[int, int], max_depth: int,
-                 seed: int, planned_spp: int | None, before: Sequence[SceneOnDevice] = ()) -> Accumulation:
+                 seed: int, planned_spp: int | None, before: Sequence[SceneOnDevice] = ()) -> LocalAccumulation:
     """Return a Session if there is one device with room for the film, else a Crew; before: see `SceneOnDevice`."""
     if len(devices) == 1:
         with suppress(NoRoomError):

@@ -15,8 +15,8 @@ from ...errors import UsageError
 from ..film.tiles import TILE_PIXELS, row_by_row, scattered
 from .accumulation import Accumulation
 from .checked_loops import check_pixels, mark_pixels
+from .launch_plan import FEWEST_TILES, FIRST_LAUNCH_SAMPLES, block_bits, first_launch_samples
 from .scene_on_device import WINDOW, WINDOWS
-from .single_device import FEWEST_TILES, FIRST_LAUNCH_SAMPLES, block_bits, first_launch_samples
 
 
 def render_pixels(session: Accumulation, source: str, name: str, record: np.dtype[Any], samples: int) -> NDArray[Any]:

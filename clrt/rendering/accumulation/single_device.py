@@ -4,39 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain
-from typing import Any
 
 import numpy as np
 import pyopencl as cl
 from numpy.typing import NDArray
 
-from ...accel.traversal_kernels import TREELESS
 from ...device.launches.device_arrays import on_device
 from ...device.launches.launch import Launches, calling, wait_for
 from ...device.launches.lent_memory import begin_copy
 from ...device.open import Device
 from ...errors import NoRoomError
-from ...scene.model import RenderSettings
-from ..compile.camera_kernel import launch_record
 from ..compile.compile_scene import CompiledScene
 from ..film.film import Film
 from ..film.host_memory import HostMemory
 from ..film.tiles import TILE_PIXELS
-from .accumulation import Accumulation
 from .checked_loops import check_samples
+from .launch_plan import FEWEST_TILES, first_launch, first_launch_samples
+from .local import LocalAccumulation
 from .scene_on_device import SceneOnDevice, largest_film
 from .work_queue import Work
 
-#: Minimum number of tiles per launch.
-FEWEST_TILES = 16
 #: Approximate number of launches per pass, unless a single sample per pixel needs more.
 PASS_LAUNCHES = 4
-#: Samples of the first launch, before any has been timed: slow devices take a tenth of a second for twice as many.
-FIRST_LAUNCH_SAMPLES = 1 << 10
 #: Fill pattern for a black film; the size of every pixel record is a multiple of its size.
 BLACK = np.zeros(8, np.uint32)
-#: Number of primitives whose brute-force intersection takes about as long as a BVH traversal.
-QUICKLY_MET = 128
 
 
 class _Tiles:
@@ -47,7 +38,7 @@ class _Tiles:
             self.numbers, self.buffer = numbers, on_device(device, numbers)
 
 
-class Session(Accumulation):
+class Session(LocalAccumulation):
     """Accumulation of one compiled scene at one size, on one device. Raises NoRoomError if scene or film do not fit."""
 
     def __init__(self, device: Device, compiled: CompiledScene, size: tuple[int, int], max_depth: int,
@@ -129,33 +120,3 @@ class Session(Accumulation):
         with calling():
             copied = begin_copy(self.device, self._film, film.pixels)
         wait_for(copied)
-
-
-def first_launch(compiled: CompiledScene, size: tuple[int, int], max_depth: int, seed: int,
-                 planned_spp: int | None) -> NDArray[Any]:
-    """Return the LAUNCH record of an image, without a range of pixels and samples."""
-    launch = launch_record(compiled.camera, size)
-    launch["max_depth"], launch["seed"], launch["block_bits"] = max_depth, seed, block_bits(planned_spp)
-    launch["clamp_direct"], launch["clamp_indirect"] = compiled.clamps
-    return launch
-
-
-def first_launch_samples(compiled: CompiledScene) -> int:
-    """Return the samples of the first launch, before any has been timed: fewer if rays are intersected by brute force.
-    """
-    primitives = int(compiled.counts["triangles"][0] + compiled.counts["spheres"][0])
-    slow = compiled.tree.name in TREELESS and primitives > QUICKLY_MET
-    return FIRST_LAUNCH_SAMPLES * QUICKLY_MET // primitives if slow else FIRST_LAUNCH_SAMPLES
-
-
-def block_bits(planned_spp: int | None) -> int:
-    """Return log2 of the samples that a pixel takes from one block of its sampler's sequence (kernels/sampler.cl).
-
-    This is the smallest power of two that covers `planned_spp`; 32, i.e. unlimited, if the sample count is not known.
-    """
-    return 32 if planned_spp is None else (planned_spp - 1).bit_length()
-
-
-def depth_of(settings: RenderSettings) -> int:
-    """Return the maximum path depth, as the integrator counts it."""
-    return min(settings.max_depth, 2) if settings.integrator == "direct" else settings.max_depth

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError, UsageError
-from ..animation import Animation, animation_problems
+from ..animation import Animation
+from ..camera_path import animation_problems
 from ..geometry.instancing import painted
 from ..lights import LIGHTS, PointLight, SpotLight
 from ..materials.material_types import MATERIALS, Diffuse, Material

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from ....scene.model import Scene
 from ..materials.pack_textures import Textures
 from ..records import DIRECTIONAL_LIGHT, POINT_LIGHT, SPHERE_LIGHT, SPOT_LIGHT, SUN_LIGHT
 from .environment_map import LUMINANCE, Sky
+from .hidden_lights import hidden_lights, opaque_and_sides
 from .light_bounds import Doubles, joined, round_lights, spot_lights
 from .light_sampler import LightChoice, pack_choice
 from .triangle_lights import pack_triangle_lights
@@ -53,9 +55,9 @@ class Emitters:
 def pack_emitters(scene: Scene, sky: Sky, textures: Textures) -> Emitters:
     """Pack all lights of the scene that are not black."""
     flat = pack_triangle_lights(scene.meshes, textures)
-    shines = np.array([any(sphere.material.radiance) for sphere in scene.spheres], bool)
-    of_sphere = np.where(shines, len(flat.records) + np.cumsum(shines) - 1, -1).astype(np.int32)
     balls, points, spots = _sphere_lights(scene, textures), _point_lights(scene), _spot_lights(scene)
+    of_sphere = np.full(len(scene.spheres), -1, np.int32)
+    of_sphere[balls["sphere"]] = len(flat.records) + np.arange(len(balls))
     beams, suns = _directional_lights(scene), _suns(scene)
     records = {"triangle": flat.records, "sphere": balls, "point": points, "spot": spots, "directional": beams,
                "sun": suns}
@@ -85,6 +87,10 @@ def light_type(light: Light) -> str | None:
 
 def _sphere_lights(scene: Scene, textures: Textures) -> NDArray[Any]:
     lamps = [(i, sphere) for i, sphere in enumerate(scene.spheres) if any(sphere.material.radiance)]
+    opaque, sides = opaque_and_sides([sphere.material for _, sphere in lamps])
+    shapes = np.array([(*sphere.center, sphere.radius) for _, sphere in lamps], np.float64).reshape(-1, 4)
+    hidden = hidden_lights(np.column_stack([shapes, sides]), opaque)
+    lamps = list(compress(lamps, ~hidden))
     records = np.zeros(len(lamps), SPHERE_LIGHT)
     for record, (record["sphere"], lamp) in zip(records, lamps):
         record["center"], record["radius"], record["radiance"] = lamp.center, lamp.radius, lamp.material.radiance

@@ -14,6 +14,7 @@ from ..geometry.pack_geometry import Corners
 from ..materials.pack_textures import Textures
 from ..records import TRIANGLE_LIGHT
 from .environment_map import LUMINANCE
+from .hidden_lights import hidden_lights, opaque_and_sides
 from .light_bounds import Doubles, LightGroups, flat_lights
 from .mean_emission import mean_emission
 
@@ -33,7 +34,8 @@ class TriangleLights(NamedTuple):
 
 
 def pack_triangle_lights(meshes: list[Mesh], textures: Textures) -> TriangleLights:
-    """Pack the emissive triangles of the meshes, in order, except for those that are black or have no area in float32.
+    """Pack the emissive triangles of the meshes, in order, except for those that are black, have no area in float32, or
+    are hidden by an earlier one in the same place.
 
     Textured ones are never joined, and are sampled according to the texels they cover. Those whose opacity varies are
     not joined either, as it is read at the texture coordinates of one triangle.
@@ -48,7 +50,9 @@ def pack_triangle_lights(meshes: list[Mesh], textures: Textures) -> TriangleLigh
     around = np.concatenate([np.ones((0, 3)), *map(mean_emission, itertools.compress(meshes, shines))])
     corners = np.asarray(Corners(list(itertools.compress(meshes, shines)))).astype(np.float64)
     area = _normals(corners)[1] / 2
+    opaque, sides = opaque_and_sides([each.material for each in meshes])
     seen = (emission[mesh[lamps]] * around).any(axis=1) & (area.astype(np.float32) > 0)
+    seen &= ~hidden_lights(np.column_stack([corners.reshape(-1, 9), sides[mesh[lamps]]]), opaque[mesh[lamps]])
     lamps, around = lamps[seen], around[seen]
     corners, whole = _joined(corners[seen], mesh[lamps], lamps, ~uneven[mesh[lamps]])
     begins = np.ones(len(lamps), bool)
