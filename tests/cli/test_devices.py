@@ -65,7 +65,7 @@ def test_a_device_that_computes_right(best: str, tmp_path: Path) -> None:
     assert "arithmetic" in result.stderr and "room" in result.stderr
     shown = run(tmp_path, "devices").stdout
     assert f"checked {check['when']}" in shown and "passed" in shown
-    assert re.search(r"device checks .* 1 deleted", run(tmp_path, "cache", "--clear").stdout)
+    assert re.search(r"checks of devices .* 1 deleted", run(tmp_path, "cache", "--clear").stdout)
     assert "check" not in listed(run(tmp_path, "devices", "--json"), best)
 
 

@@ -151,8 +151,8 @@ def test_the_one_that_is_preferred_is_chosen(monkeypatch: pytest.MonkeyPatch, tm
         monkeypatch.setenv("CLRT_DEVICE", variable)
         listed = devices()
         assert [row["index"] for row in listed if row["chosen"]] == ([] if chosen is None else [chosen])
-        assert [row["index"] for row in listed if "chosen as" in row["why"]] == ([] if chosen is None else [chosen])
-        assert chosen is None or f"{origin} names it" in listed[chosen]["why"]
+        assert [row["index"] for row in listed if "chosen " in row["why"]] == ([] if chosen is None else [chosen])
+        assert chosen is None or f"{origin} selects it" in listed[chosen]["why"]
         assert chosen is None or choose()[0].index == chosen
 
 

@@ -16,8 +16,8 @@ from pathlib import Path
 #: File names of scenes' reference images (bench/convergence/reference.py).
 REFERENCES = "reference-*.npz"
 #: File name patterns by kind of content.
-KINDS = {"programs": "*.bin", "reference images": REFERENCES, "driver probes": "*.driver.json",
-         "device checks": "*.check.json", "device speeds": "*.bench.json", "loop limits": "*.loops.json",
+KINDS = {"programs": "*.bin", "reference pictures": REFERENCES, "probes of drivers": "*.driver.json",
+         "checks of devices": "*.check.json", "speeds of devices": "*.bench.json", "loop limits": "*.loops.json",
          "logs": "last-*.log", "unfinished files": "unfinished-*"}
 
 
