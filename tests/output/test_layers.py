@@ -76,7 +76,7 @@ def test_numbers_that_float32_has_not_are_told(tmp_path: Path, caplog: pytest.Lo
     assert not caplog.messages and layers(tmp_path / "a.exr")[1]["object.X"].tolist() == [[1 << 24, -1]]
     with caplog.at_level(logging.WARNING):
         write_image(tmp_path / "a.exr", pixels, aovs={"object": ids + 1})
-    assert caplog.messages == ["object: numbers above 16777216 are rounded in an .exr; Image.aovs has the exact"]
+    assert caplog.messages == ["object: numbers above 16777216 are rounded in an .exr; Image.aovs has the exact ones"]
 
 
 def test_the_command_writes_them(tmp_path: Path) -> None:
