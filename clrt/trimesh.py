@@ -73,7 +73,7 @@ class RayMeshIntersector:
     def __init__(self, mesh: Any, scale_to_box: bool = True, *, device: str | int | None = None) -> None:
         """Build nothing yet: a trimesh primitive creates its faces on first access."""
         if not (hasattr(type(mesh), "vertices") and hasattr(type(mesh), "faces")):
-            raise UsageError(f"mesh is a {type(mesh).__name__} and has no faces; give a trimesh.Trimesh, of a Scene "
+            raise UsageError(f"mesh is a {type(mesh).__name__} and has no faces; give a trimesh.Trimesh, for a Scene "
                              "scene.to_mesh()")
         self.mesh = mesh
         self._device = device

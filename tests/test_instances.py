@@ -171,12 +171,12 @@ def test_nothing_to_hit(device: Device, layout: str) -> None:
 
 
 @pytest.mark.parametrize("mesh, matrix, message", [
-    ([3], np.eye(3, 4), r"mesh\[0\] = 3: the length of meshes is 3"),
+    ([3], np.eye(3, 4), r"mesh\[0\] = 3: there are 3 meshes"),
     ([0], np.eye(4), r"transforms \(1, 4, 4\) must .*transforms\[:, :3\]"),
     ([0], 1j * np.eye(3, 4), "transforms has dtype complex128"),
     ([0], np.diag([1.0, 1.0, 0.0]) @ np.eye(3, 4), r"transforms\[0\].*flattens the mesh"),
     ([0], np.full((3, 4), np.nan), r"transforms\[0\].*not finite"),
-    ([0.5], np.eye(3, 4), "whole numbers"),
+    ([0.5], np.eye(3, 4), "integers"),
 ])
 def test_mistakes_are_named(device: Device, mesh: list[Any], matrix: Doubles, message: str) -> None:
     with pytest.raises(clrt.SceneError, match=message):

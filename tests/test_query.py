@@ -157,13 +157,13 @@ def test_a_mesh_without_faces_is_empty(device: Device) -> None:
     (np.zeros((3, 3)), [[0, 1, 3]], "faces[0]"),
     (np.zeros((3, 3)), [[0, -1, 2]], "faces[0]"),
     (np.zeros((3, 3)), [[0.0, 1.0, 2.0]], "float64"),
-    (np.zeros((4, 3)), [[1, 2, 3], [2, 3, 4]], "faces[1] = [2, 3, 4]: there are 4 vertices, and they count from 0"),
+    (np.zeros((4, 3)), [[1, 2, 3], [2, 3, 4]], "faces[1] = [2, 3, 4]: the mesh has 4 vertices, counted from 0"),
     ([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]], "vertices[2]"),
     ([[0, 0, 0], [1e300, 0, 0], [0, 1, 0]], [[0, 1, 2]], "vertices[1] = [1e+300, 0.0, 0.0]"),
     (np.zeros((3, 3), complex), [[0, 1, 2]], "vertices has dtype complex128"),
     (np.zeros((3, 3)), [[0j, 1, 2]], "faces has dtype complex128"),
-    ([[0, 0, 0], [1, 0]], [[0, 1, 2]], "vertices is no array"),
-    (np.zeros((3, 3)), [[0, 1, 2], [0]], "faces is no array"),
+    ([[0, 0, 0], [1, 0]], [[0, 1, 2]], "vertices is not an array"),
+    (np.zeros((3, 3)), [[0, 1, 2], [0]], "faces is not an array"),
     (np.zeros((3, 3)), "faces", "faces has dtype"),
 ])
 def test_what_is_no_mesh_is_refused(vertices: Any, faces: Any, words: str) -> None:
@@ -183,7 +183,7 @@ def test_what_is_no_mesh_is_refused(vertices: Any, faces: Any, words: str) -> No
     (np.zeros(3), np.ones(3), None, "t_max has dtype object"),
     (np.zeros(3), np.ones(3), "far", "t_max has dtype"),
     (np.zeros(3, complex), np.ones(3), 1, "origins has dtype complex128"),
-    ([[0, 0, 0], [0]], np.ones(3), 1, "origins is no array"),
+    ([[0, 0, 0], [0]], np.ones(3), 1, "origins is not an array"),
 ])
 def test_rays_that_do_not_fit_are_refused(device: Device, origins: Any, directions: Any, t_max: Any,
                                           words: str) -> None:

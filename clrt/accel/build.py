@@ -52,7 +52,7 @@ def build_tree(device: Device | None, layout: str, builder: str | None, triangle
     """
     check_choice("layout", layout, LAYOUTS)
     if layout == "packs" and triangle != "watertight":
-        raise UsageError(f"the layout packs is for the watertight triangle test, not {triangle}: take another layout")
+        raise UsageError(f"the layout packs supports the triangle test watertight, not {triangle}; use another layout")
     spheres = np.zeros((0, 4), np.float32) if spheres is None else spheres
     return in_form(_over_corners(device, layout, builder, triangles, spheres), triangle, device)
 
@@ -78,8 +78,8 @@ def _fitting_builder(device: Device | None, layout: str, builder: str | None, co
     if builder in DEVICE_BUILDERS and (device is None or count < 2):
         return "sah"
     if builder in DEVICE_BUILDERS and layout not in device_builder.SHAPES:
-        raise UsageError(f"the builder {builder} makes {', '.join(device_builder.SHAPES)}, not {layout}: "
-                         "take the builder sah")
+        raise UsageError(f"the builder {builder} builds {', '.join(device_builder.SHAPES)}, not {layout}; "
+                         "use the builder sah")
     return builder
 
 

@@ -89,10 +89,10 @@ def build_tree(device: Device, shape: Shape, triangles: Triangles, spheres: Floa
     reinsertions: number of optimisation passes. Raises SceneError for more than MAX_PRIMITIVES in all, and NoRoomError.
     """
     if (count := len(triangles) + len(spheres)) > MAX_PRIMITIVES:
-        raise SceneError(f"{count} primitives, but a device builds trees over {MAX_PRIMITIVES}: take the builder sah")
+        raise SceneError(f"{count} primitives, but a device builds BVHs over {MAX_PRIMITIVES}; use the builder sah")
     if not fits(device, count):
-        raise NoRoomError(f"{count} primitives need larger buffers than the {device.info.max_alloc_bytes} bytes that "
-                          f"{device.info.name} allows, to build a tree in: take the builder sah")
+        raise NoRoomError(f"building a BVH over {count} primitives needs larger buffers than the "
+                          f"{device.info.max_alloc_bytes} bytes that {device.info.name} allows; use the builder sah")
     source = program_source(shape, len(triangles) > 0, len(spheres) > 0, reinsertions > 0)
     work = Blocks(device, source, count * SHAPE * 4)
     primitives = sort_primitives(work, triangles, spheres)

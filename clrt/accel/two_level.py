@@ -48,7 +48,7 @@ class TwoLevels:
                  mesh: IntArray, triangle: str = "watertight", spheres: FloatArray | None = None) -> None:
         check_choice("layout", layout, LAYOUTS)
         if layout not in FORMS:
-            raise UsageError(f"the layout {layout} is no tree, which instances need: take one of {', '.join(FORMS)}")
+            raise UsageError(f"the layout {layout} is not a BVH, which instances need; use one of {', '.join(FORMS)}")
         start = time.perf_counter()
         self._device, self._form, self._mesh = device, FORMS[layout], mesh
         balls = [np.zeros((0, 4), np.float32)] * len(meshes)

@@ -100,7 +100,7 @@ def collapse(tree: Tree, width: int = 8, pack: int = 1) -> Wide:
     """
     largest = max(tree.order.size, tree.sphere_order.size)
     if largest > MAX_PRIMITIVES:
-        raise SceneError(f"{largest} primitives of one kind, but a wide tree holds {MAX_PRIMITIVES}: use bvh2")
+        raise SceneError(f"{largest} primitives of one kind, but a wide BVH holds up to {MAX_PRIMITIVES}; use bvh2")
     if tree.count.max() > MAX_LEAF:
         raise ValueError(f"a leaf of {tree.count.max()} primitives; a leaf reference holds {MAX_LEAF}")
     if tree.empty:

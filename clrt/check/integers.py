@@ -97,9 +97,9 @@ def _check_loops(device: Device, findings: Findings) -> None:
     turns = measured_turns(device)
     if turns is None:
         return
-    findings.figures["turns of a work-item's loops"] = turns
+    findings.figures["iterations of a work-item's loops"] = turns
     if device.vectors or turns < LEAST_TURNS:
-        findings.failures.append(f"a loop of {TURNS} turns ends after {turns}")
+        findings.failures.append(f"a loop of {TURNS} iterations ends after {turns}")
 
 
 def _check_rows(probe: Probe, kernel: str, lanes: int, operations: Mapping[str, Operation], inputs: NDArray[np.uint32],

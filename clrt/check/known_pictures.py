@@ -58,7 +58,7 @@ def check_lamp(device: Device, findings: Findings) -> None:
     least, most = ((height / (height**2 + np.add.outer(b**2, a**2)) ** 1.5)[..., None] * light
                    for b, a in (farthest, nearest))
     inside = (least * (1 - 1e-5) <= film.mean) & (film.mean <= most * (1 + 1e-5))
-    findings.expect(inside.ravel(), "light of a lamp on a floor", ("gave", film.mean.ravel()),
+    findings.expect(inside.ravel(), "light of a point light on a floor", ("gave", film.mean.ravel()),
                     ("not between", least.ravel()), ("and", most.ravel()))
 
 
@@ -79,7 +79,7 @@ def check_ball(device: Device, findings: Findings) -> None:
                       fov_degrees=float(np.degrees(2 * np.arctan(np.tan(corner) / np.sqrt(2)))))), spp=16, max_depth=2)
     light, least_cosine = np.multiply(color, sun) / np.pi, np.cos(np.arcsin(0.3) - corner)
     inside = (shine + least_cosine * light <= film.mean * (1 + 1e-5)) & (film.mean <= (shine + light) * (1 + 1e-5))
-    findings.expect(inside.reshape(-1, 3).all(axis=1), "light of the sun on a ball that shines",
+    findings.expect(inside.reshape(-1, 3).all(axis=1), "light of the sun on an emissive sphere",
                     ("gave", film.mean.reshape(-1, 3)))
 
 
@@ -119,5 +119,5 @@ def _film(device: Device, findings: Findings, scene: Scene, spp: int, max_depth:
     renderer = Renderer(scene, device=device.info.id, size=(size, size), max_depth=max_depth)
     *_, state = renderer.passes(spp=spp)
     count, dropped = (state.film.pixels[name].ravel() for name in ("count", "dropped"))
-    findings.expect(count == spp, "samples of a pixel", ("kept", count), ("dropped", dropped))
+    findings.expect(count == spp, "samples per pixel", ("kept", count), ("dropped", dropped))
     return state.film

@@ -40,7 +40,7 @@ def check_tree_builder(device: Device, findings: Findings) -> None:
     rays = _shuffled(_rays(device, star))
     built = _check_hits(_query(device, star, builder="ploc"), star, rays, findings)
     other = _query(device, star, builder="sah").closest_hit(rays.origins, rays.directions)
-    findings.expect(built == other, "hits in the device's tree", ("gave", built), ("and in numpy's", other))
+    findings.expect(built == other, "hits in the BVH built by the device", ("gave", built), ("numpy's", other))
 
 
 def _star(device: Device) -> Star:

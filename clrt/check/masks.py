@@ -28,4 +28,4 @@ def check_masks(device: Device, findings: Findings) -> None:
         findings.same(facts[:, column], truth, f"{name} of a mask", mask.astype(int), b)
     for row, kept in enumerate(mask):
         truth = np.append(a[row][kept].view(np.int32), np.full(8 - kept.sum(), -1))
-        findings.same(stored[row], truth, "lanes that are stored", a[row])
+        findings.same(stored[row], truth, "stored lanes", a[row])

@@ -40,7 +40,7 @@ class _Commands(Group):
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="clrt")
 def commands() -> None:
-    """Path tracing on any OpenCL device, with the error of every picture."""
+    """Path tracing on any OpenCL device, with an error estimate for every image."""
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -23,7 +23,7 @@ from .options import Group
 
 @click.group(cls=Group)
 def command() -> None:
-    """Measure this machine: rays, build, hits, peers, converge, agree, combinations, floor, blender,
+    """Measure speed and accuracy: rays, build, hits, peers, converge, agree, combinations, floor, blender,
     mitsuba-data, render-fidelity, numerics, theses, farm."""
 
 

@@ -15,18 +15,18 @@ from .options import Size
 
 @click.command("agree")
 @click.argument("scenes", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SCENE...")
-@click.option("--size", type=Size(), help="Picture size in pixels; default: the scene's.")
+@click.option("--size", type=Size(), help="Image size in pixels; default: the scene's.")
 @click.option("--depth", type=click.IntRange(1, 1024), help="Maximum path depth; default: the scene's.")
 @click.option("--spp", type=click.IntRange(min=1), default=64, show_default=True, help="Samples per pixel.")
-@click.option("--seeds", type=click.IntRange(min=2), default=16, show_default=True, help="Pictures of each renderer.")
-@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--seeds", type=click.IntRange(min=2), default=16, show_default=True, help="Images per renderer.")
+@click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
 @figures_options
 def agree_command(scenes: tuple[Path, ...], size: tuple[int, int] | None, depth: int | None, spp: int, seeds: int,
                   device: str | None, json_file: Path | None) -> None:
-    """Whether clrt and Mitsuba (pip install mitsuba) draw the same pictures of each SCENE.
+    """Test whether clrt and Mitsuba (pip install mitsuba) render the same image of each SCENE.
 
-    Each block of 16 x 16 pixels is compared by the spread of its means over the seeds. Exit code 1 where one differs
-    by more than chance, or the mean of a picture by more than 0.5 %.
+    The means of each block of 16 x 16 pixels are compared, given their spread over the seeds. The exit code is 1 if a
+    block differs by more than chance, or the mean of an image by more than 0.5 %.
     """
     from ..bench.renderers.agreement import agreement
     from ..formats.load_scene import load
@@ -47,8 +47,8 @@ def agree_command(scenes: tuple[Path, ...], size: tuple[int, int] | None, depth:
 
 HEAD = [f"{'':22}{'pixels':>10}  {'mean over Mitsuba’s, ± standard error':48}{'blocks':>7}{'noise':>9}{'most':>9}"
         f"{'largest':>9}{'p':>8}  agree",
-        "  noise: standard error of a block's relative difference, the median and the most; largest: such difference;",
-        "  p: of the least likely block and channel, corrected for their number"]
+        "  noise, most: median and maximum standard error of a block's relative difference; largest: of these",
+        "  differences; p: p-value of the least likely block and channel, corrected for multiple tests"]
 
 
 def agreement_line(result: Mapping[str, Any]) -> str:

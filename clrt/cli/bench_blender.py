@@ -12,20 +12,20 @@ from .bench_files import figures_options, write_figures
 @click.command("blender")
 @click.argument("scenes", nargs=-1, metavar="[SCENE]...")
 @click.option("--material", "materials", multiple=True, metavar="NAME",
-              help="Only this material: matte, bumps, metal, glass, plastic, all; repeatable.")
+              help="Test only this material: matte, bumps, metal, glass, plastic, all; may be repeated.")
 @click.option("--spp", type=click.IntRange(min=1), default=64, show_default=True, help="Samples per pixel.")
-@click.option("--seeds", type=click.IntRange(min=2), default=4, show_default=True, help="Images of each renderer.")
+@click.option("--seeds", type=click.IntRange(min=2), default=4, show_default=True, help="Images per renderer.")
 @click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
-              help="Write clrt's image and Cycles', side by side, there as PNG.")
-@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+              help="Write clrt's and Cycles' images there, side by side, as PNG.")
+@click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
 @figures_options
 def blender_command(scenes: tuple[str, ...], materials: tuple[str, ...], spp: int, seeds: int, pictures: Path | None,
                     device: str | None, json_file: Path | None) -> None:
     """Build scenes in Blender (pip install bpy), export them as glTF, and compare clrt's images with Cycles'.
 
-    SCENE is a kind of light: spot, area, sun, delta_sun, point, emission, HDRI, or together; all without one. Values
-    are mean radiances of the floor, Suzanne, the ball and the cube in clrt over those in Cycles, with their standard
-    errors.
+    SCENE is a kind of light: spot, area, sun, delta_sun, point, emission, HDRI, or together; default: all of them. The
+    values are the mean radiances of the floor, Suzanne, the sphere and the cube in clrt, divided by those in Cycles,
+    with standard errors.
     """
     from ..bench.renderers.blender import judge
     from ..bench.renderers.blender_scenes import COLORS

@@ -18,9 +18,9 @@ PROPERTIES = ("additivity", "strategies", "choice", "integrators", "brightness",
               "bystanders")
 HEADER = (f"{'':16}{'scenes':>8}{'off':>6}{'2 rounds':>10}{'3 rounds':>10}{'4 rounds':>10}{'least p':>10}{'noise':>9}"
           f"{'dropped':>9}")
-LEGEND = """  rounds: suspicious scenes, rendered again with fresh seeds and more samples
-  least p: of a scene's last round, corrected; dropped: samples that were not finite
-  noise: standard error of the relative difference of whole pictures, median"""
+LEGEND = """  off: violations; rounds: suspicious scenes are rendered again with new seeds and more samples
+  least p: smallest p-value of a scene's last round, corrected; dropped: samples that were not finite
+  noise: median standard error of the relative difference of whole images"""
 
 
 @click.command("combinations")
@@ -31,20 +31,20 @@ LEGEND = """  rounds: suspicious scenes, rendered again with fresh seeds and mor
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(0, 2**32 - 1), help="Seed of the scenes.")
 @click.option("--keep", type=click.Path(path_type=Path), metavar="DIR",
               help="Save the scenes that violate a property there, as scene files.")
-@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
 @click.option("--quick", is_flag=True, help="Test few scenes.")
 @figures_options
 def combinations_command(names: tuple[str, ...], scenes: int | None, first: int, seed: int, keep: Path | None,
                          device: str | None, quick: bool, json_file: Path | None) -> None:
-    """Test identities that hold for all pictures over random scenes.
+    """Test identities of rendered images on random scenes.
 
-    The scenes combine all materials, lights, cameras and textures at random. Properties: the picture in all lights is
-    the sum of the pictures in each light (additivity); BSDF sampling, light sampling and both together have the same
-    mean (strategies), and so has the uniform choice of lights (choice); path at depth 2 agrees with direct, local and
-    raster (integrators); brighter light makes a proportionally brighter picture (brightness); moving, rotating,
-    mirroring and scaling a scene with its camera keeps the picture (similarity), and so do meshes in pieces and as
-    instances (partition), and further objects that are not seen (bystanders). The exit code is 1 if a scene violates a
-    property significantly.
+    The scenes combine all materials, lights, cameras and textures at random. Properties: the image with all lights is
+    the sum of the images with one light each (additivity); BSDF sampling, light sampling and both together have the
+    same mean (strategies), and so has choosing lights uniformly (choice); path at depth 2 agrees with direct, local and
+    raster (integrators); brighter light makes a proportionally brighter image (brightness); the image stays the same if
+    a scene and its camera are moved, rotated, mirrored or scaled (similarity), if meshes are split or instanced
+    (partition), and if objects out of view are added (bystanders). The exit code is 1 if a scene violates a property
+    significantly.
     """
     from ..bench.combinations.combinations import keep_scenes, verdicts
     from ..device.open import open_device
@@ -73,8 +73,8 @@ def combinations_command(names: tuple[str, ...], scenes: int | None, first: int,
 
 
 def _line(each: Verdict) -> str:
-    return (f"  off: {each.property}, scene {each.number}: {each.side}: picture {each.mean - 1:+.2%} ± {each.noise:.2%}"
-            f", a block {each.difference:+.2%}, p {each.p:.1e}")
+    return (f"  off: {each.property}, scene {each.number}: {each.side}: image {each.mean - 1:+.2%} ± {each.noise:.2%}"
+            f", one block {each.difference:+.2%}, p {each.p:.1e}")
 
 
 def _row(name: str, found: list[Verdict], tests: int) -> str:

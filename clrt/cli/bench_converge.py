@@ -27,33 +27,34 @@ INTEGRATORS = ["path", "direct", "local", "raster"]
 @click.command("converge")
 @click.argument("scenes", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="SCENE...")
 @click.option("--choice", "names", multiple=True, type=click.Choice(NAMES),
-              help="Compare these alone, with the first; may be repeated. Default: up to bvh2.")
+              help="Configuration to compare with the first; may be repeated. Default: up to bvh2.")
 @click.option("--integrator", "integrators", multiple=True, type=click.Choice(INTEGRATORS),
-              help="Instead of the scene's; may be repeated. Each is compared with a reference of its own.")
-@click.option("--peers", is_flag=True, help="Beside other renderers, where installed: Mitsuba, Cycles.")
-@click.option("--device", "selectors", multiple=True, metavar="SEL", help="See `clrt devices`; may be repeated.")
-@click.option("--size", type=Size(), help="Picture size in pixels.")
+              help="Integrator instead of the scene's; may be repeated. Each has its own reference.")
+@click.option("--peers", is_flag=True, help="Also compare Mitsuba and Cycles, if installed.")
+@click.option("--device", "selectors", multiple=True, metavar="SEL",
+              help="Device to use; see `clrt devices`. May be repeated.")
+@click.option("--size", type=Size(), help="Image size in pixels.")
 @click.option("--time", "seconds", type=click.FloatRange(min=0, min_open=True), metavar="SECONDS",
-              help="That a picture may take; default: 10, with --quick 1, with --spp any.")
+              help="Longest time per image; default: 10, with --quick 1, with --spp unlimited.")
 @click.option("--spp", multiple=True, type=click.IntRange(min=1),
-              help="Samples per pixel, instead of 1, 2, 4 ...; may be repeated.")
-@click.option("--seeds", type=click.IntRange(min=1), help="Pictures of each; default: 5, with --quick 3.")
+              help="Samples per pixel instead of 1, 2, 4, ...; may be repeated.")
+@click.option("--seeds", type=click.IntRange(min=1), help="Images of each kind; default: 5, with --quick 3.")
 @click.option("--reference", type=click.Path(path_type=Path), metavar="FILE",
               help="Image to measure the error by, taken as exact; for one SCENE. Default: rendered and cached.")
 @click.option("--reference-spp", type=click.IntRange(min=2),
               help="Samples per pixel of the reference; default: 4096, with --quick 256.")
-@click.option("--quick", is_flag=True, help="Fewer seeds and a rougher reference.")
+@click.option("--quick", is_flag=True, help="Use fewer seeds and a noisier reference.")
 @figures_options
-@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Plot error against time there.")
 def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrators: tuple[Integrator, ...], peers: bool,
                      selectors: tuple[str, ...], size: tuple[int, int] | None, json_file: Path | None,
                      plot: Path | None, reference: Path | None, **asked: Any) -> None:
-    """How fast pictures of each SCENE come near a reference of many samples, which is rendered once and kept, or an
+    """Measure how fast images of each SCENE converge to a reference, which is rendered once and cached, or to the
     image that --reference names.
 
-    Images of 1, 2, 4 ... samples per pixel by all contestants, interleaved, with several seeds. Also whether the error
-    that clrt estimates is the true one, and whether a contestant is biased (ask for many seeds of one number of
-    samples).
+    All contestants render images of 1, 2, 4, ... samples per pixel with several seeds, in interleaved runs. Also
+    reports how accurate clrt's error estimate is, and whether a contestant is biased (use many --seeds with a single
+    --spp to test for bias).
     """
     from ..bench.convergence.calibration import calibrations
     from ..bench.convergence.contestants import CHOICES, MORE_CHOICES

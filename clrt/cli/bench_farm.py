@@ -17,21 +17,21 @@ SCENES = Path(__file__).parents[2] / "scenes"
 @click.command("farm")
 @click.argument("trials", nargs=-1, type=click.Choice(TRIALS))
 @click.option("--scene", "scenes", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
-              help="Scenes; default: cornell, glass and materials, where they are.")
-@click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel; default: 64, of kills 1024, of huge 1.")
-@click.option("--every", default=4.0, show_default=True, metavar="SECONDS", help="Of kills: between two.")
+              help="Scene file; may be repeated. Default: cornell, glass and materials in a clone of the repository.")
+@click.option("--spp", type=click.IntRange(min=1), help="Samples per pixel; default: 64, for kills 1024, for huge 1.")
+@click.option("--every", default=4.0, show_default=True, metavar="SECONDS", help="kills: time between kills.")
 @click.option("--workers", default=64, show_default=True, type=click.IntRange(min=1),
-              help="Of overhead: workers that only sleep; their client's memory is told.")
-@click.option("--seconds", default=300.0, show_default=True, help="Of overhead: what the work itself takes.")
-@click.option("--size", type=Size(), default="16384x16384", show_default=True, help="Of huge: the picture.")
+              help="overhead: number of workers, which only sleep; the client's memory is measured.")
+@click.option("--seconds", default=300.0, show_default=True, help="overhead: duration of the work itself.")
+@click.option("--size", type=Size(), default="16384x16384", show_default=True, help="huge: image size.")
 @click.option("--out", type=click.Path(path_type=Path), default="huge.exr", show_default=True, metavar="FILE",
-              help="Of huge: where the picture is written.")
-@click.option("--quick", is_flag=True, help="Small pictures, and less of everything.")
+              help="huge: image file to write.")
+@click.option("--quick", is_flag=True, help="Use small images and less of everything.")
 @figures_options
 def farm_command(trials: tuple[str, ...], scenes: tuple[Path, ...], spp: int | None, every: float, workers: int,
                  seconds: float, size: tuple[int, int], out: Path, quick: bool, json_file: Path | None) -> None:
-    """Trials of a farm on this machine: is its picture that of one process to the last bit, also where workers are
-    killed; how far are 64 workers from 64 times one; and what memory does a client take for a picture of 16k x 16k."""
+    """Test a render farm on this machine: whether its image equals that of one process bit for bit, even if workers
+    are killed; how well it scales to 64 workers; how much memory the client needs for a 16k x 16k image."""
     from ..farm import trials as trial
     from ..formats.load_scene import load
     from ..output.images import check_writable

@@ -28,7 +28,7 @@ def figures_options(command: Callable[..., None]) -> Callable[..., None]:
 
     for option in (click.option("--force", is_flag=True, help="Replace files that are read-only."),
                    click.option("--json", "json_file", type=click.Path(path_type=Path), metavar="FILE",
-                                help="Write the figures there.")):
+                                help="Write the results to this file.")):
         checked = option(checked)
     return checked
 
@@ -53,12 +53,13 @@ def _check(given: Mapping[str, Any], force: bool) -> None:
     from ..output.atomic_files import check_target, check_unprotected, make_folder
     from ..output.error_plots import check_plot
 
-    taken = {os.path.realpath(path): "read" for name, value in given.items() if name not in {*FILES, *FOLDERS}
+    taken = {os.path.realpath(path): "an input" for name, value in given.items() if name not in {*FILES, *FOLDERS}
              for path in _paths(value)}
     for name, option in FILES.items():
         for path in _paths(given.get(name)):
             if before := taken.get(real := os.path.realpath(path)):
-                raise UsageError(f"{path}: is {before} and {option}, one of which would be lost; name another file")
+                raise UsageError(f"{path}: is both {before} and {option}, one of which would be lost; choose another "
+                                 "file")
             taken[real] = option
             (check_plot if name == "plot" else check_target)(path)
             check_unprotected(path, force)

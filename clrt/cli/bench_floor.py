@@ -13,24 +13,24 @@ from .bench_files import figures_options, write_figures
 
 @click.command("floor")
 @click.option("--light", "chosen", multiple=True, metavar="NAME",
-              help="Only this light: sun above, sun at 60°, point, HDRI, low lamp; repeatable.")
+              help="Test only this light: sun above, sun at 60°, point, HDRI, low lamp; may be repeated.")
 @click.option("--spp", type=click.IntRange(min=1), default=1024, show_default=True, help="Samples per pixel.")
-@click.option("--seeds", type=click.IntRange(min=2), default=4, show_default=True, help="Images of each renderer.")
-@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+@click.option("--seeds", type=click.IntRange(min=2), default=4, show_default=True, help="Images per renderer.")
+@click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
 @figures_options
 def floor_command(chosen: tuple[str, ...], spp: int, seeds: int, device: str | None, json_file: Path | None) -> None:
-    """What a white plastic floor reflects under a sun, a point, an HDRI with a low sun and a low lamp.
+    """Compare models of a white plastic floor under a sun, a point light, an HDRI with a low sun and a low area light.
 
-    In float64: clrt's model, the same with Fresnel's equations in place of Schlick's approximation, and that layered
-    by the view alone. Then clrt, Mitsuba's roughplastic and principled (pip install mitsuba), and Cycles' Principled
-    BSDF (pip install bpy). 1 is what a white Lambertian floor reflects.
+    In float64: clrt's model, the same with Fresnel's equations instead of Schlick's approximation, and the latter
+    layered by the view direction alone. Then clrt, Mitsuba's roughplastic and principled (pip install mitsuba), and
+    Cycles' Principled BSDF (pip install bpy). The values are relative to a white Lambertian floor.
     """
     from ..bench.renderers.plastic_floor import judges, lights, measure_floor
     from ..bench.renderers.plastic_floor_model import MODELS
     from ..errors import UsageError
 
     if unknown := [name for name in chosen if name not in lights()]:
-        raise UsageError(f"--light {unknown[0]}: is none of {', '.join(lights())}")
+        raise UsageError(f"--light {unknown[0]}: is unknown; choose from {', '.join(lights())}")
     found, missing = judges(device)
     columns = [*MODELS, *found]
     click.echo(f"{'light':15}{'view':7}{'material':15}" + "".join(f"{name:>17}" for name in columns))

@@ -12,14 +12,14 @@ from .bench_files import figures_options, write_figures
 
 
 @click.command("hits")
-@click.option("--device", metavar="SEL", help="See `clrt devices`; default: all of them.")
-@click.option("--quick", is_flag=True, help="Smaller meshes and fewer rays.")
+@click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`. Default: all of them.")
+@click.option("--quick", is_flag=True, help="Use smaller meshes and fewer rays.")
 @figures_options
 def hits_command(device: str | None, quick: bool, json_file: Path | None) -> None:
-    """The same rays through every tree, builder and device: how many answers are not the same bits.
+    """Trace the same rays with every BVH layout, builder and device, and count the hits that are not bitwise equal.
 
-    A million rays a mesh: random ones, and ones aimed at vertices, at edges and along the axes. Then how many of the
-    answers are wrong by float64.
+    A million rays per mesh: random ones, and rays aimed at vertices, at edges and along the axes. Then counts the hits
+    that are wrong according to float64.
     """
     from ..bench.rays.hit_agreement import measure_hits
     from ..device.discovery.discover import choose, devices
@@ -28,7 +28,7 @@ def hits_command(device: str | None, quick: bool, json_file: Path | None) -> Non
     found, results = [each for each in devices() if each["usable"] and only in (None, each["index"])], []
     for each in found:
         click.echo(f"device {each['index']}: {each['name']} ({each['platform']}, {each['driver']})")
-    click.echo("Below each kind of rays: how many answers are not the first line's, bit by bit")
+    click.echo("Below each kind of rays: number of hits that differ from the first line's in any bit")
     for result in measure_hits(quick=quick, device=device):
         click.echo("\n" + "\n".join(_lines(result)))
         results.append(result)
@@ -46,9 +46,9 @@ def _lines(result: Mapping[str, Any]) -> list[str]:
             f"{count:10}" for count in way["differ"].values())))
     if "exact" in result:
         exact = result["exact"]
-        lines.append(f"  checked in float64: {exact['wrong']} of {exact['rays']} answers impossible (only one triangle "
+        lines.append(f"  checked in float64: {exact['wrong']} of {exact['rays']} hits impossible (only one triangle "
                      f"was possible for {exact['decided']})")
         if result["escaped"] is not None:
             lines.append(f"  rays from the inside that hit nothing: {result['escaped']}")
-        lines.append(f"  hits on triangles whose corners lie in one line, the seams between others: {result['flat']}")
+        lines.append(f"  hits on degenerate triangles (collinear corners, seams between others): {result['flat']}")
     return lines

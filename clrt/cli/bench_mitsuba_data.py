@@ -13,26 +13,27 @@ from .bench_files import figures_options, write_figures
 
 @click.command("mitsuba-data")
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
-@click.option("--scene", "scenes", multiple=True, metavar="TEXT", help="Only scenes whose names hold this; repeatable.")
+@click.option("--scene", "scenes", multiple=True, metavar="TEXT",
+              help="Only scenes whose name contains this; may be repeated.")
 @click.option("--samples", type=click.IntRange(min=1), default=2_000_000, show_default=True,
-              help="Samples per picture, as in Mitsuba's tests.")
+              help="Samples per image, as in Mitsuba's tests.")
 @click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
-              help="Write clrt's picture, the reference, and the difference of the two times 4 there, as PNG.")
-@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+              help="Write clrt's image, the reference and 4 times their difference there, side by side, as PNG.")
+@click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
 @figures_options
 def mitsuba_data_command(folder: Path, scenes: tuple[str, ...], samples: int, pictures: Path | None,
                          device: str | None, json_file: Path | None) -> None:
     """Render the test scenes in DIR, a checkout of github.com/mitsuba-renderer/mitsuba-data, and test them against
     their references by Mitsuba's own Z-tests.
 
-    Scenes that clrt cannot express are listed with what is missing. Exit code 1 where one fails.
+    Scenes with unsupported features are listed with those features. The exit code is 1 if a scene fails.
     """
     from ..bench.renderers.mitsuba_data import cases, judge
     from ..errors import UsageError
 
     chosen = [case for case in cases(folder) if not scenes or any(text in case.name for text in scenes)]
     if not chosen:
-        raise UsageError(f"--scene {scenes[0]}: is in no scene's name; leave it out to see all")
+        raise UsageError(f"--scene {scenes[0]}: no scene's name contains it; leave it out to see all")
     rows = []
     for line in HEAD:
         click.echo(line)
@@ -49,9 +50,9 @@ def mitsuba_data_command(folder: Path, scenes: tuple[str, ...], samples: int, pi
 
 
 HEAD = [f"{'':67}{'result':10}{'rejected':>10}  {'mean over the reference’s':26}{'noise':>8}{'blocks':>9}{'p':>9}",
-        "  rejected: pixels and channels that are further off than chance, at most 0.25 % for a pass;",
-        "  noise: standard error of a block of 8x8 pixels; blocks: off by more than chance, of all; p: of the least",
-        "  likely one, corrected for their number"]
+        "  rejected: pixels and channels that differ by more than chance, at most 0.25 % for a pass;",
+        "  noise: standard error of a block of 8x8 pixels; blocks: those that differ by more than chance, of all;",
+        "  p: p-value of the least likely block, corrected for multiple tests"]
 
 
 def _line(row: Mapping[str, Any]) -> str:

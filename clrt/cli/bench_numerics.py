@@ -13,17 +13,17 @@ from .bench_files import figures_options, write_figures
 
 
 @click.command("numerics")
-@click.option("--device", metavar="SEL", help="See `clrt devices`; default: all but simulators.")
-@click.option("--quick", is_flag=True, help="Seconds instead of many minutes.")
+@click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`. Default: all but simulators.")
+@click.option("--quick", is_flag=True, help="Take seconds instead of many minutes.")
 @figures_options
-@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against speed there.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Plot error against speed there.")
 def numerics_command(device: str | None, quick: bool, json_file: Path | None, plot: Path | None) -> None:
-    """Numerical stability: errors beside speeds.
+    """Measure numerical stability: errors and the speed they are bought with.
 
-    First the intersection tests of each family, the default on top: Mrays/s of bounce rays (of offsets: Msamples/s of
-    a picture), how many times as fast as the default, by the clock and by processor time, and errors: of a million
-    rays or pixels, or of t in units in the last place (ulp). Then the hard cases by the defaults: how many answers are
-    wrong, where 0 is asked of all but M1.
+    First the intersection tests of each family, the default on top: Mrays/s of bounce rays (for offsets: Msamples/s of
+    an image), speed relative to the default (by wall-clock time, in brackets by processor time), and errors: per
+    million rays or pixels, or of t in units in the last place (ulp). Then the hard cases with the default tests: the
+    number of wrong results, which must be 0 except for M1.
     """
     from ..bench.numerics.families import measure_families
     from ..bench.numerics.numerics import chosen_devices, measure_device, measure_together
@@ -43,7 +43,7 @@ def numerics_command(device: str | None, quick: bool, json_file: Path | None, pl
         results.append({"device": info, "families": families, "rows": rows})
     together = [_echo(row) for row in measure_together(chosen, quick=quick)]
     wrong = sum(row["wrong"] for result in results for row in result["rows"])
-    click.echo(f"wrong in all: {wrong + sum(row['wrong'] for row in together if row['case'] != 'M1')}")
+    click.echo(f"wrong in total: {wrong + sum(row['wrong'] for row in together if row['case'] != 'M1')}")
     write_figures(json_file, {"quick": quick, "devices": results, "together": together})
     if plot is not None:
         click.echo(str(plot_families(plot, results)))
@@ -53,7 +53,7 @@ def _family(name: str, tests: Mapping[str, Mapping[str, Any]]) -> list[str]:
     from ..bench.numerics.families import FIGURES
 
     figures = FIGURES[name]
-    lines = [f"  {name:18}{'M/s':>9}{'times as fast':>18}" + "".join(f"{title:>17}" for title in figures.values())]
+    lines = [f"  {name:18}{'M/s':>9}{'relative speed':>18}" + "".join(f"{title:>17}" for title in figures.values())]
     for test, row in tests.items():
         lines.append(f"  {test:18}{row['mrays']:9.3g}{1 / row['ratio']:9.2f} ({1 / row['cpu_ratio']:5.2f})  "
                      + "".join(f"{row[key]:17.6g}" for key in figures))

@@ -13,29 +13,29 @@ from .options import box_option, triangle_option
 
 
 @click.command("rays")
-@click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE", help="A model file; default: a bumpy ball.")
+@click.option("--mesh", type=click.Path(path_type=Path), metavar="FILE", help="Model file; default: a bumpy sphere.")
 @click.option("--rays", type=click.Path(path_type=Path), metavar="FILE.npz",
-              help="origins (n, 3), directions (n, 3), t_max (n,); default: four kinds, in a closed room.")
-@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+              help="Arrays origins (n, 3), directions (n, 3), t_max (n,); default: four kinds, in a closed room.")
+@click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
 @click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "packs", "list"]),
-              help="Tree layout; default: all of them or, with --rays, the device's.")
+              help="BVH layout; default: all of them or, with --rays, the device's default.")
 @triangle_option
 @box_option
-@click.option("--builder", type=click.Choice(["ploc", "reinsertion", "sah", "midpoint"]), help="Tree builder.")
-@click.option("--quick", is_flag=True, help="Fewer rays, and a smaller ball.")
+@click.option("--builder", type=click.Choice(["ploc", "reinsertion", "sah", "midpoint"]), help="BVH builder.")
+@click.option("--quick", is_flag=True, help="Use fewer rays and a smaller sphere.")
 @figures_options
 def rays_command(mesh: Path | None, rays: Path | None, quick: bool, json_file: Path | None, **options: Any) -> None:
-    """Rays per second through a mesh, in kernels alone and in whole calls from Python.
+    """Measure rays per second through a mesh, for kernels alone and for whole calls from Python.
 
-    With --rays, those of the file: for their closest hits and for any hit. Without, from a camera, on from their hits
-    and to two lights, by every tree layout in turns.
+    With --rays: the closest hit and any hit of the file's rays. Without: camera rays, bounce rays and shadow rays to
+    two lights, with every BVH layout in interleaved runs.
     """
     from ..bench.rays.layout_speed import measure_layouts
     from ..bench.rays.ray_speed import load_rays, load_triangles, measure_rays
     from ..bench.rays.workloads import bumpy_ball
 
     if rays is not None and mesh is None:
-        raise click.UsageError("--rays needs the mesh that they are for: add --mesh FILE")
+        raise click.UsageError("--rays needs the mesh to intersect: add --mesh FILE")
     triangles = load_triangles(mesh) if mesh else bumpy_ball(5 if quick else 7)
     if rays is not None:
         result = measure_rays(*triangles, load_rays(rays), repeats=3 if quick else 7, **options)
@@ -51,7 +51,7 @@ def rays_command(mesh: Path | None, rays: Path | None, quick: bool, json_file: P
 def _lines(result: Mapping[str, Any]) -> list[str]:
     trees, kinds = result["trees"], result["kinds"]
     lines = [f"{result['triangles']} triangles in a closed room; {result['device']}, {result['platform']}",
-             f"  {'tree':24}{'builder':>12}{'seconds':>10}{'B/triangle':>12}{'SAH cost':>10}{'depth':>7}{'stack':>7}"]
+             f"  {'BVH':24}{'builder':>12}{'seconds':>10}{'B/triangle':>12}{'SAH cost':>10}{'depth':>7}{'stack':>7}"]
     lines += [f"  {name:24}{tree['builder']:>12}{tree['tree_seconds']:10.3f}{tree['bytes_per_triangle']:12.1f}"
               f"{tree['sah_cost']:10.2f}{tree['depth']:7}{tree['stack']:7}" for name, tree in trees.items()]
     for kind, rows in kinds.items():
@@ -66,6 +66,6 @@ COLUMNS = [("rays", "rays", "12"), ("Mrays/s", "mrays", "12.3g"), ("in calls", "
            ("time", "ratio", "12.2f"), ("CPU time", "cpu_ratio", "12.2f"), ("nodes", "nodes", "12.2f"),
            ("leaf tests", "tests", "12.2f"), ("differ", "differ", "12")]
 LEGEND = ["  Mrays/s: kernels alone, and in whole calls from Python",
-          "  time, CPU time (of the processor): of a ray, over the first line's; above 1 is slower",
-          "  nodes, leaf tests: what a ray visits; a leaf test is of one triangle, in bvh8 of eight",
-          "  differ: answers that are not the first line's, bit by bit"]
+          "  time, CPU time (processor time): per ray, over the first line's; above 1 is slower",
+          "  nodes, leaf tests: visited per ray; a leaf test intersects one triangle, in bvh8 eight",
+          "  differ: number of hits that differ from the first line's in any bit"]

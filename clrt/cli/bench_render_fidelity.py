@@ -14,22 +14,23 @@ from .bench_files import figures_options, write_figures
 @click.command("render-fidelity")
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
 @click.option("--scenario", "scenarios_", multiple=True, metavar="TEXT",
-              help="Only scenarios whose names hold this; repeatable.")
+              help="Only scenarios whose name contains this; may be repeated.")
 @click.option("--width", type=click.IntRange(min=16),
-              help="Pixels per row; the others' images are shrunk to that. Default: as many as they had.")
+              help="Image width; the other renderers' images are scaled down to it. Default: their own width.")
 @click.option("--spp", type=click.IntRange(min=1), default=32, show_default=True, help="Samples per pixel.")
-@click.option("--denoise", is_flag=True, help="Denoise clrt's pictures, as Cycles' were.")
+@click.option("--denoise", is_flag=True, help="Denoise clrt's images, as Cycles' were.")
 @click.option("--pictures", type=click.Path(path_type=Path), metavar="DIR",
-              help="Write clrt's picture and the others', side by side, there as PNG.")
-@click.option("--device", metavar="SEL", help="See `clrt devices`.")
+              help="Write clrt's and the other renderers' images there, side by side, as PNG.")
+@click.option("--device", metavar="SEL", help="Device to use; see `clrt devices`.")
 @figures_options
 def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: int | None, spp: int, denoise: bool,
                             pictures: Path | None, device: str | None, json_file: Path | None) -> None:
     """Render the glTF models in DIR, a checkout of github.com/KhronosGroup/glTF-Render-Fidelity with its submodules,
-    and compare the pictures with those of Cycles, V-Ray, Stellar, dspbr and three-gpu-pathtracer.
+    and compare the images with those of Cycles, V-Ray, Stellar, dspbr and three-gpu-pathtracer.
 
-    A scenario is inside if clrt is no further from the others than one of them is, by FLIP, and its means are within
-    5 % of theirs, of the whole and by material. Those whose files are missing are listed.
+    A scenario is inside if clrt's mean FLIP difference from the others is at most the largest of theirs from each
+    other, and its means over the whole image and each material are within 5 % of their range. Scenarios with missing
+    files are listed.
     """
     from ..bench.renderers.fidelity_suite import scenarios
     from ..bench.renderers.render_fidelity import judge
@@ -38,9 +39,9 @@ def render_fidelity_command(folder: Path, scenarios_: tuple[str, ...], width: in
 
     chosen = [each for each in scenarios(folder) if not scenarios_ or any(text in each.name for text in scenarios_)]
     if not chosen:
-        raise UsageError(f"--scenario {scenarios_[0]}: is in no scenario's name; leave it out to see all")
+        raise UsageError(f"--scenario {scenarios_[0]}: no scenario's name contains it; leave it out to see all")
     rows = []
-    click.echo(f"{'':36}{'result':10}{'FLIP':>6}{'spread':>8}{'whole':>8}  regions beyond the range of the others")
+    click.echo(f"{'':36}{'result':10}{'FLIP':>6}{'spread':>8}{'whole':>8}  regions outside the range of the others")
     for judged in judge(chosen, width, spp, denoise, device):
         click.echo(_line(judged.row))
         rows.append(judged.row)

@@ -6,11 +6,11 @@ import click
 
 
 @click.command()
-@click.option("--clear", is_flag=True, help="Delete all of it.")
+@click.option("--clear", is_flag=True, help="Delete everything in it.")
 def command(clear: bool) -> None:
-    """Show the folder of compiled programs, what is known of devices, and reference pictures, or clear it.
+    """Show or clear the cache: compiled programs, checks and measurements of devices, and reference images.
 
-    All of it is made again when it is needed. Drivers keep programs in caches of their own.
+    All of it is recreated when needed. Drivers have program caches of their own.
     """
     from ..device.programs import cache_files
 

@@ -7,8 +7,8 @@ from math import isfinite
 from statistics import median
 from typing import Any
 
-LEGEND = ["  relMSE: mean over seeds, less the reference's own; ratio: of relMSE·s (CPU: processor's) to the first's",
-          "  slope: of log relMSE over log samples; mean ratio: to the reference, by channel; z: how many standard",
+LEGEND = ["  relMSE: mean over seeds, minus the reference's own; ratio: relMSE·s (CPU: processor time) to the first's",
+          "  slope: of log relMSE over log samples; mean ratio: to the reference, by channel; z: by how many standard",
           "  errors it is above 1"]
 
 
@@ -23,9 +23,9 @@ def scene_lines(result: Mapping[str, Any], on_cpu: bool) -> list[str]:
              + " (  CPU)" * on_cpu + f"{'slope':>7}  {'mean ratio':20}      z"]
     lines += [_line(name, row, on_cpu) for name, row in rows.items()]
     lines += [f"  {name}: {why}" for name, why in result["missing"].items()]
-    lines += [f"  {name}: more than {AGREES:.1%} off in the mean, by too few samples or another scene"
+    lines += [f"  {name}: more than {AGREES:.1%} off in the mean: too few samples, or a different scene"
               for name, row in rows.items() if not row["agrees"]]
-    lines += [f"  {name}: biased; p, corrected for all means here: " + " ".join(f"{p:.1g}" for p in row["p"])
+    lines += [f"  {name}: biased; p-values, corrected for multiple tests: " + " ".join(f"{p:.1g}" for p in row["p"])
               for name, row in rows.items() if row["biased"]]
     return lines + LEGEND + _noise_lines(rows)
 
@@ -46,7 +46,7 @@ def _noise_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
                  for spp, ratios in zip(row["spp"], row["noise_ratio"])]
         lines += [f"  {name:28}" + " ".join(f"{spp}: {median(ratios):.2f}" for spp, ratios in known if ratios)
                   for _ in range(any(ratios for _, ratios in known))]
-    return ["  estimated error over the true one, by samples per pixel, median of seeds:", *lines] if lines else []
+    return ["  estimated error over true error, by samples per pixel, median over seeds:", *lines] if lines else []
 
 
 def calibration_lines(told: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -55,5 +55,5 @@ def calibration_lines(told: Mapping[str, Mapping[str, Any]]) -> list[str]:
 
     lines = [f"  {name:28}{row['pictures']:9}{row['within']:9.1%}{row['median']:9.2f}{row['worst']:9.2f}"
              for name, row in told.items()]
-    title = "estimated error over the true one, all scenes and numbers of samples"
-    return [title, f"  {'':28}{'pictures':>9}{f'to {RIGHT}x':>9}{'median':>9}{'worst':>9}", *lines, ""] if lines else []
+    title = "estimated error over true error, all scenes and numbers of samples"
+    return [title, f"  {'':28}{'images':>9}{f'to {RIGHT}x':>9}{'median':>9}{'worst':>9}", *lines, ""] if lines else []

@@ -14,20 +14,20 @@ from .options import CAMERA
 @click.argument("model", type=click.Path(path_type=Path))
 @click.argument("scene", type=click.Path(path_type=Path), metavar="SCENE.toml")
 @click.option("--camera", metavar="NAME", help=CAMERA)
-@click.option("--force", is_flag=True, help="Replace files that are there, also read-only ones.")
+@click.option("--force", is_flag=True, help="Replace existing files, including read-only ones.")
 def command(model: Path, scene: Path, camera: str | None, force: bool) -> None:
-    """Write SCENE.toml, which shows MODEL as `clrt render MODEL` does: camera, sky, lights and materials to change."""
+    """Write SCENE.toml, which renders like `clrt render MODEL`, with its camera, sky, lights and materials to edit."""
     from ..formats.load_scene import load
     from ..formats.toml.writer import started
     from ..output.atomic_files import check_target
     from ..output.scenes import save_scene
 
     if scene.suffix.lower() != ".toml":
-        raise UsageError(f"{scene}: a scene file ends in .toml; write {scene.with_suffix('.toml')}")
+        raise UsageError(f"{scene}: a scene file's name must end in .toml; write {scene.with_suffix('.toml')}")
     if model.suffix.lower() == ".toml":
-        raise UsageError(f"{model}: is a scene file already; name a model")
+        raise UsageError(f"{model}: is already a scene file; give a model file")
     if scene.exists() and not force:
-        raise UsageError(f"{scene}: exists already; name another file, or replace it with --force")
+        raise UsageError(f"{scene}: already exists; choose another file, or replace it with --force")
     check_target(scene)
     save_scene(started(load(model, camera)), scene, force=force)
     click.echo(str(scene))

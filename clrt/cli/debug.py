@@ -22,20 +22,20 @@ SETTINGS = ("size", "spp", "seed", "integrator", "sampler", "back_face_culling",
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("--pixel", type=Pixel(),
-              help="Column and row, from 0,0 in the upper left corner. Default: the center.")
+              help="Column and row of the pixel; 0,0 is the upper left corner. Default: the center.")
 @click.option("--samples", type=click.IntRange(min=0), default=4, show_default=True, metavar="N",
-              help="How many of the pixel's samples to list, from the first.")
+              help="Number of the pixel's samples to list, starting with the first.")
 @click.option("--spp", type=click.IntRange(min=1),
-              help="Samples per pixel that the render takes; all are traced for the summary. Default: the scene's.")
-@click.option("--integrator", type=click.Choice(["path", "direct"]), help="What to compute. Default: the scene's.")
-@click.option("--device", metavar="SEL", help="Number, id, part of a name, cpu or gpu; see `clrt devices`.")
+              help="Samples per pixel of the render; all are traced for the summary. Default: the scene's.")
+@click.option("--integrator", type=click.Choice(["path", "direct"]), help="Integrator; default: the scene's.")
+@click.option("--device", metavar="SEL", help="Device: number, id, part of a name, cpu or gpu; see `clrt devices`.")
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @picture_options
 @tracing_options
 def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: str | None, as_json: bool,
             camera: str | None, depth: int | None, pixel_filter: str | None, lanes: int | None, **given: Any) -> None:
-    """Show the paths of one pixel's samples in SCENE, and what they found: why the pixel is black, or where its light
-    comes from. With the options of a render they are the very samples of that render."""
+    """Show the light paths of one pixel of SCENE, and why it is black or where its light comes from. With the options
+    of a render, the samples are exactly those of that render."""
     if click.get_current_context().obj == PROGRAM:
         guarded(lambda: "")
     from ..debug.names import Names

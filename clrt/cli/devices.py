@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON list.")
-@click.option("--check", is_flag=True, help="Check each against known answers, and keep what is found.")
-@click.option("--bench", is_flag=True, help="Measure how many rays per second each follows, and rank them by that.")
-@click.option("--device", "selectors", multiple=True, metavar="SEL", help="Only this one; may be repeated.")
+@click.option("--check", is_flag=True, help="Check each device against known results, and store the outcome.")
+@click.option("--bench", is_flag=True, help="Measure each device's rays per second, and rank by it.")
+@click.option("--device", "selectors", multiple=True, metavar="SEL", help="Only this device; may be repeated.")
 @click.option("--limit", type=Finite(1.0), default=300.0, show_default=True, metavar="SECONDS",
-              help="What a check or measurement of a device may take.")
+              help="Time limit of a device's check or measurement.")
 @verbose_option
 def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...], limit: float) -> None:
-    """List the OpenCL devices, best first; * marks the one used when none is named.
+    """List the OpenCL devices, best first; * marks the default.
 
-    Checks and measurements take some seconds a device, measurements of simulators minutes: these are among them only
-    if they are named. A device that fails its check is used only if it is named, until its driver or clrt changes or
-    it passes.
+    A check or measurement takes seconds per device, a measurement of a simulator minutes: simulators are included only
+    if selected with --device. A device that fails its check is used only if selected explicitly, until its driver or
+    clrt changes or it passes.
     """
     from ..device.discovery.discover import as_dict, find_devices, select
     from ..device.discovery.install_advice import no_device
@@ -53,10 +53,10 @@ def command(as_json: bool, check: bool, bench: bool, selectors: tuple[str, ...],
     if not found:
         click.echo(no_device(), err=True)
     if preference:
-        click.echo(f"{preference.origin} names {preference.selector!r}: device {select()[0].index} is used where none "
-                   "is named", err=True)
+        click.echo(f"{preference.origin} selects {preference.selector!r}: device {select()[0].index} is the default",
+                   err=True)
     problems += [f"{info.name} failed the check: update the driver and run `clrt devices --check` again; until that "
-                 "passes, it is used only if it is named"
+                 "passes, it is used only if selected explicitly"
                  for info in found if info.id in verdicts and info.failed]
     if problems:
         raise DeviceError("; ".join(problems))
@@ -72,7 +72,8 @@ def _measured(info: DeviceInfo, limit: float) -> str:
         speed = measure_device(info, limit)
     except DeviceError as error:
         return str(error)
-    return "" if keep_speed(info, speed) else f"{info.name}: its speed cannot be kept"
+    stored = keep_speed(info, speed)
+    return "" if stored else f"{info.name}: its speed cannot be stored: the cache folder is not writable"
 
 
 def _checked(info: DeviceInfo, limit: float, verdicts: dict[str, Verdict]) -> str:
@@ -85,7 +86,7 @@ def _checked(info: DeviceInfo, limit: float, verdicts: dict[str, Verdict]) -> st
     except DeviceError as error:
         return str(error)
     if not keep_verdict(info, verdict):
-        click.echo(f"{info.name}: what was found cannot be kept: the cache folder cannot be written", err=True)
+        click.echo(f"{info.name}: the result cannot be stored: the cache folder is not writable", err=True)
     verdicts[info.id] = verdict
     return ""
 

@@ -17,16 +17,16 @@ FORMS = (".txt", ".json", ".zip")
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), metavar="FILE",
-              help="Write it there: .txt, .json or .zip, which has both and the logs.")
+              help="Write the report there: .txt, .json, or .zip with both and the logs.")
 @click.option("--force", is_flag=True, help="Replace a file that is read-only.")
 def command(as_json: bool, output: Path | None, force: bool) -> None:
     """Report versions, drivers, devices, their checks, the cache and the last logs.
 
-    Homes, user and machine are not named. Paths elsewhere are, so look through it before you publish it. Run
-    `clrt devices --check` first: what it found is part of the report.
+    The report does not contain home folders or the names of the user and the machine. It contains other paths, so read
+    it before you publish it. Run `clrt devices --check` first: its results are part of the report.
     """
     if output is not None and output.suffix.lower() not in FORMS:
-        raise UsageError(f"{output}: a report is a {', '.join(FORMS)} file; name one of these")
+        raise UsageError(f"{output}: unknown report format; use {', '.join(FORMS[:-1])} or {FORMS[-1]}")
     from ..device.discovery.diagnosis import diagnosis
     from ..output.json_text import json_text
 

@@ -19,7 +19,7 @@ def kept_elsewhere(error: OutputError, path: Path, write: Callable[[Path], objec
     if isinstance(error, KeptBesideError):
         return error
     kept = _write_elsewhere(path, write)
-    return error if kept is None else type(error)(f"{error}; it was written to {kept}")
+    return error if kept is None else type(error)(f"{error}; written to {kept} instead")
 
 
 def _write_elsewhere(path: Path, write: Callable[[Path], object]) -> Path | None:

@@ -30,9 +30,9 @@ def farm_options(command: F) -> F:
     """Add the options that select a cluster instead of this machine's devices."""
     for option in [
         click.option("--local-cluster", type=click.IntRange(min=1), metavar="N",
-                     help="Render with N processes on this machine; needs Dask."),
+                     help="Render with N worker processes on this machine; needs Dask."),
         click.option("--scheduler", metavar="ADDRESS",
-                     help="Render on the workers of a Dask scheduler, tcp://… or tls://…; --device is of theirs."),
+                     help="Render on the workers of a Dask scheduler, tcp://… or tls://…; --device is one of theirs."),
     ]:
         command = option(command)
     return command
@@ -45,7 +45,7 @@ def cluster_for(scheduler: str | None, local: int | None, progress: Progress) ->
         yield None
         return
     if scheduler is not None and local is not None:
-        raise UsageError("--scheduler and --local-cluster name two clusters; keep one of them")
+        raise UsageError("--scheduler and --local-cluster select two clusters; keep one of them")
     from ..farm.cluster import connect, local_cluster
 
     progress.phase("connect")
@@ -80,8 +80,8 @@ def render_huge(cluster: Cluster, scene: Scene, options: dict[str, Any], goal: G
     for name, value in {"--time": goal.seconds, "--aov": options["aovs"] or None, "--plot": results.plot,
                         "--denoise": results.denoise or None}.items():
         if value is not None:
-            raise UsageError(f"{name}: a picture of more than 8 million pixels is rendered in bands, each by a worker, "
-                             "which does not go with it; leave it out, or choose a smaller --size")
+            raise UsageError(f"{name}: is not supported for images of more than 8 million pixels, which are rendered "
+                             "in bands, each by a worker; leave it out, or choose a smaller --size")
     checkpoint, resume = options["checkpoint"], options["resume"]
     of_farm = ("checkpoint", "resume", "checkpoint_seconds", "aovs")
     chosen = {name: value for name, value in options.items() if name not in of_farm}

@@ -32,8 +32,8 @@ class Numbers(click.ParamType[str]):
 
     def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> str:
         if value != "all" and not _numbers(str(value)):
-            self.fail(f"{value!r} names no frames; write all, or numbers and ranges such as 12, 0-47, 0-99:5 or "
-                      "3,7,20-30", param, context)
+            self.fail(f"{value!r} is not a list of frames; write all, or numbers and ranges such as 12, 0-47, 0-99:5 "
+                      "or 3,7,20-30", param, context)
         return str(value)
 
 
@@ -43,10 +43,10 @@ def frame_options(command: F) -> F:
         click.option("--fps", type=click.FloatRange(min=0, min_open=True),
                      help="Frames per second; default: the scene's."),
         click.option("--turntable", type=click.IntRange(min=1), metavar="N",
-                     help="Go once around what the camera looks at, in N frames."),
+                     help="Orbit once around the point the camera looks at, in N frames."),
         click.option("--frames", type=Numbers(),
-                     help="Frames of a moving camera, to numbered files (name_####.png) and videos (.gif, .mp4, .webm):"
-                          " all, or such as 12, 0-47, 0-99:5."),
+                     help="Frames of an animation, written to numbered files (name_####.png) or a video (.gif, .mp4, "
+                          ".webm): all, or numbers and ranges such as 12, 0-47, 0-99:5."),
     ]:
         command = option(command)
     return command
@@ -96,8 +96,8 @@ class Sequence:
             self._of(number).check_apart(inputs)
         for video in self.videos:
             if os.path.realpath(video) in files:
-                raise UsageError(f"{video}: is a file of the scene and a video, one of which would be lost; name "
-                                 "another file")
+                raise UsageError(f"{video}: is both a file of the scene and a video, one of which would be lost; "
+                                 "choose another file")
 
     def left(self, scene: Scene, choices: Choices, goal: object) -> Iterator[tuple[Outputs, Camera]]:
         """Yield outputs and camera of each remaining frame. Finished images contain a hash of all they depend on."""
@@ -129,7 +129,7 @@ class Sequence:
             try:
                 write_video(video, [numbered(pattern, number) for number in self._stills], self._fps)
             except OutputError as error:
-                raise OutputError(f"{error}; its frames are {pattern}, from which --resume makes it") from error
+                raise OutputError(f"{error}; its frames are in {pattern}: --resume encodes them") from error
             click.echo(str(video))
         if spool := self.outputs.spool:
             for number in self._stills:
@@ -143,10 +143,10 @@ def make_sequence(outputs: Outputs, frames: str | None, resume: bool, single: Ma
     from ..output.video import is_video
 
     if outputs.pipes:
-        raise UsageError(f"-o {outputs.pipes[0].path}: takes one image, not many frames; name a file")
+        raise UsageError(f"-o {outputs.pipes[0].path}: takes one image, not several frames; give a file name")
     for name, value in single.items():
         if value is not None:
-            raise UsageError(f"--{name} is for one picture, not for many frames; leave it out")
+            raise UsageError(f"--{name} is not supported for animations; leave it out")
     videos = tuple(path for path in outputs.pictures if is_video(path))
     pictures = tuple(path for path in outputs.pictures if not is_video(path))
     if videos and not any(path.suffix.lower() == ".png" for path in pictures):

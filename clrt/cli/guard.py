@@ -72,7 +72,7 @@ def _watch(child: int, watched: set[signal.Signals], limit: float, advice: Calla
         if waited > LOOKS:
             os.kill(child, signal.SIGKILL)
             _say(f"the driver has not returned from a call in {limit:g} s: it hangs, or its device is lost; if calls "
-                 f"may take that long there, set {VARIABLE} to more", advice)
+                 f"may take that long, set {VARIABLE} to more seconds", advice)
             return DEVICE
         if came is not None and came.si_signo == signal.SIGTSTP:
             os.kill(child, signal.SIGSTOP)
@@ -91,16 +91,16 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
         from ..device.pocl.kernel_cache import kept_programs, remove_damaged
 
         damaged = remove_damaged()
-        cause = "most likely in the device's driver: see `clrt devices --check`"
+        cause = "most likely in the device's driver: run `clrt devices --check`"
         if damaged:
-            cause = (f"since PoCL keeps programs in {kept_programs()}, of which {damaged} were damaged: they are "
-                     "removed, so run it again")
+            cause = (f"because {damaged} of the programs that PoCL caches in {kept_programs()} were damaged: they have "
+                     "been removed, run it again")
         if full := no_room():
-            cause = f"since {full}"
+            cause = f"because {full}"
         _say(f"the render crashed ({name}), {cause}", advice)
         return DEVICE
-    known = "; by SIGKILL systems end what uses too much memory" if name == "SIGKILL" else ""
-    _say(f"the render was ended from outside ({name}){known}", advice)
+    known = "; systems send SIGKILL to processes that use too much memory" if name == "SIGKILL" else ""
+    _say(f"the render was killed ({name}){known}", advice)
     return 128 + os.WTERMSIG(status)
 
 

@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path), required=False)
-@click.option("--materials", "list_materials", is_flag=True, help="List all types of material and presets instead.")
+@click.option("--materials", "list_materials", is_flag=True, help="List all material types and presets instead.")
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
-@click.option("--aov", "aovs", multiple=True, metavar="NAME,...", help="With what these pictures beside it need.")
+@click.option("--aov", "aovs", multiple=True, metavar="NAME,...", help="Include what these AOVs need.")
 @click.option("--device", "selector", metavar="SEL",
-              help="For which device; see `clrt devices`. Default: the best, or a CPU where there is none.")
+              help="Device to compile for; see `clrt devices`. Default: the best, or a CPU if there is none.")
 @tracing_options
 def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple[str, ...], selector: str | None,
             **chosen: Any) -> None:
-    """Show what SCENE contains and what is compiled for it; renders nothing and needs no device."""
+    """Show what SCENE contains and what is compiled for it, without rendering; needs no device."""
     if list_materials:
         from .material_list import material_lines
 
@@ -33,7 +33,7 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
             click.echo(line)
         return
     if scene is None:
-        raise click.UsageError("Missing argument 'SCENE'; write a scene file or a model, or --materials")
+        raise click.UsageError("Missing argument 'SCENE'; give a scene file or a model, or --materials")
     from ..formats.load_scene import load
     from ..output.json_text import json_text
     from ..rendering.accumulation.first_hits import first_hit_program

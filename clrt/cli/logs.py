@@ -14,7 +14,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 def verbose_option(command: F) -> F:
     """Add `-v`, which also shows informational messages, and `-vv`, which shows all messages."""
     return click.option("-v", "--verbose", count=True, expose_value=False, callback=_show_more,
-                        help="Tell more; -vv tells everything.")(command)
+                        help="Show informational messages; -vv shows debug messages, too.")(command)
 
 
 def silence() -> None:

@@ -39,7 +39,7 @@ class Size(click.ParamType[tuple[int, int]]):
     def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> tuple[int, int]:
         match = re.fullmatch(r"(\d+)[xX](\d+)", str(value))
         if not match or not all(1 <= int(n) <= 65536 for n in match.groups()):
-            self.fail(f"{value!r} is no size; write WIDTHxHEIGHT with 1 to 65536 pixels, e.g. 640x480", param, context)
+            self.fail(f"{value!r} is not a size; write WIDTHxHEIGHT, each 1 to 65536, e.g. 640x480", param, context)
         return int(match[1]), int(match[2])
 
 
@@ -51,7 +51,7 @@ class Pixel(click.ParamType[tuple[int, int]]):
     def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> tuple[int, int]:
         match = re.fullmatch(r"(\d{1,9}),(\d{1,9})", str(value))
         if not match:
-            self.fail(f"{value!r} is no pixel; write X,Y, its column and row from 0 on, e.g. 120,64", param, context)
+            self.fail(f"{value!r} is not a pixel; write X,Y, its column and row from 0, e.g. 120,64", param, context)
         return int(match[1]), int(match[2])
 
 
@@ -61,7 +61,7 @@ class Finite(click.FloatRange):
     def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> float:
         number: float = super().convert(value, param, context)
         if not isfinite(number):
-            self.fail(f"{value!r} is no finite number; write one that is", param, context)
+            self.fail(f"{value!r} is not a finite number; give a finite one", param, context)
         return number
 
 
@@ -69,29 +69,29 @@ class Finite(click.FloatRange):
 CAMERA = "A camera of the scene or model file; see `clrt info`. Of a bare model also: front, right, back, left."
 triangle_option = click.option(
     "--triangle", type=click.Choice(["watertight", "moller_trumbore", "precomputed", "baldwin_weber"]),
-    default="watertight", show_default=True, help="Triangle test.")
+    default="watertight", show_default=True, help="Triangle intersection test.")
 box_option = click.option("--box", type=click.Choice(["robust", "plain"]), default="robust", show_default=True,
-                          help="Box test.")
+                          help="Box intersection test.")
 
 
 def picture_options(command: F) -> F:
     """Add the options that, together with the scene's own settings, determine every sample of an image."""
     for option in reversed([
         click.option("--camera", metavar="NAME", help=CAMERA),
-        click.option("--size", type=Size(), help="Picture size in pixels."),
+        click.option("--size", type=Size(), help="Image size in pixels."),
         click.option("--depth", type=click.IntRange(1, 1024),
                      help="Maximum path depth: 1 emission only, 2 direct light, 3 one bounce."),
-        click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random numbers."),
+        click.option("--seed", type=click.IntRange(0, 2**32 - 1), help="Seed of the random number generator."),
         click.option("--sampler", type=click.Choice(["sobol", "stratified", "independent"]),
-                     help="Where samples come from."),
+                     help="Sample sequence; default: the scene's."),
         click.option("--filter", "pixel_filter", type=click.Choice(["box", "tent", "blackman_harris", "gaussian"]),
-                     help="Pixel filter."),
+                     help="Pixel filter; default: the scene's."),
         click.option("--back-face-culling", type=click.Choice(["none", "camera", "all"]),
-                     help="Which rays pass through the back faces of materials that are not double-sided."),
+                     help="Which rays ignore the back faces of materials that are not double-sided."),
         click.option("--clamp-direct", type=Finite(min=0), metavar="X",
-                     help="Largest value that one contribution of direct light adds to a sample; 0 does not clamp."),
+                     help="Clamp each contribution of direct light to a sample to this value; 0: no clamp."),
         click.option("--clamp-indirect", type=Finite(min=0), metavar="X",
-                     help="The same for indirect light: fewer fireflies, but a picture that is too dark."),
+                     help="The same for indirect light: fewer fireflies, but the image is biased (too dark)."),
     ]):
         command = option(command)
     return command
@@ -100,22 +100,22 @@ def picture_options(command: F) -> F:
 def tracing_options(command: F) -> F:
     """Add the options for tracing methods: the defaults suit the device; others are for comparison."""
     for option in [
-        click.option("--lanes", type=click.Choice(["1", "8", "16"]), help="Paths a work-item.",
+        click.option("--lanes", type=click.Choice(["1", "8", "16"]), help="SIMD width: paths per work-item.",
                      callback=lambda context, parameter, value: int(value) if value else None),
         click.option("--paths", type=click.Choice(["lanes", "waves"]),
-                     help="How paths are followed: each in its lane, or many together edge by edge (with 8 lanes)."),
+                     help="lanes: megakernel; waves: wavefront with compaction (needs 8 lanes). Default: by device."),
         triangle_option,
         box_option,
         click.option("--sphere", type=click.Choice(["robust", "textbook"]), default="robust", show_default=True,
-                     help="Sphere test."),
+                     help="Sphere intersection test."),
         click.option("--offset", type=click.Choice(["bound", "ulp", "fixed"]), default="bound", show_default=True,
-                     help="Where rays leave a surface: beyond its rounding, some ulps away, or 0.001."),
+                     help="Offset of ray origins from the surface: its rounding error bound, a few ulps, or 0.001."),
         click.option("--builder", type=click.Choice(["ploc", "reinsertion", "sah", "midpoint"]),
-                     help="Tree builder; default: sah for small scenes, ploc on the device for large ones."),
+                     help="BVH builder; default: sah for small scenes, ploc on the device for large ones."),
         click.option("--layout", type=click.Choice(["bvh8", "bvh2", "cwbvh", "packs", "list"]),
-                     help="Tree layout; packs (for small scenes) and list are no tree."),
+                     help="BVH layout; packs (for small scenes) and list use no BVH."),
         click.option("--tree", type=click.Choice(["on", "off"]),
-                     help="Whether there is a tree, or every ray meets all there is; default: what is faster.",
+                     help="Use a BVH, or intersect every ray with all primitives (brute force); default: the faster.",
                      callback=lambda context, parameter, value: value and value == "on"),
     ]:
         command = option(command)

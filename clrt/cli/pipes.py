@@ -37,7 +37,7 @@ class Pipe:
         if self.path == STDOUT and sys.__stdout__ is None:
             raise UsageError("-o -: standard output is closed; redirect it to a file or a program")
         if self._is_terminal():
-            raise UsageError(f"-o {self.path}: is a terminal; redirect it to a file or a program, or name a file")
+            raise UsageError(f"-o {self.path}: is a terminal; redirect it to a file or a program, or give a file name")
 
     def write(self, save: Callable[[Path], object]) -> None:
         """Write the image that `save` writes to a path; raises OutputError."""
@@ -76,7 +76,7 @@ def split_pipes(outputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Pipe, 
         if (pipe := pipe_at(path)) is None:
             files.append(path)
         elif pipe.path in {each.path for each in pipes}:
-            raise UsageError(f"-o {pipe.path}: is named twice, and takes one image; name it once")
+            raise UsageError(f"-o {pipe.path}: is given twice, but takes one image; give it once")
         else:
             pipes.append(pipe)
     return tuple(files), tuple(pipes)

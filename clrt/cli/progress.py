@@ -14,7 +14,7 @@ from .streams import tell
 if TYPE_CHECKING:
     from ..rendering.renderer import State
 
-PHASES = {"connect": "starting the workers", "load": "loading the scene", "build": "building the tree",
+PHASES = {"connect": "starting the workers", "load": "loading the scene", "build": "building the BVH",
           "compile": "compiling the kernel", "render": "rendering", "write": "writing", "denoise": "denoising"}
 
 
@@ -164,13 +164,13 @@ def _is_watched() -> bool:
 
 def where(device: str, device_bytes: int) -> str:
     """Describe the device and its memory use."""
-    return f" on {device}, {device_bytes / 2**20:.1f} MiB there" if device else ""
+    return f" on {device}, {device_bytes / 2**20:.1f} MiB" if device else ""
 
 
 def figures(state: State, rate: float) -> list[str]:
     """Return samples, time, samples per second, and errors if known."""
     told = [f"{state.spp} spp", f"{state.seconds:.1f} s", f"{rate / 1e6:.2f} Msamples/s"]
-    tiles = "" if state.tile_noise is None else f" (of tiles {state.tile_noise:.4f})"
+    tiles = "" if state.tile_noise is None else f" (tiles {state.tile_noise:.4f})"
     if state.noise is not None:
         told.append(f"noise {state.noise:.4f}{tiles}")
     if state.relmse is not None:

@@ -42,38 +42,40 @@ RIGHT = 1.2
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option("-o", "--output", "outputs", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
               help="Image to write: .png, .exr or .hdr; may be repeated. - is standard output as PNG, exr:- as "
-                   "OpenEXR. Default: <scene>.png here.")
+                   "OpenEXR. Default: <scene>.png in the current folder.")
 @picture_options
 @click.option("--spp", type=click.IntRange(min=1), help="Stop at this many samples per pixel.")
 @click.option("--time", "seconds", type=float, metavar="SECONDS", help="Stop after this time.")
 @click.option("--error", type=float, help="Stop at this estimated error (root of relMSE).")
 @click.option("--error-percentile", type=click.FloatRange(0, 100, min_open=True), metavar="PERCENT",
-              help="Stop where so much of the picture, in tiles of 8x8 pixels, has that error, not the whole.")
+              help="Stop when this percentage of the tiles of 8x8 pixels has reached --error, not the whole image.")
 @click.option("--device", "devices", multiple=True, metavar="SEL",
-              help="Number, id, part of a name, cpu or gpu; see `clrt devices`. Given twice, both render.")
+              help="Device: number, id, part of a name, cpu or gpu; see `clrt devices`. Repeat to use several.")
 @click.option("--integrator", type=click.Choice(["path", "direct", "local", "raster", "normals", "albedo", "depth"]),
-              help="What to compute.")
-@click.option("--shadows/--no-shadows", default=None, help="Whether local and raster ask what stands before lights.")
-@click.option("--adaptive", is_flag=True, default=None, help="More samples where the error is larger.")
-@click.option("--reference", type=click.Path(path_type=Path), metavar="FILE", help="Picture to measure the error by.")
-@click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write what was done.")
-@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Draw error against time there.")
+              help="Integrator; default: the scene's.")
+@click.option("--shadows/--no-shadows", default=None, help="Whether local and raster cast shadow rays.")
+@click.option("--adaptive", is_flag=True, default=None, help="Take more samples where the error is larger.")
+@click.option("--reference", type=click.Path(path_type=Path), metavar="FILE",
+              help="Reference image to measure the error against.")
+@click.option("--report", type=click.Path(path_type=Path), metavar="FILE.json", help="Write a report of the render.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Plot error against time there.")
 @click.option("--aov", "aovs", multiple=True, metavar="NAME,...",
-              help="Pictures beside it: layers of an .exr, files beside a .png. An unknown NAME lists them.")
+              help="AOVs to write: layers of an .exr, or files next to a .png. An unknown NAME lists them.")
 @click.option("--denoise", is_flag=True,
-              help="Denoise the picture; the raw one is kept beside it as <stem>.raw<suffix>.")
+              help="Denoise the image; the raw one is saved next to it as <stem>.raw<suffix>.")
 @click.option("--checkpoint", type=click.Path(path_type=Path), metavar="FILE",
-              help="Keep there what --resume needs to go on; FILE~ is the one before.")
+              help="Save the state there regularly, so that --resume can continue; FILE~ is the previous one.")
 @click.option("--checkpoint-every", type=click.FloatRange(min=0), default=30.0, show_default=True, metavar="SECONDS",
-              help="How often; less often where that would take more than 2 % of the time.")
-@click.option("--resume", is_flag=True, help="Go on from --checkpoint; without one yet, begin.")
+              help="Time between checkpoints; longer if they would take more than 2 % of the time.")
+@click.option("--resume", is_flag=True, help="Resume from --checkpoint; start afresh if it does not exist yet.")
 @click.option("--view", default="srgb", show_default=True, metavar="NAME",
-              help="View transform of .png pictures: srgb, agx, pbr_neutral, reinhard, raw, aces, ocio:VIEW.")
-@click.option("--exposure", default=0.0, metavar="EV", help="Exposure of .png pictures, in stops.")
-@click.option("--progress", "progress_kind", type=click.Choice(["bar", "plain", "json"]), help="Progress on stderr.")
+              help="View transform of .png images: srgb, agx, pbr_neutral, reinhard, raw, aces, ocio:VIEW.")
+@click.option("--exposure", default=0.0, metavar="EV", help="Exposure of .png images, in stops.")
+@click.option("--progress", "progress_kind", type=click.Choice(["bar", "plain", "json"]),
+              help="Format of the progress display on standard error; default: bar on a terminal, else plain.")
 @click.option("--force", is_flag=True, help="Replace files that are read-only.")
-@click.option("--print-kernel", is_flag=True, help="Print the program that would run, and stop.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress and no warnings.")
+@click.option("--print-kernel", is_flag=True, help="Print the kernel source that would run, and exit.")
+@click.option("-q", "--quiet", is_flag=True, help="Show no progress and no warnings.")
 @frame_options
 @farm_options
 @verbose_option
@@ -87,11 +89,11 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
             view: str, exposure: float, progress_kind: str | None, force: bool, print_kernel: bool,
             quiet: bool, frames: str | None, turntable: int | None, fps: float | None, scheduler: str | None,
             local_cluster: int | None, **others: Any) -> None:
-    """Render SCENE, a .toml scene, a Mitsuba scene (.xml), a bare model, or - for a .toml scene on standard input,
-    until the first of --spp, --time and --error is reached."""
+    """Render SCENE until the first of --spp, --time and --error is reached. SCENE is a .toml scene, a Mitsuba scene
+    (.xml), a model, or - for a .toml scene on standard input."""
     def advice() -> str:
         kept = checkpoint is not None and checkpoint.exists()
-        return f"; {checkpoint} holds what was rendered before, and --resume goes on from it" if kept else ""
+        return f"; {checkpoint} holds the samples so far: resume with --resume" if kept else ""
 
     if click.get_current_context().obj == PROGRAM:
         guarded(advice)
@@ -114,14 +116,14 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
                              ) if frames or turntable else None
     if sequence is None:
         if fps is not None:
-            raise UsageError("--fps is how fast frames follow each other; ask for some with --frames or --turntable")
+            raise UsageError("--fps is the frame rate of an animation; add --frames or --turntable")
         if resume and checkpoint is None:
-            raise UsageError("--resume goes on from a checkpoint; name its file with --checkpoint")
+            raise UsageError("--resume needs a checkpoint; give its file with --checkpoint")
         results.check(checkpoint)
         results.check_unprotected(checkpoint)
     check_stops(spp, seconds, error)
     if error_percentile is not None and error is None:
-        raise UsageError("--error-percentile says of how much of the picture --error is asked; name that, too")
+        raise UsageError("--error-percentile is the part of the image that must reach --error; add --error")
     denoiser = _denoiser() if denoise else None
     if quiet:
         silence()
@@ -179,9 +181,9 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
                 raise advised from failure
         if renderer.stop_reason == "interrupted":
             logging.getLogger(__name__).warning("%s: interrupted; %s", content.name, (
-                "with --resume the same command renders the frames that are missing" if sequence else
-                f"--resume goes on from {checkpoint}" if checkpoint else
-                "a render that has a --checkpoint can go on with --resume"))
+                "run the same command with --resume to render the missing frames" if sequence else
+                f"run it with --resume to continue from {checkpoint}" if checkpoint else
+                "to be able to resume a render, start it with --checkpoint"))
     if interruptible.asked:
         sys.exit(INTERRUPTED)
 
@@ -242,8 +244,8 @@ def _write(renderer: Renderer, state: State, results: Outputs, denoiser: Denoise
     renderer.warnings.log(state.film)
     ratio = state.noise_ratio
     if ratio is not None and not 1 / RIGHT <= ratio <= RIGHT:
-        logging.getLogger(__name__).warning("the noise that is told is %.2f times the error against the "
-                                            "reference, which may have noise of its own", ratio)
+        logging.getLogger(__name__).warning("the estimated error is %.2f times the error against the "
+                                            "reference, which may be noisy itself", ratio)
     if denoiser is None:
         results.save(image)
     else:
@@ -263,7 +265,7 @@ def read_reference(path: Path, size: tuple[int, int]) -> Any:
     pixels = read_image(path)
     height, width = pixels.shape[:2]
     if (width, height) != size:
-        raise UsageError(f"{path}: the reference is {width}x{height}, the picture {size[0]}x{size[1]}; "
+        raise UsageError(f"{path}: the reference is {width}x{height}, the image {size[0]}x{size[1]}; "
                          f"use --size {width}x{height}")
     try:
         check_reference(pixels, size)

@@ -27,7 +27,7 @@ def race_table(title: str, kinds: Mapping[str, Any], on_cpu: bool, *, agrees: bo
 
 def race_legend(on_cpu: bool) -> str:
     """Explain the columns of `race_table`."""
-    return f"  time{' (CPU: processor time)' if on_cpu else ''}: of a ray, over the first line's; above 1 is slower"
+    return f"  time{' (CPU: processor time)' if on_cpu else ''}: per ray, over the first line's; above 1 is slower"
 
 
 def _rate(rays: float) -> str:

@@ -19,10 +19,10 @@ class Outcome(StrEnum):
     PARTLY = "partly shadowed"
     SHADOWED = "shadowed"
     ABSORBED = "absorbed on the way"
-    NO_EMISSION = "where the light emits nothing"
+    NO_EMISSION = "in a direction without emission"
     BEHIND = "behind the surface"
     NO_BSDF = "on a material that scatters nothing there"
-    UNSAMPLED = "of a density of 0"
+    UNSAMPLED = "with a pdf of 0"
 
 
 def outcomes(rows: NDArray[Any]) -> list[Outcome]:

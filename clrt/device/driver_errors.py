@@ -20,7 +20,7 @@ def driver_errors() -> Iterator[None]:
     try:
         yield
     except cl.MemoryError as error:
-        raise NoRoomError(f"the device has not enough memory: {error}") from error
+        raise NoRoomError(f"the device is out of memory: {error}") from error
     except cl.Error as error:
         share_no_more()
         raise DeviceError(f"the device failed: {error}") from error

@@ -91,7 +91,7 @@ def open_devices(selectors: Selectors) -> list[Device]:
     Raises DeviceError if a device cannot be opened, and UsageError for an empty list.
     """
     if isinstance(selectors, Sequence) and not selectors:
-        raise UsageError(f"device is {selectors!r}; name at least one, or leave it out for the best")
+        raise UsageError(f"device is {selectors!r}; give at least one, or leave it out for the best")
     several = list(selectors) if isinstance(selectors, Sequence) and not isinstance(selectors, str) else [selectors]
     return [each if isinstance(each, Device) else open_device(each) for each in several]
 

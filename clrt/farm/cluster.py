@@ -64,7 +64,7 @@ class Cluster:
                 return Client(self._local or self.address, timeout=ANSWER, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
             raise DeviceError(f"the scheduler at {self.address} does not answer ({error}); start it with `dask "
-                              "scheduler`, and name the address that it prints, not its dashboard's") from error
+                              "scheduler`, and use the address that it prints, not the dashboard's") from error
 
     @property
     def alive(self) -> bool:
@@ -204,7 +204,7 @@ async def _fetched(client: Client, future: Future[Any]) -> Any:
     assert client.scheduler is not None    # while it is connected
     found = await client.scheduler.gather(keys=[future.key])
     if found["status"] != "OK":
-        raise ConnectionError("its worker has not got it any more")
+        raise ConnectionError("its worker no longer has it")
     return found["data"][future.key]
 
 
@@ -212,7 +212,7 @@ def connect(address: str) -> Cluster:
     """Connect to the scheduler at tcp://… or tls://…, with the certificates from Dask's settings."""
     _check_dask()
     if "://" not in address or not address.partition("://")[2]:
-        raise UsageError(f"--scheduler {address}: is no address; write tcp://HOST:PORT or tls://HOST:PORT, as the "
+        raise UsageError(f"--scheduler {address}: is not an address; write tcp://HOST:PORT or tls://HOST:PORT, as the "
                          "scheduler prints it")
     return Cluster(address)
 
@@ -224,7 +224,7 @@ def local_cluster(count: int) -> Cluster:
     """
     _check_dask()
     if count < 1:
-        raise UsageError(f"--local-cluster {count}: there must be a worker")
+        raise UsageError(f"--local-cluster {count}: must be at least 1")
     from distributed import LocalCluster
 
     threads = max(1, (os.cpu_count() or 1) // count)
@@ -242,7 +242,7 @@ def _check_dask() -> None:
         import dask
         import distributed  # noqa: F401
     except ImportError:
-        raise UsageError("a farm needs Dask: pip install distributed cryptography") from None
+        raise UsageError("rendering on workers needs Dask: pip install distributed cryptography") from None
     # By default each connection keeps its last thousand messages with their contents.
     dask.config.set({"distributed.admin.low-level-log-length": LOG_LENGTH})
     for name in ("distributed", "distributed.client"):    # Dask sets a level for the latter

@@ -124,12 +124,12 @@ class Dispatch:
         if any(member.facts for member in hopes):
             self._alone_since = 0.0
         elif not hopes and (refused := list(dict.fromkeys(each.refused for each in self.everyone() if each.refused))):
-            raise DeviceError(f"no worker of {self.cluster.address} can be used: {'; '.join(refused)}")
+            raise DeviceError(f"no worker of {self.cluster.address} is usable: {'; '.join(refused)}")
         elif not self._alone_since:
             self._alone_since = now
         elif now - self._alone_since > HOPELESS:
-            raise DeviceError(f"{self.cluster.address} has had no worker for {HOPELESS:g} s that answers; start some "
-                              f"with `dask worker {self.cluster.address}`, where the same clrt is installed")
+            raise DeviceError(f"no worker of {self.cluster.address} has answered for {HOPELESS:g} s; start some with "
+                              f"`dask worker {self.cluster.address}` where the same clrt is installed")
         elif now - self._alone_since > LONELY and not self._told_alone:
             self._told_alone = True
             _log.warning("%s has %s; waiting", self.cluster.address,
@@ -145,15 +145,15 @@ class Dispatch:
             run.task.runs.remove(run)
             run.task.deaths += place == 0
             if run.task.deaths >= MOST_DEATHS:
-                raise DeviceError(f"{run.task.name} has ended {run.task.deaths} workers, at last {member.name}"
-                                  f"{self.cluster.last_words()}; their logs may tell more, and `clrt devices --check` "
-                                  "there whether their devices work")
+                raise DeviceError(f"{run.task.name} has killed {run.task.deaths} workers, last {member.name}"
+                                  f"{self.cluster.last_words()}; see their logs, and run `clrt devices "
+                                  "--check` there")
             self._repeat(run.task)
         for key in [key for key, run in self._runs.items() if run.member is member]:
             del self._runs[key]
             self.cluster.forget(key)
         if runs:
-            _log.warning("%s is gone; others do again what it was at", member.name)
+            _log.warning("%s is lost; other workers repeat its tasks", member.name)
 
     def _hand_out(self) -> None:
         """Queue tasks on the workers round-robin; then give overdue tasks to those without any."""
@@ -167,7 +167,7 @@ class Dispatch:
             self._begin(task, member)
         idle = [member for member in ready if not member.load]
         for member, run in zip(idle, self._overdue() if idle else []):
-            _log.info("%s is slow; %s does again what it is at", run.member.name, member.name)
+            _log.info("%s is slow; %s repeats its task", run.member.name, member.name)
             self.cluster.is_late(run.key)
             self._begin(run.task, member)
 
@@ -219,7 +219,7 @@ class Dispatch:
         known = isinstance(error, ClrtError | BadResult | RuntimeError)
         told = str(error) if known else f"{type(error).__name__}: {error}"
         if not member.refused:
-            _log.warning("%s is left out: %s", member.name, told)
+            _log.warning("%s is excluded: %s", member.name, told)
         member.refused = f"{member.name}: {told}"
 
     def _ended(self, run: Run, result: Result) -> None:
@@ -267,7 +267,7 @@ class Dispatch:
 
     def _find_scheduler(self) -> Iterator[None]:
         """Wait until the scheduler answers again. Results so far are kept, and tasks in flight are repeated."""
-        _log.warning("%s does not answer any more; waiting for it for up to %g s", self.cluster.address, GONE)
+        _log.warning("%s no longer answers; waiting up to %g s", self.cluster.address, GONE)
         self.former += self.members.values()
         self.members, self._runs, self._meeting = {}, {}, {}
         for task in self.tasks:

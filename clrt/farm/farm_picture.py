@@ -237,7 +237,7 @@ class FarmPicture(Accumulation):
     @property
     def scene(self) -> SceneOnDevice:
         """Raise ClrtError: the scene is not on the client."""
-        raise ClrtError("the scene of a farm is on its workers alone")
+        raise ClrtError("the scene is loaded on the workers, not on this client")
 
     @property
     def device_bytes(self) -> int:
@@ -266,10 +266,10 @@ def evenly(most: int, work: Work) -> int:
 def check_pixels(found: NDArray[Any], before: NDArray[Any], inside: NDArray[np.bool_], more: int) -> int:
     """Raise BadResult unless these can be the pixels with `more` more samples; return how many were dropped."""
     if not isinstance(found, np.ndarray) or found.shape != before.shape or found.dtype != before.dtype:
-        raise BadResult("it returned something that is no pixels")
+        raise BadResult("it returned something other than pixels")
     if not all(np.isfinite(found[name]).all() for name in ("sum", "sum_error", "square", "square_error")):
-        raise BadResult("it returned pixels that are no finite numbers")
+        raise BadResult("it returned pixels that are not finite")
     kept, dropped = (found[name].astype(np.int64) - before[name] for name in ("count", "dropped"))
     if ((kept + dropped)[inside] != more).any():
-        raise BadResult(f"it returned pixels without all of their {more} samples")
+        raise BadResult(f"it returned pixels with fewer than their {more} samples")
     return int(dropped.sum())

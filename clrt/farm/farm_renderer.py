@@ -54,7 +54,7 @@ class FarmRenderer(Renderer):
         given = [device] if device is None or isinstance(device, str | int | Device) else list(device)
         selectors = tuple(each for each in given if isinstance(each, str | int))
         if len(selectors) < len(given) - (given == [None]):
-            raise UsageError("a farm's devices are those of its workers; name them, instead of opening any")
+            raise UsageError("a farm renders on its workers' devices; give their names instead of opened devices")
         self.devices = []
         self._lanes, self._selectors = lanes, selectors
 

@@ -67,9 +67,9 @@ class Manifest:
         except (ValueError, TypeError, LookupError):
             found = None
         if not isinstance(found, dict):
-            raise CheckpointError(f"{self.path}: is no list of pictures that this version of clrt can read; name "
-                                  "another file, or leave out --resume to begin anew")
+            raise CheckpointError(f"{self.path}: is not a list of images that this version of clrt can read; choose "
+                                  "another file, or leave out --resume to start afresh")
         if others := differences(found, facts):
-            raise CheckpointError(f"{self.path}: is of another render ({', '.join(others)}); ask for that one to go "
-                                  "on, name another file, or leave out --resume to begin anew")
+            raise CheckpointError(f"{self.path}: is of another render ({', '.join(others)}); use its settings to "
+                                  "resume it, choose another file, or leave out --resume to start afresh")
         return sum(map(len, lines))

@@ -98,7 +98,7 @@ class _Unpickler(pickle.Unpickler):
         if digest == HERE:
             return None
         if digest not in self.arrays:
-            raise SceneError(f"what was sent lacks an array ({digest})")
+            raise SceneError(f"the received scene lacks an array ({digest})")
         return self.arrays[digest]
 
     def find_class(self, module: str, name: str) -> Any:
@@ -106,4 +106,4 @@ class _Unpickler(pickle.Unpickler):
             return super().find_class(module, name)
         if module.startswith(ROOMS) and "." not in name and is_dataclass(found := super().find_class(module, name)):
             return found
-        raise SceneError(f"what was sent names {module}.{name}, which no scene is made of")
+        raise SceneError(f"the received scene contains {module}.{name}, which is not allowed in a scene")

@@ -79,5 +79,5 @@ class WholePictures:
     def accept(self, task: Task, result: dict[str, Any], member: Member) -> None:
         """Store the result until it is handed on. Raises BadResult unless its pixels are finite."""
         if not np.isfinite(result["pixels"]).all():
-            raise BadResult("it returned pixels that are no finite numbers")
+            raise BadResult("it returned pixels that are not finite")
         self._results.append((task.what[0], result))

@@ -33,23 +33,24 @@ class Proofs:
         facts: dict[str, Any] = member.facts or {}
         proof, kind = facts["proof"], tuple(str(facts[name]) for name in KIND)
         if not all(np.isfinite(proof[name]).all() for name in ("sum", "square")):
-            raise BadResult("its first pixels are no finite numbers; see `clrt devices --check` there")
+            raise BadResult("its first pixels are not finite; run `clrt devices --check` there")
         if self._first is None:
             self._first = member, proof
         if kind in self._kinds:
             other, expected = self._kinds[kind]
             if proof.tobytes() != expected.tobytes():
-                raise BadResult(f"its first pixels are not those of {other.name}, which has the same device and "
-                                "driver; one of the two is broken: see `clrt devices --check` on both")
+                raise BadResult(f"its first pixels differ from those of {other.name}, which has the same device and "
+                                "driver; one of them is broken: run `clrt devices --check` on both")
             return
         self._kinds[kind] = member, proof
         other, expected = self._first
         if (differing := _differing(proof, expected)) > MOST_DIFFERING:
-            raise BadResult(f"{differing:.0%} of its first pixels are not those of {other.name}; one of the two is "
-                            "broken: see `clrt devices --check` on both")
+            raise BadResult(f"{differing:.0%} of its first pixels differ from those of {other.name}; one of them is "
+                            "broken: run `clrt devices --check` on both")
         if proof.tobytes() != expected.tobytes():
-            _log.warning("%s (%s) rounds otherwise than %s (%s): the picture is as right, but its last bits depend on "
-                         "who renders what", member.name, facts["name"], other.name, (other.facts or {}).get("name"))
+            _log.warning("%s (%s) rounds differently from %s (%s): the image is equally accurate, but its last bits "
+                         "depend on which worker renders what", member.name, facts["name"], other.name,
+                         (other.facts or {}).get("name"))
 
 
 def _differing(found: NDArray[Any], expected: NDArray[Any]) -> float:

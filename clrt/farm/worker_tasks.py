@@ -154,7 +154,7 @@ def _check_identity(client: dict[str, str]) -> None:
     if own != client:
         told = [f"clrt {each['version']} with the kernels {each['kernels']} and the code {each.get('code')}"
                 for each in (own, client)]
-        raise DeviceError(f"it has {told[0]}, this client {told[1]}; install the same clrt on both")
+        raise DeviceError(f"it runs {told[0]}, this client {told[1]}; install the same version on both")
 
 
 def _found(key: str) -> ShareRenderer | Simulation | None:

@@ -38,7 +38,7 @@ def load(path: StrPath, camera: str | None = None) -> Scene:
     object: value is wrong; remedy".
     """
     if not isinstance(path, (str, PathLike)):
-        raise SceneError(f"{path!r} is no path of a scene; name a file, such as \"scene.toml\"")
+        raise SceneError(f"{path!r} is not the path of a scene; give a file name, such as \"scene.toml\"")
     path = Path(path)
     check_scene(path)
     reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower())

@@ -88,7 +88,8 @@ def _meshes(parts: dict[str, Any], stem: str, normals: Normals) -> list[Mesh]:
     several = parts.get("geometry", {stem: parts})
     pieces = {name: piece for name, piece in several.items() if _size(piece.get("faces"))}
     if not pieces:
-        raise SceneError("holds no triangles (points, lines and PLY strips are not drawn); export a triangle mesh")
+        raise SceneError("contains no triangles (points, lines and PLY strips are not supported); export a triangle "
+                         "mesh")
     meshes, problems = [], []
     for name, piece in pieces.items():
         try:
@@ -115,7 +116,7 @@ def _mesh(name: str, piece: dict[str, Any], normals: Normals) -> Mesh:
     plain = Diffuse() if colors is None else Diffuse(color=(1.0, 1.0, 1.0))
     material = piece.get("material") or plain
     if uv is None and material.textures():
-        log.warning('mesh "%s" has no texture coordinates; the textures of its material are left out', name)
+        log.warning('mesh "%s" has no texture coordinates; the textures of its material are ignored', name)
         material = material.without_textures()
     mesh = Mesh(vertices, faces.astype(np.int32), material, name=name, material_name=piece.get("material_name", ""),
                 uv=uv, colors=colors)

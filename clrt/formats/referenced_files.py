@@ -41,7 +41,7 @@ def check_file(path: Path, what: str) -> None:
     if path.is_dir():
         raise SceneError(f"{path}: is a folder, not a {what}")
     if path.exists() and not path.is_file():
-        raise SceneError(f"{path}: is a device, a pipe or a socket, not a {what}; name a regular file")
+        raise SceneError(f"{path}: is a device, a pipe or a socket, not a {what}; choose a regular file")
     if not path.exists():
         raise SceneError(f"{path}: no such {what} file")
     note_read(path)

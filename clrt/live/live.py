@@ -183,7 +183,7 @@ class Live:
             except ClrtError as error:
                 self._publish(asked=asked.number, error=str(error), phase="rest")
             except Exception as error:  # a bug must not freeze the image forever
-                _log.exception("a picture failed")
+                _log.exception("rendering an image failed")
                 self._publish(asked=asked.number, error=f"{type(error).__name__}: {error}", phase="rest")
 
     def _next(self, last: Asked | None) -> Asked | None:

@@ -27,7 +27,7 @@ def layered(pixels: FloatArray, aovs: Pictures) -> tuple[FloatArray, list[str]]:
     """Return all in one array (height, width, n) float32, and the channel names: R, G, B, albedo.R, depth.Z …"""
     for name, aov in aovs.items():
         if aov.dtype.kind in "iu" and aov.max(initial=0) > LARGEST_ID:
-            _log.warning("%s: numbers beyond %d are rounded in an .exr; Image.aovs has them", name, LARGEST_ID)
+            _log.warning("%s: numbers above %d are rounded in an .exr; Image.aovs has the exact ones", name, LARGEST_ID)
     names = [*"RGB", *(f"{name}.{channel}" for name in aovs for channel in CHANNELS[name])]
     layers = [aov.astype(np.float32).reshape(*aov.shape[:2], -1) for aov in aovs.values()]
     return np.concatenate([pixels, *layers], axis=2), names

@@ -20,7 +20,7 @@ PAUSES = (0.05, 0.1, 0.2, 0.4, 0.8)
 def check_target(path: Path) -> None:
     """Raise OutputError unless a file can be written at `path`; to be called before the work that produces it."""
     if path.is_dir():
-        raise OutputError(f"{path}: is a folder; name a file in it")
+        raise OutputError(f"{path}: is a folder; choose a file in it")
     _check_kind(path)
     if not path.parent.is_dir():
         raise OutputError(f"{path}: the folder {path.parent} does not exist; create it first")
@@ -36,18 +36,18 @@ def make_folder(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"{path}: cannot be made ({error.strerror}); choose another path") from error
+        raise OutputError(f"{path}: cannot be created ({error.strerror}); choose another path") from error
 
 
 def _check_kind(path: Path) -> None:
     if path.exists() and not path.is_file():
-        raise OutputError(f"{path}: is a device, a pipe or a socket, which is not replaced; name a regular file")
+        raise OutputError(f"{path}: is a device, a pipe or a socket, which is not replaced; choose a regular file")
 
 
 def check_unprotected(path: Path, force: bool) -> None:
     """Raise OutputError if `path` is a read-only file, unless `force`; its mode decides, also for root."""
     if not force and path.is_file() and not path.stat().st_mode & 0o222:
-        raise OutputError(f"{path}: is read-only; name another file, make it writable, or replace it with --force")
+        raise OutputError(f"{path}: is read-only; choose another file, make it writable, or replace it with --force")
 
 
 @contextmanager
@@ -88,4 +88,4 @@ def _move(new: Path, target: Path) -> None:
     kept = target.with_name(f"{target.stem}-{os.urandom(4).hex()}{target.suffix}")
     os.replace(new, kept)
     raise KeptBesideError(f"{target}: cannot be replaced ({problem.strerror}); is it open in another program, or "
-                          f"read-only? The new file is {kept.name} beside it") from problem
+                          f"read-only? The new file is {kept.name} next to it") from problem

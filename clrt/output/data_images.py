@@ -35,4 +35,4 @@ def shown_data(integrator: str, pixels: FloatArray) -> FloatArray | None:
 def check_denoisable(integrator: str) -> None:
     """Raise UsageError unless images of this integrator are colors, which denoisers require."""
     if integrator in _SHOWN:
-        raise UsageError(f"denoising is for colours, and the integrator is {integrator}; leave one of them out")
+        raise UsageError(f"denoising is for colour images, and the integrator is {integrator}; leave one of them out")

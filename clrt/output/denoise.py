@@ -33,7 +33,7 @@ class Denoiser:
             import pyoidn
         except ImportError as error:
             raise UsageError("denoising needs the package pyoidn, which is not installed: "
-                             "pip install pyoidn (there is none for Linux on ARM), or render without "
+                             "pip install pyoidn (not available for Linux on ARM), or render without "
                              "denoising") from error
         try:
             self._device = pyoidn.Device()

@@ -32,7 +32,7 @@ def check_plot(path: Path) -> None:
     check_target(path)
     if path.suffix.lower() not in EXTENSIONS:
         raise OutputError(f"{path}: plots are written as {', '.join(EXTENSIONS[:-1])} or {EXTENSIONS[-1]}; "
-                          "name such a file")
+                          "choose such a file")
     if find_spec("matplotlib") is None:
         raise UsageError("plots need matplotlib: install it with `pip install matplotlib`")
 

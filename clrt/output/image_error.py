@@ -57,7 +57,7 @@ def _pixels(picture: Picture, name: str) -> FloatArray:
     pixels = picture.pixels if isinstance(picture, Image) else picture
     if not isinstance(pixels, np.ndarray) or pixels.ndim != 3 or pixels.shape[2] != 3:
         raise UsageError(f"{name} is {type(pixels).__name__} {getattr(pixels, 'shape', '')}, not (height, width, 3) "
-                         "pixels; give an array of them, a clrt.Image or the path of a picture")
+                         "pixels; give such an array, a clrt.Image or the path of an image")
     return pixels
 
 
@@ -108,4 +108,4 @@ def _check_sizes(image: FloatArray, reference: FloatArray, image_name: str, refe
     if image.shape != reference.shape:
         (h, w), (height, width) = image.shape[:2], reference.shape[:2]
         raise SceneError(f"sizes differ: {image_name} has {w}x{h} pixels, {reference_name} {width}x{height}; "
-                         "only pictures of one size can be compared")
+                         "only images of the same size can be compared")

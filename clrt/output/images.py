@@ -53,7 +53,7 @@ def check_writable(path: Path) -> None:
     if extension not in EXTENSIONS:
         meant = "".join(f"; did you mean {path.with_suffix(match)}?"
                         for match in get_close_matches(extension, EXTENSIONS, 1))
-        problem = f"unknown picture format {extension}" if extension else "the name has no extension"
+        problem = f"unknown image format {extension}" if extension else "the name has no extension"
         raise OutputError(f"{path}: {problem}; use {', '.join(EXTENSIONS[:-1])} or {EXTENSIONS[-1]}{meant}")
 
 
@@ -91,8 +91,8 @@ def _tell_flaws(path: Path, pixels: FloatArray) -> None:
     flaws = (np.isnan(pixels), pixels < 0, np.isposinf(pixels))
     nan, negative, infinite = map(np.count_nonzero, flaws)
     if nan or negative or infinite:
-        _log.warning("%s: of the picture's values %d are NaN and %d negative, written as 0, and %d infinite, written "
-                     "as the brightest", path, nan, negative, infinite)
+        _log.warning("%s: of the image's values, %d are NaN and %d negative, written as 0, and %d infinite, written "
+                     "as the largest value", path, nan, negative, infinite)
 
 
 def _write_png(path: Path, samples: NDArray[np.uint8], metadata: Mapping[str, str]) -> None:

@@ -36,8 +36,8 @@ def ocio_view(config: str, view: str) -> Callable[[FloatArray], FloatArray]:
     display, view = _display_view(config, colors, view)
     source = next((name for name in REC709 if colors.getColorSpaceIndex(colors.resolve(name)) >= 0), None)
     if source is None:
-        raise UsageError(f"{config}: none of its colour spaces is called {', '.join(REC709)}; give the one of linear "
-                         f"Rec. 709 the alias {REC709[1]}")
+        raise UsageError(f"{config}: has no colour space called {', '.join(REC709)}; give its linear Rec. 709 space "
+                         f"the alias {REC709[1]}")
 
     def shown(linear: FloatArray) -> FloatArray:
         buffer = oiio.ImageBufAlgo.ociodisplay(oiio.ImageBuf(np.ascontiguousarray(linear)), display, view,
@@ -56,8 +56,8 @@ def _config(config: str) -> Any:
     colors = oiio.ColorConfig(config)
     if problem := colors.geterror():
         remedy = ("install a newer OpenImageIO" if config.startswith("ocio:") else
-                  "set the environment variable OCIO to one, or to nothing")
-        raise UsageError(f"{config}: is no OpenColorIO config that can be used ({problem.splitlines()[0]}); {remedy}")
+                  "set the environment variable OCIO to a valid one, or unset it")
+        raise UsageError(f"{config}: is not a usable OpenColorIO config ({problem.splitlines()[0]}); {remedy}")
     return colors
 
 
@@ -72,5 +72,5 @@ def _display_view(config: str, colors: Any, name: str) -> tuple[str, str]:
     if name in all_views:
         return all_views[name]
     meant = "".join(f"; did you mean ocio:{match}?" for match in get_close_matches(name, [*views, *all_views], 1))
-    raise UsageError(f"{config}: no view {name!r}; of {display} there are {', '.join(views)}, and others as "
-                     f"DISPLAY/VIEW of {', '.join(colors.getDisplayNames())}{meant}")
+    raise UsageError(f"{config}: view {name!r} is unknown; {display} has {', '.join(views)}, others are named "
+                     f"DISPLAY/VIEW for {', '.join(colors.getDisplayNames())}{meant}")

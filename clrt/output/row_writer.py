@@ -44,7 +44,7 @@ def write_rows(path: Path, size: tuple[int, int], pieces: Iterable[NDArray[np.fl
         if complaint or not closed:
             raise OSError(complaint.splitlines()[0] if complaint else "the writer gave no reason")
         if row != height:
-            raise OSError(f"there are {row} of its {height} rows")
+            raise OSError(f"only {row} of its {height} rows were written")
         check_whole(temporary)
 
 

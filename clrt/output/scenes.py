@@ -19,13 +19,13 @@ def save_scene(scene: Scene, path: StrPath, *, force: bool = True) -> list[Path]
     """
     path = Path(path)
     if path.suffix.lower() != ".toml":
-        raise OutputError(f"{path}: a scene file ends in .toml; write {path.with_suffix('.toml')}")
+        raise OutputError(f"{path}: a scene file's name must end in .toml; write {path.with_suffix('.toml')}")
     check_target(path)
     files = scene_files(scene, path)
     try:
         text = files.text.encode()
     except UnicodeEncodeError:
-        raise OutputError(f"{path}: the name of a file of the scene is no text, so no scene file can name it; rename it"
+        raise OutputError(f"{path}: this file's name is not valid text, so a scene file cannot contain it; rename it"
                           ) from None
     written = [path.with_name(name) for name in (*files.models, *files.texels, *files.pixels)]
     for other in written:

@@ -44,17 +44,17 @@ def check_video(path: Path, size: tuple[int, int], fps: float) -> None:
     width, height = size
     if path.suffix.lower() == ".gif":
         if fps > FASTEST_GIF:
-            raise UsageError(f"{path}: {fps:g} frames per second are more than the {FASTEST_GIF:g} that a .gif is "
-                             "shown with; write an .mp4, or lower --fps")
+            raise UsageError(f"{path}: {fps:g} frames per second are more than the {FASTEST_GIF:g} that a .gif "
+                             "supports; write an .mp4, or lower --fps")
         if 1 / fps > LONGEST_GIF:
-            raise UsageError(f"{path}: {1 / fps:g} s are more than the {LONGEST_GIF:g} that a frame of a .gif can "
+            raise UsageError(f"{path}: {1 / fps:g} s are more than the {LONGEST_GIF:g} s that a frame of a .gif can "
                              "last; write an .mp4, or raise --fps")
         return
     if find_spec("imageio_ffmpeg") is None:
         raise UsageError(f"{path}: {path.suffix} videos need ffmpeg: run `pip install 'imageio[ffmpeg]'`, or "
                          "write a .gif")
     if width % 2 or height % 2:
-        raise UsageError(f"{path}: {path.suffix} videos have an even width and height; use --size "
+        raise UsageError(f"{path}: {path.suffix} videos need an even width and height; use --size "
                          f"{width + width % 2}x{height + height % 2}")
 
 
@@ -64,7 +64,7 @@ def write_video(path: Path, pictures: Sequence[Path], fps: float) -> Path:
         try:
             (_write_gif if path.suffix.lower() == ".gif" else _write_by_ffmpeg)(temporary, pictures, fps)
         except (RuntimeError, ValueError, SyntaxError) as error:   # raised by imageio, ffmpeg and pillow
-            raise OutputError(f"{path}: the video could not be made: {error}") from error
+            raise OutputError(f"{path}: the video cannot be written: {error}") from error
     return path
 
 
@@ -111,5 +111,5 @@ def _write_by_ffmpeg(path: Path, pictures: Sequence[Path], fps: float) -> None:
         if ffmpeg.returncode:
             errors.seek(0)
             lines = errors.read().decode(errors="replace").splitlines()
-            code = f"ffmpeg ended with code {ffmpeg.returncode}"
+            code = f"ffmpeg exited with code {ffmpeg.returncode}"
             raise OSError(re.sub(r"^\[.*?\] ", "", lines[0]) if lines else code)

@@ -104,7 +104,7 @@ def view_called(name: str) -> View:
     if kind == "ocio":
         return ocio_view("", view)
     meant = "".join(f"; did you mean {match}?" for match in get_close_matches(name, [*VIEWS, "aces"], 1))
-    raise UsageError(f"no view transform {name!r}; there are {', '.join(VIEWS)}, aces and ocio:VIEW{meant}")
+    raise UsageError(f"view transform {name!r} is unknown; choose from {', '.join(VIEWS)}, aces and ocio:VIEW{meant}")
 
 
 def check_view(name: str, exposure: float) -> None:

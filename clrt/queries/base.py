@@ -74,7 +74,7 @@ class TreeQuery:
         self._tests = tests
         check_choice("traversal", traversal, (None, *TRAVERSALS))
         if traversal in ("packet", "pool") and tree.name != "bvh8":
-            raise UsageError(f"the traversal {traversal} is for the layout bvh8, not {tree.name}; leave it out")
+            raise UsageError(f"the traversal {traversal} needs the layout bvh8, not {tree.name}; leave it out")
         self._traversal = traversal if tree.name == "bvh8" and any(counts) else "single"
         self._lock = threading.Lock()
         self._kernels: dict[tuple[str, str, int], cl.Kernel] = {}
@@ -130,7 +130,7 @@ class TreeQuery:
         float32 and is inf.
         """
         if not isinstance(max_hits, int | np.integer) or max_hits < 1:
-            raise UsageError(f"max_hits is {max_hits!r}; it must be a whole number, at least 1")
+            raise UsageError(f"max_hits is {max_hits!r}; it must be an integer of at least 1")
         o, d, t = ray_arrays(origins, directions, t_max)
         index = np.arange(len(t))
         last = np.zeros(len(t), self._hit)
@@ -167,9 +167,9 @@ class TreeQuery:
             return
         ended = answers["primitive"] == -2 if answers.dtype.names else answers.view(np.uint8) == 2
         if ended.any():
-            raise DeviceError(f"{self.device.info.name} ({self.device.info.platform}): the driver ends all loops of a "
-                              f"work-item after {turns} turns, and {np.count_nonzero(ended)} of {len(answers)} rays "
-                              f"need more in the layout {self.tree.name}; use another device or layout")
+            raise DeviceError(f"{self.device.info.name} ({self.device.info.platform}): the driver ends every loop of a "
+                              f"work-item after {turns} iterations, and {np.count_nonzero(ended)} of {len(answers)} "
+                              f"rays need more in the layout {self.tree.name}; use another device or layout")
 
     def _parts(self, name: str, n: int) -> Iterator[slice]:
         """Yield slices of n rays, one per launch."""

@@ -100,11 +100,11 @@ def _meshes(meshes: Sequence[tuple[ArrayLike, ArrayLike]]) -> list[NDArray[np.fl
 def _indices(mesh: ArrayLike, meshes: int) -> NDArray[np.int32]:
     index = whole_array("mesh", mesh, SceneError)
     if index.ndim != 1:
-        raise SceneError(f"mesh {index.shape} must have the shape (k,): for each instance which mesh it is")
+        raise SceneError(f"mesh {index.shape} must have the shape (k,): the mesh index of each instance")
     outside = (index < 0) | (index >= meshes)
     if outside.any():
         first = int(np.argmax(outside))
-        raise SceneError(f"mesh[{first}] = {index[first]}: the length of meshes is {meshes}, and they count from 0")
+        raise SceneError(f"mesh[{first}] = {index[first]}: there are {meshes} meshes, counted from 0")
     return index.astype(np.int32)
 
 
@@ -112,7 +112,7 @@ def _matrices(transforms: ArrayLike, instances: int) -> Doubles:
     to_world = real_array("transforms", transforms, SceneError).astype(np.float64)
     if to_world.shape != (instances, 3, 4):
         rows = "; drop the last row: transforms[:, :3]" * (to_world.shape == (instances, 4, 4))
-        raise SceneError(f"transforms {to_world.shape} must have the shape ({instances}, 3, 4), one an instance{rows}")
+        raise SceneError(f"transforms {to_world.shape} must have the shape ({instances}, 3, 4), one per instance{rows}")
     faults = transform_faults(to_world)
     firsts = {fault: (int(np.argmax(wrong)), int(wrong.sum())) for fault, wrong in faults.items() if wrong.any()}
     if firsts:

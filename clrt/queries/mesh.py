@@ -68,7 +68,7 @@ class RayQuery(TreeQuery):
         """
         points = finite_points(vertices)
         if len(points) != self._vertices:
-            raise SceneError(f"vertices {points.shape}: the mesh has {self._vertices}; for another make another query")
+            raise SceneError(f"vertices {points.shape}: the mesh has {self._vertices}; create a new query for another")
         if not can_refit(self.tree) or not self._comfortable(points):
             self._refitter = None
             self._use(*self._built(self.device, points, self._tests.triangle))

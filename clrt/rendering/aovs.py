@@ -53,7 +53,7 @@ def chosen_aovs(names: str | Iterable[str]) -> tuple[str, ...]:
     for name in chosen:
         if name not in AOVS:
             meant = "".join(f"; did you mean {match}?" for match in get_close_matches(name, AOVS, 1))
-            raise UsageError(f"no AOV {name!r}; there are {', '.join(AOVS)}{meant}")
+            raise UsageError(f"AOV {name!r} is unknown; choose from {', '.join(AOVS)}{meant}")
     return chosen
 
 
@@ -65,7 +65,7 @@ def needs_direct_light(names: Iterable[str]) -> bool:
 def check_light(names: Iterable[str], integrator: str) -> None:
     """Raise UsageError if AOVs of light are requested from an integrator that does not compute light transport."""
     if needs_direct_light(names) and integrator not in WITH_LIGHT:
-        raise UsageError(f"the AOVs {' and '.join(LIGHT)} are of light, and the integrator is {integrator}; choose "
+        raise UsageError(f"the AOVs {' and '.join(LIGHT)} store light, and the integrator is {integrator}; choose "
                          f"{' or '.join(WITH_LIGHT)}")
 
 

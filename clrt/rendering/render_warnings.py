@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 
 def nonfinite_warnings(dropped: int, samples: int) -> list[str]:
     """Return one warning if samples were dropped, else none."""
-    return [f"{dropped} of {samples} samples were not finite and were dropped, so the picture may be too dark; look "
+    return [f"{dropped} of {samples} samples were not finite and were dropped, so the image may be too dark; look "
             "for extreme values in lights, textures and materials"] if dropped else []
 
 
@@ -29,7 +29,7 @@ def bias_warnings(settings: RenderSettings, removed: float) -> list[str]:
     """Return one warning if a setting biases the image, else none. removed: the fraction of the light."""
     if not (names := biased_by(settings)):
         return []
-    return [f"the picture is biased by {' and '.join(names)}: {removed:.2%} of the light was removed; the estimated "
+    return [f"the image is biased by {' and '.join(names)}: {removed:.2%} of the light was removed; the estimated "
             "error does not include this bias"]
 
 
@@ -43,7 +43,7 @@ def black_warnings(settings: RenderSettings, features: Iterable[str], brightest:
         cause = f"its brightest value is {brightest:.2g}; --exposure {stops:.0f} makes it visible"
     x, y = (length // 2 for length in settings.size)
     advice = f"; `clrt debug SCENE --pixel {x},{y}` shows why" if settings.integrator in WITH_LIGHT else ""
-    return [f"the picture is black: {cause}{advice}"]
+    return [f"the image is black: {cause}{advice}"]
 
 
 class PictureWarnings:
@@ -55,7 +55,7 @@ class PictureWarnings:
         self._of_scene = [f'the emissive mesh "{name}" emits light only away from the scene; reverse the order of its '
                           "faces' vertices, or set double_sided = true in its material" for name in self._backward]
         if _shows_light(scene.render) and _is_dark(self._features):
-            self._of_scene.append("the picture is black: nothing in this scene emits light")
+            self._of_scene.append("the image is black: nothing in this scene emits light")
         for text in self._of_scene:
             _log.warning("%s: %s", scene.name, text)
 
@@ -80,7 +80,7 @@ class PictureWarnings:
     def _cause(self, film: Film) -> str:
         """Return the likely cause of an image without any light."""
         if film.nonfinite_samples == film.samples:
-            return "none of its samples was finite"
+            return "none of its samples is finite"
         if self._scene.render.max_depth == 1:
             return "max_depth is 1, which shows emission alone, and the camera sees no emitter"
         if self._backward:

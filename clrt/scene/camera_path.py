@@ -22,7 +22,7 @@ def turntable(scene: Scene, frames: int, fps: float = Animation.fps) -> Scene:
     """Return the scene with the camera going once around in this number of frames. Raises UsageError unless `frames`
     is at least 1 and `fps` is above 0 and finite."""
     if not frames >= 1:
-        raise UsageError(f"frames is {frames}; a turntable has at least 1")
+        raise UsageError(f"frames is {frames}; it must be at least 1")
     if not 0 < fps < np.inf:
         raise UsageError(f"fps is {fps}; it must be above 0 and finite")
     return replace(scene, animation=Animation(fps=fps, turntable_seconds=frames / fps))
@@ -33,7 +33,7 @@ def frames(scene: Scene, chosen: Iterable[int] | None = None) -> Iterator[tuple[
     alone. Raises SceneError if the scene has no animation or an invalid one, UsageError for an invalid number.
     """
     if scene.animation is None:
-        raise SceneError(f"{scene.name}: nothing moves; write [[keyframe]] tables, or have it turned (--turntable, "
+        raise SceneError(f"{scene.name}: has no animation; write [[keyframe]] tables, or use a turntable (--turntable, "
                          "clrt.turntable)")
     if problems := (field_problems(Animation, vars(scene.animation), "animation")
                     or animation_problems(scene.camera, scene.animation)):
@@ -51,15 +51,15 @@ def animation_problems(camera: Camera, animation: Animation) -> list[str]:
     """Return what is wrong with an animation whose fields are within their limits, one sentence per problem."""
     keys, around = animation.keyframes, animation.turntable_seconds
     if around is not None and keys:
-        return ["animation: has turntable_seconds and keyframes; keep one of them"]
+        return ["animation: has both turntable_seconds and keyframes; keep one of them"]
     if around is None and len(keys) < 2:
-        return [f"animation: has {len(keys) or 'no'} keyframe{'s' * (not keys)} and no turntable_seconds; write two "
-                "[[keyframe]] tables or more"]
+        return [f"animation: has {len(keys) or 'no'} keyframe{'s' * (not keys)} and no turntable_seconds; write two or "
+                "more [[keyframe]] tables"]
     if around == 0:
-        return ["animation.turntable_seconds: 0 is no time; write how long once around takes"]
+        return ["animation.turntable_seconds: is 0; write the duration of one turn"]
     times = [key.time for key in keys]
-    problems = [f"keyframe[{i + 1}].time: {times[i + 1]:g} is not after {times[i]:g}, that of the one before; write "
-                "them in order" for i in range(len(times) - 1) if times[i + 1] <= times[i]]
+    problems = [f"keyframe[{i + 1}].time: {times[i + 1]:g} is not after the previous one, {times[i]:g}; write them "
+                "in ascending order" for i in range(len(times) - 1) if times[i + 1] <= times[i]]
     if not problems and animation.seconds * animation.fps >= MOST_FRAMES:
         problems = [f"animation: would have {animation.seconds * animation.fps:.9g} frames, more than {MOST_FRAMES}; "
                     "check the times, in seconds, and fps"]
@@ -77,9 +77,9 @@ def _view_problems(camera: Camera, animation: Animation) -> list[str]:
     if not bad.any():
         return []
     frame = int(bad.argmax())
-    what = "where it looks comes to where it is" if not length[frame % len(length)] else "it looks along its up"
-    return [f"animation: in frame {frame}, {frame / animation.fps:g} s after the first, the camera sees nothing: "
-            f"{what}; move a keyframe, or write one between"]
+    what = "look_at equals its position" if not length[frame % len(length)] else "it looks along its up vector"
+    return [f"animation: in frame {frame}, {frame / animation.fps:g} s after the first, the camera has no orientation: "
+            f"{what}; move a keyframe, or add one in between"]
 
 
 def _cameras(camera: Camera, animation: Animation, numbers: Doubles) -> Iterator[Camera]:

@@ -152,7 +152,7 @@ class Editor:
 
         def checked() -> None:
             if path.resolve() in {file.resolve() for file in source.paths}:
-                raise UsageError(f"{path}: is a file of the scene, which would be lost; name another file")
+                raise UsageError(f"{path}: is a file of the scene, which would be lost; choose another file")
             check_unprotected(path, force=False)
             write()
 

@@ -7,8 +7,8 @@ import sys
 
 from ..errors import OutputError, UsageError
 
-NO_DISPLAY = ("no window can be opened: {}. Run it on a desktop, through `ssh -X`, or on a virtual one "
-              "(`xvfb-run -s '-screen 0 1280x800x24' clrt view SCENE`); `clrt render` needs none")
+NO_DISPLAY = ("no window can be opened: {}. Run it on a desktop, through `ssh -X`, or on a virtual display "
+              "(`xvfb-run -s '-screen 0 1280x800x24' clrt view SCENE`); `clrt render` needs no display")
 
 
 def check_window() -> None:
@@ -20,7 +20,7 @@ def check_window() -> None:
         raise UsageError(f"the window needs the packages imgui-bundle and PyOpenGL ({fault}): install them with "
                          "`pip install imgui-bundle PyOpenGL`") from fault
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise no_display("there is no display, as neither DISPLAY nor WAYLAND_DISPLAY is set")
+        raise no_display("neither DISPLAY nor WAYLAND_DISPLAY is set")
 
 
 def no_display(fault: str) -> OutputError:

@@ -113,5 +113,5 @@ def test_the_same_tree_by_many_work_items(device: Device, layout: str, case: str
 
 def test_more_than_a_reference_can_say_is_refused(device: Device) -> None:
     many = np.broadcast_to(np.zeros((1, 3, 3), np.float32), (MAX_PRIMITIVES + 1, 3, 3))
-    with pytest.raises(SceneError, match="take the builder sah"):
+    with pytest.raises(SceneError, match="use the builder sah"):
         build_tree(device, "bvh2", "ploc", many, NO_SPHERES)

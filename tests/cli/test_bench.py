@@ -56,7 +56,7 @@ def test_rays_of_four_kinds(tmp_path: Path) -> None:
         assert not any(row["differ"] for row in rows.values()) and f"{kind}: " in printed
     assert all({"build_seconds", "tree_seconds", "bytes_per_triangle", "sah_cost", "builder"} <= set(tree)
                for tree in figures["trees"].values())
-    assert "time, CPU time (of the processor): of a ray, over the first line's" in printed
+    assert "time, CPU time (processor time): per ray, over the first line's" in printed
 
 
 def test_trees_by_size(tmp_path: Path) -> None:
@@ -81,7 +81,7 @@ def test_hits_that_must_be_the_same(tmp_path: Path) -> None:
     for mesh in figures["meshes"]:
         assert {way["layout"] for way in mesh["ways"]} >= {"bvh8", "bvh2", "cwbvh", "packs", "list"}
         assert all(list(way["differ"]) == mesh["kinds"] for way in mesh["ways"]) and mesh["rays"] == 4 * 4096
-        assert f"float64: {mesh['exact']['wrong']} of {mesh['exact']['rays']} answers impossible" in printed
+        assert f"float64: {mesh['exact']['wrong']} of {mesh['exact']['rays']} hits impossible" in printed
     assert [mesh["escaped"] for mesh in figures["meshes"]] == [0, 0, None]
     assert {"index", "platform", "driver"} <= set(figures["devices"][0])
 
@@ -132,19 +132,20 @@ def test_files_without_rays_are_refused(tmp_path: Path) -> None:
     (tmp_path / "cut.npz").write_bytes(stored(tmp_path / "whole.npz").read_bytes()[:300])
     np.savez(tmp_path / "unlimited.npz", origins=np.zeros((4, 3)), directions=np.ones((4, 3)))
     for file, words in {
-            tmp_path / "one.npy": "no .npz", tmp_path / "text.npz": "no .npz", tmp_path / "cut.npz": "no .npz",
+            tmp_path / "one.npy": "not an .npz", tmp_path / "text.npz": "not an .npz",
+            tmp_path / "cut.npz": "not an .npz",
             tmp_path / "none.npz": "No such file", tmp_path: "directory", tmp_path / "unlimited.npz": "t_max is not",
             stored(tmp_path / "a.npz", origins=np.zeros((0, 3)), directions=np.ones(3), t_max=1): "no rays",
             stored(tmp_path / "b.npz", directions=np.ones((3, 4))): r"directions \(3, 4\) must",
             stored(tmp_path / "c.npz", t_max=np.ones(5)): r"t_max \(5,\): there are 4 origins",
-            stored(tmp_path / "d.npz", origins=np.array([None])): "no .npz"}.items():
+            stored(tmp_path / "d.npz", origins=np.array([None])): "not an .npz"}.items():
         with pytest.raises(SceneError, match=f"^{re.escape(str(file))}: .*{words}"):
             load_rays(file)
 
 
 @pytest.mark.parametrize(("arguments", "code", "words"), [
     (("rays", "--rays", "r.npz"), 2, ["--rays", "--mesh"]),
-    (("rays", "--json", "."), 6, [".: is a folder; name a file in it\n"]),
+    (("rays", "--json", "."), 6, [".: is a folder; choose a file in it\n"]),
     (("build", "--mesh", "missing.ply"), 3, ["missing.ply"]),
     (("hits", "--device", "nonesuch"), 4, ["nonesuch"]),
     (("build", "--json", "no/such/b.json"), 6, ["no/such"]),

@@ -108,7 +108,7 @@ def test_the_first_signal_keeps_everything(folder: Path, number: signal.Signals)
     process.send_signal(number)
     output, messages = process.communicate(timeout=60)
     assert output.split() == ["a.exr", "r.json"] and process.returncode == 130
-    assert "ball: interrupted; --resume goes on from a.ck" in messages
+    assert "ball: interrupted; run it with --resume to continue from a.ck" in messages
     report = json.loads((folder / "r.json").read_text())
     assert report["stop_reason"] == "interrupted" and read_image(folder / "a.exr").shape == (64, 96, 3)
     film = read_checkpoint(folder / "a.ck", KINDS)[1]["film"]
@@ -151,7 +151,7 @@ def test_a_full_disk_ends_no_render(folder: Path) -> None:
     (("--checkpoint", "a.png", "-o", "a.png"), 2, ["a.png", "--checkpoint"]),
     (("--checkpoint", "a.ck", "--checkpoint-every", "-1"), 2, ["--checkpoint-every"]),
     (("--checkpoint", "a.ck", "--resume", "--seed", "3"), 3, ["a.ck", "seed 0 instead of 3", "--resume"]),
-    (("--checkpoint", "b.ck", "--resume"), 3, ["b.ck", "no checkpoint", "remove it"])])
+    (("--checkpoint", "b.ck", "--resume"), 3, ["b.ck", "not a checkpoint", "remove it"])])
 def test_mistakes_end_in_one_message(folder: Path, content: bytes, options: tuple[Any, ...], code: int,
                                      words: list[str]) -> None:
     (folder / "a.ck").write_bytes(content)

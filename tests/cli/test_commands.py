@@ -86,7 +86,7 @@ def test_warnings_are_json_where_progress_is(scene: Path) -> None:
     lines = [json.loads(line) for line in result.stderr.splitlines()]
     assert all("phase" in line for line in lines)
     assert [line["warning"] for line in lines if "warning" in line] == [
-        "ball: the picture is black: nothing in this scene emits light"]
+        "ball: the image is black: nothing in this scene emits light"]
 
 
 def test_time_and_error_end_a_render(scene: Path) -> None:
@@ -152,13 +152,13 @@ file = "nowhere.ply"
     (("render", "x.png"), 3, ["x.png: a scene must be one of .toml"]),
     (("render", "."), 3, [".: is a folder, not a scene"]),
     (("convert", "nope.obj", "z.toml"), 3, ["nope.obj: no such model file"]),
-    (("render", "ball.toml", "--reference", "ball.toml"), 3, ["ball.toml: cannot be decoded as a picture"]),
+    (("render", "ball.toml", "--reference", "ball.toml"), 3, ["ball.toml: cannot be decoded as an image"]),
     (("render", "ball.toml", "-o", "no/such/folder/x.png"), 6, ["no/such/folder"]),
     (("render", "ball.toml", "-o", "x.pgn"), 6, [".pgn", "did you mean", ".png"]),
     (("render", "ball.toml", "--device", "nonesuch"), 4, ["nonesuch"]),
     (("render", "ball.toml", "--size", "0x4"), 2, ["0x4"]),
     (("render", "ball.toml", "--view", "srbg"), 2, ["srbg"]),
-    (("render", "ball.toml", "-q", "--view", "ocio:Nope"), 2, ["no view 'Nope'"]),
+    (("render", "ball.toml", "-q", "--view", "ocio:Nope"), 2, ["view 'Nope' is unknown"]),
     (("render", "ball.toml", "--exposure", "nan"), 2, ["exposure is nan", "finite"]),
     (("render", "ball.toml", "--spp", "0"), 2, ["--spp"]),
     (("render", "ball.toml", "--time", "-1"), 2, ["time", "-1"]),
@@ -269,7 +269,7 @@ def test_convert(tmp_path: Path) -> None:
                     cwd=tmp_path).returncode == 0
     np.testing.assert_array_equal(read_image(tmp_path / "obj.exr"), read_image(tmp_path / "toml.exr"))
     done = clrt("convert", "models/a.obj", "scenes/a.toml", cwd=tmp_path)
-    assert done.returncode == 2 and "exists already" in done.stderr and "--force" in done.stderr
+    assert done.returncode == 2 and "already exists" in done.stderr and "--force" in done.stderr
     assert clrt("convert", "models/a.obj", "scenes/a.toml", "--force", cwd=tmp_path).returncode == 0
     assert clrt("convert", "scenes/a.toml", "b.toml", cwd=tmp_path).returncode == 2
     assert clrt("convert", "models/a.obj", "b.obj", cwd=tmp_path).returncode == 2

@@ -93,10 +93,10 @@ def test_a_shadow_says_what_casts_it(scene: Path) -> None:
 
 
 @pytest.mark.parametrize(("arguments", "kind", "words"), [
-    (("ball.toml", "--pixel", "24,0"), UsageError, "pixel 24,0 is outside of the picture of 24x16"),
+    (("ball.toml", "--pixel", "24,0"), UsageError, "pixel 24,0 is outside the image of 24x16"),
     (("ball.toml", "--pixel", "5,16", "--size", "16x8"), UsageError, "Y 0 to 7"),
     (("nope.toml", "--pixel", "0,0"), SceneError, "nope.toml: no such scene file"),
-    (("local.toml", "--pixel", "0,0"), UsageError, 'integrator "local" follows no paths; choose path or direct'),
+    (("local.toml", "--pixel", "0,0"), UsageError, 'integrator "local" traces no paths; choose path or direct'),
 ])
 def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], kind: type[ClrtError],
                                      words: str) -> None:
@@ -108,4 +108,4 @@ def test_mistakes_end_in_one_message(scene: Path, arguments: tuple[str, ...], ki
 def test_a_pixel_is_two_numbers(scene: Path) -> None:
     for wrong in ("5", "5;6", "a,b", "-1,0"):
         result = run(scene, f"--pixel={wrong}")
-        assert result.exit_code == 2 and f"'{wrong}' is no pixel; write X,Y" in result.stderr
+        assert result.exit_code == 2 and f"'{wrong}' is not a pixel; write X,Y" in result.stderr

@@ -116,7 +116,8 @@ def test_a_check_that_runs_out_of_the_default_limit_has_failed(monkeypatch: pyte
 
 
 @pytest.mark.parametrize(("limit", "words"), [
-    ("nan", "'nan' is no finite number"), ("inf", "'inf' is no finite number"), ("0.5", "0.5 is not in the range")])
+    ("nan", "'nan' is not a finite number"), ("inf", "'inf' is not a finite number"),
+    ("0.5", "0.5 is not in the range")])
 def test_limits_that_are_none(limit: str, words: str) -> None:
     refused = CliRunner().invoke(devices.command, ["--limit", limit])
     assert refused.exit_code == 2 and words in refused.output and "--limit" in refused.output

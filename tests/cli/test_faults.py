@@ -66,26 +66,26 @@ def assert_same(folder: Path, whole: Path) -> None:
 def test_of_two_devices_one_ends_it_alone(folder: Path, whole: Path, faulty: Path, kind: str, queue: int) -> None:
     """The image equals that of a single device, and the exit code is that of success."""
     result = render(folder, *TWO, **fault(faulty, kind, queue))
-    assert result.returncode == 0 and result.stderr.count("is left out") == 1, result.stderr
+    assert result.returncode == 0 and result.stderr.count("is excluded") == 1, result.stderr
     assert_same(folder, whole)
 
 
 def test_of_two_devices_one_never_does_anything(folder: Path, whole: Path, faulty: Path) -> None:
     """Drivers may compile at the first launch, so its timeout is ten times as long, but finite."""
     result = render(folder, *TWO, **fault(faulty, "endless", 1, after=0) | {"CLRT_HANG_SECONDS": "0.3"})
-    assert result.returncode == 0 and "has not ended a launch in 3 s" in result.stderr, result.stderr
+    assert result.returncode == 0 and "has not finished a launch in 3 s" in result.stderr, result.stderr
     assert_same(folder, whole)
 
 
 @pytest.mark.parametrize(("kind", "words", "devices"), [
-    ("lost", "the device failed", ONE), ("endless", "has not ended a launch in 1 s", ONE),
+    ("lost", "the device failed", ONE), ("endless", "has not finished a launch in 1 s", ONE),
     ("hangs", "has not returned from a call in 1 s", ONE), ("hangs", "has not returned from a call in 1 s", TWO),
     ("crashes", "crashed (SIGABRT)", ONE)])
 def test_it_ends_in_a_message_and_goes_on(folder: Path, whole: Path, faulty: Path, kind: str, words: str,
                                           devices: tuple[str, ...]) -> None:
     """If no device is left or a call does not return, the checkpoint stays valid and --resume finishes it."""
     result = render(folder, *devices, **fault(faulty, kind))
-    assert result.returncode == 4 and words in result.stderr and "--resume goes on" in result.stderr, result.stderr
+    assert result.returncode == 4 and words in result.stderr and "resume with --resume" in result.stderr, result.stderr
     assert "Traceback" not in result.stderr and result.stdout == ""
     again = render(folder, *devices, "--resume")
     assert again.returncode == 0, again.stderr

@@ -130,7 +130,7 @@ def test_no_file_of_the_scene_is_replaced(folder: Path, arguments: tuple[str, ..
         write_image(folder / name, np.ones((4, 8, 3), np.float32))
     before = {path: path.read_bytes() for path in folder.iterdir()}
     result = clrt("render", *arguments, "--spp", "1", cwd=folder)
-    assert (result.returncode, result.stdout) == (2, "") and "is a file of the scene and" in result.stderr
+    assert (result.returncode, result.stdout) == (2, "") and "is both a file of the scene and" in result.stderr
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
@@ -144,7 +144,7 @@ def test_checkpoints_of_any_version_are_replaced(folder: Path) -> None:
 
 def test_lists_of_bands_replace_their_own_kind_alone(tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("somebody's file")
-    with pytest.raises(CheckpointError, match="mine: is there and is no checkpoint"):
+    with pytest.raises(CheckpointError, match="mine: exists and is not a checkpoint"):
         Manifest(tmp_path / "mine", {}, resume=False)
     assert (tmp_path / "mine").read_text() == "somebody's file"
     for _ in range(2):

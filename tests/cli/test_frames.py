@@ -140,17 +140,17 @@ def test_interrupted_frames_are_not_written_and_resume_ends_it(flight: Path) -> 
         if told["phase"] == "frame" and told["frame"] == 2:
             running.send_signal(signal.SIGINT)
             break
-    assert "flight: interrupted; with --resume the same command renders the frames" in running.stderr.read()
+    assert "flight: interrupted; run the same command with --resume" in running.stderr.read()
     assert running.wait() == 130 and {path.name for path in Path().iterdir()} == {"flight.toml", "0000.png", "0001.png"}
     done = subprocess.run([*wanted, "--resume"], capture_output=True, text=True)
     assert done.stdout.split() == ["0002.png", "0003.png", "0004.png", "0005.png", "f.gif"], done.stderr
 
 
 @pytest.mark.parametrize(("arguments", "code", "words"), [
-    (["--frames", "7-5"], 2, "'7-5' names no frames"), (["--frames", "0-4:0"], 2, "0-99:5"),
+    (["--frames", "7-5"], 2, "'7-5' is not a list of frames"), (["--frames", "0-4:0"], 2, "0-99:5"),
     (["--frames", "6"], 2, "flight has no frame 6; its frames are 0 to 5"),
-    (["--frames", "all", "--checkpoint", "c"], 2, "--checkpoint is for one picture"),
-    (["--fps", "3"], 2, "--turntable"), (["--turntable", "2", "-o", "a.gif", "--aov", "depth"], 2, "as a video does"),
+    (["--frames", "all", "--checkpoint", "c"], 2, "--checkpoint is not supported for animations"),
+    (["--fps", "3"], 2, "--turntable"), (["--turntable", "2", "-o", "a.gif", "--aov", "depth"], 2, "cannot store AOVs"),
     (["--frames", "0", "-o", "a.mp4", "--size", "25x16"], 2, "26x16"), (["-o", "a.gif"], 6, ".gif"),
     (["--frames", "0", "-o", "a.gif", "--fps", "60"], 2, "60 frames per second"),
     (["--frames", "0", "-o", "a.gif", "--fps", "0.0015"], 2, "666.667 s are more than the 655.35"),
@@ -170,4 +170,4 @@ def test_what_does_not_move_has_no_frames(flight: Path) -> None:
     flight.write_text("sphere = [{}]\n")
     done = subprocess.run([sys.executable, "-m", "clrt", "render", "flight.toml", "--frames", "all"],
                           capture_output=True, text=True)
-    assert done.returncode == 3 and "flight: nothing moves; write [[keyframe]]" in done.stderr
+    assert done.returncode == 3 and "flight: has no animation; write [[keyframe]]" in done.stderr

@@ -61,7 +61,7 @@ def test_what_is_no_pipe(folder: Path) -> None:
 def test_a_pipe_takes_one_image(folder: Path) -> None:
     files, pipes = split_pipes(map(Path, ("a.png", "-", "exr:fifo")))
     assert files == (Path("a.png"),) and pipes == (Pipe(STDOUT, ".png"), Pipe(Path("fifo"), ".exr"))
-    with pytest.raises(UsageError, match="named twice"):
+    with pytest.raises(UsageError, match="given twice"):
         split_pipes(map(Path, ("-", "exr:/dev/stdout")))
 
 
@@ -82,7 +82,7 @@ def test_images(folder: Path, form: str, redirection: str) -> None:
 
 
 @pytest.mark.parametrize(("options", "code", "told"), [
-    ("-o - --turntable 2", 2, "takes one image"), ("-o - -o exr:-", 2, "named twice"),
+    ("-o - --turntable 2", 2, "takes one image"), ("-o - -o exr:-", 2, "given twice"),
     ("-o - --aov depth", 2, ".exr or .png"), ("-o tif:-", 6, "png, exr or hdr"), ("-o - >&-", 2, "is closed")])
 def test_mistakes(folder: Path, options: str, code: int, told: str) -> None:
     done = shell(f"{CLRT} render ball.toml {options}")
@@ -110,7 +110,7 @@ def test_a_reader_that_has_gone_loses_nothing(folder: Path, to: str) -> None:
     os.close(writing)
     kept, = folder.glob("image-*.exr")
     assert done.returncode == 6 and done.stderr.count("\n") == 1 and done.stderr.startswith("error: -: cannot be ")
-    assert str(kept) in done.stderr and "a.ck holds what was rendered" in done.stderr
+    assert str(kept) in done.stderr and "a.ck holds the samples so far" in done.stderr
     assert subprocess.run([*line, "-o", "b.exr", "--resume"]).returncode == 0
     assert np.array_equal(read_image(kept), read_image(Path("b.exr")))
 

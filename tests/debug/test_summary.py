@@ -59,7 +59,7 @@ REASONS: dict[str, tuple[Scene, str]] = {
     "light below": (above_floor(lights=[replace(POINT, position=(0.0, -4.0, 0.0))]),
                     "light samples there: all 16 behind the surface (light[0] (point))"),
     "wound backwards": (above_floor(square(1.5, "lamp", LAMP)),
-                        "light samples there: all 16 where the light emits nothing (mesh \"lamp\")"),
+                        "light samples there: all 16 in a direction without emission (mesh \"lamp\")"),
     "seen from behind": (above_floor(material=LAMP, camera=Camera(position=(0.0, -3.0, 0.5))),
                          'the camera sees mesh "floor", from behind; the emission of mesh "floor" faces away'),
     "inside a ball": (above_floor(lights=[POINT], spheres=[Sphere(center=(0.0, 1.0, 2.0), radius=0.5, material=WHITE)]),

@@ -127,13 +127,13 @@ def test_direct_light_ends_at_two_edges(device: Device) -> None:
 
 @pytest.mark.parametrize("pixel", [(45, 0), (0, 33), (-1, 0)])
 def test_pixels_outside_are_refused(device: Device, pixel: tuple[int, int]) -> None:
-    with pytest.raises(UsageError, match=rf"pixel {pixel[0]},{pixel[1]} is outside of the picture of 45x33; X must be "
+    with pytest.raises(UsageError, match=rf"pixel {pixel[0]},{pixel[1]} is outside the image of 45x33; X must be "
                                          "0 to 44 and Y 0 to 32"):
         trace_pixel(everything(), device, pixel)
 
 
 def test_integrators_without_paths_are_refused(device: Device) -> None:
-    with pytest.raises(UsageError, match='integrator "local" follows no paths; choose path or direct'):
+    with pytest.raises(UsageError, match='integrator "local" traces no paths; choose path or direct'):
         trace_pixel(Scene(render=RenderSettings(integrator="local")), device, (0, 0))
 
 
@@ -150,5 +150,5 @@ def test_paths_that_were_ended_are_missed(device: Device, tmp_path: Path, monkey
     folder = sabotaged(tmp_path / "kernels", r"!loops_ended\(2 \+ \(launch.width == 0\)\)", "(launch.width == 0)")
     monkeypatch.setattr(program, "kernel_folder", lambda: folder)
     monkeypatch.setattr(checked_loops, "loop_turns", lambda device: 50_000)
-    with pytest.raises(DeviceError, match="after 50000 turns, and 4 of 4 paths .* need more"):
+    with pytest.raises(DeviceError, match="after 50000 iterations, and 4 of 4 paths .* need more"):
         trace_pixel(everything(), device, (4, 4))

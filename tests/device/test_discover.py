@@ -69,7 +69,7 @@ def test_simulators_are_used_only_if_named(machine: list[DeviceInfo], monkeypatc
     monkeypatch.setattr(discover, "_everything", lambda again: only)
     monkeypatch.setattr(discover, "find_devices", find_all)
     assert [(info.type, info.chosen) for info, _ in find_all()] == [("simulator", False), ("gpu", False)]
-    with pytest.raises(DeviceError, match="(?s)no device but a simulator.*Oclgrind Simulator"):
+    with pytest.raises(DeviceError, match="(?s)only a simulator.*Oclgrind Simulator"):
         choose()
     for selector in ("gpu", "cpu"):
         with pytest.raises(DeviceError):
@@ -95,7 +95,7 @@ def test_configuration_file(machine: list[DeviceInfo], monkeypatch: pytest.Monke
     monkeypatch.setattr("platformdirs.user_config_dir", lambda name: str(tmp_path))
     assert choose()[0] is machine[0], "there need be none"
     monkeypatch.setenv("CLRT_CONFIG", str(file))
-    with pytest.raises(UsageError, match="config.toml: CLRT_CONFIG names it"):
+    with pytest.raises(UsageError, match="config.toml: CLRT_CONFIG names this file"):
         choose()
     for content, chosen in (('device = "epyc"', 3), ("device = 0", 0), ('device = "cpu"', 3), ('device = ""', 0),
                             ("# nothing", 0)):
@@ -110,8 +110,9 @@ def test_configuration_file(machine: list[DeviceInfo], monkeypatch: pytest.Monke
 @pytest.mark.parametrize(("content", "error", "words"), [
     (b'device = "quadro"', DeviceError, r"no usable device matches 'quadro' \(.*config.toml\).*Radeon"),
     (b"device = [0]", UsageError, "config.toml: device is \\[0\\]"), (b"device = true", UsageError, "device is True"),
-    (b"device = gpu", UsageError, "config.toml: is no TOML"), (b"\xff", UsageError, "config.toml: is no TOML"),
-    (b'devise = "gpu"', UsageError, "config.toml: devise is unknown; there is device")])
+    (b"device = gpu", UsageError, "config.toml: is not valid TOML"),
+    (b"\xff", UsageError, "config.toml: is not valid TOML"),
+    (b'devise = "gpu"', UsageError, "config.toml: devise is unknown; the only key is")])
 def test_mistakes_in_the_configuration_file(machine: list[DeviceInfo], monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
                                             content: bytes, error: type[ClrtError], words: str) -> None:
     (tmp_path / "config.toml").write_bytes(content)
@@ -150,8 +151,8 @@ def test_the_one_that_is_preferred_is_chosen(monkeypatch: pytest.MonkeyPatch, tm
         monkeypatch.setenv("CLRT_DEVICE", variable)
         listed = devices()
         assert [row["index"] for row in listed if row["chosen"]] == ([] if chosen is None else [chosen])
-        assert [row["index"] for row in listed if "chosen as" in row["why"]] == ([] if chosen is None else [chosen])
-        assert chosen is None or f"{origin} names it" in listed[chosen]["why"]
+        assert [row["index"] for row in listed if "chosen " in row["why"]] == ([] if chosen is None else [chosen])
+        assert chosen is None or f"{origin} selects it" in listed[chosen]["why"]
         assert chosen is None or choose()[0].index == chosen
 
 

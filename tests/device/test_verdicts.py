@@ -101,7 +101,7 @@ def test_a_device_that_failed_is_used_only_if_named(info: DeviceInfo, caplog: py
         keep_verdict(other, FAILED)
     failed = find_devices()[0][0]
     assert failed.usable and not failed.chosen and "sums: 3 of 8 wrong (and 1 more)" in failed.why
-    with pytest.raises(DeviceError, match=r"(?s)Update the driver .*--check.*name a device.*failed its check"):
+    with pytest.raises(DeviceError, match=r"(?s)Update the driver .*--check.*select a device.*failed its check"):
         choose()
     with caplog.at_level(logging.WARNING):
         for selector in (failed.id, 0, "0", failed.type):

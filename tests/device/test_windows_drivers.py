@@ -69,8 +69,8 @@ def test_added_to_all_others(monkeypatch: pytest.MonkeyPatch, named: str | None)
 @pytest.mark.parametrize(("system", "machine", "told"), [
     ("linux", "x86_64", 'pip install "pyopencl[pocl]"'), ("linux", "aarch64", "pocl-opencl-icd"),
     ("win32", "AMD64", "pip install intel-opencl-rt msvc-runtime"),
-    ("win32", "ARM64", "install the driver of your GPU"),
-    ("darwin", "arm64", "conda install"), ("freebsd14", "amd64", "install the driver of your GPU")])
+    ("win32", "ARM64", "install your GPU vendor's driver"),
+    ("darwin", "arm64", "conda install"), ("freebsd14", "amd64", "install your GPU vendor's driver")])
 def test_what_to_install(system: str, machine: str, told: str) -> None:
     message = no_device(system, machine)
     assert message.startswith("no OpenCL device: ") and told in message

@@ -62,7 +62,7 @@ def test_nothing_listens_to_others() -> None:
 
 
 def test_wrong_addresses() -> None:
-    with pytest.raises(UsageError, match="is no address; write tcp://HOST:PORT"):
+    with pytest.raises(UsageError, match="is not an address; write tcp://HOST:PORT"):
         connect("localhost")
 
 

@@ -94,7 +94,7 @@ def test_an_interrupt_before_any_sample(cluster: Cluster, capsys: pytest.Capture
 
 def test_a_checkpoint_is_of_one_camera(cluster: Cluster, tmp_path: Path) -> None:
     renderer = FarmRenderer(room(), cluster, simulated=1e6, size=SIZE, checkpoint=tmp_path / "a.ck")
-    with pytest.raises(UsageError, match="make a renderer for each"):
+    with pytest.raises(UsageError, match="create a renderer for each"):
         renderer.look(Camera(position=(0, 0, 2)))
 
 
@@ -124,7 +124,7 @@ def test_bands_warn_of_the_whole_picture(tmp_path: Path) -> None:
                       "b": band(samples=100, nonfinite_samples=4, light=1.0, clamped_part=0.5)}
     first, dropped, biased = banded.summary()["warnings"]
     assert first == "of the scene" and dropped.startswith("7 of 200 samples were not finite")
-    assert biased.startswith("the picture is biased by clamp_direct: 33.33% of the light was removed; the")
+    assert biased.startswith("the image is biased by clamp_direct: 33.33% of the light was removed; the")
     banded.reports["b"]["brightest"] = 0.0
-    assert banded.summary()["warnings"][3:] == ["the picture is black: no light reaches what the camera sees; "
+    assert banded.summary()["warnings"][3:] == ["the image is black: no light reaches what the camera sees; "
                                                 "`clrt debug SCENE --pixel 32,24` shows why"]

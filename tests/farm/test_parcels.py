@@ -66,7 +66,7 @@ class Escape:
     Escape(np.load, "x.npy"), Escape(pickle.loads, b"N.")], ids=lambda escape: escape.called[0].__name__)
 def test_a_text_calls_nothing(escape: Escape) -> None:
     """Only the classes of scenes and arrays may be named; anything else is refused before it is called."""
-    with pytest.raises(SceneError, match="no scene is made of"):
+    with pytest.raises(SceneError, match="is not allowed in a scene"):
         unpack(pickle.dumps(escape), {})
 
 

@@ -47,7 +47,7 @@ def refused(address: str) -> str:
     """Return the error message for an address; it must name the address once."""
     with pytest.raises(DeviceError) as error:
         connect(address)
-    assert str(error.value).count(address) == 1 and "name the address that it prints" in str(error.value)
+    assert str(error.value).count(address) == 1 and "use the address that it prints" in str(error.value)
     return str(error.value)
 
 

@@ -147,7 +147,7 @@ def test_files(tmp_path: Path, first: str, second: str, hdr: bool) -> None:
 
 @pytest.mark.parametrize("wrong", [None, np.zeros((2, 2), np.float32), 3.0, [[0.0, 0.0, 0.0]]], ids=str)
 def test_what_is_no_picture(wrong: Any) -> None:
-    with pytest.raises(UsageError, match="the reference is .* give an array of them, a clrt.Image or the path"):
+    with pytest.raises(UsageError, match="the reference is .* give such an array, a clrt.Image or the path"):
         compare(picture((1, 1, 1)), wrong)
 
 

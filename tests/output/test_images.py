@@ -147,11 +147,11 @@ def test_exr_is_compressed_float(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name, message", [
-    ("picture.pgn", r"picture\.pgn: unknown picture format \.pgn; use .*did you mean .*picture\.png\?"),
-    ("picture.xyz", r"unknown picture format \.xyz; use \.png, \.exr or \.hdr$"),
+    ("picture.pgn", r"picture\.pgn: unknown image format \.pgn; use .*did you mean .*picture\.png\?"),
+    ("picture.xyz", r"unknown image format \.xyz; use \.png, \.exr or \.hdr$"),
     ("picture", r"the name has no extension; use"),
     ("missing/deeper/a.png", r"the folder .*missing/deeper does not exist; create it first"),
-    ("folder.png", r"folder\.png: is a folder; name a file in it"),
+    ("folder.png", r"folder\.png: is a folder; choose a file in it"),
     ("/proc/picture.png", r"/proc/picture\.png: no file can be written in the folder /proc \("),
     ("file.png/a.png", r"the folder .*file\.png does not exist"),
 ])
@@ -172,7 +172,7 @@ def test_checking_leaves_nothing_behind(tmp_path: Path) -> None:
 
 
 def test_unknown_views_and_exposures_write_nothing(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="no view transform"):
+    with pytest.raises(UsageError, match="view transform .* is unknown"):
         write_image(tmp_path / "a.png", noise(), view="film")
     for exposure in (math.nan, math.inf, -math.inf):
         with pytest.raises(UsageError, match="exposure is .*; it must be a finite number"):
@@ -240,8 +240,8 @@ def test_values_that_are_no_light_are_counted(tmp_path: Path, caplog: pytest.Log
     """They are replaced and counted in .png and .hdr files; an .exr keeps them."""
     flawed = np.array([[[math.nan, math.nan, -1], [-math.inf, math.inf, 0.5], [0, -0.0, 3e38]]], np.float32)
     write_image(tmp_path / name, flawed)
-    message = (f"{tmp_path / name}: of the picture's values 2 are NaN and 2 negative, written as 0, and 1 infinite, "
-               "written as the brightest")
+    message = (f"{tmp_path / name}: of the image's values, 2 are NaN and 2 negative, written as 0, and 1 infinite, "
+               "written as the largest value")
     assert caplog.messages == [message] * told
     write_image(tmp_path / name, np.ones((1, 1, 3), np.float32))
     assert len(caplog.messages) == told

@@ -76,7 +76,7 @@ def test_numbers_that_float32_has_not_are_told(tmp_path: Path, caplog: pytest.Lo
     assert not caplog.messages and layers(tmp_path / "a.exr")[1]["object.X"].tolist() == [[1 << 24, -1]]
     with caplog.at_level(logging.WARNING):
         write_image(tmp_path / "a.exr", pixels, aovs={"object": ids + 1})
-    assert caplog.messages == ["object: numbers beyond 16777216 are rounded in an .exr; Image.aovs has them"]
+    assert caplog.messages == ["object: numbers above 16777216 are rounded in an .exr; Image.aovs has the exact ones"]
 
 
 def test_the_command_writes_them(tmp_path: Path) -> None:
@@ -100,10 +100,10 @@ def test_a_denoised_picture_has_them_and_the_raw_one_not(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("arguments, message", [
-    (["--aov", "dept"], "no AOV 'dept'; there are albedo, .*did you mean depth"),
-    (["--aov", "depth", "-o", "a.hdr"], "an .hdr holds the picture alone"),
-    (["--aov", "depth", "-o", "a.png", "--reference", "a.depth.png"], "a.depth.png: is the reference and where an AOV"),
-    (["--aov", "depth", "-o", "a.png", "-o", "a.depth.png"], "a.depth.png: is a picture .* where an AOV")], ids=str)
+    (["--aov", "dept"], "AOV 'dept' is unknown; choose from albedo, .*did you mean depth"),
+    (["--aov", "depth", "-o", "a.hdr"], "an .hdr file, a video .* cannot store AOVs"),
+    (["--aov", "depth", "-o", "a.png", "--reference", "a.depth.png"], "a.depth.png: is both the reference and an AOV"),
+    (["--aov", "depth", "-o", "a.png", "-o", "a.depth.png"], "a.depth.png: is both an image .* an AOV")], ids=str)
 def test_mistakes(tmp_path: Path, arguments: list[str], message: str) -> None:
     result = run(tmp_path, *arguments)
     assert result.returncode == 2 and len(result.stderr.splitlines()) == 1

@@ -190,8 +190,8 @@ def test_views_of_a_config_of_ones_own(own_config: Path) -> None:
     for view, power in (("ocio", 1 / 2), ("ocio:Plain", 1 / 2), ("ocio:Filmic", 1 / 3), ("ocio:Other/Plain", 1 / 3)):
         expected = [math.floor(255 * value**power + 0.5) for value in (1 / 16, 1 / 4)]
         assert shown([0.125, 0.5], view, exposure=-1) == expected
-    told = ("config.ocio: no view 'Flimic'; of Screen there are Plain, Filmic, and others as DISPLAY/VIEW of Screen, "
-            "Other; did you mean ocio:Filmic")
+    told = ("config.ocio: view 'Flimic' is unknown; Screen has Plain, Filmic, others are named DISPLAY/VIEW for "
+            "Screen, Other; did you mean ocio:Filmic")
     with pytest.raises(UsageError, match=told):
         view_called("ocio:Flimic")
 
@@ -199,12 +199,12 @@ def test_views_of_a_config_of_ones_own(own_config: Path) -> None:
 def test_configs_that_are_none(own_config: Path) -> None:
     own_config.with_name("broken.ocio").write_text("[")
     own_config.with_name("other.ocio").write_text(own_config.read_text().replace("Linear Rec.709", "film"))
-    for name, message in (("broken", "is no OpenColorIO config"), ("missing", "is no OpenColorIO config"),
-                          ("other", "none of its colour spaces is called lin_rec709")):
+    for name, message in (("broken", "is not a usable OpenColor"), ("missing", "is not a usable OpenColor"),
+                          ("other", "has no colour space called lin_rec709")):
         with pytest.raises(UsageError, match=f"{name}.ocio: {message}"):
             ocio_view(str(own_config.with_name(f"{name}.ocio")), "")
 
 
 def test_unknown_view_is_a_usage_error() -> None:
-    with pytest.raises(UsageError, match="no view transform 'srbg'.*did you mean srgb"):
+    with pytest.raises(UsageError, match="view transform 'srbg' is unknown.*did you mean srgb"):
         to_display(np.zeros((1, 1, 3), np.float32), "srbg")

@@ -196,7 +196,7 @@ def test_depth_is_what_the_integrator_of_it_shows(camera: dict[str, Any]) -> Non
 
 
 def test_light_needs_an_integrator_of_light() -> None:
-    with pytest.raises(UsageError, match="the AOVs direct and indirect are of light, and the integrator is normals"):
+    with pytest.raises(UsageError, match="the AOVs direct and indirect store light, and the integrator is normals"):
         clrt.render(everything(), aovs="indirect", integrator="normals")
 
 
@@ -252,5 +252,5 @@ def test_a_checkpoint_keeps_direct_light(tmp_path: Any) -> None:
 
 def test_names() -> None:
     assert chosen_aovs(" depth,albedo, depth") == chosen_aovs(["depth", "albedo"]) == ("depth", "albedo")
-    with pytest.raises(UsageError, match="no AOV 'normals'; there are albedo, .*; did you mean normal"):
+    with pytest.raises(UsageError, match="AOV 'normals' is unknown; choose from albedo, .*; did you mean normal"):
         clrt.render(everything(), aovs=["normals"])

@@ -93,7 +93,7 @@ def test_from_whatever_was_written_on_the_way(device: Device, tmp_path: Path, sm
 
 def test_without_one_yet_it_begins(device: Device, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     running = renderer(device, checkpoint=tmp_path / "a.ck", resume=True)
-    assert "no checkpoint yet" in caplog.text and run(running, spp=2).spp == 2
+    assert "does not exist yet" in caplog.text and run(running, spp=2).spp == 2
     caplog.clear()
     renderer(device, checkpoint=tmp_path / "a.ck")
     assert "will be replaced" in caplog.text

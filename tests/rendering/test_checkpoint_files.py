@@ -173,7 +173,7 @@ def test_a_film_with_or_without_direct_light_is_refused(device: Device, kept: Pa
 def test_a_file_that_is_no_checkpoint_is_kept(device: Device, tmp_path: Path, resume: bool) -> None:
     """The message does not advise to start afresh, as that would be rejected, too."""
     (tmp_path / "a.ck").write_text("a letter")
-    with pytest.raises(CheckpointError, match="is no checkpoint, so it is not replaced; name another file, or remove"):
+    with pytest.raises(CheckpointError, match="is not a checkpoint, so it is not replaced; choose another file"):
         renderer(device, checkpoint=tmp_path / "a.ck", resume=resume)
     assert (tmp_path / "a.ck").read_text() == "a letter"
 
@@ -184,15 +184,16 @@ def test_other_scenes_and_kernels_are_refused(device: Device, kept: Path, monkey
     mesh, *others = scene.meshes
     moved = replace(mesh, vertices=mesh.vertices + np.float32(1e-6))
     for changed, named in [
-            (replace(scene, camera=replace(scene.camera, fov_degrees=41.0)), "other camera"),
-            (replace(scene, meshes=[moved, *others]), "other meshes"),
-            (replace(scene, meshes=[replace(mesh, material=Diffuse(color=(0.1, 0.2, 0.3))), *others]), "other meshes"),
-            (replace(scene, environment=replace(scene.environment, strength=2.0)), "other environment")]:
+            (replace(scene, camera=replace(scene.camera, fov_degrees=41.0)), "different camera"),
+            (replace(scene, meshes=[moved, *others]), "different meshes"),
+            (replace(scene, meshes=[replace(mesh, material=Diffuse(color=(0.1, 0.2, 0.3))), *others]),
+             "different meshes"),
+            (replace(scene, environment=replace(scene.environment, strength=2.0)), "different environment")]:
         with pytest.raises(CheckpointError, match=rf"another render \({named}\)"):
             renderer(device, changed, checkpoint=kept, resume=True)
     renamed = replace(scene, name="x", meshes=[replace(mesh, name="y"), *others])
     renderer(device, renamed, checkpoint=kept, resume=True, spp=100)
-    for digest, named in [("kernel_digest", "other kernels"), ("code_digest", "other code")]:
+    for digest, named in [("kernel_digest", "different kernels"), ("code_digest", "different code")]:
         with monkeypatch.context() as patch, pytest.raises(CheckpointError, match=rf"another render \({named}\)"):
             patch.setattr(f"clrt.rendering.checkpoint.identity.{digest}", lambda: "0" * 64)
             renderer(device, checkpoint=kept, resume=True)
@@ -203,7 +204,7 @@ def test_a_checkpoint_of_an_older_release_is_refused(device: Device, kept: Path)
     header, arrays = read_checkpoint(kept, KINDS)
     facts = {name: value for name, value in header["facts"].items() if name != "code"}
     release = {**header["facts"], "version": "0.0.1"}
-    for changed, named in [(facts, "other code"), (release, "version 0.0.1 instead of")]:
+    for changed, named in [(facts, "different code"), (release, "version 0.0.1 instead of")]:
         _rewrite(kept, {**header, "facts": changed}, arrays)
         with pytest.raises(CheckpointError, match=named):
             renderer(device, checkpoint=kept, resume=True)

@@ -77,7 +77,7 @@ def test_the_report_names_the_bias(device: Device) -> None:
     report = clrt.render(scene, clamp_direct=1.0, **chosen).report
     assert (report["biased_by"], report["clamp_direct"], report["clamp_indirect"]) == (["clamp_direct"], 1.0, 0.0)
     assert report["clamped_part"] == pytest.approx(0.75)
-    assert report["warnings"] == ["the picture is biased by clamp_direct: 75.00% of the light was removed; the "
+    assert report["warnings"] == ["the image is biased by clamp_direct: 75.00% of the light was removed; the "
                                   "estimated error does not include this bias"]
     for clamp, integrator in ((0.0, "path"), (1.0, "local")):
         report = clrt.render(scene, clamp_direct=clamp, integrator=integrator, **chosen).report

@@ -96,7 +96,7 @@ def test_one_that_fails_is_left_out(device: Device, small_launches: None, caplog
     _fail_after(running.session.workers[1], where, when, monkeypatch)
     run(running, spp=24)
     assert len(running.session.workers) == 2
-    assert same(at_once, running) and caplog.text.count("is left out: out of order") == 1
+    assert same(at_once, running) and caplog.text.count("is excluded: out of order") == 1
     assert [entry["lost"] for entry in running.session.shares()] == [False, False, True]
 
 
@@ -165,7 +165,7 @@ def test_one_that_cannot_begin_is_left_out(device: Device, caplog: pytest.LogCap
 
     monkeypatch.setattr(scene_on_device, call, refuse)
     running = crew(device, 2)
-    assert len(running.session.shares()) == 1 and "is left out" in caplog.text
+    assert len(running.session.shares()) == 1 and "is excluded" in caplog.text
     refused.clear()
     with pytest.raises((DeviceError, KernelError)):
         renderer(device)

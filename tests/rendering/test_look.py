@@ -66,5 +66,5 @@ def test_what_cannot_be_looked_at_is_refused(device: Device, tmp_path: Path) -> 
     with pytest.raises(SceneError, match="camera.look_at"):
         renderer.look(replace(HERE, look_at=HERE.position))
     kept = Renderer(room(), size=(8, 8), device=device.info.index, checkpoint=tmp_path / "a.ck")
-    with pytest.raises(UsageError, match="a checkpoint is of one picture"):
+    with pytest.raises(UsageError, match="a checkpoint stores one image"):
         kept.look(ASIDE)

@@ -99,7 +99,7 @@ def test_samples_that_were_ended_are_missed(device: Device, tmp_path: Path, monk
     limit(monkeypatch, 50_000)
     folder = sabotaged(tmp_path / "kernels", r"return a != 31;", "return a != 31 || get_global_id(0) % 5 == 0;")
     monkeypatch.setattr(program, "kernel_folder", lambda: folder)
-    with pytest.raises(DeviceError, match=r"after 50000 turns, and (77|8\d) of 384 samples .* need more"):
+    with pytest.raises(DeviceError, match=r"after 50000 iterations, and (77|8\d) of 384 samples .* need more"):
         picture(device)
 
 
@@ -139,5 +139,5 @@ def test_pixels_that_were_ended_are_missed(device: Device, entry: str, tmp_path:
     assert all(np.isfinite(picture).all() for picture in seen.values())
     folder = sabotaged(tmp_path / "kernels", r"return a != 31;", "return a != 31 || get_global_id(0) % 5 == 0;")
     monkeypatch.setattr(program, "kernel_folder", lambda: folder)
-    with pytest.raises(DeviceError, match=r"after 50000 turns, and (77|8\d) of 384 pixels .* need more"):
+    with pytest.raises(DeviceError, match=r"after 50000 iterations, and (77|8\d) of 384 pixels .* need more"):
         render[entry](Renderer(scene(), device=device.info.id, size=SIZE).session)

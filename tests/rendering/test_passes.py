@@ -92,7 +92,7 @@ def test_impossible_conditions_are_refused(renderer: Renderer, stops: dict[str, 
 
 
 @pytest.mark.parametrize("reference, said", [
-    (np.zeros((4, 4, 3)), "of shape \\(4, 4, 3\\); give a numpy array of the picture's, \\(30, 40, 3\\)"),
+    (np.zeros((4, 4, 3)), "of shape \\(4, 4, 3\\); give a numpy array of the image's shape, \\(30, 40, 3\\)"),
     ("full.exr", "read it with clrt.read_image"), (np.full((30, 40, 3), "1"), "give real numbers"),
     (np.where(np.arange(3600).reshape(30, 40, 3) < 5, [np.nan, np.inf, 1], 1), "NaN or infinite \\(2 of 1200\\)")])
 def test_what_is_no_reference_is_refused(renderer: Renderer, reference: Any, said: str) -> None:
@@ -155,7 +155,7 @@ def test_what_is_no_scene_is_refused(scene: Any, words: str) -> None:
 
 
 def test_no_device_at_all_is_refused() -> None:
-    with pytest.raises(UsageError, match="name at least one"):
+    with pytest.raises(UsageError, match="give at least one"):
         Renderer(Scene(), device=[])
 
 

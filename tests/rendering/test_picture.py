@@ -146,5 +146,5 @@ def test_png_files_are_for_eyes_and_exr_files_for_numbers(device: Device, tmp_pa
 
 
 def test_only_colours_are_denoised(device: Device) -> None:
-    with pytest.raises(UsageError, match="denoising is for colours, and the integrator is normals"):
+    with pytest.raises(UsageError, match="denoising is for colour images, and the integrator is normals"):
         render(Scene(), integrator="normals", size=(8, 8), spp=1, denoise=True, device=device.info.index)

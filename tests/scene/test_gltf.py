@@ -200,9 +200,9 @@ def test_cameras_by_name(tmp_path: Path) -> None:
     with pytest.raises(SceneError) as caught:
         load(scene)
     assert caught.value.problems == [f'{scene}: camera.name: "sid" is unknown; did you mean "side"?',
-                                     f"{scene}: camera: has a name and fov_degrees; keep one of them"]
+                                     f"{scene}: camera: has both a name and fov_degrees; keep one of them"]
     scene.write_text('[camera]\nname = "side"\n')
-    with pytest.raises(SceneError, match='"side" is unknown, since neither .cameras. nor a model file has one'):
+    with pytest.raises(SceneError, match='"side" is unknown, as neither .cameras. nor a model file has one'):
         load(scene)
 
 

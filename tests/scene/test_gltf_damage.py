@@ -36,7 +36,7 @@ BROKEN = {
     "component": (edited("accessors", 0, "componentType", value=5124), "accessors[0].componentType: "),
     "float index": (edited(*PRIMITIVE, "indices", value=0), "accessor 0 is VEC3, not SCALAR"),
     "signed index": (edited("accessors", 1, "componentType", value=5122), "accessor 1, are int16; they must"),
-    "corners": (edited("accessors", 1, "count", value=58), "has 58 corners, which is no multiple of 3"),
+    "corners": (edited("accessors", 1, "count", value=58), "has 58 corners, which is not a multiple of 3"),
     "zeros": (edited("accessors", 0, value={"componentType": 5126, "count": 10**12, "type": "VEC3"}),
               "accessor 0: 1000000000000 elements without a bufferView"),
     "cycle": (edited("nodes", 0, "children", value=[0]), "node 0: has two parents or is its own ancestor"),
@@ -47,8 +47,8 @@ BROKEN = {
     "matrix": (edited("nodes", 0, "matrix", value=[1, 2, 3]), "nodes[0].matrix: "),
     "rotation": (edited("nodes", 0, "rotation", value=[0, 0, 0, 0]), "node 0: its rotation is [0, 0, 0, 0]"),
     "infinite": (edited("nodes", 0, "scale", value=[1e39, 1, 1]), 'mesh "mesh 0": vertices[0] = ['),
-    "points": (edited(*PRIMITIVE, "mode", value=0), "holds no triangles"),
-    "nothing": (edited("nodes", value=[{}]), "holds no triangles"),
+    "points": (edited(*PRIMITIVE, "mode", value=0), "contains no triangles"),
+    "nothing": (edited("nodes", value=[{}]), "contains no triangles"),
 }
 
 
@@ -64,11 +64,11 @@ def test_broken_documents(name: str, tmp_path: Path) -> None:
 def test_index_out_of_range(tmp_path: Path) -> None:
     gltf = Gltf()
     gltf.mesh(attributes={"POSITION": gltf.accessor(np.eye(3))}, indices=gltf.accessor(np.array([0, 1, 3]), "<u1"))
-    with pytest.raises(SceneError, match=r'mesh "mesh 0": faces\[0\] uses vertex 3, but valid are 0 to 2'):
+    with pytest.raises(SceneError, match=r'mesh "mesh 0": faces\[0\] uses vertex 3, but valid indices are 0 to 2'):
         read_gltf(gltf.write(tmp_path / "a.glb"))
 
 
-@pytest.mark.parametrize("size, sentence", [(0, "document: "), (10, "cut short"), (30, "cut short"), (-4, "cut short")])
+@pytest.mark.parametrize("size, sentence", [(0, "document: "), (10, "truncated"), (30, "truncated"), (-4, "truncated")])
 def test_cut_files(size: int, sentence: str, tmp_path: Path) -> None:
     (tmp_path / "a.glb").write_bytes(ball().glb()[:size])
     with pytest.raises(SceneError, match=sentence):
@@ -77,7 +77,7 @@ def test_cut_files(size: int, sentence: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("uri, sentence", [
     ("lost.bin", 'cannot read the file "lost.bin"'), ("http://example.org/a.bin", "cannot read the file"),
-    (".", "cannot read the file"), ("data:;base64,A", "no base64"), ("data:;base64,AAAA", "buffer 0: has 3 of its")])
+    (".", "cannot read the file"), ("data:;base64,A", "not base64"), ("data:;base64,AAAA", "buffer 0: has 3 of its")])
 def test_unreadable_buffers(uri: str, sentence: str, tmp_path: Path) -> None:
     ball().write_with_uri(tmp_path / "a.gltf", uri)
     with pytest.raises(SceneError, match=sentence):

@@ -83,7 +83,7 @@ def test_a_mesh_table_places_a_files_instances(tmp_path: Path, monkeypatch: pyte
 
 
 @pytest.mark.parametrize("damage, message", [
-    ({"TRANSLATION": 2, "SCALE": 0}, "has 7 and 12 transforms; write as many"), ({}, "has no transforms"),
+    ({"TRANSLATION": 2, "SCALE": 0}, "has 7 and 12 transforms; write the same"), ({}, "has no transforms"),
     ({"TRANSLATION": 4}, "accessor 4 is VEC4, not VEC3"), ({"TRANSLATION": 99}, "accessor 99, but the file has"),
     ({"ROTATION": 5}, "instance 0 has a transform that is not finite"),
 ])

@@ -107,7 +107,7 @@ def test_defaults_includes_references_and_paths(folder: Path) -> None:
      ["sensor[0]", "mirrors"]),
     ('<sensor type="perspective"><transform name="to_world"><shear value="2"/></transform></sensor>',
      ["sensor[0].to_world", "rotate"]),
-    ('<emitter type="constant"/><emitter type="constant"/>', ["several skies"]),
+    ('<emitter type="constant"/><emitter type="constant"/>', ["several environment lights"]),
     ('<shape type="sphere"><bsdf type="roughdielectric"/></shape>', ["shape[0].bsdf", '"beckmann"', '"ggx"']),
     ('<shape type="sphere"><bsdf type="conductor"><string name="material" value="Xy"/></bsdf></shape>', ['"Xy"', "Au"]),
     ('<shape type="sphere"><bsdf type="dielectric"><string name="int_ior" value="jam"/></bsdf></shape>',

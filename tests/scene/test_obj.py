@@ -76,7 +76,7 @@ def test_mtl_tells_what_it_leaves_out(tmp_path: Path, caplog: pytest.LogCaptureF
         meshes = read_mesh(tmp_path / "a.obj")
     assert [mesh.material_name for mesh in meshes] == ["a", "b"]
     warning, = caplog.messages
-    assert warning.endswith("a.obj: left out: textures (bump, map_ka), clearcoat (Pc)")
+    assert warning.endswith("a.obj: ignored: textures (bump, map_ka), clearcoat (Pc)")
     for wrong, sentence in [("Kd 1 2", 'Kd is "1 2"; write three numbers'), ("Ns nan", 'Ns is "nan"; write a number'),
                             ("Kd spectral a.rfl", 'Kd is "spectral a.rfl"; write three numbers')]:
         library.write_text(f"newmtl a\n{wrong}")

@@ -71,7 +71,7 @@ def test_round_trip(kind: str, tmp_path: Path) -> None:
     assert again.cameras == scene.cameras
     if kind == "obj":
         assert set(tomllib.loads(text)["materials"]) == {"red", 'odd "name" \\ # é', "lost", "model", "lamp"}
-        assert '# The file\'s own: "model"' in text
+        assert '# The file\'s materials: "model"' in text
     if kind == "cameras":
         assert '# or, instead of the lines above: name = "side 2"' in text
 
@@ -88,7 +88,7 @@ def test_some_of_a_file_s_materials_are_replaced(tmp_path: Path) -> None:
     with pytest.raises(SceneError) as caught:
         load(scene)
     assert caught.value.problems == [
-        f"{scene}: mesh[0]: has a material and materials; keep one of them",
+        f"{scene}: mesh[0]: has both a material and materials; keep one of them",
         f'{scene}: mesh[0].materials: "read" is unknown; did you mean "red"?',
         f'{scene}: mesh[0].materials.red: "whit" is unknown; did you mean "white"?']
     scene.write_text(head + "materials = 3\n[environment]\nsky = 1\ncolor = [1, 1, 1]\n")
@@ -96,7 +96,7 @@ def test_some_of_a_file_s_materials_are_replaced(tmp_path: Path) -> None:
         load(scene)
     assert caught.value.problems == [
         f'{scene}: environment.sky: 1 is unknown; write "default"',
-        f"{scene}: environment: has a sky and color; keep one of them",
+        f"{scene}: environment: has both a sky and color; keep one of them",
         f'{scene}: mesh[0].materials: 3 is not a table; write {{ "name in the file" = "NAME" }}']
 
 

@@ -25,7 +25,7 @@ def test_error_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(("arguments", "known"), [(["moon"], SCENES), (["point", "--material", "moon"], MATERIALS)])
 def test_names_that_are_not_there_are_refused(arguments: list[str], known: dict[str, object]) -> None:
     result = CliRunner().invoke(blender_command, arguments)
-    assert result.exit_code != 0 and f"moon: is none of {', '.join(known)}" in str(result.exception)
+    assert result.exit_code != 0 and f"moon: is unknown; choose from {', '.join(known)}" in str(result.exception)
 
 
 def test_materials_are_of_objects_that_there_are() -> None:

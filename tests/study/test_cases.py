@@ -75,7 +75,7 @@ def test_pictures_off_by_a_hundredth_are_found_out(device: Device, monkeypatch: 
     monkeypatch.setattr("clrt.bench.numerics.hard_light.ALBEDO", 0.505)
     rows = [row for row in measure_pictures(Subject(device.info.index), quick=True) if row.unit == "standard errors"]
     wrong = [row.what for row in rows if row.wrong]
-    assert wrong == ["a point light", "a lamp like a ball", "a tiny lamp", "992 lamps"]
+    assert wrong == ["a point light", "a spherical light", "a tiny spherical light", "992 lamps"]
 
 
 def test_exact_hits_of_a_sphere() -> None:

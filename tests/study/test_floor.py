@@ -102,4 +102,4 @@ def test_table_names_the_judges_that_are_missing(monkeypatch: pytest.MonkeyPatch
 
 def test_lights_that_are_not_there_are_refused() -> None:
     result = CliRunner().invoke(floor_command, ["--light", "moon"])
-    assert result.exit_code != 0 and "--light moon: is none of sun above" in str(result.exception)
+    assert result.exit_code != 0 and "--light moon: is unknown; choose from sun above" in str(result.exception)

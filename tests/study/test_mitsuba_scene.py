@@ -91,9 +91,9 @@ def test_materials_are_told_by_what_they_reflect() -> None:
 @pytest.mark.parametrize(("material", "words"), [
     (MetallicRoughness(clearcoat=0.5, roughness=Texture(picture=GREY)), "the texture grey"),
     (MetallicRoughness(clearcoat=0.5, normal_map=Texture(picture=GREY)), "a clearcoat with a normal map"),
-    (Dielectric(roughness=Texture(picture=GREY)), "the texture grey"), (Diffuse(one_sided=True), "one side")])
+    (Dielectric(roughness=Texture(picture=GREY)), "the texture grey"), (Diffuse(one_sided=True), "one-sided")])
 def test_what_has_no_counterpart_is_refused_by_name(material: Material, words: str) -> None:
-    with pytest.raises(UsageError, match=f"the ball: Mitsuba cannot draw .*{words}"):
+    with pytest.raises(UsageError, match=f"the ball: Mitsuba does not support .*{words}"):
         mitsuba_scene(ball(material))
 
 

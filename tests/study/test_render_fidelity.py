@@ -99,7 +99,7 @@ def test_an_image_alone_and_what_is_missing(tmp_path: Path) -> None:
     assert next(judge(scenarios(folder), SIZE, 1)).row["problems"] == [
         str(folder / GENERATOR / "environments" / "sky.hdr")]
     (folder / GENERATOR / "test" / "config.json").write_text('{"scenarios": [7]}')
-    with pytest.raises(UsageError, match="is no list of scenarios"):
+    with pytest.raises(UsageError, match="is not a list of scenarios"):
         scenarios(folder)
     shutil.rmtree(folder / GENERATOR)
     with pytest.raises(UsageError, match="--recurse-submodules"):
@@ -224,5 +224,5 @@ def test_command(tmp_path: Path) -> None:
     run = CliRunner().invoke(render_fidelity_command, arguments, catch_exceptions=False)
     assert run.exit_code == 0 and "wall" in run.output and (tmp_path / "pictures" / "wall.png").is_file()
     assert json.loads((tmp_path / "a.json").read_text())["scenarios"][0]["scenario"] == "wall"
-    with pytest.raises(UsageError, match="is in no scenario's name"):
+    with pytest.raises(UsageError, match="no scenario's name contains it"):
         CliRunner().invoke(render_fidelity_command, [str(folder), "--scenario", "roof"], catch_exceptions=False)

@@ -40,7 +40,7 @@ def test_what_is_saved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             window.until(lambda: window.app.editor.message == f"{name} is written", name)
         window.context.item_input_value("picture/##file", "saved.gif")
         window.context.item_click("picture/save picture")
-        window.until(lambda: "unknown picture format .gif" in window.app.editor.message, "a complaint")
+        window.until(lambda: "unknown image format .gif" in window.app.editor.message, "a complaint")
         (tmp_path / "locked.png").touch(0o444)
         for what, name in (("picture", "locked.png"), ("screenshot", "locked.png"), ("picture", "no/such.png")):
             window.context.item_input_value(f"{what}/##file", name)

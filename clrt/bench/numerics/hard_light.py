@@ -39,11 +39,11 @@ def measure_pictures(subject: Subject, *, quick: bool) -> Iterator[Row]:
         sigmas = abs(mean.mean() - expected) / np.sqrt(variance)
         yield Row(case, what, int(count.sum()), int(sigmas > SIGMAS), float(sigmas), "standard errors")
     mirrored = subject.picture(mirrored_lamp(), 4)
-    yield Row("L3", "a lamp in a mirror shines as it does", mirrored.size, int(np.count_nonzero(mirrored != 2.5)))
+    yield Row("L3", "area light in a mirror keeps its radiance", mirrored.size, int(np.count_nonzero(mirrored != 2.5)))
     ball = subject.picture(white_ball(64 if quick else 256), 64 if quick else 256)
-    yield Row("L5", "white ball of 80 triangles, smooth normals: gains light", ball.size // 3,
+    yield Row("L5", "white sphere of 80 triangles, smooth normals: gains light", ball.size // 3,
               int(np.count_nonzero(ball[..., 0] > 1 + 1e-5)))
-    yield Row("L5", "white ball of 80 triangles, smooth normals: loses more than 2 %", 1, int(1 - ball.mean() > LOST),
+    yield Row("L5", "white sphere of 80 triangles, smooth normals: loses more than 2 %", 1, int(1 - ball.mean() > LOST),
               float(1 - ball.mean()), "lost")
 
 
@@ -52,7 +52,7 @@ def lit_points() -> Iterator[tuple[str, str, Scene, float]]:
     lamp = PointLight(position=(1, 2, 0.5), intensity=(30, 30, 30))
     d2 = 1 + 4 + 0.25
     yield "L9", "a point light", Scene(meshes=[FLOOR], lights=[lamp]), ALBEDO / np.pi * 30 * 2 / d2**1.5
-    for name, radius in (("a lamp like a ball", 0.5), ("a tiny lamp", 1e-3)):
+    for name, radius in (("a spherical light", 0.5), ("a tiny spherical light", 1e-3)):
         scene = Scene(meshes=[FLOOR], spheres=[_lamp((1, 2, 0.5), radius, 2.0)])
         yield "L9" if radius > 0.1 else "L3", name, scene, ALBEDO * 2 * radius**2 * 2 / d2**1.5
     centers = [(x, 2.0, z) for x in np.linspace(-5, 5, 32) for z in np.linspace(-5, 5, 31)]
@@ -62,7 +62,7 @@ def lit_points() -> Iterator[tuple[str, str, Scene, float]]:
     yield "L3", f"{len(lamps)} lamps", Scene(meshes=[FLOOR], spheres=lamps), total
     sky = np.full((256, 512, 3), 0.5, np.float32)
     sky[60:62, 100:102] = 5e4
-    yield "L3", "a sun of four pixels", Scene(meshes=[FLOOR], environment=Environment(image=sky)), \
+    yield "L3", "a sky with a sun of four pixels", Scene(meshes=[FLOOR], environment=Environment(image=sky)), \
         ALBEDO / np.pi * sky_irradiance(sky[..., 0].astype(np.float64))
 
 

@@ -121,7 +121,7 @@ def _draw_ratios(axis: Axes, results: Sequence[Mapping[str, Any]]) -> None:
             if value:
                 axis.barh(place, value, 0.34, color=color)
                 axis.annotate(f" {value:.{0 if value > 100 else 2}f}", (value, place), va="center", fontsize="small")
-    axis.set(xscale="log", xlabel="times as long a frame; blue: clrt, grey: theirs")
+    axis.set(xscale="log", xlabel="relative time per frame; blue: clrt, grey: theirs")
     axis.set_yticks(range(len(ratios)), [name for name, _, _ in ratios], fontsize="small")
     axis.margins(x=0.2)
 

@@ -69,12 +69,12 @@ def measure_samplers(device: Device, *, quick: bool) -> Iterator[Row]:
 
 def _furnaces(device: Device, effort: Effort) -> Iterator[Row]:
     wrong, count = inexact(device, effort.furnace)
-    yield Row("L1", "diffuse and mirror weigh their color exactly", count, wrong)
+    yield Row("L1", "diffuse and mirror weights equal their color exactly", count, wrong)
     metals = list(measure_metals(device, effort.furnace, SMITHS[:effort.smiths]))
     single, full = ([m for m in metals if m.material.multiple_scattering == multiple] for multiple in (False, True))
     for what, found in (("white metal reflects the albedo of one bounce", single),
                         ("white metal with multiple scattering reflects all", full),
-                        ("white under gloss reflects all", list(measure_plastics(device, effort.furnace)))):
+                        ("white under a glossy coat reflects all", list(measure_plastics(device, effort.furnace)))):
         errors = [abs(each.found - each.exact) for each in found]
         yield Row("L1", what, len(errors), sum(not error <= FURNACE for error in errors), max(errors), "largest error")
     for name in LAYERS:
@@ -103,35 +103,35 @@ def _materials(device: Device, effort: Effort) -> Iterator[Row]:
 def scattering_rows(found: list[Scattered], samples: int) -> Iterator[Row]:
     """Yield rows for the results of `scatter` for all cases, each with `samples` samples."""
     count = len(found) * samples
-    yield family_row("L2", "directions of materials follow their densities",
+    yield family_row("L2", "BSDF samples follow their pdf",
                      {s.name: s.density for s in found if not s.specular})
-    yield family_row("L2", "materials reflect no more than they get", {s.name: s.energy for s in found})
+    yield family_row("L2", "materials reflect no more light than they receive", {s.name: s.energy for s in found})
     integral = max(s.integral for s in found) - 1
-    yield Row("L2", "densities integrate to at most 1", len(found),
+    yield Row("L2", "BSDF pdfs integrate to at most 1", len(found),
               sum(not s.integral <= 1 + QUADRATURE for s in found), integral, "largest excess")
     weight = float(max(s.weight for s in found))
-    yield Row("L2", "weights are value over density", len(found), sum(not s.weight <= ROUNDING for s in found), weight,
+    yield Row("L2", "BSDF weights are value over pdf", len(found), sum(not s.weight <= ROUNDING for s in found), weight,
               "largest relative error")
-    yield Row("L2", "directions have length 1, and fail exactly on the wrong side", count, sum(s.wrong for s in found))
+    yield Row("L2", "BSDF directions have length 1, fail only on the wrong side", count, sum(s.wrong for s in found))
 
 
 def _areas(subject: Bsdfs, chosen: list[tuple[Material, float]], found: list[Scattered]) -> Row:
     checked = [check_density(subject, subject.materials.index(material), cosine)
                for (material, cosine), scattered in zip(chosen, found) if not scattered.specular]
     errors = [c.error for c in checked]
-    return Row("L2", "densities are 1 over the area that the map makes", sum(c.known for c in checked),
+    return Row("L2", "pdfs equal 1 over the mapped area", sum(c.known for c in checked),
                sum(not error <= AREA for error in errors), max(errors), "largest relative error")
 
 
 def _warps_and_lights(device: Device, effort: Effort) -> Iterator[Row]:
     warps = warp_probe(device)
-    yield family_row("L2", "warps follow their densities", warp_p_values(warps, effort.warped, 1))
+    yield family_row("L2", "warps follow their pdf", warp_p_values(warps, effort.warped, 1))
     missed = warp_density_errors(warps)
-    yield Row("L2", "densities of warps are 1 over the area that the map makes", len(missed),
+    yield Row("L2", "pdfs of warps equal 1 over the mapped area", len(missed),
               sum(not error <= AREA for error in missed.values()), max(missed.values()), "largest relative error")
     lights = light_tests(device, effort.warped, 1)
-    yield family_row("L2", "lights and skies follow their densities", {test.name: test.density for test in lights})
-    yield Row("L2", "densities of lights are their closed forms", len(lights),
+    yield family_row("L2", "light and sky samples follow their pdf", {test.name: test.density for test in lights})
+    yield Row("L2", "light pdfs match their closed forms", len(lights),
               sum(not test.error <= DENSITY for test in lights), max(test.error for test in lights),
               "largest relative error")
 
@@ -147,11 +147,11 @@ def _sums(probe: Probe, effort: Effort) -> Iterator[Row]:
 def _dropped(device: Device, probe: Probe) -> Iterator[Row]:
     bad, one = np.array([[np.nan, 1, 1], [1, np.inf, 1], [1, 1, -np.inf], [3e38, 1, 1]]), np.ones((4, 3))
     film = accumulate(probe, one, bad, 3, 3000).film
-    yield Row("L7", "samples that are no numbers are dropped and counted", 4 * 1000,
+    yield Row("L7", "NaN samples are dropped and counted", 4 * 1000,
               abs(film.nonfinite_samples - 4 * 1000) + int(np.sum(film.mean != 1)))
     hits, lost = _lamp(device, 1.0), _lamp(device, 3e38)
     count = round(float(hits.mean[..., 0].sum() * LAMP_SAMPLES))
-    yield Row("L7", "samples of a lamp that is too bright for floats are dropped and counted", count,
+    yield Row("L7", "samples of a light that overflows float32 are dropped and counted", count,
               abs(lost.nonfinite_samples - count) + int(np.sum(lost.mean != 0)))
 
 

@@ -41,7 +41,7 @@ def measure_fresh(scene: Mesh, rays: Rays, cache: Path | None = None, **options:
         done = subprocess.run([sys.executable, "-m", __name__, folder], env=os.environ | caches, text=True,
                               capture_output=True)
         if done.returncode:
-            raise ClrtError(f"a new process that builds a tree ended with {done.returncode}: {done.stderr.strip()}")
+            raise ClrtError(f"a new process that builds a BVH exited with {done.returncode}: {done.stderr.strip()}")
         figures: dict[str, Any] = json.loads((Path(folder) / FIGURES).read_text())
         return figures
 

@@ -152,7 +152,7 @@ def _loop() -> ctypes.CDLL:
         try:
             subprocess.run([*COMPILER, str(SOURCE), "-o", str(target)], check=True, capture_output=True, text=True)
         except FileNotFoundError:
-            raise UsageError("there is no C compiler `cc`, which Embree's own loop needs") from None
+            raise UsageError("no C compiler `cc` found, which the loop that calls Embree needs") from None
         except subprocess.CalledProcessError as error:
             raise UsageError(f"`cc` cannot compile {SOURCE}: {error.stderr}") from error
         return ctypes.CDLL(str(target))

@@ -77,9 +77,9 @@ def load_rays(path: Path) -> Rays:
     except KeyError as error:
         raise SceneError(f"{path}: {error.args[0]}; {remedy}") from error
     except (BadZipFile, EOFError, TypeError, ValueError, zlib.error) as error:
-        raise SceneError(f"{path}: is no .npz file of arrays; {remedy}") from error
+        raise SceneError(f"{path}: is not an .npz file of arrays; {remedy}") from error
     if not len(t_max):
-        raise SceneError(f"{path}: holds no rays; {remedy}")
+        raise SceneError(f"{path}: contains no rays; {remedy}")
     return origins, directions, t_max
 
 

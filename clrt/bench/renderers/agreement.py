@@ -103,7 +103,7 @@ def agreement(scene: Scene, spp: int, seeds: int, device: str | int | None = Non
     """
     if min(scene.render.size) < BLOCK:
         width, height = scene.render.size
-        raise UsageError(f"pictures of {width}x{height} pixels have no block of {BLOCK}x{BLOCK}; write a larger --size")
+        raise UsageError(f"images of {width}x{height} pixels have no block of {BLOCK}x{BLOCK}; use a larger --size")
     try:
         from .mitsuba_renderer import contestants
         # The first, with independent samples: images of multijitter share permutations between seeds, so that the

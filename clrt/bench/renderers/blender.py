@@ -39,7 +39,7 @@ def judge(scenes: Collection[str], materials: Collection[str], spp: int, seeds: 
     """
     for chosen, known in ((scenes, SCENES), (materials, MATERIALS)):
         if unknown := [name for name in chosen if name not in known]:
-            raise UsageError(f"{unknown[0]}: is none of {', '.join(known)}")
+            raise UsageError(f"{unknown[0]}: is unknown; choose from {', '.join(known)}")
     try:
         library = import_module("bpy")
     except ImportError:

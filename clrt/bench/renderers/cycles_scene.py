@@ -36,16 +36,16 @@ def check_scene(scene: Scene) -> None:
     owners: list[Mesh | Sphere] = [*unfolded(scene).meshes, *scene.spheres]
     for owner in owners:
         if type(owner.material) not in BSDFS:
-            raise UsageError(f"{owner.name}: Cycles is not told of {owner.material.kernel} yet")
+            raise UsageError(f"{owner.name}: {owner.material.kernel} is not exported to Cycles yet")
         if isinstance(owner.material, MetallicRoughness) and not _is_metal(owner.material):
-            raise UsageError(f"{owner.name}: Cycles can draw metallic_roughness that is all metal, with single "
+            raise UsageError(f"{owner.name}: Cycles supports metallic_roughness that is fully metallic, with single "
                              'scattering and smith = "height_correlated"')
         if isinstance(owner.material, Dielectric) and owner.material.features() != {"TRANSMISSION"}:
-            raise UsageError(f"{owner.name}: Cycles can draw dielectric that is smooth, not thin, and absorbs nothing")
+            raise UsageError(f"{owner.name}: Cycles supports dielectric that is smooth, not thin, and absorbs nothing")
     if any(isinstance(light, SpotLight) or getattr(light, "range", None) for light in scene.lights):
-        raise UsageError(f"{scene.name}: Cycles is not told of ranges and spot lights, which fall off otherwise there")
+        raise UsageError(f"{scene.name}: ranges and spot lights fall off differently in Cycles and are not exported")
     if scene.camera.projection != "perspective" or scene.camera.aperture_radius:
-        raise UsageError(f"{scene.name}: Cycles is told of pinholes only")
+        raise UsageError(f"{scene.name}: only pinhole cameras are exported to Cycles")
     if scene.render.integrator == "local":
         raise UsageError(f'{scene.name}: Cycles has no integrator "local"')
     if scene.render.back_face_culling != "none":

@@ -62,7 +62,7 @@ def scenarios(folder: Path) -> list[Scenario]:
         raise UsageError(f"{config}: is missing; clone KhronosGroup/glTF-Render-Fidelity with --recurse-submodules "
                          f"and name its folder") from None
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise UsageError(f"{config}: is no list of scenarios ({error!r}); fetch it again") from None
+        raise UsageError(f"{config}: is not a list of scenarios ({error!r}); fetch it again") from None
     found = [scenario for scenario in found if scenario.goldens]
     if not found:
         raise UsageError(f"{folder}: has no image by {', '.join(PATH_TRACERS)}; fetch its files in Git LFS")

@@ -39,7 +39,7 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
     """Return the plugin of the owner's material, with vertex colors. Raises UsageError for an unsupported feature."""
     material = owner.material
     if type(material) not in BSDFS:
-        raise UsageError(f"{owner.name}: Mitsuba is not told of {material.kernel} yet")
+        raise UsageError(f"{owner.name}: {material.kernel} is not exported to Mitsuba yet")
     try:
         plugin = BSDFS[type(material)](material)
         if isinstance(owner, Mesh) and owner.colors is not None:
@@ -53,11 +53,11 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
                       "use_shadowing_function": isinstance(material, Diffuse), "flip_invalid_normals": False}
         plugin = plugin if "TRANSMISSION" in material.features() else {"type": "twosided", "front": plugin}
         if material.one_sided:
-            raise ValueError("surfaces with one side")
+            raise ValueError("one-sided surfaces")
         if material.opacity != 1:
             plugin = {"type": "mask", "opacity": _opacity(material), "bsdf": plugin}
     except ValueError as error:
-        raise UsageError(f"{owner.name}: Mitsuba cannot draw {error}") from None
+        raise UsageError(f"{owner.name}: Mitsuba does not support {error}") from None
     return plugin
 
 
@@ -121,7 +121,7 @@ def _bend(texture: Texture) -> Plugin:
     """Return a linear normal map that includes the factor, in the frame of u and v."""
     axes = texture.image_axes   # Mitsuba bends along u and v, however to_uv turns the image
     if np.abs(np.abs(axes) - 0.5).max() < 0.499:
-        raise ValueError(f"the normal map {texture.picture.name}, which is not turned by quarters")
+        raise ValueError(f"the normal map {texture.picture.name}, which is not rotated by a multiple of 90 degrees")
     xyz = _channels(texture, "red", "green", "blue")
     xyz[..., :2] = 0.5 + (xyz[..., :2] - 0.5) @ axes * np.max(texture.factor)
     return _bitmap(texture, xyz)
@@ -129,7 +129,7 @@ def _bend(texture: Texture) -> Plugin:
 
 def _bitmap(texture: Texture, texels: Any) -> Plugin:
     if texture.wrap[0] != texture.wrap[1]:
-        raise ValueError("a texture that wraps in two ways")
+        raise ValueError("a texture with two wrap modes")
     to_picture = np.eye(4)
     to_picture[:2][:, [0, 1, 3]] = texture.to_picture
     return {"type": "bitmap", "bitmap": np.asarray(texels, np.float32), "raw": True, "to_uv": to_picture,

@@ -96,7 +96,7 @@ def _surface(owner: Mesh | Sphere) -> Plugin:
         if owner.material.double_sided:
             raise UsageError(f"{owner.name}: Mitsuba's area lights emit from one side; leave out double_sided")
         if isinstance(owner, Sphere) and isinstance(owner.material.emission, Texture):
-            raise UsageError(f"{owner.name}: Mitsuba samples the light of painted balls as if they were turned")
+            raise UsageError(f"{owner.name}: Mitsuba samples textured emissive spheres as if they were rotated")
         shape["emitter"] = {"type": "area", "radiance": color(owner.material.emission)}
     return shape
 
@@ -128,7 +128,7 @@ def _distance(camera: Camera) -> float:
 
 def _light(light: Light, camera: Camera) -> Plugin:
     if not isinstance(light, DirectionalLight) and light.range is not None:
-        raise UsageError("light: Mitsuba is not told of ranges")
+        raise UsageError("light: ranges are not exported to Mitsuba")
     if isinstance(light, PointLight):
         return {"type": "point", "position": list(light.position), "intensity": rgb(light.intensity)}
     if isinstance(light, SpotLight):
@@ -159,7 +159,7 @@ def _up_for(direction: Any) -> tuple[float, float, float]:
 def _spot(light: SpotLight) -> Plugin:
     """Return a spot light. Mitsuba's falloff is linear in the angle; ours is represented by a projected texture."""
     if light.outer_degrees > SPOT_DEGREES:
-        raise UsageError(f"spot: Mitsuba is told of cones up to {SPOT_DEGREES} degrees from their axis")
+        raise UsageError(f"spot: only cones up to {SPOT_DEGREES} degrees from their axis are exported to Mitsuba")
     across = (np.arange(SPOT_TEXELS) * 2 + 1) / SPOT_TEXELS - 1
     off = np.hypot(across[:, None], across) * tan(radians(light.outer_degrees))
     inner, outer = cos(radians(light.inner_degrees)), cos(radians(light.outer_degrees))

@@ -59,5 +59,5 @@ def _verdict(stored: Mapping[str, Any]) -> Verdict:
     failures, figures = [str(failure) for failure in stored["failures"]], dict(stored["figures"])
     when, seconds, kernels = str(stored["when"]), float(stored["seconds"]), str(stored["kernels"])
     if stored["passed"] is not (not failures) or not all(isinstance(f, (int, float, str)) for f in figures.values()):
-        raise ValueError("it contradicts itself")
+        raise ValueError("it is inconsistent")
     return Verdict(not failures, failures, when, seconds, kernels, figures)

@@ -107,15 +107,15 @@ def size_of(device: cl.Device) -> int:
 
 def describe_empty(platform: cl.Platform) -> DeviceInfo:
     """Describe a platform without devices."""
-    return replace(_nothing(platform.name.strip(), platform.version, "it has no device: is its hardware there, may you "
-                            "use it (groups video and render), does the driver want a variable to be set? If you do "
-                            "not need it, remove it"), platform_version=platform.version.strip())
+    return replace(_nothing(platform.name.strip(), platform.version, "it has no device: is the hardware present, may "
+                            "you use it (groups video and render), does the driver need an environment variable? If "
+                            "you do not need it, remove it"), platform_version=platform.version.strip())
 
 
 def describe_faulty(driver: Driver, fault: str) -> DeviceInfo:
     """Describe a driver that was left out because of `fault`."""
-    return replace(_nothing(driver.library, driver.source, f"{fault}. It is left out. Update, reinstall or remove this "
-                            f"driver ({driver.source} names it), then run `clrt devices`"), driver=driver.source)
+    return replace(_nothing(driver.library, driver.source, f"{fault}. It is ignored. Update, reinstall or remove this "
+                            f"driver (listed in {driver.source}), then run `clrt devices`"), driver=driver.source)
 
 
 def _nothing(name: str, source: str, why: str) -> DeviceInfo:
@@ -145,7 +145,7 @@ def _type(device: cl.Device) -> str:
 def _unusable(device: cl.Device) -> str:
     """Return why the device cannot run clrt, empty if it can."""
     if not device.available:
-        return "the driver says that it is not available"
+        return "the driver reports it as unavailable"
     if not device.compiler_available:
         return "its driver has no compiler"
     if lacks_linker(device):

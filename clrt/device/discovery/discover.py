@@ -65,7 +65,7 @@ def choose(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
     """Return the device that `selector` names (see `select`); log a warning if its check failed."""
     info, device = select(selector)
     if info.failed:
-        log.warning("%s is used though its check failed: %s", info.name, _failures(info))
+        log.warning("%s is used although its check failed: %s", info.name, _failures(info))
     log.info("device %d, %s (%s): %s", info.index, info.name, info.platform, info.why)
     return info, device
 
@@ -86,18 +86,18 @@ def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
     listing = "\n".join(f"  {info.index}  {info.id}  {info.name} ({info.platform}){_trouble(info)}"
                         for info, _ in found)
     if not matches and selector is None and any(info.failed for info, _ in found):
-        raise DeviceError(f"no usable device passed its check; `clrt devices` says what failed. Update the driver and "
-                          f"run `clrt devices --check` again, or name a device to use it all the same:\n{listing}")
+        raise DeviceError(f"no usable device passed its check; `clrt devices` lists what failed. Update the driver and "
+                          f"run `clrt devices --check` again, or select a device to use it anyway:\n{listing}")
     if not matches and selector is None and any(info.usable for info, _ in found):
-        raise DeviceError("no device but a simulator, a thousand times as slow, can be used; name that to use it, or "
-                          f"install a driver (`clrt devices` says what is wrong with others):\n{listing}")
+        raise DeviceError("only a simulator, a thousand times as slow, is usable; select it to use it, or "
+                          f"install a driver (`clrt devices` shows why others are unusable):\n{listing}")
     if not matches and selector is None:
-        raise DeviceError(f"no device can be used; `clrt devices` says why and what to do:\n{listing}"
+        raise DeviceError(f"no device is usable; `clrt devices` shows why and what to do:\n{listing}"
                           + f"\n{no_room()}".rstrip())
     if not matches:
         raise DeviceError(f"no usable device matches {asked}; there are:\n{listing}")
     if len(matches) > 1:
-        raise DeviceError(f"{len(matches)} devices match {asked}; name one by number or id:\n{listing}")
+        raise DeviceError(f"{len(matches)} devices match {asked}; select one by number or id:\n{listing}")
     info, device = matches[0]
     if not info.usable or device is None:
         raise DeviceError(f"{info.name} cannot be used: {info.why}")
@@ -141,12 +141,12 @@ def _why(info: DeviceInfo, infos: list[DeviceInfo], chosen: DeviceInfo | None, o
     if info is chosen:
         rivals = sum(other.usable and not other.failed for other in _real(infos))
         rank = "only one" if rivals <= 1 else "fastest measured" if info.bench else f"largest {info.type}"
-        notes = [f"chosen as {origin} names it, {speed}" if origin else f"chosen as the {rank}, {speed}"]
+        notes = [f"chosen because {origin} selects it, {speed}" if origin else f"chosen as the {rank}, {speed}"]
     twin = next((other for other in infos[:info.index] if other.usable and _same_hardware(info, other)), None)
     if twin:
-        notes.append(f"the same hardware as {twin.index} through another platform")
+        notes.append(f"same hardware as device {twin.index}, through another platform")
     if info.translated:
-        notes.append(f"a translation of OpenCL to {info.translated}; a driver of the hardware's own is better")
+        notes.append(f"OpenCL translated to {info.translated}; the hardware's native driver is better")
     if info.failed:
         notes.append(f"but its check failed: {_failures(info)}")
     return "; ".join(notes)

@@ -92,7 +92,7 @@ def _what_is_wrong(library: str) -> str:
         ctypes.CDLL(library)
     except OSError as error:
         return f"it cannot be loaded: {error}"
-    return "it offers no platform, as drivers do whose hardware is not there"
+    return "it provides no platform, probably because its hardware is missing"
 
 
 def _no_core_dump() -> None:

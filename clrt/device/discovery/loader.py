@@ -36,8 +36,8 @@ def load(libraries: Sequence[str]) -> list[cl.Platform]:
             with _variables(**dict.fromkeys(VARIABLES, folder) | {FILENAMES: None}):
                 return _platforms()
     except OSError as error:
-        raise DeviceError(f"no temporary file can be written ({error.strerror}), which OpenCL's loader needs; free "
-                          "some space, or name another folder with TMPDIR") from error
+        raise DeviceError(f"cannot write a temporary file ({error.strerror}), which OpenCL's loader needs; free "
+                          "some space, or set TMPDIR to another folder") from error
 
 
 def load_all(added: Sequence[str]) -> list[cl.Platform]:

@@ -30,7 +30,8 @@ def preferred_device() -> Preference | None:
         content = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError, RuntimeError):
         if os.environ.get("CLRT_CONFIG"):
-            raise UsageError(f"{path}: CLRT_CONFIG names it, and there is no such file; create or unset it") from None
+            raise UsageError(f"{path}: CLRT_CONFIG names this file, which does not exist; create it or unset "
+                             "CLRT_CONFIG") from None
         return None
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror}); make it readable, or move it away") from error
@@ -57,7 +58,7 @@ def _settings(path: Path, content: bytes) -> dict[str, object]:
     try:
         settings = tomllib.loads(content.decode())
     except ValueError as error:
-        raise UsageError(f"{path}: is no TOML ({error}); write device = \"gpu\", or move it away") from error
+        raise UsageError(f"{path}: is not valid TOML ({error}); write device = \"gpu\", or move it away") from error
     if others := sorted(set(settings) - {"device"}):
-        raise UsageError(f"{path}: {', '.join(others)} is unknown; there is device alone")
+        raise UsageError(f"{path}: {', '.join(others)} is unknown; the only key is device")
     return settings

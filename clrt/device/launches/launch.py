@@ -163,8 +163,8 @@ class Wait:
         if self._clock.look() > patience() and status != cl.command_execution_status.COMPLETE:
             note_hang()
             share_no_more()
-            raise HungError(f"the device has not ended a launch in {patience():g} s: its driver hangs, or it is lost; "
-                            f"if launches may take that long there, set {VARIABLE} to more")
+            raise HungError(f"the device has not finished a launch in {patience():g} s: its driver hangs, or it is "
+                            f"lost; if launches may take that long, set {VARIABLE} to more seconds")
         return bool(status == cl.command_execution_status.COMPLETE)
 
 

@@ -24,8 +24,8 @@ def part_records(itemsize: int, part_bytes: int) -> int:
     """
     records = part_bytes // itemsize - OVERLAP
     if records < 1:
-        raise NoRoomError(f"buffers of {part_bytes} bytes are too small for this scene, of whose largest records "
-                          f"{OVERLAP + 1} must fit: {VARIABLE} must be {(OVERLAP + 1) * itemsize} or more")
+        raise NoRoomError(f"buffers of {part_bytes} bytes are too small for this scene: {OVERLAP + 1} of its largest "
+                          f"records must fit; set {VARIABLE} to {(OVERLAP + 1) * itemsize} or more")
     return records
 
 
@@ -57,10 +57,9 @@ def check_memory(info: DeviceInfo, needs: Mapping[str, int], parameter_bytes: in
     """
     check_room(info, needs)
     if parameter_bytes > most_parameter_bytes:
-        raise NoRoomError(f"{info.name}: its buffers are {size(info.max_alloc_bytes)} at most, and the scene of "
-                          f"{size(sum(needs.values()))} would be in more of them than the {most_parameter_bytes // 8} "
-                          "or so that a kernel takes; take another --device, or a smaller scene (or set "
-                          f"{VARIABLE} to more)")
+        raise NoRoomError(f"{info.name}: its buffers are at most {size(info.max_alloc_bytes)}, and the scene of "
+                          f"{size(sum(needs.values()))} needs more of them than the about {most_parameter_bytes // 8} "
+                          f"that a kernel takes; use another --device or a smaller scene (or set {VARIABLE} to more)")
 
 
 def check_room(info: DeviceInfo, needs: Mapping[str, int]) -> None:
@@ -70,15 +69,14 @@ def check_room(info: DeviceInfo, needs: Mapping[str, int]) -> None:
         largest = sorted(needs, key=lambda name: -needs[name])[:4]
         told = ", ".join(f"{name} {size(needs[name])}" for name in largest)
         raise NoRoomError(f"{info.name}: this render needs {size(total)} ({told}), and the device has "
-                          f"{size(info.global_bytes)}; take another --device, smaller pictures and models, or fewer "
-                          "of them")
+                          f"{size(info.global_bytes)}; use another --device, or smaller or fewer images and models")
 
 
 def check_host(film_bytes: int, width: int, height: int) -> None:
     """Raise NoRoomError if this machine has no room for a film and for the same size again of derived data."""
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 2 * film_bytes
     if 2 * film_bytes > memory:
-        raise NoRoomError(f"a picture of {width}x{height} needs {size(2 * film_bytes)} of memory, and this machine has "
+        raise NoRoomError(f"an image of {width}x{height} needs {size(2 * film_bytes)} of memory, and this machine has "
                           f"{size(memory)}; render a smaller --size")
 
 

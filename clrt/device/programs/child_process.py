@@ -47,7 +47,7 @@ def told_end(code: int) -> str:
     """Describe how a process ended that should have returned 0."""
     if code < 0:
         return f"the driver crashed with signal {-code} ({signal.strsignal(-code)})"
-    return f"the process ended with code {code}"
+    return f"the process exited with code {code}"
 
 
 def last_line(errors: IO[bytes]) -> str:
@@ -55,4 +55,4 @@ def last_line(errors: IO[bytes]) -> str:
     errors.seek(0)
     lines = errors.read().decode(errors="replace").split("\n")
     last = next((line.strip() for line in reversed(lines) if line.strip()), "")
-    return f"; it said: {last}" if last else ""
+    return f"; its last output: {last}" if last else ""

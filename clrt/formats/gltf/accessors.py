@@ -43,14 +43,14 @@ class GltfData:
             try:
                 return base64.b64decode(uri.partition(",")[2], validate=True)
             except (binascii.Error, ValueError):
-                raise SceneError(f"{user}: its data URI is no base64; export the file again") from None
+                raise SceneError(f"{user}: its data URI is not base64; export the file again") from None
         try:
             file = self.path.parent / unquote(uri)
             if not file.is_file():
                 raise FileNotFoundError
             return note_read(file).read_bytes()
         except (OSError, ValueError):
-            raise SceneError(f'{user}: cannot read the file "{unquote(uri)[:200]}"; put it beside the model') from None
+            raise SceneError(f'{user}: cannot read the file "{unquote(uri)[:200]}"; put it next to the model') from None
 
     def view(self, index: int, user: str) -> Bytes:
         """Return the bytes of a buffer view."""
@@ -123,7 +123,7 @@ class GltfData:
                 raise SceneError(f"buffer {index}: has neither a URI nor a binary chunk; export the file again")
             if len(data) < buffer.byteLength:
                 raise SceneError(f"buffer {index}: has {len(data)} of its {buffer.byteLength} bytes; "
-                                 "the file is cut short, copy it again")
+                                 "the file is truncated, copy it again")
             self._buffers[index] = np.frombuffer(data, np.uint8)[:buffer.byteLength]
         return self._buffers[index]
 
@@ -135,7 +135,7 @@ def split_glb(content: bytes) -> tuple[bytes, bytes | None]:
     if version != 2:
         raise SceneError(f"is glTF version {version}; only version 2 is supported, export it again")
     if length > len(content):
-        raise SceneError(f"has {len(content)} of its {length} bytes; the file is cut short, copy it again")
+        raise SceneError(f"has {len(content)} of its {length} bytes; the file is truncated, copy it again")
     position = 12
     while position + 8 <= length:
         size, kind = struct.unpack_from("<I4s", content, position)
@@ -144,7 +144,7 @@ def split_glb(content: bytes) -> tuple[bytes, bytes | None]:
         chunks.setdefault(kind, content[position + 8:position + 8 + size])
         position += 8 + size
     if b"JSON" not in chunks:
-        raise SceneError("holds no JSON chunk; export it again")
+        raise SceneError("contains no JSON chunk; export it again")
     return chunks[b"JSON"], chunks.get(b"BIN\0")
 
 

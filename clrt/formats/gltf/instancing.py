@@ -33,8 +33,8 @@ def matrices(data: GltfData, node: gltf.Node, matrix: Matrix) -> list[Matrix]:
              for key, kind in kinds.items() if key in own.attributes}
     counts = {len(values) for values in given.values()}
     if len(counts) != 1 or max(counts) > MOST:
-        raise SceneError(f"{name}: has {' and '.join(map(str, sorted(counts))) or 'no'} transforms; write as many of "
-                         f"TRANSLATION, ROTATION and SCALE, at most {MOST}")
+        raise SceneError(f"{name}: has {' and '.join(map(str, sorted(counts))) or 'no'} transforms; write the same "
+                         f"number of TRANSLATION, ROTATION and SCALE, at most {MOST}")
     count = counts.pop()
     local = np.tile(np.eye(4), (count, 1, 1))
     local[:, :3, 3] = given.get("TRANSLATION", 0.0)

@@ -51,7 +51,7 @@ def _read(path: Path, normals: Normals) -> Model:
     materials = Materials(data)
     meshes, instances = shown(_places(data, materials, nodes, normals))
     if not meshes and not instances:
-        raise SceneError("its scene holds no triangles; export a model with triangle meshes")
+        raise SceneError("its scene contains no triangles; export a model with triangle meshes")
     every = [*meshes, *meshes_by_id(instances).values()]
     problems = [problem for mesh in every for problem in mesh_problems(mesh, "mesh")]
     if problems:
@@ -176,7 +176,7 @@ def _corners(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> ND
         order = indices[:, 0].astype(np.int64)
     if primitive.mode == TRIANGLES or primitive.indices in data.decoded:
         if len(order) % 3:
-            raise SceneError(f"{user}: has {len(order)} corners, which is no multiple of 3; export it again")
+            raise SceneError(f"{user}: has {len(order)} corners, which is not a multiple of 3; export it again")
         return order.reshape(-1, 3)
     first = np.arange(max(len(order) - 2, 0))
     if primitive.mode == FAN:

@@ -46,7 +46,7 @@ def decode(kind: str, source: Path | bytes, suffix: str = "") -> tuple[Arrays, d
             file.write_bytes(source)
             return decode(kind, file)
     except OSError as error:
-        raise SceneError("the system refuses its decoder a process or a temporary file "
+        raise SceneError("the system cannot provide a process or a temporary file for the decoder "
                          f"({error.strerror or error})") from error
 
 

@@ -46,7 +46,7 @@ def picture(file: str) -> Found:
     kind, size = kinds.get(spec.format.basetype, (oiio.FLOAT, 4))
     count = spec.width * spec.height * spec.nchannels * size
     if count > max(FREE_BYTES, MOST_RATIO * os.path.getsize(file)):
-        raise ValueError(f"{spec.width}x{spec.height} pixels cannot be in {os.path.getsize(file)} bytes")
+        raise ValueError(f"{os.path.getsize(file)} bytes cannot contain {spec.width}x{spec.height} pixels")
     pixels = buffer.get_pixels(kind) if buffer.read(0, 0, True, kind) else None
     if pixels is None:
         raise ValueError(_complaint(buffer))
@@ -102,7 +102,7 @@ def _answer(replies: Any, kind: str, file: str) -> None:
     except Exception as error:  # a damaged file may make the libraries raise anything
         reply = {"error": str(error) or type(error).__name__}
     if sum(array.nbytes for array in arrays.values()) > MOST_BYTES:
-        arrays, reply = {}, {"error": f"it holds more than {MOST_BYTES >> 30} GiB"}
+        arrays, reply = {}, {"error": f"its content exceeds {MOST_BYTES >> 30} GiB"}
     arrays = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     reply["arrays"] = {name: [array.shape, array.dtype.str] for name, array in arrays.items()}
     replies.write(json.dumps(reply).encode() + b"\n")

@@ -48,7 +48,7 @@ def read_texels(source: StrPath | bytes, name: str = "") -> NDArray[np.uint8]:
     name = name or str(source)
     pixels, names = _stored(source, name)
     if pixels.dtype == np.float32:
-        raise SceneError(f"{name}: holds floats, but textures have 8 bits a channel; convert it to PNG")
+        raise SceneError(f"{name}: contains floats, but textures have 8 bits per channel; convert it to PNG")
     if pixels.dtype == np.uint16:
         pixels = (pixels.astype(np.uint32) + 128) // 257
     texels = np.full((*pixels.shape[:2], 4), 255, np.uint8)
@@ -62,7 +62,7 @@ def read_texels(source: StrPath | bytes, name: str = "") -> NDArray[np.uint8]:
 def _check_stored(path: Path) -> None:
     check_file(path, "picture")
     if path.stat().st_size == 0:
-        raise SceneError(f"{path}: the picture file is empty; write it again")
+        raise SceneError(f"{path}: the image file is empty; save it again")
 
 
 def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], list[str]]:
@@ -71,16 +71,16 @@ def _stored(source: Path | bytes, name: str) -> tuple[NDArray[Any], list[str]]:
     if isinstance(source, bytes):
         suffix = next((ending for start, ending in EMBEDDED.items() if source.startswith(start)), "")
         if not suffix:
-            raise SceneError(f"{name}: is neither PNG, JPEG nor WebP; convert it")
+            raise SceneError(f"{name}: is not a PNG, JPEG or WebP image; convert it")
     try:
         arrays, facts = decode("picture", source, suffix)
     except SceneError as error:
-        raise SceneError(f"{name}: cannot be decoded as a picture: {error}") from None
+        raise SceneError(f"{name}: cannot be decoded as an image: {error}") from None
     pixels = arrays["pixels"]
     if facts["cropped"]:
         height, width = pixels.shape[:2]
         full_width, full_height = facts["whole"]
-        raise SceneError(f"{name}: the file holds {width}x{height} pixels of a {full_width}x{full_height} picture; "
+        raise SceneError(f"{name}: the file contains {width}x{height} pixels of a {full_width}x{full_height} image; "
                          "save it uncropped")
     return pixels, facts["channels"]
 
@@ -97,5 +97,5 @@ def _colour_channels(file: str, names: list[str]) -> list[int]:
     if len(names) <= 2:  # grey, or grey and alpha
         return [0, 0, 0]
     if not {"R", "G", "B"} <= set(upper):
-        raise SceneError(f"{file}: no channels R, G, B, but {', '.join(names)}; save its colour layer alone")
+        raise SceneError(f"{file}: has channels {', '.join(names)} instead of R, G, B; save its colour layer alone")
     return [upper.index(channel) for channel in "RGB"]

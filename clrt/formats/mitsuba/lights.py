@@ -48,8 +48,8 @@ def _turn(plugin: Plugin, to_world: Doubles) -> float:
     angle = atan2(to_world[0, 2], to_world[0, 0])
     c, s = np.cos(angle), np.sin(angle)
     if np.abs(to_world[:3, :3] - [[c, 0, s], [0, 1, 0], [-s, 0, c]]).max() > TURN:
-        plugin.refuse("is turned about another axis than y", "turn the scene and its camera, so that y is up",
-                      "envmap turned about x or z")
+        plugin.refuse("is rotated about an axis other than y", "rotate the scene and its camera so that y is up",
+                      "envmap rotated about x or z")
     return degrees(angle)
 
 

@@ -59,7 +59,7 @@ class MaterialReader:
     def _twosided(self, plugin: Plugin) -> Look:
         sides = plugin.all("bsdf")
         if len(sides) != 1:
-            plugin.refuse("has two BSDFs", "give one for both sides", "twosided with two BSDFs")
+            plugin.refuse("has two BSDFs", "write one for both sides", "twosided with two BSDFs")
         return self.look(sides[0])
 
     def _mask(self, plugin: Plugin) -> Look:
@@ -77,8 +77,8 @@ class MaterialReader:
             self.differences.append(f"{plugin.where}: normal map that shadows diffuse reflection, and nothing else")
         normals = self._textures.normals(plugin, "normalmap")
         if not np.allclose(normals.image_axes, np.eye(2)):
-            self.differences.append(f"{plugin.where}: a normal map bends along its image as to_uv turns it, in Mitsuba "
-                                    "along u")
+            self.differences.append(f"{plugin.where}: a normal map is oriented by its image, rotated by to_uv; in "
+                                    "Mitsuba by u")
         return look._replace(material=replace(look.material, normal_map=normals))
 
     def _blend(self, plugin: Plugin) -> Look:
@@ -87,7 +87,7 @@ class MaterialReader:
         colors = [look.material.color for look in map(self.look, plugin.all("bsdf"))
                   if type(look.material) is Diffuse and look == Look(Diffuse(color=look.material.color))]
         if len(colors) != 2 or isinstance(weight, Texture) or any(isinstance(each, Texture) for each in colors):
-            plugin.refuse("blends other than two even diffuse ones", "write one BSDF", "blendbsdf")
+            plugin.refuse("blends anything but two uniform diffuse BSDFs", "write one BSDF", "blendbsdf")
         low, high = (each for each in colors if not isinstance(each, Texture))
         if isinstance(weight, Attribute):
             return Look(Diffuse(color=(1.0, 1.0, 1.0)), Attribute(weight.name, low, high))
@@ -110,12 +110,12 @@ class MaterialReader:
         if color != (1.0, 1.0, 1.0):
             plugin.refuse("specular_reflectance is not 1", "leave it out", "specular_reflectance")
         if name and name not in METALS:
-            plugin.refuse(f'material "{name}" is not known', f"write eta and k, or one of {', '.join(METALS)}",
+            plugin.refuse(f'material "{name}" is unknown', f"write eta and k, or one of {', '.join(METALS)}",
                           f"metal {name}")
         eta, k = METALS[name] if name else (rgb(plugin.color("eta", 0.0)), rgb(plugin.color("k", 1.0)))
         if plugin.kind == "roughconductor":
             return Look(Conductor(eta=eta, k=k, roughness=self._roughness(plugin)))
-        self.differences.append(f"{plugin.where}: smooth metal has alpha 0.0001, and shows lights without a size")
+        self.differences.append(f"{plugin.where}: smooth metal has alpha 0.0001, and reflects point-like lights")
         return Look(Conductor(eta=eta, k=k, roughness=0.0))
 
     def _roughness(self, plugin: Plugin) -> float:
@@ -140,7 +140,7 @@ def _only(plugin: Plugin) -> Plugin:
     """Return the one BSDF nested in a BSDF."""
     nested = plugin.all("bsdf")
     if len(nested) != 1:
-        raise SceneError(f"{plugin.where}: has {len(nested)} BSDFs in it; write one")
+        raise SceneError(f"{plugin.where}: contains {len(nested)} BSDFs; write one")
     return nested[0]
 
 
@@ -165,7 +165,7 @@ def absorbing(material: Material, medium: Plugin) -> Material:
     """Return glass with a medium inside that absorbs and does not scatter."""
     if not isinstance(material, Dielectric) or material.thin or medium.kind != "homogeneous" or any(
             rgb(medium.color("albedo", 0.75))):
-        medium.refuse(f"a {medium.kind} medium that scatters, or not in glass", "leave it out",
+        medium.refuse(f"is a {medium.kind} medium that scatters, or is not inside glass", "leave it out",
                       f"{medium.kind} medium")
     rates = [rate * medium.value("scale", float, 1.0) for rate in rgb(medium.color("sigma_t", 1.0))]
     if not (most := max(rates)):

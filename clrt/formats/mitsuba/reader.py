@@ -75,7 +75,7 @@ class _Reader:
             else:
                 lights.append(self._tried(light, plugin))
         if len(skies) > 1:
-            self._note(SceneError("scene: has several skies; keep one constant or envmap emitter"))
+            self._note(SceneError("scene: has several environment lights; keep one constant or envmap emitter"))
         settings, camera = RenderSettings(), Camera()
         for sensor in root.all("sensor")[:1]:
             settings = self._tried(_film, sensor) or settings
@@ -142,8 +142,8 @@ def _film(sensor: Plugin) -> RenderSettings:
             kind = rfilter.kind
             if kind not in FILTERS or rfilter.value("stddev", float, 0.5) != 0.5 or rfilter.value(
                     "radius", float, 1.0) != 1:
-                rfilter.refuse(f'filter "{kind}" is not supported so', "write box, tent or gaussian, as they are",
-                               f"rfilter {kind}")
+                rfilter.refuse(f'filter "{kind}" is not supported like this',
+                               "write box, tent or gaussian without parameters", f"rfilter {kind}")
     return RenderSettings(size=size, spp=spp, filter=FILTERS[kind])
 
 
@@ -185,8 +185,8 @@ def _lengths(plugin: Plugin, to_world: Doubles) -> tuple[float, float, float]:
     x, y, z = np.linalg.norm(axes, axis=0).tolist()
     if min(x, y, z) == 0 or np.abs((axes / (x, y, z)).T @ (axes / (x, y, z)) - np.eye(3)).max() > ODD or (
             abs(x - y) > ODD * x) or np.linalg.det(axes) < 0:
-        plugin.refuse("its to_world mirrors, shears or stretches the picture", "turn, move and scale evenly alone",
-                      "sensor that mirrors or stretches")
+        plugin.refuse("its to_world mirrors, shears or stretches the image",
+                      "only rotate, translate and scale uniformly", "sensor that mirrors or stretches")
     return x, y, z
 
 
@@ -200,7 +200,7 @@ def _vertical_fov(plugin: Plugin, aspect: float) -> float:
         try:
             spread = DIAGONAL / (2 * float(text))
         except (ValueError, ZeroDivisionError):
-            raise SceneError(f'{plugin.where}: focal_length "{text}" is no length; write "50mm"') from None
+            raise SceneError(f'{plugin.where}: focal_length "{text}" is not a length; write it like "50mm"') from None
         axis = "diagonal"
     axis = {"smaller": "y" if aspect > 1 else "x", "larger": "x" if aspect > 1 else "y"}.get(axis, axis)
     shares = {"x": 1 / aspect, "y": 1.0, "diagonal": 1 / hypot(1, aspect)}

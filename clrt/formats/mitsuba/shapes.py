@@ -59,7 +59,7 @@ class ShapeReader:
         to_world = plugin.transform("to_world")
         look = self._lit(plugin, self._look(plugin))
         if plugin.value("flip_normals", bool, False):
-            plugin.refuse("flip_normals is not supported", "turn the shape's faces", "flip_normals")
+            plugin.refuse("flip_normals is not supported", "reverse the shape's faces", "flip_normals")
         mirrored = bool(np.linalg.det(to_world[:3, :3]) < 0)
         if plugin.kind == "sphere":
             to_world = to_world @ _ball(plugin)
@@ -110,7 +110,7 @@ class ShapeReader:
     def _instances(self, plugin: Plugin) -> Iterator[Instance | Sphere]:
         groups = plugin.all("shape")
         if len(groups) != 1 or groups[0].kind != "shapegroup":
-            raise SceneError(f"{plugin.where}: refers to no shapegroup; write one <ref> to one")
+            raise SceneError(f"{plugin.where}: does not refer to a shapegroup; write one <ref> to one")
         to_world = plugin.transform("to_world")
         if groups[0] not in self._groups:
             self._groups[groups[0]] = [part for shape in groups[0].all("shape") for part in self._shape(shape)]
@@ -123,7 +123,7 @@ class ShapeReader:
             place[:3, 3] = part.center
             moved = _sphere(to_world @ place, Look(part.material), plugin.where)
             if moved is None:
-                plugin.refuse("stretches a sphere", "scale evenly", "stretched sphere")
+                plugin.refuse("stretches a sphere", "scale uniformly", "stretched sphere")
             yield moved
 
 
@@ -142,7 +142,7 @@ def _between(plugin: Plugin) -> Doubles:
     radius, along = plugin.value("radius", float, 1.0), end - start
     x, y, z = unit(along).tolist()
     if not along.any():
-        raise SceneError(f"{plugin.where}: p0 and p1 are one point; move one")
+        raise SceneError(f"{plugin.where}: p0 and p1 are the same point; move one")
     sign = 1.0 if z >= 0 else -1.0
     a = -1 / (sign + z)
     frame = np.eye(4)
@@ -231,7 +231,7 @@ def _dressed(mesh: Mesh, look: Look, attributes: Attributes, plugin: Plugin) -> 
     """Return the mesh with its material, and the colors of an attribute; a face attribute splits shared vertices."""
     mesh = replace(mesh, material=look.material, name=plugin.where)
     if mesh.uv is None and look.material.textures():
-        raise SceneError(f"{plugin.where}: has a texture and no texture coordinates; add them to the file")
+        raise SceneError(f"{plugin.where}: has a texture but no texture coordinates; add them to the file")
     if look.attribute is None:
         return mesh
     name, low, high = look.attribute

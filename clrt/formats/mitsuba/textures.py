@@ -83,7 +83,7 @@ class TextureReader:
         wrap = WRAPS.get(plugin.value("wrap_mode", str, "repeat"))
         kind = FILTERS.get(plugin.value("filter_type", str, "bilinear"))
         if wrap is None or kind is None:
-            plugin.refuse("wraps or filters as no other", f"write {', '.join(WRAPS)}; {', '.join(FILTERS)}")
+            plugin.refuse("its wrap_mode or filter_type is unknown", f"write {', '.join(WRAPS)}; {', '.join(FILTERS)}")
         linear = "linear" if use == "number" and not raw else ""
         return Texture(picture=self._picture(path, linear), wrap=(wrap, wrap), filter=kind, **place)
 
@@ -134,7 +134,7 @@ def _placed(plugin: Plugin, to_uv: Doubles) -> dict[str, Any]:
     matrix = to_uv[:2, :2]
     columns = hypot(*matrix[:, 0]), hypot(*matrix[:, 1])
     if abs(float(matrix[:, 0] @ matrix[:, 1])) > SHEAR * columns[0] * columns[1]:
-        plugin.refuse("its to_uv shears", "turn, scale and move alone", "to_uv that shears")
+        plugin.refuse("its to_uv shears", "only rotate, scale and translate", "to_uv that shears")
     angle = atan2(-matrix[1, 0], matrix[0, 0])
     height = float(np.linalg.det(matrix)) / columns[0] if columns[0] else columns[1]
     return {"offset": (float(to_uv[0, 3]), float(to_uv[1, 3])), "scale": (columns[0], height),

@@ -145,8 +145,8 @@ STEPS: dict[str, Callable[[Attributes], Doubles]] = {
 
 Value = bool | int | float | str | Color | Spectrum | tuple[float, float, float] | Doubles
 _READERS: dict[str, tuple[Callable[[str], Value], str]] = {
-    "float": (lambda text: float(numbers(text)[0]), "a number"), "integer": (integer, "a whole number"),
-    "boolean": (boolean, "true or false"), "string": (str, "a text"), "rgb": (color, "three numbers"),
+    "float": (lambda text: float(numbers(text)[0]), "a number"), "integer": (integer, "an integer"),
+    "boolean": (boolean, "true or false"), "string": (str, "a string"), "rgb": (color, "three numbers"),
     "spectrum": (spectrum, 'a number, or pairs such as "400:0.2, 700:0.8"')}
 
 
@@ -161,6 +161,6 @@ def value_of(element: Element, where: str) -> Value:
         return _READERS[element.tag][0](attributes["value"])
     except (ValueError, KeyError, IndexError):
         wanted = _READERS[element.tag][1] if element.tag in _READERS else (
-            f"steps out of {', '.join(STEPS)}" if element.tag == "transform" else "three numbers")
+            f"steps from {', '.join(STEPS)}" if element.tag == "transform" else "three numbers")
         given = attributes.get("value", "of these steps" if element.tag == "transform" else "of these attributes")
         raise SceneError(f'{where}: <{element.tag}> "{given}" cannot be read; write {wanted}') from None

@@ -56,7 +56,7 @@ class Plugin:
         if kind is float and isinstance(value, int) and not isinstance(value, bool):
             value = float(value)
         if not isinstance(value, kind) or isinstance(value, bool) != (kind is bool):
-            raise SceneError(f'{self.where}: "{name}" is not a {kind.__name__}; write one')
+            raise SceneError(f'{self.where}: "{name}" is not of type {kind.__name__}; write one')
         return value
 
     def color(self, name: str, default: float) -> float | Color | Spectrum:
@@ -64,7 +64,7 @@ class Plugin:
         self.used.add(name)
         value = self.values.get(name, default)
         if isinstance(value, bool) or not isinstance(value, (int, float, Color, Spectrum)):
-            raise SceneError(f'{self.where}: "{name}" is no color; write <rgb name="{name}" value="…"/>')
+            raise SceneError(f'{self.where}: "{name}" is not a color; write <rgb name="{name}" value="…"/>')
         return value
 
     def point(self, name: str) -> tuple[float, float, float] | None:
@@ -72,7 +72,7 @@ class Plugin:
         self.used.add(name)
         value = self.values.get(name)
         if value is not None and not isinstance(value, tuple) or isinstance(value, (Color, Spectrum)):
-            raise SceneError(f'{self.where}: "{name}" has not three numbers; write <point name="{name}" value="…"/>')
+            raise SceneError(f'{self.where}: "{name}" is not three numbers; write <point name="{name}" value="…"/>')
         return value
 
     def transform(self, name: str) -> Doubles:
@@ -80,7 +80,7 @@ class Plugin:
         self.used.add(name)
         value = self.values.get(name)
         if value is not None and not isinstance(value, np.ndarray):
-            raise SceneError(f'{self.where}: "{name}" is no transform; write <transform name="{name}">')
+            raise SceneError(f'{self.where}: "{name}" is not a transform; write <transform name="{name}">')
         return np.eye(4) if value is None else value
 
     def all(self, tag: str) -> list[Plugin]:
@@ -127,7 +127,7 @@ class _Document:
         self._read_children(root, scene, 0)
         for owner, place, name in self._references:
             if name not in self._by_id:
-                raise SceneError(f'{owner.where}: refers to "{name}", which nothing has as its id; define it')
+                raise SceneError(f'{owner.where}: refers to "{name}", but nothing has that id; define it')
             owner.children[place] = owner.children[place][0], self._by_id[name]
         return scene
 
@@ -139,7 +139,7 @@ class _Document:
             raise SceneError(f"is not valid XML: {error}" if path == self._path
                              else f"{path.name}: is not valid XML: {error}") from None
         if root.tag != "scene":
-            raise SceneError(f"{path.name}: begins with <{root.tag}>; a scene of Mitsuba begins with <scene>")
+            raise SceneError(f"{path.name}: begins with <{root.tag}>; a Mitsuba scene begins with <scene>")
         return root
 
     def _read_children(self, element: Element, owner: Plugin, depth: int) -> None:
@@ -181,7 +181,7 @@ class _Document:
             where = f"{owner.where}.{element.get('name') or element.tag}"
         plugin = Plugin(element.tag, kind, where)
         if name in self._by_id:
-            raise SceneError(f"{where}: the id is there twice; rename one")
+            raise SceneError(f"{where}: the id is used twice; rename one")
         if name:
             self._by_id[name] = plugin
         self._read_children(element, plugin, depth)
@@ -195,7 +195,7 @@ class _Document:
 
     def _known(self, name: str, owner: Plugin) -> Plugin:
         if name not in self._by_id:
-            raise SceneError(f'{owner.where}: an alias of "{name}", which nothing before has as its id; define it')
+            raise SceneError(f'{owner.where}: is an alias of "{name}", but nothing before it has that id; define it')
         return self._by_id[name]
 
     def file(self, name: str) -> Path:
@@ -207,7 +207,7 @@ class _Document:
         """Replace $NAME in attributes by the value of its <default>."""
         def said(match: re.Match[str]) -> str:
             if match[1] not in self._defaults:
-                raise SceneError(f'{where}: nothing says what ${match[1]} is; write <default name="{match[1]}" …/>')
+                raise SceneError(f'{where}: ${match[1]} is undefined; write <default name="{match[1]}" …/>')
             return self._defaults[match[1]]
         for key, text in element.attrib.items():
             if "$" in text:

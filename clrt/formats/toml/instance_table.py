@@ -55,7 +55,7 @@ class InstanceReader:
     def problems(self, mesh: object, where: str) -> list[str]:
         """Return a problem unless exactly one table has the name `mesh`."""
         tables = self._shown.get(str(mesh), [])
-        wrong = f"names {len(tables)} meshes; rename them" if tables else unknown(mesh, self._shown)
+        wrong = f"is the name of {len(tables)} meshes; rename them" if tables else unknown(mesh, self._shown)
         return [] if len(tables) == 1 else [f"{where}.mesh: {show(mesh)} {wrong}"]
 
     def materials(self, table: InstanceTable) -> list[Material | None]:
@@ -66,14 +66,15 @@ class InstanceReader:
              ) -> list[Instance]:
         """Return the instances of what the mesh shows, and their copies; raises SceneError for invalid transforms."""
         if (count := prod(repeat.count for repeat in repeats)) > MOST_INSTANCES:
-            raise SceneError(f"{where}.repeat: makes {count} copies; write counts of at most {MOST_INSTANCES} in all")
+            raise SceneError(f"{where}.repeat: makes {count} copies; reduce the counts to at most {MOST_INSTANCES} in "
+                             "all")
         matrices = table.to_world(where)[None]
         for i, repeat in enumerate(repeats):
             matrices = repeated(matrices, repeat.to_world(f"{where}.repeat[{i}]"), repeat.count)
         for fault, found in transform_faults(matrices[:, :3]).items():
             if found.any():
                 copy = f", of copy {found.argmax()}," if found.size > 1 else ""
-                raise SceneError(f"{where}: its transform{copy} {fault}; write a scale without 0")
+                raise SceneError(f"{where}: its transform{copy} {fault}; write a nonzero scale")
         shown = self._shown.get(str(table.mesh), [[]])[0]
         return [replace(moved(each, matrix), material=material or each.material, name=table.name or each.name)
                 for matrix in matrices for each in shown]

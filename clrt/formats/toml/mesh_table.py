@@ -58,7 +58,7 @@ class MeshTable(Placing):
     def _read(self, folder: Path, where: str) -> Model:
         inline = self.vertices is not None or self.faces is not None or self.uv is not None
         if self.file is not None and inline:
-            raise SceneError(f"{where}: has a file and vertices, faces or uv; keep one of them")
+            raise SceneError(f"{where}: has both a file and vertices, faces or uv; keep one of them")
         if self.file is not None:
             return self._from_file(self.file, folder, where)
         if self.vertices is None or self.faces is None:

@@ -29,7 +29,7 @@ class Placing:
         if self.matrix is None:
             return translation(self.translate) @ rotation(self.rotate_degrees) @ scaling(self.scale)
         if any(getattr(self, key.name) != key.default for key in fields(Placing) if key.name != "matrix"):
-            raise SceneError(f"{where}: has a matrix and translate, scale or rotate_degrees; keep one of them")
+            raise SceneError(f"{where}: has both a matrix and translate, scale or rotate_degrees; keep one of them")
         if self.matrix[3] != (0.0, 0.0, 0.0, 1.0):
             raise SceneError(f"{where}.matrix[3]: {show(self.matrix[3])} is not affine; write [0, 0, 0, 1]")
         return np.array(self.matrix, np.float64)

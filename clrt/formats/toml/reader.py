@@ -88,7 +88,7 @@ class SceneReader:
         """Return the camera of `cameras` that the table names."""
         name = str(values["name"])
         self.problems += camera_problems(name, self._cameras, "camera.name")
-        self.problems += [f"camera: has a name and {key}; keep one of them" for key in values if key != "name"]
+        self.problems += [f"camera: has both a name and {key}; keep one of them" for key in values if key != "name"]
         return self._cameras.get(name, Camera())
 
     def _animation(self) -> Animation | None:
@@ -97,7 +97,7 @@ class SceneReader:
             return None
         table = self._table("animation")
         if "keyframes" in table:
-            self.problems.append("animation.keyframes: is written as tables of their own; write [[keyframe]]")
+            self.problems.append("animation.keyframes: keyframes are tables of their own; write [[keyframe]]")
         whole = self._build(Animation, {key: table[key] for key in table if key != "keyframes"}, "animation")
         keys = [self._keyframe(values, f"keyframe[{i}]") for i, values in enumerate(self._tables("keyframe"))]
         known = tuple(key for key in keys if key)
@@ -160,18 +160,18 @@ class SceneReader:
             image = default_sky().image
             if sky != "default":
                 self.problems.append(f'environment.sky: {show(sky)} is unknown; write "default"')
-            self.problems += [f"environment: has a sky and {key}; keep one of them" for key in ("color", "image")
+            self.problems += [f"environment: has both a sky and {key}; keep one of them" for key in ("color", "image")
                               if key in values]
         if "image" in values:
             image = self._picture(values["image"])
             self._source.files += [] if image is None else [(image, (self._path.parent / values["image"]).resolve())]
             if "color" in values:
-                self.problems.append("environment: has a color and an image; keep one of them")
+                self.problems.append("environment: has both a color and an image; keep one of them")
         return self._build(Environment, {**values, "image": image}, "environment")
 
     def _picture(self, name: Any) -> Any:
         if not isinstance(name, str):
-            self.problems.append(f"environment.image: {show(name)} is not a text; write a file name in quotes")
+            self.problems.append(f"environment.image: {show(name)} is not a string; write a file name in quotes")
             return None
         try:
             return read_picture(self._path.parent / name)
@@ -209,7 +209,7 @@ class SceneReader:
             model = self._tried((table or MeshTable(**geometry)).read, self._path.parent, where)
             matrix = self._tried((table or MeshTable()).to_world, where)
         if matrix is not None and not matrix[:3, :3].any():
-            self.problems.append(f"{where}: its transform leaves nothing but a point; write a scale without 0")
+            self.problems.append(f"{where}: its transform collapses it to a point; write a nonzero scale")
         if model is None or matrix is None:
             model = Model(meshes=[])
         else:
@@ -235,11 +235,11 @@ class SceneReader:
                                  'write { "name in the file" = "NAME" }')
             return {}
         if pairs and "material" in values:
-            self.problems.append(f"{where}: has a material and materials; keep one of them")
+            self.problems.append(f"{where}: has both a material and materials; keep one of them")
         named = own - {""}
         self.problems += [f'{where}.materials: "{name}" '
-                          + (unknown(name, named) if named else "is unknown, since the model names no materials; write "
-                             'material = "NAME"') for name in pairs if name not in own]
+                          + (unknown(name, named) if named else "is unknown, as the model has no named materials; "
+                             'write material = "NAME"') for name in pairs if name not in own]
         return {name: self._named_material(other, f"{where}.materials.{toml_key(name)}")
                 for name, other in pairs.items()}
 
@@ -275,7 +275,7 @@ def camera_problems(name: str, cameras: Collection[str], where: str) -> list[str
     """Return a problem if there is no camera of this name."""
     if name in cameras:
         return []
-    remedy = unknown(name, cameras) if cameras else "is unknown, since neither [cameras] nor a model file has one"
+    remedy = unknown(name, cameras) if cameras else "is unknown, as neither [cameras] nor a model file has one"
     return [f"{where}: {show(name)} {remedy}"]
 
 

@@ -47,7 +47,7 @@ class TextureReader:
         problems = field_problems(TextureTable, values, where)
         name = values.pop("image", "")
         if not isinstance(name, str):
-            problems.append(f"{where}.image: {show(name)} is not a text; write a file name in quotes")
+            problems.append(f"{where}.image: {show(name)} is not a string; write a file name in quotes")
         if problems:
             raise SceneError(problems)
         if name not in self.pictures:

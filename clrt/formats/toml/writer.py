@@ -91,7 +91,7 @@ class _Writer:
         self._tables: set[str] = set()
         objects = [*self._read_meshes(), *self._own_objects(), *self._spheres()]
         name = scene.name.encode("unicode_escape").decode()
-        head = [f"# {name} as clrt shows it; change what you like (docs/scene-format.md).",
+        head = [f"# {name} as clrt renders it; edit it as you like (docs/scene-format.md).",
                 *self._section("[camera]", scene.camera), *self._cameras(), *self._animation(),
                 *self._section("[render]", scene.render), *self._environment(scene.environment)]
         for light in scene.lights:
@@ -181,7 +181,7 @@ class _Writer:
         kept = [name for name in groups if name not in changed]
         return [*(["", "[mesh.materials]  # the file's name = the one above"] if changed else []),
                 *(f"{toml_key(name)} = {toml_value(other)}" for name, other in changed.items()),
-                *([f"# The file's own: {', '.join(map(toml_value, theirs))}; [mesh.materials] can name others for them"]
+                *([f"# The file's materials: {', '.join(map(toml_value, theirs))}; [mesh.materials] can replace them"]
                   if (theirs := [name for name in kept if name]) else [])]
 
     def _own_objects(self) -> Iterator[str]:

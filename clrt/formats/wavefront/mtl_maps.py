@@ -64,7 +64,7 @@ class Maps:
                 file = self._model.parent / name.replace("\\", "/")
                 self._pictures[name] = Picture(read_texels(file), printable(name))
             except (SceneError, OSError, ValueError) as error:
-                log.warning("%s: a texture is left out: %s", self._model, error)
+                log.warning("%s: a texture is ignored: %s", self._model, error)
                 self._pictures[name] = None
         return self._pictures[name]
 

@@ -94,7 +94,7 @@ def _table(text: str, key: str, least: int) -> Floats:
     except ValueError:
         values = np.zeros((0, 0))
     if values.ndim != 2 or values.shape[1] < least:
-        raise SceneError(f'a line "{key} {" ".join(_odd(rows, least))[:60]}" has not {least} numbers; repair the file')
+        raise SceneError(f'a line "{key} {" ".join(_odd(rows, least))[:60]}" needs {least} numbers; repair the file')
     return values
 
 
@@ -113,7 +113,7 @@ def _fans(polygons: list[list[str]]) -> tuple[list[str], Ints]:
     sizes = np.array(list(map(len, polygons)))
     if sizes.min() < 3:
         odd = " ".join(polygons[int(sizes.argmin())])[:60]
-        raise SceneError(f'a face "f {odd}" has not 3 corners; repair the file')
+        raise SceneError(f'a face "f {odd}" has fewer than 3 corners; repair the file')
     first = np.cumsum(sizes) - sizes
     polygon = np.repeat(np.arange(len(sizes)), sizes - 2)
     step = np.arange(len(polygon)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
@@ -135,7 +135,7 @@ def _indices(corners: list[str], counts: tuple[int, int, int]) -> Ints:
             for row, corner in zip(rows, corners):
                 row[:corner.count("/") + 1] = [int(index or 0) for index in corner.split("/")]
     except (ValueError, OverflowError):
-        raise SceneError("a face has a corner that is no index; repair the file") from None
+        raise SceneError("a face has a corner that is not an index; repair the file") from None
     if (rows[:, 0] == 0).any():
         raise SceneError("a face uses vertex 0, but OBJ counts from 1; repair the file")
     for kind, column, count in zip(("vertex", "texture coordinate", "normal"), rows.T, counts):
@@ -170,7 +170,7 @@ def _libraries(path: Path, text: str) -> dict[str, Material]:
         for library in (path.parent / name for name in names):
             if not library.is_file():
                 log.warning("%s: no material library %s; %s", path, library.name,
-                            f"took {own.name}" if own.is_file() else "its materials are plain grey")
+                            f"using {own.name}" if own.is_file() else "its materials are plain gray")
                 library = own
             if library.is_file():
                 try:
@@ -178,7 +178,7 @@ def _libraries(path: Path, text: str) -> dict[str, Material]:
                 except SceneError as error:
                     raise SceneError([f"{library.name}: {problem}" for problem in error.problems]) from None
     if names := left_out(entries):
-        log.warning("%s: left out: %s", path, ", ".join(names))
+        log.warning("%s: ignored: %s", path, ", ".join(names))
     maps = Maps(path)
     return {name: material(entry, maps) for name, entry in entries.items()}
 

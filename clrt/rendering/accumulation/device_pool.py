@@ -51,7 +51,7 @@ class Team:
             except (DeviceError, KernelError) as error:
                 if len(devices) == 1:
                     raise
-                _log.warning("%s is left out: %s", device.info.name, error)
+                _log.warning("%s is excluded: %s", device.info.name, error)
                 failure = error
         if not self.workers:
             raise failure
@@ -130,7 +130,7 @@ class Team:
         self._take_back(worker, work)
         if not self.workers:
             raise error
-        _log.warning("%s is left out: %s; the others do its work again", worker.name, error)
+        _log.warning("%s is excluded: %s; the others repeat its work", worker.name, error)
 
     def _take_back(self, worker: Worker, work: Work) -> None:
         """Return a worker's shares in flight to the pending work; nothing of them has entered the film."""

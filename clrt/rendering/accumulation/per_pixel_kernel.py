@@ -27,8 +27,8 @@ def render_pixels(session: Accumulation, source: str, name: str, record: np.dtyp
     without `first_hits` and traces no rays.
     """
     if session.compiled.tree is NO_RAYS:
-        raise UsageError("nothing of this picture takes rays, so there is no tree for them: what they meet first must "
-                         "be asked for when the renderer is made (first_hits=True)")
+        raise UsageError("this image traces no rays, so there is no BVH for them: request first hits when creating "
+                         "the renderer (first_hits=True)")
     device = session.device
     kernel = make_kernel(device, build(device, WINDOWS + source), name)
     order = scattered(session.tile_samples.size).astype(np.uint32)

@@ -58,7 +58,7 @@ class Bins:
         before = drawn_before(compiled)
         self._drawn = int(before[-1]), int(compiled.counts["spheres"][0])
         if sum(self._drawn) > MOST:
-            raise NoRoomError(f"{sum(self._drawn)} primitives are too many to be rasterised, {MOST} at most; take the "
+            raise NoRoomError(f"{sum(self._drawn)} primitives are too many to rasterise, at most {MOST}; use the "
                               "integrator local, or fewer instances")
         self._blocks = Blocks(device, compiled.source_of("raster/outline.cl"))
         self._before, self._instances = self._blocks.upload(before.astype(np.uint32)), len(before) - 1
@@ -113,6 +113,6 @@ class Bins:
         info = self._device.info
         check_room(info, {**needs, **dict(zip(("bin_starts", "bin_entries", "outlines"), sizes))})
         if max(sizes) > info.max_alloc_bytes:
-            raise NoRoomError(f"{info.name}: what the camera sees takes a buffer of {size(max(sizes))} to rasterise, "
-                              f"and there they have {size(info.max_alloc_bytes)} at most; take the integrator local, a "
-                              "smaller picture or fewer primitives")
+            raise NoRoomError(f"{info.name}: rasterising this view needs a buffer of {size(max(sizes))}, and buffers "
+                              f"of this device have at most {size(info.max_alloc_bytes)}; use the integrator local, a "
+                              "smaller image or fewer primitives")

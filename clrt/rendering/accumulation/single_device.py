@@ -46,7 +46,8 @@ class Session(LocalAccumulation):
         super().__init__(size)
         film_bytes = size[0] * size[1] * compiled.choices.pixel.itemsize
         if film_bytes > largest_film(device, compiled):
-            raise NoRoomError(f"{device.info.name}: a film of {size[0]}x{size[1]} has no room in a buffer")
+            raise NoRoomError(f"{device.info.name}: a film of {size[0]}x{size[1]} does not fit into a buffer; use a "
+                              "smaller --size")
         launch = first_launch(compiled, size, max_depth, seed, planned_spp)
         self._scene = SceneOnDevice(device, compiled, launch, film_bytes, before=before)
         self._copies = HostMemory(size[::-1], compiled.choices.pixel)   # everything else has been allocated

@@ -50,10 +50,10 @@ def check_replaceable(path: Path, beginning: bytes) -> None:
     except FileNotFoundError:
         return
     except OSError as error:
-        raise CheckpointError(f"{path}: cannot be read ({error.strerror}); name another file") from error
+        raise CheckpointError(f"{path}: cannot be read ({error.strerror}); choose another file") from error
     if not beginning.startswith(found):
-        raise CheckpointError(f"{path}: is there and is no checkpoint, so it is not replaced; name another file, or "
-                              "remove it first")
+        raise CheckpointError(f"{path}: exists and is not a checkpoint, so it is not replaced; choose another file, "
+                              "or remove it first")
 
 
 def write_checkpoint(path: Path, header: Mapping[str, Any], arrays: Arrays, *, keep_older: bool = True) -> None:
@@ -95,7 +95,7 @@ def read_checkpoint(path: Path, kinds: Mapping[str, np.dtype[Any]]) -> tuple[dic
         size = os.fstat(file.fileno()).st_size
         magic, line = file.readline(len(MAGIC)), file.readline(LONGEST_HEADER)
         if magic != MAGIC:
-            raise ValueError("is no checkpoint that this version of clrt can read")
+            raise ValueError("is not a checkpoint that this version of clrt can read")
         header, shapes = _header(line, kinds)
         expected = len(magic) + len(line) + sum(prod(shapes[name]) * kinds[name].itemsize for name in shapes) + 32
         if size != expected:
@@ -119,7 +119,7 @@ def _header(line: bytes, kinds: Mapping[str, np.dtype[Any]]) -> tuple[dict[str, 
     except (ValueError, TypeError, LookupError, RecursionError):
         good = False
     if not good:
-        raise ValueError("is damaged: its header makes no sense")
+        raise ValueError("is damaged: its header is invalid")
     return header, shapes
 
 

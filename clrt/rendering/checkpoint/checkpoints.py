@@ -30,7 +30,7 @@ class Checkpoints:
 
     def __init__(self, path: Path, facts: dict[str, str], device: str, seconds: float) -> None:
         if not path.parent.is_dir() or path.exists() and not path.is_file():
-            raise OutputError(f"{path}: is no place for a checkpoint; name a regular file in a folder that exists")
+            raise OutputError(f"{path}: cannot store a checkpoint; choose a regular file in an existing folder")
         if not seconds >= 0:
             raise UsageError(f"checkpoint_seconds is {seconds}; it must be 0 or more")
         self.path, self._facts, self._device, self._every = path, facts, device, seconds
@@ -43,7 +43,7 @@ class Checkpoints:
         """
         check_replaceable(self.path, FAMILY)
         if self.path.exists():
-            _log.warning("%s: this checkpoint will be replaced; --resume goes on from it", self.path)
+            _log.warning("%s: this checkpoint will be replaced; to continue from it, use --resume", self.path)
 
     @property
     def due(self) -> bool:
@@ -69,7 +69,7 @@ class Checkpoints:
             self._failed, self._newest_is_whole = False, True
         except OSError as error:
             if not self._failed:
-                _log.warning("%s: the checkpoint cannot be written (%s); the render goes on, and tries again later",
+                _log.warning("%s: the checkpoint cannot be written (%s); the render continues and tries again later",
                              self.path, error.strerror or error)
             self._failed = True
         end = time.perf_counter()
@@ -97,24 +97,24 @@ class Checkpoints:
             return kept
         if problems:
             check_replaceable(self.path, FAMILY)    # else starting afresh would be refused, too
-            raise CheckpointError(f"{'; '.join(problems)}; there is nothing to go on from: leave out --resume to begin "
-                                  "anew")
-        _log.warning("%s: there is no checkpoint yet, so the render begins", self.path)
+            raise CheckpointError(f"{'; '.join(problems)}; there is nothing to resume: leave out --resume to start "
+                                  "afresh")
+        _log.warning("%s: does not exist yet, so the render starts afresh", self.path)
         return None
 
     def _check_facts(self, path: Path, header: dict[str, Any]) -> None:
         if not isinstance(found := header.get("facts"), dict):
             raise ValueError(NO_SENSE)
         if others := differences(found, self._facts):
-            raise CheckpointError(f"{path}: is a checkpoint of another render ({', '.join(others)}); ask for that one "
-                                  "to go on, name another file, or leave out --resume to begin anew")
+            raise CheckpointError(f"{path}: is a checkpoint of another render ({', '.join(others)}); use its settings "
+                                  "to resume it, choose another file, or leave out --resume to start afresh")
 
     def _warn(self, path: Path, header: dict[str, Any], problems: list[str]) -> None:
         if problems:
-            _log.warning("%s; going on from the older %s", "; ".join(problems), path)
+            _log.warning("%s; resuming from the older %s", "; ".join(problems), path)
         if header.get("device") != self._device:
-            _log.warning("%s: was begun on %s, and what %s adds may be rounded otherwise", path, header.get("device"),
-                         self._device)
+            _log.warning("%s: was started on %s; samples from %s may be rounded differently", path,
+                         header.get("device"), self._device)
 
 
 def open_checkpoints(path: StrPath | None, resume: bool, seconds: float, scene: Scene, choices: Choices,
@@ -122,7 +122,7 @@ def open_checkpoints(path: StrPath | None, resume: bool, seconds: float, scene: 
     """Return a render's checkpoints, if enabled, and the state to resume from, if there is one."""
     if path is None:
         if resume:
-            raise UsageError("resume goes on from a checkpoint, and none is named; name its file, too")
+            raise UsageError("resume needs a checkpoint; give its file, too")
         return None, None
     checkpoints = Checkpoints(Path(path), facts_of(scene, choices), device, seconds)
     if resume:
@@ -134,4 +134,4 @@ def open_checkpoints(path: StrPath | None, resume: bool, seconds: float, scene: 
 def check_of_none(checkpoints: Checkpoints | None) -> None:
     """Raise UsageError if checkpoints are written, before another image is started."""
     if checkpoints is not None:
-        raise UsageError("a checkpoint is of one picture, seen by one camera; make a renderer for each")
+        raise UsageError("a checkpoint stores one image of one camera; create a renderer for each")

@@ -87,7 +87,7 @@ def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:
             told.append(f"{'without' if value == 'True' else 'with'} --aov direct or indirect")
         else:
             hidden = name in ("kernels", "code") or name in {field.name for field in fields(Scene)}
-            told.append(f"other {name}" if hidden else f"{name} {other} instead of {value}")
+            told.append(f"different {name}" if hidden else f"{name} {other} instead of {value}")
     return told
 
 

@@ -22,7 +22,7 @@ KINDS: dict[str, np.dtype[Any]] = {
     "parts": np.dtype(np.int64), "noise_mean": np.dtype(np.float32), "noise_changes": np.dtype(np.float64),
     "noise_level": np.dtype(np.int64), "history": np.dtype(np.float64)}
 MOST_SAMPLES = 1 << 32
-NO_SENSE = "is damaged: its parts do not fit each other"
+NO_SENSE = "is damaged: its parts are inconsistent"
 
 
 @dataclass(frozen=True)

@@ -49,10 +49,10 @@ class Choices:
         for name, values in known.items():
             check_choice(name, getattr(self, name), values)
         if self.paths == "waves" and self.lanes != WAVE_LANES:
-            raise UsageError(f"paths in waves need {WAVE_LANES} lanes, not {self.lanes}; leave out one of the choices")
+            raise UsageError(f"paths = waves needs {WAVE_LANES} lanes, not {self.lanes}; leave out one of them")
         if self.tree is not None and self.layout is not None and self.tree == (self.layout in TREELESS):
-            raise UsageError(f"the layout {self.layout} is {'no tree' if self.tree else 'a tree'}, and tree is "
-                             f"{'on' if self.tree else 'off'}; leave out one of the choices")
+            raise UsageError(f"the layout {self.layout} is {'not ' * self.tree}a BVH, and tree is "
+                             f"{'on' if self.tree else 'off'}; leave out one of them")
 
     @property
     def waves(self) -> bool:

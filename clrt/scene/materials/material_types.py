@@ -54,7 +54,7 @@ class Conductor(Material):
         if (self.eta is None) == (self.k is None):
             return []
         given, other = ("k", "eta") if self.eta is None else ("eta", "k")
-        return [f"{given}: is there without {other}; write both, or a preset alone"]
+        return [f"{given}: is given without {other}; write both, or a preset alone"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +120,7 @@ class Dielectric(Material):
         return not self.rough or (self.ior == 1 and not self.thin)
 
     def conflicts(self) -> list[str]:
-        fault = "attenuation_distance: a thin sheet has no inside; leave it out, or thin"
+        fault = "attenuation_distance: a thin surface has no interior; leave it out, or remove thin"
         return [fault] if self.thin and self.attenuation_distance is not None else []
 
     def in_unit(self, unit: float) -> Dielectric:

@@ -45,7 +45,7 @@ def field_problems(kind: type, values: Mapping[str, Any], where: str) -> list[st
     if problems:
         more = [f"{where}: {len(problems) - MOST} more mistakes like these"] if len(problems) > MOST else []
         return problems[:MOST] + more
-    return [f"{where}.{name}: {show(value)} is beyond the range of float32; write a smaller number"
+    return [f"{where}.{name}: {show(value)} is outside the range of float32; write a smaller number"
             for name, value in plain.items() if _too_large(value)]
 
 
@@ -102,10 +102,11 @@ def _problems(hint: Any, value: Any, path: str) -> Iterator[str]:
         if isinstance(value, Texture):
             yield from _problems(_factor(parts[0], value), value.factor, f"{path}.factor")
     elif hint is Texture and not isinstance(value, Texture):
-        yield f'{path}: {show(value)} is no texture; write {{ image = "FILE" }}'
+        yield f'{path}: {show(value)} is not a texture; write {{ image = "FILE" }}'
     elif isinstance(hint, type) and is_dataclass(hint):
         yield from (field_problems(hint, {field.name: getattr(value, field.name) for field in fields(hint)}, path)
-                    if isinstance(value, hint) else [f"{path}: {show(value)} is no {hint.__name__}; write one"])
+                    if isinstance(value, hint) else
+                    [f"{path}: {show(value)} is not of type {hint.__name__}; write one"])
     elif origin is Literal:
         if not (isinstance(value, str) and value in parts):
             yield f"{path}: {show(value)} {unknown(value, parts)}"
@@ -167,9 +168,9 @@ def _fault(kind: Any, value: Any) -> str:
 
 _ACCEPTED: dict[Any, Any] = {float: (float, int), int: int, str: str, bool: bool, tuple: tuple}
 _REMEDIES = {float: "is not a number; write one without quotes",
-             int: "is not a whole number; write one without quotes or decimal point",
-             str: "is not a text; write it in quotes",
-             bool: "is neither true nor false; write one of them",
+             int: "is not an integer; write one without quotes or decimal point",
+             str: "is not a string; write it in quotes",
+             bool: "is not a boolean; write true or false",
              tuple: "is not a list; write the numbers in brackets"}
 _LIMITS: dict[type, tuple[Callable[[float, float], bool], str, str]] = {
     Ge: (operator.ge, "is below", "write at least"), Le: (operator.le, "is above", "write at most"),

@@ -20,7 +20,7 @@ def matrix_problems(placed: list[tuple[int, Instance]]) -> list[str]:
     with np.errstate(all="ignore"):
         reach = np.einsum("kij,kj->ki", np.abs(to_world[..., :3]), extent) + np.abs(to_world[..., 3])
     known = np.any([*faults.values()], axis=0)
-    faults["takes the mesh beyond the range of float32"] = (reach > FLOAT32_MAX).any(axis=1) & ~known
+    faults["moves the mesh outside the range of float32"] = (reach > FLOAT32_MAX).any(axis=1) & ~known
     problems = []
     for fault, wrong in faults.items():
         if wrong.any():

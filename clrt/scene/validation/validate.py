@@ -72,7 +72,7 @@ def scene_problems(scene: Scene) -> list[str]:
 def _list_problems(scene: Scene) -> list[str]:
     """Return problems of parts of the scene that should be lists and are not."""
     parts = {name: getattr(scene, name) for name in ("meshes", "instances", "spheres", "lights")}
-    return [f"{name}: {show(part)} is no list; write {name}=[...]" for name, part in parts.items()
+    return [f"{name}: {show(part)} is not a list; write {name}=[...]" for name, part in parts.items()
             if not isinstance(part, (list, tuple))]
 
 
@@ -83,7 +83,7 @@ def mesh_problems(mesh: object, where: str) -> list[str]:
     not), indices out of range, normals of length zero, and colors outside 0 to 1.
     """
     if not isinstance(mesh, Mesh):
-        return [f"{where}: {show(mesh)} is no Mesh; write a clrt.Mesh"]
+        return [f"{where}: {show(mesh)} is not a Mesh; write a clrt.Mesh"]
     where += f" {show(mesh.name)}"
     n = len(mesh.vertices) if isinstance(mesh.vertices, np.ndarray) else 0
     arrays: list[tuple[str, object, type, str, tuple[int, ...]]] = [
@@ -104,7 +104,7 @@ def mesh_problems(mesh: object, where: str) -> list[str]:
         if name == "normals":
             bad, fault = bad | ~np.any(array, axis=1), "points nowhere"
         elif name == "colors":
-            bad, fault = bad | np.any((array < 0) | (array > 1), axis=1), "is no colour from 0 to 1"
+            bad, fault = bad | np.any((array < 0) | (array > 1), axis=1), "is not a colour from 0 to 1"
         problems += _row_problems(bad, array, f"{where}: {name}", fault)
     return problems
 
@@ -113,8 +113,8 @@ def texture_problems(mesh: Mesh, where: str) -> list[str]:
     """Return problems of textures for which the mesh has no texture coordinates."""
     material: object = mesh.material
     textures = material.textures() if isinstance(material, Material) else []
-    return [f'{where} {show(mesh.name)}: its material reads the texture {show(texture.picture.name)} by uv'
-            f'{texture.uv_set or ""}, but the mesh has none; give it texture coordinates, or another material'
+    return [f'{where} {show(mesh.name)}: its material reads the texture {show(texture.picture.name)} at uv'
+            f'{texture.uv_set or ""}, but the mesh has none; add texture coordinates, or use another material'
             for texture in textures if (mesh.uv1 if texture.uv_set else mesh.uv) is None]
 
 
@@ -125,7 +125,7 @@ def index_problems(faces: NDArray[np.integer], n: int, where: str) -> list[str]:
     bad = np.asarray(((faces < 0) | (faces >= n)).any(axis=1))
     face = int(bad.argmax())
     vertex = next(index for index in faces[face].tolist() if not 0 <= index < n)
-    valid = f"valid are 0 to {n - 1}" if n else "the mesh has no vertices"
+    valid = f"valid indices are 0 to {n - 1}" if n else "the mesh has no vertices"
     return [f"{where}: faces[{face}] uses vertex {vertex}, but {valid}{_others(bad)}; repair the mesh"]
 
 
@@ -169,7 +169,7 @@ def _object_problems(value: object, kind: type, where: str) -> list[str]:
     """Return problems unless `value` is a `kind` whose fields are within their limits."""
     if not isinstance(value, kind):
         names = [each.__name__ for each in MATERIALS] if kind is Material else [kind.__name__]
-        return [f"{where}: {show(value)} is no {kind.__name__}; write a clrt.{' or clrt.'.join(names)}"]
+        return [f"{where}: {show(value)} is not of type {kind.__name__}; write a clrt.{' or clrt.'.join(names)}"]
     values = {field.name: getattr(value, field.name) for field in fields(type(value))}  # type: ignore[arg-type]
     return field_problems(type(value), values, where)
 
@@ -184,7 +184,7 @@ def _instance_problems(instances: list[Instance], of_mesh: dict[int, list[str]])
         wrong = _object_problems(instance, Instance, where)
         if not wrong and np.shape(instance.to_world) != (3, 4):
             wrong = [f"{where} {show(instance.name)}: to_world has shape {np.shape(instance.to_world)}; write a numpy "
-                     "array of (3, 4), or of (4, 4) with the last row 0, 0, 0, 1"]
+                     "array of shape (3, 4), or (4, 4) with the last row 0, 0, 0, 1"]
         if isinstance(instance, Instance) and id(instance.mesh) not in of_mesh:
             wrong += of_mesh.setdefault(id(instance.mesh), mesh_problems(instance.mesh, f"{where}.mesh"))
         problems += wrong
@@ -221,13 +221,13 @@ def _camera_problems(camera: Camera) -> list[str]:
     if not forward.any():
         return [f"camera.look_at: {show(camera.look_at)} is the camera's own position; move one of them"]
     if not up.any():
-        return ["camera.up: [0, 0, 0] is no direction; write one, such as [0, 1, 0]"]
+        return ["camera.up: [0, 0, 0] is not a direction; write one, such as [0, 1, 0]"]
     right = np.cross(forward / np.abs(forward).max(), up / np.abs(up).max())
     if np.linalg.norm(right) < 1e-6:
-        return [f"camera.up: {show(camera.up)} is parallel to the view; write another direction, such as [0, 0, -1]"]
+        return [f"camera.up: {show(camera.up)} is parallel to the view direction; write another, such as [0, 0, -1]"]
     given = {"aperture_radius": camera.aperture_radius or None, "focus_distance": camera.focus_distance,
              "view_height": camera.view_height}
-    return [f'camera.{name}: {show(value)} is of no use to projection = "{camera.projection}"; leave it out'
+    return [f'camera.{name}: {show(value)} has no effect with projection = "{camera.projection}"; leave it out'
             for name, value in given.items() if value is not None
             and camera.projection != ("orthographic" if name == "view_height" else "perspective")]
 
@@ -239,8 +239,8 @@ def _raster_problems(scene: Scene) -> list[str]:
         return []
     given = (f"projection = {show(camera.projection)}" if camera.projection != "perspective"
              else f"aperture_radius = {camera.aperture_radius:g}")
-    return [f'render.integrator: "raster" draws what a pinhole sees, and the camera has {given}; leave that out, or '
-            'write "local"']
+    return [f'render.integrator: "raster" supports only pinhole cameras, and the camera has {given}; leave that out, '
+            'or write "local"']
 
 
 def _environment_problems(environment: Environment) -> list[str]:
@@ -259,18 +259,18 @@ def _environment_problems(environment: Environment) -> list[str]:
             pixels = bad.any(axis=2)
             row, column = np.argwhere(pixels)[0]
             problems.append(f"{where}: {np.count_nonzero(pixels)} pixels are {fault}, the first in row {row}, "
-                            f"column {column}: {_row(image[row, column])}; repair the picture")
+                            f"column {column}: {_row(image[row, column])}; repair the image")
     return problems
 
 
 def _light_problems(light: object, where: str) -> list[str]:
     if not isinstance(light, LIGHTS):
-        return [f"{where}: {show(light)} is no light; write a {' or '.join(kind.__name__ for kind in LIGHTS)}"]
+        return [f"{where}: {show(light)} is not a light; write a {' or '.join(kind.__name__ for kind in LIGHTS)}"]
     if problems := _object_problems(light, type(light), where):
         return problems
     if not isinstance(light, PointLight) and not any(light.direction):
-        problems.append(f"{where}.direction: [0, 0, 0] is no direction; write the one the light travels in")
+        problems.append(f"{where}.direction: [0, 0, 0] is not a direction; write the one the light travels in")
     if isinstance(light, SpotLight) and light.inner_degrees >= light.outer_degrees:
         problems.append(f"{where}.inner_degrees: {light.inner_degrees:g} is not below outer_degrees, "
-                        f"{light.outer_degrees:g}; write less")
+                        f"{light.outer_degrees:g}; write a smaller angle")
     return problems

@@ -7,9 +7,9 @@ from imgui_bundle import imgui
 from ..editor import Editor
 from ..fields import choose, edit_fields
 
-ABOUT = """In the picture: W A S D walk, Q and E go down and up, Shift is faster.
-Dragging with the left button looks around, or orbits; with the middle one it shifts the picture.
-The wheel comes nearer."""
+ABOUT = """In the image: W A S D to walk, Q and E to move down and up, Shift to move faster.
+Drag with the left button to look around or orbit, with the middle button to pan.
+Scroll to move closer or farther."""
 
 
 class CameraPanel:
@@ -25,7 +25,7 @@ class CameraPanel:
         imgui.set_item_tooltip(ABOUT)
         _, controls.pace = imgui.slider_float("speed", controls.pace, 0.01, 10, "%.2g",
                                               imgui.SliderFlags_.logarithmic.value)
-        imgui.set_item_tooltip("What a second of walking covers of the distance to what the camera looks at.")
+        imgui.set_item_tooltip("Walking speed per second, relative to the distance to the look-at point.")
         imgui.push_id("camera")
         new = edit_fields(camera, editor.step)
         imgui.pop_id()

@@ -45,7 +45,7 @@ class Lights:
         if isinstance(light, DirectionalLight):
             return light
         changed, moves = imgui.checkbox("moves", editor.moving_light == self.chosen)
-        imgui.set_item_tooltip(f"It circles round what the camera looks at, once in {ROUND:g} seconds.")
+        imgui.set_item_tooltip(f"The light circles around the camera's look-at point once every {ROUND:g} seconds.")
         if changed:
             editor.moving_light = self.chosen if moves else None
         return light

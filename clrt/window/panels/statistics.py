@@ -42,7 +42,7 @@ def _progress(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
     yield "rays", f"{snapshot.rays_per_second / 1e6:.2f} million/s"
     height, width = snapshot.pixels.shape[:2]
     yield "resolution", f"{width} x {height}" + ("" if (width, height) == snapshot.size else " for now")
-    yield "samples", f"{snapshot.spp} of {snapshot.scene.render.spp} a pixel in {snapshot.seconds:.2f} s"
+    yield "samples", f"{snapshot.spp} of {snapshot.scene.render.spp} per pixel in {snapshot.seconds:.2f} s"
     yield "noise", "-" if snapshot.noise is None else f"{100 * snapshot.noise:.2f} %"
     yield "state", snapshot.phase
 
@@ -50,10 +50,10 @@ def _progress(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
 def _means(snapshot: Snapshot) -> Iterator[tuple[str, str]]:
     """Yield rows about device, memory, BVH and programs."""
     yield "device", snapshot.device
-    yield "memory there", f"{snapshot.device_bytes / 2**20:.1f} MiB"
+    yield "device memory", f"{snapshot.device_bytes / 2**20:.1f} MiB"
     tree = snapshot.tree
     if tree:
-        yield "tree", f"{tree['layout']} by {tree['builder'] or 'none'}, {tree['nodes']} nodes, {tree['bytes']} bytes"
+        yield "BVH", f"{tree['layout']} by {tree['builder'] or 'none'}, {tree['nodes']} nodes, {tree['bytes']} bytes"
         yield "", f"{tree['triangles']} triangles, {tree['spheres']} spheres, {tree['instances']} instances"
         yield "built in", f"{1000 * tree['build_seconds']:.1f} ms"
     yield "programs built", str(snapshot.programs)

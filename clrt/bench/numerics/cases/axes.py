@@ -26,7 +26,7 @@ def measure_axes(subject: Subject, *, quick: bool) -> Iterator[Row]:
     wrong = closest_bounds(*mesh, rays).wrong(rays, hits)
     yield Row("G6", "along axes through cubes, by float64", count, int(np.count_nonzero(wrong)))
     unlike = differing(subject.query(mesh, layout="list").closest_hit(*rays), hits)
-    yield Row("G6", "along axes through cubes, unlike without a tree", count, int(np.count_nonzero(unlike)))
+    yield Row("G6", "along axes through cubes, unlike brute force", count, int(np.count_nonzero(unlike)))
     yield from _onto_plane(subject, count)
 
 

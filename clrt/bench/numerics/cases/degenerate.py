@@ -25,7 +25,7 @@ def measure_degenerate(subject: Subject, *, quick: bool) -> Iterator[Row]:
         for builder in (None, "midpoint"):
             query = subject.query(mesh, builder=builder)
             wrong = closest_bounds(*mesh, rays).wrong(rays, query.closest_hit(*rays))
-            yield Row("G8", f"{name}, {len(mesh[1])} triangles, {builder or 'default'} tree", count,
+            yield Row("G8", f"{name}, {len(mesh[1])} triangles, {builder or 'default'} BVH", count,
                       int(np.count_nonzero(wrong)), query.tree.stack, "entries")
     refused = [_is_refused(subject, mesh) for mesh in no_meshes().values()]
     yield Row("G12", f"refused: {', '.join(no_meshes())}", len(refused), refused.count(False))

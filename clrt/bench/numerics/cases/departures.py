@@ -59,9 +59,9 @@ def held_scenes(place: Doubles, factor: float, *, level_only: bool) -> dict[str,
     if not place.any():
         ground = Sphere(center=(0, -1e6 * factor, 0), radius=1e6 * factor)
         level = lit_scenes(place, factor, level_only=True)["level plane"]
-        return {"ground of a million sizes": replace(level, meshes=[], spheres=[ground])}
+        return {"ground a million times as large": replace(level, meshes=[], spheres=[ground])}
     ball = Sphere(center=_tuple(-place), radius=0.5 * factor)
-    return {f"{name} and a far ball": replace(scene, spheres=[*scene.spheres, ball])
+    return {f"{name} and a far sphere": replace(scene, spheres=[*scene.spheres, ball])
             for name, scene in lit_scenes(place, factor, level_only=level_only).items() if "corner" not in name}
 
 
