@@ -21,6 +21,7 @@ if TYPE_CHECKING:
                          UsageError as UsageError)
     from .output.image import Image as Image
     from .output.image_error import compare as compare
+    from .output.images import read_image as read_image
     from .queries.instanced import InstancedRayQuery as InstancedRayQuery
     from .queries.mesh import RayQuery as RayQuery
     from .rendering.renderer import Renderer as Renderer, State as State
@@ -44,6 +45,7 @@ _HOME = {
     "queries.instanced": ("InstancedRayQuery",),
     "output.image_error": ("compare",),
     "output.image": ("Image",),
+    "output.images": ("read_image",),
     "queries.mesh": ("RayQuery",),
     "rendering.renderer": ("Renderer", "State"),
     "scene.animation": ("Animation", "Keyframe"), "scene.camera_path": ("frames", "turntable"),

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .file_names import StrPath
 from .float_errors import with_default_errors
 from .formats.load_scene import load as _load
 from .output.data_images import check_denoisable
@@ -22,14 +22,15 @@ from .scene.model import Scene
 
 
 @with_default_errors
-def load(path: str | Path, camera: str | None = None) -> Scene:
+def load(path: StrPath, camera: str | None = None) -> Scene:
     """Load the scene in a .toml file or a bare model (.glb .gltf .obj .ply .stl .off). camera: the name of one of the
-    model file's cameras to use. Raises SceneError, which lists all problems."""
+    file's cameras to use, or for a bare model "front", "right", "back" or "left". Raises SceneError, which lists all
+    problems."""
     return _load(path, camera)
 
 
 @with_default_errors
-def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | None = None, error: float | None = None,
+def render(scene: Scene | StrPath, *, spp: int | None = None, time: float | None = None, error: float | None = None,
            reference: NDArray[np.float32] | None = None, denoise: bool = False, **options: Any) -> Image:
     """Render a scene, or the scene in a file, until a stop condition: see `Renderer.passes` for these and `Renderer`
     for `options`. denoise: see docs/denoise.md; the image keeps its `raw` pixels. Raises subclasses of ClrtError."""
@@ -39,7 +40,7 @@ def render(scene: Scene | str | Path, *, spp: int | None = None, time: float | N
     return _rendered(renderer, denoiser, reference, spp=spp, time=time, error=error)
 
 
-def animate(scene: Scene | str | Path, *, frames: Iterable[int] | None = None, spp: int | None = None,
+def animate(scene: Scene | StrPath, *, frames: Iterable[int] | None = None, spp: int | None = None,
             time: float | None = None, error: float | None = None, denoise: bool = False,
             **options: Any) -> Iterator[tuple[int, Image]]:
     """Render a scene with camera animation, all `frames` or the given numbers; yields each frame's number and image.

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+#: What public functions accept as a file name.
+StrPath = str | os.PathLike[str]
 #: Encoding error handlers. Characters missing from an encoding become escapes such as "\\u65e5"; bytes of file names
 #: are kept for programs that read the names, or become escapes such as "\\xe8" for people.
 AS_BYTES, SHOWN = "clrt.as_bytes", "clrt.shown"

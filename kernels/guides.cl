@@ -2,8 +2,8 @@
 //
 // One work-item takes LANES pixels and averages `sample_count` camera rays per pixel. Rays follow mirrors and glass,
 // taking the likelier of reflection and refraction since guides should be noise-free. They record the first surface
-// that is neither, as Open Image Denoise recommends, with its albedo tinted by the specular colors. The sky, suns
-// included, stores its radiance, clamped to 1, as albedo, and no normal. World frame.
+// that is neither, as Open Image Denoise recommends, with its albedo tinted by the specular colors and by absorption
+// in glass. The sky, suns included, stores its radiance, clamped to 1, as albedo, and no normal. World frame.
 //
 // To add one: add a field to the record GUIDE (clrt/rendering/compile/records.py) and to Seen, and compute it below.
 #include "camera.cl"
@@ -18,10 +18,16 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
                               Sampler *sampler) {
     Seen seen = {splat(ZERO), splat(ZERO)};
     real3 origin = eye, direction = view, tint = splat(ONE);
+#if ATTENUATION
+    real3 absorption = splat(ZERO);
+#endif
     for (int depth = 1;; ++depth) {
         Surface surface;
         Hits hits = first_surface(scene, origin, direction, depth == 1, active, sampler, &surface);
         ireal hit = active & (hits.primitive >= 0);
+#if ATTENUATION
+        tint = mul(tint, attenuated(absorption, hit ? hits.t : (real)(INFINITY)));
+#endif
 #if ENVIRONMENT
         ireal escaped = active & !hit;
         if (ANY(escaped)) {
@@ -41,6 +47,9 @@ static inline Seen seen_along(const Scene *scene, real3 eye, real3 view, ireal a
         seen.normal = choose(ends, surface.ns, seen.normal);
         if (depth >= max_depth || !ANY(followed)) return seen;
         tint = choose(followed, mul(tint, sample.weight), tint);
+#if ATTENUATION
+        absorption = absorption_along(&shading, &surface, sample.wi, absorption);
+#endif
         origin = offset_origin(surface.p, surface.p_error, surface.ng, sample.wi);
         direction = sample.wi;
         active = followed;

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..errors import UsageError
 from .bench_files import figures_options, write_figures
 from .options import Size
 
@@ -38,6 +39,8 @@ INTEGRATORS = ["path", "direct", "local", "raster"]
 @click.option("--spp", multiple=True, type=click.IntRange(min=1),
               help="Samples per pixel instead of 1, 2, 4, ...; may be repeated.")
 @click.option("--seeds", type=click.IntRange(min=1), help="Images of each kind; default: 5, with --quick 3.")
+@click.option("--reference", type=click.Path(path_type=Path), metavar="FILE",
+              help="Image to measure the error against, taken as exact; for one SCENE. Default: rendered and cached.")
 @click.option("--reference-spp", type=click.IntRange(min=2),
               help="Samples per pixel of the reference; default: 4096, with --quick 256.")
 @click.option("--quick", is_flag=True, help="Use fewer seeds and a noisier reference.")
@@ -45,8 +48,9 @@ INTEGRATORS = ["path", "direct", "local", "raster"]
 @click.option("--plot", type=click.Path(path_type=Path), metavar="FILE.png", help="Plot error against time there.")
 def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrators: tuple[Integrator, ...], peers: bool,
                      selectors: tuple[str, ...], size: tuple[int, int] | None, json_file: Path | None,
-                     plot: Path | None, **asked: Any) -> None:
-    """Measure how fast images of each SCENE converge to a reference, which is rendered once and cached.
+                     plot: Path | None, reference: Path | None, **asked: Any) -> None:
+    """Measure how fast images of each SCENE converge to a reference, which is rendered once and cached, or given with
+    --reference.
 
     All contestants render images of 1, 2, 4, ... samples per pixel with several seeds, in interleaved runs. Also
     reports how accurate clrt's error estimate is, and whether a contestant is biased (use many --seeds with a single
@@ -55,10 +59,12 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
     from ..bench.convergence.calibration import calibrations
     from ..bench.convergence.contestants import CHOICES, MORE_CHOICES
     from ..bench.convergence.converge import measure_convergence
+    from ..bench.convergence.reference import Reference
     from ..bench.numerics.plots import plot_convergence
     from ..device.discovery.discover import choose
     from ..formats.load_scene import load
     from .converge_tables import calibration_lines, scene_lines
+    from .render import read_reference
 
     devices = [choose(selector)[0] for selector in selectors or (None,)]
     named = [f"device {device.index}: {device.name} ({device.platform}, {device.driver})" for device in devices]
@@ -69,10 +75,16 @@ def converge_command(scenes: tuple[Path, ...], names: tuple[str, ...], integrato
     if integrators:
         loaded = [replace(scene, name=f"{scene.name}, {name}", render=replace(scene.render, integrator=name))
                   for scene in loaded for name in integrators]
+    given = None
+    if reference is not None:
+        if len(loaded) > 1 or asked["reference_spp"]:
+            raise UsageError(f"{reference}: is the reference of one image; name one SCENE, at most one --integrator, "
+                             "and leave out --reference-spp")
+        given = Reference.exact(read_reference(reference, loaded[0].render.size))
     chosen = [name if name == "clrt" else f"clrt, {name}" for name in names] or list(CHOICES)
     results = []
     for result in measure_convergence(
-            loaded, [device.index for device in devices], _effort(**asked), peers=peers,
+            loaded, [device.index for device in devices], _effort(**asked), peers=peers, given=given,
             choices={name: (CHOICES | MORE_CHOICES)[name] for name in chosen}, say=partial(click.echo, err=True)):
         click.echo("\n".join(scene_lines(result, all(device.type == "cpu" for device in devices))) + "\n")
         results.append(result)

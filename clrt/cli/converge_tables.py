@@ -17,8 +17,8 @@ def scene_lines(result: Mapping[str, Any], on_cpu: bool) -> list[str]:
     from ..bench.convergence.converge import AGREES
 
     (width, height), reference, rows = result["size"], result["reference"], result["contestants"]
-    lines = [f"{result['scene']}: {width}x{height}, max_depth {result['max_depth']}; reference of {reference['spp']} "
-             f"samples per pixel, relMSE {reference['relmse']:.1e}",
+    told = f"of {reference['spp']} samples per pixel, relMSE {reference['relmse']:.1e}" if reference["spp"] else "given"
+    lines = [f"{result['scene']}: {width}x{height}, max_depth {result['max_depth']}; reference {told}",
              f"  {'':28}{'spp':>7}{'seconds':>9}{'Msamples/s':>12}{'relMSE':>10}{'relMSE·s':>10}{'ratio':>7}"
              + " (  CPU)" * on_cpu + f"{'slope':>7}  {'mean ratio':20}      z"]
     lines += [_line(name, row, on_cpu) for name, row in rows.items()]

@@ -7,12 +7,13 @@ from pathlib import Path
 import click
 
 from ..errors import UsageError
+from .options import CAMERA
 
 
 @click.command()
 @click.argument("model", type=click.Path(path_type=Path))
 @click.argument("scene", type=click.Path(path_type=Path), metavar="SCENE.toml")
-@click.option("--camera", metavar="NAME", help="Camera of the model file to use; see `clrt info`.")
+@click.option("--camera", metavar="NAME", help=CAMERA)
 @click.option("--force", is_flag=True, help="Replace existing files, including read-only ones.")
 def command(model: Path, scene: Path, camera: str | None, force: bool) -> None:
     """Write SCENE.toml, which renders like `clrt render MODEL`, with its camera, sky, lights and materials to edit."""

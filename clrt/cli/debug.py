@@ -21,7 +21,8 @@ SETTINGS = ("size", "spp", "seed", "integrator", "sampler", "back_face_culling",
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
-@click.option("--pixel", required=True, type=Pixel(), help="Column and row of the pixel; 0,0 is the upper left corner.")
+@click.option("--pixel", type=Pixel(),
+              help="Column and row of the pixel; 0,0 is the upper left corner. Default: the center.")
 @click.option("--samples", type=click.IntRange(min=0), default=4, show_default=True, metavar="N",
               help="Number of the pixel's samples to list, starting with the first.")
 @click.option("--spp", type=click.IntRange(min=1),
@@ -31,8 +32,8 @@ SETTINGS = ("size", "spp", "seed", "integrator", "sampler", "back_face_culling",
 @click.option("--json", "as_json", is_flag=True, help="Print a JSON object.")
 @picture_options
 @tracing_options
-def command(scene: Path, pixel: tuple[int, int], samples: int, device: str | None, as_json: bool, camera: str | None,
-            depth: int | None, pixel_filter: str | None, lanes: int | None, **given: Any) -> None:
+def command(scene: Path, pixel: tuple[int, int] | None, samples: int, device: str | None, as_json: bool,
+            camera: str | None, depth: int | None, pixel_filter: str | None, lanes: int | None, **given: Any) -> None:
     """Show the light paths of one pixel of SCENE, and why it is black or where its light comes from. With the options
     of a render, the samples are exactly those of that render."""
     if click.get_current_context().obj == PROGRAM:
@@ -49,6 +50,7 @@ def command(scene: Path, pixel: tuple[int, int], samples: int, device: str | Non
     content = load(scene, camera)
     chosen = {"max_depth": depth, "filter": pixel_filter, **{name: given.pop(name) for name in SETTINGS}}
     content.render = settings = replace(content.render, **{k: v for k, v in chosen.items() if v is not None})
+    pixel = pixel or (settings.size[0] // 2, settings.size[1] // 2)
     paths = trace_pixel(content, open_device(device), pixel, _choices(**given), lanes)
     names = Names(content, paths.compiled)
     found = summary(paths, names)

@@ -87,12 +87,16 @@ def _exit_code(status: int, advice: Callable[[], str]) -> int:
         return os.WEXITSTATUS(status)
     name = signal.Signals(os.WTERMSIG(status)).name
     if name in CRASHES:
+        from ..device.discovery.driver_caches import no_room
         from ..device.pocl.kernel_cache import kept_programs, remove_damaged
 
         damaged = remove_damaged()
-        cause = (f"because {damaged} of the programs that PoCL caches in {kept_programs()} were damaged: they have "
-                 "been removed, run it again" if damaged else
-                 "most likely in the device's driver: run `clrt devices --check`")
+        cause = "most likely in the device's driver: run `clrt devices --check`"
+        if damaged:
+            cause = (f"because {damaged} of the programs that PoCL caches in {kept_programs()} were damaged: they have "
+                     "been removed, run it again")
+        if full := no_room():
+            cause = f"because {full}"
         _say(f"the render crashed ({name}), {cause}", advice)
         return DEVICE
     known = "; systems send SIGKILL to processes that use too much memory" if name == "SIGKILL" else ""

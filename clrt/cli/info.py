@@ -41,6 +41,7 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
     from ..rendering.compile.choices import choices_on
     from ..rendering.compile.compile_scene import compile_scene
     from ..rendering.renderer_options import choices_of
+    from .scene_lists import light_texts, lights_in, material_texts, materials_in
 
     names = chosen_aovs(",".join(aovs)) if aovs else ()
     content = load(scene)
@@ -73,8 +74,9 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
     if seen := seen_first(names):
         program = first_hit_program(compiled, seen)[0]
         report["first_hit"] = {"aovs": " ".join(seen), "kernel_bytes": len(program.encode())}
+    shown, emitting = materials_in(content), lights_in(content)
     if as_json:
-        click.echo(json_text(report))
+        click.echo(json_text({**report, "material_list": shown, "light_list": emitting}))
         return
     for name, value in report.items():
         if isinstance(value, dict):
@@ -82,6 +84,9 @@ def command(scene: Path | None, list_materials: bool, as_json: bool, aovs: tuple
         elif isinstance(value, list):
             value = " ".join(value) or "none"
         click.echo(f"{name:13} {_short(value)}")
+    for name, lines in (("material", material_texts(shown)), ("light", light_texts(emitting))):
+        for line in lines:
+            click.echo(f"{name:13} {line}")
 
 
 def _device(selector: str | None) -> Device | None:

@@ -65,6 +65,8 @@ class Finite(click.FloatRange):
         return number
 
 
+#: Help of --camera.
+CAMERA = "Camera of the scene or model file to use; see `clrt info`. For a bare model also: front, right, back, left."
 triangle_option = click.option(
     "--triangle", type=click.Choice(["watertight", "moller_trumbore", "precomputed", "baldwin_weber"]),
     default="watertight", show_default=True, help="Triangle intersection test.")
@@ -75,7 +77,7 @@ box_option = click.option("--box", type=click.Choice(["robust", "plain"]), defau
 def picture_options(command: F) -> F:
     """Add the options that, together with the scene's own settings, determine every sample of an image."""
     for option in reversed([
-        click.option("--camera", metavar="NAME", help="Camera of the model file to use; see `clrt info`."),
+        click.option("--camera", metavar="NAME", help=CAMERA),
         click.option("--size", type=Size(), help="Image size in pixels."),
         click.option("--depth", type=click.IntRange(1, 1024),
                      help="Maximum path depth: 1 emission only, 2 direct light, 3 one bounce."),

@@ -146,7 +146,7 @@ def command(scene: Path, outputs: tuple[Path, ...], camera: str | None, size: tu
         else:
             content = sequence.scene(content, size, turntable, fps)
             sequence.check_apart(inputs)
-        expected = None if reference is None else _read_reference(reference, size or content.render.size)
+        expected = None if reference is None else read_reference(reference, size or content.render.size)
         planned = planned_spp(content.render, spp, seconds, error)
         if denoiser is not None:
             check_denoisable(integrator or content.render.integrator)
@@ -256,7 +256,9 @@ def _write(renderer: Renderer, state: State, results: Outputs, denoiser: Denoise
     results.save_measures(renderer, image)
 
 
-def _read_reference(path: Path, size: tuple[int, int]) -> Any:
+def read_reference(path: Path, size: tuple[int, int]) -> Any:
+    """Return the reference in an image file, (height, width, 3). Raises UsageError if it cannot be compared with an
+    image of `size` (width, height)."""
     from ..output.images import read_image
     from ..rendering.film.state import check_reference
 

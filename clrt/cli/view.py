@@ -14,12 +14,12 @@ from . import PROGRAM
 from .guard import guarded
 from .interrupt import Interruptible
 from .logs import verbose_option
-from .options import Size
+from .options import CAMERA, Size
 
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
-@click.option("--camera", metavar="NAME", help="Camera of the model file to use; see `clrt info`.")
+@click.option("--camera", metavar="NAME", help=CAMERA)
 @click.option("--size", type=Size(), help="Image size in pixels.")
 @click.option("--spp", type=click.IntRange(min=1), help="Stop refining at this many samples per pixel.")
 @click.option("--depth", "max_depth", type=click.IntRange(1, 1024),

@@ -33,12 +33,13 @@ _starting, _table = Lock(), Lock()
 
 
 def identity() -> dict[str, str]:
-    """Return what must be equal on the client and all workers: the version, and the kernels' digest."""
+    """Return what must be equal on the client and all workers: the version, and digests of kernels and code."""
     from importlib.metadata import version
 
     from ..device.programs.kernel_files import kernel_digest
+    from ..rendering.checkpoint.identity import code_digest
 
-    return {"version": version("clrt"), "kernels": kernel_digest()[:16]}
+    return {"version": version("clrt"), "kernels": kernel_digest()[:16], "code": code_digest()[:16]}
 
 
 class Answer(NamedTuple):
@@ -151,7 +152,8 @@ def _check_identity(client: dict[str, str]) -> None:
     """Raise DeviceError if clrt differs from the client's: images could differ, or records be incompatible."""
     own = identity()
     if own != client:
-        told = [f"clrt {each['version']} with the kernels {each['kernels']}" for each in (own, client)]
+        told = [f"clrt {each['version']} with the kernels {each['kernels']} and the code {each.get('code')}"
+                for each in (own, client)]
         raise DeviceError(f"it runs {told[0]}, this client {told[1]}; install the same version on both")
 
 

@@ -9,8 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scene.geometry.instancing import meshes_by_id
+from ..scene.geometry.transform import Matrix
 from ..scene.model import Camera, Instance, Mesh
 
+#: Views of a model by name: angle about +Y in degrees from the front. glTF defines +Z as the front, and viewers assume
+#: it for OBJ and PLY, but some models face the other way.
+VIEWS = {"front": 0.0, "right": 90.0, "back": 180.0, "left": 270.0}
 #: Direction from the model to the camera: in front (+Z), 28° to the right and 17° above.
 THREE_QUARTER = (0.53, 0.34, 1.0)
 FOV_DEGREES = 30.0
@@ -22,13 +26,14 @@ ROUNDS = 20
 Doubles = NDArray[np.float64]
 
 
-def frame(meshes: list[Mesh], instances: Sequence[Instance] = ()) -> Camera:
+def frame(meshes: list[Mesh], instances: Sequence[Instance] = (), turn: Matrix = np.eye(4)) -> Camera:
     """Return the nearest three-quarter view that has every vertex inside a square image, with the model centered.
 
     Only vertices that faces use count; instances count by the corners of their mesh's bounding box. The model fills
     FILL of the image's width or height, and its left and right margins are equal, as are the top and bottom ones.
+    turn: rotation of the camera about +Y.
     """
-    back = np.array(THREE_QUARTER) / np.linalg.norm(THREE_QUARTER)
+    back = turn[:3, :3] @ THREE_QUARTER / np.linalg.norm(THREE_QUARTER)
     right = np.cross([0.0, 1.0, 0.0], back) / np.linalg.norm(np.cross([0.0, 1.0, 0.0], back))
     axes = np.array([right, np.cross(back, right), back])
     vertices = _extremes(meshes, instances)

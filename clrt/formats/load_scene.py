@@ -7,13 +7,16 @@ import sys
 import tomllib
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from ..errors import SceneError
+from ..file_names import StrPath
 from ..scene.default_sky import SUN, default_sky
+from ..scene.geometry.transform import rotation, transform_light, transform_mesh
 from ..scene.model import Scene
 from ..scene.provenance import source_of_model
 from ..scene.validation.validate import scene_problems
-from .frame_model import frame
+from .frame_model import VIEWS, frame
 from .models import SUFFIXES, read_model
 from .referenced_files import check_file, name_of
 from .toml.reader import SceneReader, camera_problems
@@ -22,24 +25,28 @@ from .toml.reader import SceneReader, camera_problems
 log = logging.getLogger(__name__)
 #: Stands for a TOML scene on standard input; its file names are relative to the working directory.
 STDIN = Path("-")
+#: Formats of CAD and 3D printing, where +Z is up and −Y the front, and how bare models of these are rotated.
+Z_UP, UPRIGHT = (".stl",), (-90.0, 0.0, 0.0)
 
 
-def load(path: str | Path, camera: str | None = None) -> Scene:
+def load(path: StrPath, camera: str | None = None) -> Scene:
     """Load a scene from a .toml file, a Mitsuba .xml file, a model file (whose meshes get a sky, a sun and a camera),
     or from standard input for "-".
 
-    A glTF model's first camera and its lights are used if it has any. camera: name of a camera in a model file to use
-    instead. Raises one SceneError with all problems of the file, each as "FILE: object: value is wrong; remedy".
+    A glTF model's first camera and its lights are used if it has any. camera: name of another camera to use, of a scene
+    or a model file, or for a model one of VIEWS. Raises one SceneError with all problems of the file, each as "FILE:
+    object: value is wrong; remedy".
     """
     if not isinstance(path, (str, PathLike)):
         raise SceneError(f"{path!r} is not the path of a scene; give a file name, such as \"scene.toml\"")
     path = Path(path)
     check_scene(path)
-    reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower(), _load_model)
-    scene, problems = reader(path)
-    if camera is not None:
+    reader = _load_toml if path == STDIN else _READERS.get(path.suffix.lower())
+    scene, problems = reader(path) if reader else (_load_model(path, camera), [])
+    views = [] if reader else [name for name in VIEWS if name not in scene.cameras]
+    if camera is not None and camera not in views:
         scene.camera = scene.cameras.get(camera, scene.camera)
-        problems += camera_problems(camera, scene.cameras, "--camera")
+        problems += camera_problems(camera, [*scene.cameras, *views], "--camera")
     problems += scene_problems(scene)
     if problems:
         raise SceneError([f"{path}: {problem}" for problem in problems])
@@ -56,13 +63,24 @@ def check_scene(path: Path) -> None:
         raise SceneError(f"{path}: a scene must be one of {', '.join((*_READERS, *SUFFIXES))}; convert it")
 
 
-def _load_model(path: Path) -> tuple[Scene, list[str]]:
-    """Load a bare model with the default sky, its own lights or the sun, and its first camera or one that frames it."""
+def _load_model(path: Path, view: str | None) -> Scene:
+    """Load a bare model with the default sky, its own lights or the sun, and its first camera or one that frames it.
+
+    view: one of VIEWS replaces the model's cameras, except one of that name.
+    """
     model = read_model(path)
-    camera = next(iter(model.cameras.values()), None) or frame(model.meshes, model.instances)
-    return Scene(meshes=model.meshes, instances=model.instances, camera=camera, cameras=model.cameras,
-                 environment=default_sky(), lights=model.lights or [SUN], name=name_of(path),
-                 source=source_of_model(path, model)), []
+    placing: dict[str, Any] = {}
+    if path.suffix.lower() in Z_UP:
+        placing = {"rotate_degrees": UPRIGHT}
+        model.meshes = [transform_mesh(mesh, rotation(UPRIGHT)) for mesh in model.meshes]
+    angle = None if view is None or view in model.cameras else VIEWS.get(view)
+    turn = rotation((0.0, angle or 0.0, 0.0))
+    camera = next(iter(model.cameras.values()), None) if angle is None else None
+    sun = transform_light(SUN, turn) if angle else SUN
+    return Scene(meshes=model.meshes, instances=model.instances,
+                 camera=camera or frame(model.meshes, model.instances, turn), cameras=model.cameras,
+                 environment=default_sky(), lights=model.lights or [sun], name=name_of(path),
+                 source=source_of_model(path, model, placing))
 
 
 def _load_toml(path: Path) -> tuple[Scene, list[str]]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError
+from ..file_names import StrPath
 from ..scene.geometry.instancing import baked
 from ..scene.geometry.normals import Normals, choose_normals
 from ..scene.materials.material_types import Diffuse
@@ -28,18 +29,19 @@ log = logging.getLogger(__name__)
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 
 
-def read_mesh(path: Path, normals: Normals = "file") -> list[Mesh]:
+def read_mesh(path: StrPath, normals: Normals = "file") -> list[Mesh]:
     """Return the meshes of a model file, as `read_model` reads them, with its instances as further ones."""
     model = read_model(path, normals)
     return model.meshes + [baked(each) for each in model.instances]
 
 
-def read_model(path: Path, normals: Normals = "file") -> Model:
+def read_model(path: StrPath, normals: Normals = "file") -> Model:
     """Read a model file: meshes, one per material, each with at least one triangle and valid arrays, and cameras.
 
     Polygons become triangle fans. `normals`: see `choose_normals`. Raises SceneError naming the file, the mesh, and the
     index or vertex that is wrong.
     """
+    path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise SceneError(f"{path}: a model must be one of {', '.join(SUFFIXES)}; convert it")

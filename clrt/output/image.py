@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..file_names import StrPath
 from ..float_errors import with_default_errors
 from .data_images import shown_data
 from .images import write_image
@@ -28,7 +29,7 @@ class Image:
     aovs: dict[str, NDArray[np.generic]] = field(default_factory=dict)
 
     @with_default_errors
-    def save(self, path: str | Path, *, view: str = "srgb", exposure: float = 0.0) -> Path:
+    def save(self, path: StrPath, *, view: str = "srgb", exposure: float = 0.0) -> Path:
         """Write .exr, .hdr (linear) or .png (through `view` after 2^exposure; normals and depths by `shown_data`).
 
         The AOVs become layers of an .exr, and separate .png files for a .png. Raises OutputError if that fails.

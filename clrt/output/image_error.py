@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import SceneError, UsageError
+from ..file_names import StrPath
 from ..float_errors import with_default_errors
 from ..formats.images.image_reader import read_picture
 from .image import Image
 
 FloatArray = NDArray[np.float32]
-Picture = FloatArray | Image | str | PathLike[str]
+Picture = FloatArray | Image | StrPath
 #: Keeps relMSE finite where the reference is dark.
 RELMSE_FLOOR = 0.01
 #: Limit for HDR-FLIP, the largest float16: the brighter the reference, the more exposures it evaluates.

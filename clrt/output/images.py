@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import OutputError
-from ..file_names import utf8_path
+from ..file_names import StrPath, utf8_path
 from ..formats.images.image_reader import read_picture
 from .aov_files import Pictures, drawn, files_beside, layered
 from .atomic_files import check_target, replacing
@@ -57,7 +57,7 @@ def check_writable(path: Path) -> None:
         raise OutputError(f"{path}: {problem}; use {', '.join(EXTENSIONS[:-1])} or {EXTENSIONS[-1]}{meant}")
 
 
-def write_image(path: Path, pixels: FloatArray, *, metadata: Mapping[str, str] | None = None,
+def write_image(path: StrPath, pixels: FloatArray, *, metadata: Mapping[str, str] | None = None,
                 exposure: float = 0.0, view: str = "srgb", aovs: Pictures | None = None) -> None:
     """Write (h, w, 3) float32 linear pixels in the format of the extension, atomically (see `replacing`).
 
@@ -67,6 +67,7 @@ def write_image(path: Path, pixels: FloatArray, *, metadata: Mapping[str, str] |
     negative values as 0. `metadata` is stored in .exr and .png; names with a colon, such as "clrt:spp", do not collide
     with the formats' own. Raises OutputError, and UsageError for an unknown view or an exposure that is not finite.
     """
+    path = Path(path)
     check_writable(path)
     check_view(view, exposure)
     about, aovs = metadata or {}, aovs or {}

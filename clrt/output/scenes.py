@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import OutputError
+from ..file_names import StrPath
 from ..formats.toml.writer import scene_files
 from ..scene.model import Scene
 from .atomic_files import check_target, check_unprotected, replacing
 from .images import write_image, write_texels
 
 
-def save_scene(scene: Scene, path: str | Path, *, force: bool = True) -> list[Path]:
+def save_scene(scene: Scene, path: StrPath, *, force: bool = True) -> list[Path]:
     """Write the files that the scene needs (scene.writing), then the scene file `path`; return all these paths.
 
     Raises OutputError if one cannot be written, or is read-only, unless `force`.

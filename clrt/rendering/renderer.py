@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from ..awake import AwakeClock, watched_clock
 from ..device.open import Selectors, name_of, open_devices
 from ..errors import DeviceError
+from ..file_names import StrPath
 from ..float_errors import with_default_errors
 from ..scene.model import Camera, RenderSettings, Scene
 from ..scene.validation.validate import check_is_scene, validate
@@ -67,7 +67,7 @@ class Renderer:
                  layout: str | None = None, lanes: int | None = None, paths: str | None = None,
                  tree: bool | None = None, error_percentile: float | None = None,
                  on_phase: Callable[[str], None] = lambda phase: None, aovs: str | Iterable[str] = (),
-                 checkpoint: str | Path | None = None, resume: bool = False, checkpoint_seconds: float = 30.0,
+                 checkpoint: StrPath | None = None, resume: bool = False, checkpoint_seconds: float = 30.0,
                  before: Renderer | None = None, first_hits: bool = False) -> None:
         check_is_scene(scene)
         check_stops(spp)

@@ -5,7 +5,9 @@ Parts are compared by identity: an array that was changed, or made in Python, ha
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from .materials.material import Material
 from .model import Instance, Mesh, Model, Origin, Source
@@ -14,10 +16,11 @@ from .model import Instance, Mesh, Model, Origin, Source
 ARRAYS = ("vertices", "faces", "normals", "uv", "uv1", "colors", "tangents")
 
 
-def source_of_model(path: Path, model: Model) -> Source:
-    """Return the source of a bare model."""
+def source_of_model(path: Path, model: Model, placing: Mapping[str, Any]) -> Source:
+    """Return the source of a bare model, to which the transform keys `placing` of a [[mesh]] were applied."""
     parts = parts_of(model)
-    return Source([Origin({"file": path.resolve()}, parts, list(map(material_of, parts)))], cameras=model.cameras)
+    origin = Origin({"file": path.resolve(), **placing}, parts, list(map(material_of, parts)))
+    return Source([origin], cameras=model.cameras)
 
 
 def parts_of(model: Model) -> list[Mesh | Instance]:

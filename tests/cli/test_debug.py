@@ -49,6 +49,12 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(debug.command, [str(each) for each in arguments])
 
 
+def test_the_default_is_the_pixel_in_the_center(scene: Path) -> None:
+    default, named = (json.loads(run(scene, *pixel, "--size", "9x6", "--json").output)
+                      for pixel in ([], ["--pixel", "4,3"]))
+    assert default == named and default["pixel"] == [4, 3]
+
+
 def test_it_is_the_pixel_of_the_render(scene: Path) -> None:
     """The values equal those of `clrt render` with the same options."""
     options = ("--size", "12x10", "--seed", "7", "--depth", "3", "--spp", "16", "--filter", "tent",

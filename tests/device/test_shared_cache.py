@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clrt.device.discovery import driver_caches
 from clrt.device.discovery.driver_caches import ROOM
 from clrt.device.programs import background_compile, cache_files as cache
 from clrt.errors import KernelError
@@ -64,6 +65,38 @@ def test_whatever_the_home_is(tmp_path: Path, home: str) -> None:
                             capture_output=True, text=True, timeout=100, preexec_fn=no_rights)
     assert (result.returncode, result.stdout) == (0, "picture.png\n"), result.stderr
     assert not (tmp_path / "~").exists() and not list(closed.iterdir())
+
+
+@pytest.mark.parametrize("most", [0, 20_000, 100_000])
+def test_where_no_file_can_be_written_the_cause_is_named(tmp_path: Path, most: int) -> None:
+    """By every limit, whatever the driver does: it does not load, cannot build, or aborts."""
+    (tmp_path / "scene.toml").write_text(SCENE)
+    done = subprocess.run([*RENDER, "-"], cwd=tmp_path, env=surroundings(HOME=str(tmp_path), TMPDIR=str(tmp_path)),
+                          capture_output=True, timeout=300,
+                          preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)))
+    told = done.stderr.decode()
+    assert done.returncode in (4, 5) and f"no file of {ROOM >> 10} kB can be written in" in told, told
+    assert "Traceback" not in told
+
+
+def test_memory_is_taken_where_the_temporary_folder_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also by users to whom neither folder belongs, as is usual."""
+    memory = tmp_path / "memory"
+    memory.mkdir()
+    monkeypatch.setattr(driver_caches, "MEMORY", str(memory))
+    monkeypatch.setattr(driver_caches, "_has_room", lambda folder: folder.startswith(str(memory)))
+    monkeypatch.setattr(os, "getuid", lambda: os.stat(memory).st_uid + 1, raising=False)
+    for name in ("XDG_CACHE_HOME", "POCL_CACHE_DIR"):
+        monkeypatch.setenv(name, str(tmp_path))
+    driver_caches.provide_cache_folders()
+    assert os.environ["XDG_CACHE_HOME"].startswith(str(memory)) and not driver_caches.no_room()
+
+
+def test_the_cause_is_not_named_where_there_is_room(tmp_path: Path) -> None:
+    code = "from clrt.device.discovery.driver_caches import no_room; print(repr(no_room()))"
+    done = subprocess.run([sys.executable, "-c", code], env=surroundings(TMPDIR=str(tmp_path), HOME="/nonexistent"),
+                          capture_output=True, text=True, check=True)
+    assert done.stdout == "''\n"
 
 
 @pytest.mark.parametrize("missing", [0, 1])

@@ -193,9 +193,21 @@ def test_other_scenes_and_kernels_are_refused(device: Device, kept: Path, monkey
             renderer(device, changed, checkpoint=kept, resume=True)
     renamed = replace(scene, name="x", meshes=[replace(mesh, name="y"), *others])
     renderer(device, renamed, checkpoint=kept, resume=True, spp=100)
-    monkeypatch.setattr("clrt.rendering.checkpoint.identity.kernel_digest", lambda: "0" * 64)
-    with pytest.raises(CheckpointError, match="different kernels"):
-        renderer(device, checkpoint=kept, resume=True)
+    for digest, named in [("kernel_digest", "different kernels"), ("code_digest", "different code")]:
+        with monkeypatch.context() as patch, pytest.raises(CheckpointError, match=rf"another render \({named}\)"):
+            patch.setattr(f"clrt.rendering.checkpoint.identity.{digest}", lambda: "0" * 64)
+            renderer(device, checkpoint=kept, resume=True)
+
+
+def test_a_checkpoint_of_an_older_release_is_refused(device: Device, kept: Path) -> None:
+    """Also one from before the code counted: it lacks that fact."""
+    header, arrays = read_checkpoint(kept, KINDS)
+    facts = {name: value for name, value in header["facts"].items() if name != "code"}
+    release = {**header["facts"], "version": "0.0.1"}
+    for changed, named in [(facts, "different code"), (release, "version 0.0.1 instead of")]:
+        _rewrite(kept, {**header, "facts": changed}, arrays)
+        with pytest.raises(CheckpointError, match=named):
+            renderer(device, checkpoint=kept, resume=True)
 
 
 def test_device_is_told_where_it_is_another(device: Device, kept: Path, caplog: pytest.LogCaptureFixture) -> None:

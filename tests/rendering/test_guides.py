@@ -148,6 +148,17 @@ def test_glass_is_looked_through(device: Device) -> None:
     everywhere(found["normal"], (-1, 0, 0))
 
 
+def test_glass_absorbs(device: Device) -> None:
+    """What is seen through a pane 1 unit thick is tinted by its transmittance, also the sky."""
+    glass = Dielectric(color=(0.9, 0.8, 0.5), attenuation_color=(0.49, 0.25, 0.04), attenuation_distance=2.0)
+    pane = Scene(meshes=[front(glass, -0.5), back(glass, 0.5), back(Diffuse(color=RED))], render=FLAT,
+                 environment=Environment(color=(0.5, 0.5, 0.5)), camera=replace(INSIDE, fov_degrees=1e-3))
+    tint = 0.9**2 * 0.7, 0.8**2 * 0.5, 0.5**2 * 0.2
+    everywhere(guides(device, pane)["albedo"], (0.7 * tint[0], 0.2 * tint[1], 0.1 * tint[2]))
+    sky = guides(device, replace(pane, meshes=pane.meshes[:2]))
+    everywhere(sky["albedo"], (0.5 * tint[0], 0.5 * tint[1], 0.5 * tint[2]))
+
+
 def test_edges_are_shares_of_the_pixel(device: Device) -> None:
     """A wall that covers half of the middle column: half its albedo, half its normal."""
     half = quad([(-2, -2, -1), (0, -2, -1), (0, 2, -1), (-2, 2, -1)], Diffuse(color=RED))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import inspect
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass, replace
 from pathlib import Path
@@ -21,7 +23,8 @@ from clrt.device.open import Device
 from clrt.farm.banded_picture import Banded
 from clrt.farm.orders import PictureOrder
 from clrt.live.settings import Settings
-from clrt.rendering.checkpoint.identity import ENDS, NAMES, ROUNDING, UNSEEN, differences, facts_of, scene_hash
+from clrt.rendering.checkpoint.identity import (CODE, ENDS, NAMES, ROUNDING, UNSEEN, code_digest, differences, facts_of,
+                                                scene_hash)
 from clrt.rendering.compile.choices import Choices
 from clrt.rendering.render_report import render_report
 from clrt.rendering.renderer_options import choices_of, settings_of
@@ -91,6 +94,38 @@ def test_what_is_added_counts_by_itself() -> None:
         one, other = (facts_of(*made(more(kind, value))) for value in (1, 2))
         assert differences(one, other) and differences(other, one), kind
     assert differences({**facts_of(scene(), Choices()), "novel": "1"}, facts_of(scene(), Choices()))
+
+
+def test_any_edit_of_the_code_that_samples_depend_on_counts(tmp_path: Path) -> None:
+    """A changed, added, renamed or removed Python file, and nothing else."""
+    for folder in CODE:
+        (tmp_path / folder / "inner").mkdir(parents=True)
+        (tmp_path / folder / "inner" / "a.py").write_text("x = 1\n")
+    code_of = code_digest.__wrapped__
+    found = [code_of(tmp_path)]
+    for folder in CODE:
+        file = tmp_path / folder / "inner" / "a.py"
+        for change in (lambda: file.write_text("x = 2\n"), lambda: file.rename(file.with_name("b.py")),
+                       lambda: file.with_name("c.py").write_text(""), lambda: file.with_name("b.py").unlink()):
+            change()
+            found.append(code_of(tmp_path))
+    assert len(set(found)) == len(found) == 1 + 4 * len(CODE)
+    (tmp_path / "other.py").write_text("y = 1\n")
+    assert code_of(tmp_path) == found[-1]
+
+
+def test_no_other_package_takes_part_in_samples() -> None:
+    """The packages that a renderer imports are known: those in CODE, and those that do not determine samples."""
+    program = "import sys, clrt.rendering.renderer; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    counted = tuple(f"clrt.{folder.replace('/', '.')}." for folder in CODE)
+    others = {name.split(".")[1] for name in done.stdout.split()
+              if name.startswith("clrt.") and not f"{name}.".startswith(counted)}
+    assert others == {
+        "accel",    # affects rounding only
+        "device", "awake", "threads",    # compile and launch, in any order
+        "formats",    # file names of scenes
+        "errors", "file_names", "file_mode", "float_errors"}
 
 
 def things(value: Any) -> Iterator[Any]:

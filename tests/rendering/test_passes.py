@@ -93,7 +93,7 @@ def test_impossible_conditions_are_refused(renderer: Renderer, stops: dict[str, 
 
 @pytest.mark.parametrize("reference, said", [
     (np.zeros((4, 4, 3)), "of shape \\(4, 4, 3\\); give a numpy array of the image's shape, \\(30, 40, 3\\)"),
-    ("full.exr", "read it with clrt.output.images.read_image"), (np.full((30, 40, 3), "1"), "give real numbers"),
+    ("full.exr", "read it with clrt.read_image"), (np.full((30, 40, 3), "1"), "give real numbers"),
     (np.where(np.arange(3600).reshape(30, 40, 3) < 5, [np.nan, np.inf, 1], 1), "NaN or infinite \\(2 of 1200\\)")])
 def test_what_is_no_reference_is_refused(renderer: Renderer, reference: Any, said: str) -> None:
     with pytest.raises(UsageError, match=said):

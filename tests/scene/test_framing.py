@@ -2,12 +2,18 @@ from __future__ import annotations
 
 import itertools
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from clrt.errors import SceneError
 from clrt.formats.frame_model import FILL, bounds, frame
+from clrt.formats.load_scene import load
+from clrt.output.scenes import save_scene
 from clrt.scene.default_sky import SUN, default_sky
+from clrt.scene.geometry.transform import Matrix, rotation, unit
+from clrt.scene.lights import DirectionalLight
 from clrt.scene.model import Mesh
 
 BOXES = {"cube": ((-1, -1, -1), (1, 1, 1)), "tower": ((0, 0, 0), (1, 30, 1)), "plate": ((-5, 0, -5), (5, 0, 5)),
@@ -61,3 +67,49 @@ def test_sky() -> None:
     assert luminance.argmax() in (15, 16)
     assert image[0, 0].argmax() == 2 and image[-1, 0].argmax() == 0
     assert SUN.direction[1] < 0 and SUN.direction[2] < 0
+
+
+def wedge(path: Path, turn: Matrix) -> Path:
+    """Write a shape without symmetries, transformed by `turn`, as OBJ or STL."""
+    corners = [(0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0)]
+    points = np.array(corners) @ turn[:3, :3].T
+    faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    if path.suffix == ".obj":
+        lines = [*(f"v {x} {y} {z}" for x, y, z in points.tolist()),
+                 *(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces)]
+    else:
+        vertex = ["vertex {} {} {}".format(*point) for point in points.tolist()]
+        lines = ["solid wedge", *(f"facet normal 0 0 0\nouter loop\n{vertex[a]}\n{vertex[b]}\n{vertex[c]}\nendloop\n"
+                                  "endfacet" for a, b, c in faces), "endsolid"]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("view, degrees", [("front", 0), ("right", 90), ("back", 180), ("left", 270)])
+def test_a_named_view_shows_the_model_as_if_it_were_turned(view: str, degrees: float, tmp_path: Path) -> None:
+    """Camera and sun are turned together, so the view equals the default one of a model turned the other way."""
+    turn = rotation((0.0, degrees, 0.0))
+    seen = load(wedge(tmp_path / "a.obj", np.eye(4)), view)
+    turned = load(wedge(tmp_path / "b.obj", turn.T))
+    for own, other in [(seen.camera.position, turned.camera.position), (seen.camera.look_at, turned.camera.look_at)]:
+        np.testing.assert_allclose(own, turn[:3, :3] @ other, atol=1e-6)
+    sun, = seen.lights
+    assert isinstance(sun, DirectionalLight) and sun.irradiance == SUN.irradiance
+    np.testing.assert_allclose(unit(np.array(sun.direction)), turn[:3, :3] @ unit(np.array(SUN.direction)), atol=1e-12)
+
+
+def test_an_unknown_view_is_answered_by_the_names(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match='a.obj: --camera: "top" is unknown; write one of back, front, left, right'):
+        load(wedge(tmp_path / "a.obj", np.eye(4)), "top")
+
+
+def test_stl_stands_upright(tmp_path: Path) -> None:
+    """CAD's +Z is up and −Y in front; in a scene file meshes keep their coordinates, and a converted one turns them."""
+    stl = wedge(tmp_path / "a.stl", np.eye(4))
+    corners = load(stl).meshes[0].vertices.tolist()
+    assert np.unique(np.round(corners, 6) + 0.0, axis=0).tolist() == [[0, 0, -2], [0, 0, 0], [0, 1, 0], [3, 0, 0]]
+    scene = tmp_path / "a.toml"
+    scene.write_text('[[mesh]]\nfile = "a.stl"\n')
+    assert load(scene).meshes[0].vertices[:, 2].max() == 1
+    save_scene(load(stl), scene)
+    assert load(scene).meshes[0].vertices.tolist() == corners and load(scene).camera == load(stl).camera

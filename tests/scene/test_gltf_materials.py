@@ -122,6 +122,37 @@ def test_layers_and_glass(tmp_path: Path) -> None:
         color=(1, 0.5, 1), ior=1.4, roughness=0.5, attenuation_color=(0.5, 1, 1), attenuation_distance=2)
 
 
+GLASS: dict[str, Any] = {"KHR_materials_transmission": {"transmissionFactor": 1},
+                         "KHR_materials_volume": {"thicknessFactor": 1}}
+LAYERS: dict[str, Any] = {"KHR_materials_clearcoat": {"clearcoatFactor": 1},
+                          "KHR_materials_sheen": {"sheenColorFactor": [0, 0.5, 0]},
+                          "KHR_materials_specular": {"specularFactor": 0.5}}
+PANE = {"baseColorFactor": [1, 1, 1, 0.5], "metallicFactor": 0}
+
+
+@pytest.mark.parametrize("materials, told", [
+    ([{"name": "jar", "alphaMode": "BLEND", "pbrMetallicRoughness": PANE, "extensions": GLASS | LAYERS}],
+     'left out: alphaMode and clearcoat and sheen and specular of material "jar"'),
+    ([{"alphaMode": "MASK", "pbrMetallicRoughness": PANE, "extensions": GLASS},
+      {"pbrMetallicRoughness": PANE,
+       "extensions": GLASS | {"KHR_materials_transmission": {"transmissionFactor": 0.5}}}],
+     'left out: alphaMode of material "material 0", volume of material "material 1"'),
+    ([{"pbrMetallicRoughness": PANE, "extensions": GLASS}], ""),
+    ([{"alphaMode": "BLEND", "pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": GLASS}], ""),
+    ([{"alphaMode": "BLEND", "pbrMetallicRoughness": PANE, "extensions": LAYERS}], ""),
+    ([{"extensions": {"KHR_materials_volume": {"thicknessFactor": 1}}}], "")])
+def test_features_that_are_not_rendered_are_named_once(materials: list[dict[str, Any]], told: str, tmp_path: Path,
+                                                       caplog: pytest.LogCaptureFixture) -> None:
+    """Per file in one warning, by material; not those without effect, nor those that are rendered."""
+    gltf = ball()
+    gltf.document["materials"] = materials
+    first, = gltf.document["meshes"][0]["primitives"]
+    gltf.document["meshes"][0]["primitives"] = [{**first, "material": number} for number in range(len(materials))] * 2
+    with caplog.at_level(logging.WARNING):
+        read(gltf, tmp_path)
+    assert [record.getMessage().split(": ", 1)[1] for record in caplog.records] == ([told] if told else [])
+
+
 def test_glass_has_bumps(tmp_path: Path) -> None:
     """As any other surface."""
     material = drawn((255, 255, 255), tmp_path, normalTexture={"index": 0, "scale": 0.25}, extensions={

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import clrt
 from clrt.bench.convergence.contestants import CHOICES, MORE_CHOICES, Picture, choices_on
 from clrt.bench.convergence.converge import Effort, Point, figures, measure_convergence, take_turns
 from clrt.bench.convergence.reference import FIRST_SEED, STEP_SPP, Reference, render_reference
@@ -245,6 +246,26 @@ def test_each_integrator_has_a_reference_of_its_own(tmp_path: Path) -> None:
     assert [scene["scene"] for scene in scenes] == ["ball, path", "ball, direct"]
     assert all(scene["contestants"]["clrt"]["mean_ratio"] == pytest.approx([1, 1, 1], abs=0.02) for scene in scenes)
     assert (tmp_path / "c.svg").read_text().count("<svg") == 1
+
+
+def test_a_given_reference_is_used(tmp_path: Path) -> None:
+    """Errors are those of the same seeds' images relative to the file; nothing else is rendered."""
+    (tmp_path / "ball.toml").write_text(SCENE)
+    truth = np.random.default_rng(5).uniform(0.2, 1, (16, 24, 3)).astype(np.float32)
+    clrt.Image(truth).save(tmp_path / "ref.exr")
+    asked = ["--choice", "clrt", "--spp", "4", "--seeds", "2", "--json", str(tmp_path / "c.json"), "--plot",
+             str(tmp_path / "c.svg"), "--reference", str(tmp_path / "ref.exr")]
+    done = CliRunner().invoke(converge_command, [str(tmp_path / "ball.toml"), *asked])
+    assert done.exit_code == 0, done.output
+    assert "reference given" in done.output and "step" not in done.output
+    row = json.loads((tmp_path / "c.json").read_text())["scenes"][0]["contestants"]["clrt"]
+    pictures = [clrt.render(tmp_path / "ball.toml", spp=4, seed=seed).pixels for seed in (0, 1)]
+    errors = [float(np.mean((picture - truth.astype(np.float64))**2 / (truth.astype(np.float64)**2 + 0.01)))
+              for picture in pictures]
+    assert row["relmse"] == [pytest.approx(np.mean(errors), rel=1e-5)]
+    for wrong, words in [(["--size", "8x8"], "is 24x16, the picture 8x8"), (["--reference-spp", "9"], "leave out")]:
+        failed = CliRunner().invoke(converge_command, [str(tmp_path / "ball.toml"), *asked, *wrong])
+        assert isinstance(failed.exception, clrt.UsageError) and words in str(failed.exception)
 
 
 def test_command_knows_all_choices() -> None:

@@ -15,12 +15,19 @@ from clrt.bench.renderers.mitsuba_renderer import newest_llvm
 from clrt.bench.renderers.mitsuba_scene import mitsuba_scene, rows_at_poles
 from clrt.errors import UsageError
 from clrt.scene.lights import DirectionalLight, PointLight, SpotLight
-from clrt.scene.materials.material_types import (MATERIALS, Conductor, Dielectric, Diffuse, Material,
-                                                 MetallicRoughness, Mirror)
+from clrt.scene.materials.material_types import (MATERIALS, BlinnPhong, Conductor, Dielectric, Diffuse, Material,
+                                                 MetallicRoughness, Mirror, Phong)
 from clrt.scene.materials.textures import Picture, Texture
 from clrt.scene.model import Camera, Environment, Mesh, RenderSettings, Scene, Sphere
 
 RNG = np.random.default_rng(5)
+GREY = Picture(np.full((1, 1, 4), 128, np.uint8), "grey")
+PICTURE = Picture(np.array([[[0, 51, 102, 255], [255, 153, 204, 0]]], np.uint8))
+#: The plugin of `MetallicRoughness()`.
+PLASTIC = {"type": "gltf", "color": {"type": "rgb", "value": [0.8] * 3}, "metallic": 0, "roughness": 0.5,
+           "f0": {"type": "rgb", "value": [pytest.approx(0.04)] * 3}, "specular": 1, "transmission": 0, "clearcoat": 0,
+           "sheen_color": {"type": "rgb", "value": [0, 0, 0]}, "smith": "height_correlated", "coupling": "albedo",
+           "multiple": False, "transmits": False, "layered": False}
 
 
 def ball(material: Material) -> Scene:
@@ -82,10 +89,9 @@ def test_materials_are_told_by_what_they_reflect() -> None:
 
 
 @pytest.mark.parametrize(("material", "words"), [
-    (MetallicRoughness(transmission=0.5), "with transmission"),
-    (MetallicRoughness(smith="schlick"), 'smith = "separable"'),
-    (MetallicRoughness(clearcoat=0.5, coupling="fresnel"), 'coupling = "albedo"'),
-    (Dielectric(roughness=0.2), "multiple_scattering = false"), (Diffuse(one_sided=True), "one-sided")])
+    (MetallicRoughness(clearcoat=0.5, roughness=Texture(picture=GREY)), "the texture grey"),
+    (MetallicRoughness(clearcoat=0.5, normal_map=Texture(picture=GREY)), "a clearcoat with a normal map"),
+    (Dielectric(roughness=Texture(picture=GREY)), "the texture grey"), (Diffuse(one_sided=True), "one-sided")])
 def test_what_has_no_counterpart_is_refused_by_name(material: Material, words: str) -> None:
     with pytest.raises(UsageError, match=f"the ball: Mitsuba does not support .*{words}"):
         mitsuba_scene(ball(material))
@@ -103,9 +109,16 @@ def test_settings_without_a_counterpart_are_refused(scene: Scene, words: str) ->
 def test_other_gloss_is_a_plugin_of_our_own() -> None:
     """The plugin gets all parameters of the formula in docs/scene-format.md."""
     plastic = bsdf(MetallicRoughness(preset="plastic_high", color=(0.1, 0.2, 0.3), roughness=0.4))
-    assert plastic == {"type": "gltf", "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}, "metallic": 0,
-                       "roughness": 0.4, "f0": {"type": "rgb", "value": [0.05, 0.05, 0.05]},
-                       "smith": "height_correlated", "coupling": "albedo", "multiple": False}
+    assert plastic == PLASTIC | {"color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}, "roughness": 0.4,
+                                 "f0": {"type": "rgb", "value": [0.05, 0.05, 0.05]}}
+    pane = MetallicRoughness(ior=3, specular=0.5, specular_color=(8, 2, 0), transmission=0.25)
+    tinted = mitsuba_scene(ball(pane))["sphere0"]["bsdf"]
+    assert tinted == PLASTIC | {"f0": {"type": "rgb", "value": [1, 0.5, 0]}, "specular": 0.5, "transmission": 0.25,
+                                "transmits": True, "multiple": True}
+    tint = Texture(picture=PICTURE, factor=(1, 2, 4))
+    map_of_f0 = bsdf(MetallicRoughness(ior=3, specular_color=tint))["f0"]
+    white = bsdf(Diffuse(color=tint))["reflectance"]
+    np.testing.assert_allclose(map_of_f0["bitmap"], 0.25 * white["bitmap"], rtol=1e-6)
 
 
 @pytest.mark.parametrize(("material", "kind"), [
@@ -120,13 +133,40 @@ def test_rough_glass_and_metal_have_the_height_correlated_smith_term(material: M
 
 def test_layers_are_a_plugin_of_our_own() -> None:
     velvet = bsdf(MetallicRoughness(color=(0.1, 0.2, 0.3), roughness=0.4, clearcoat=0.5, sheen_color=(0.6, 0.7, 0.8)))
-    assert velvet == {"type": "gltf_layers", "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]},
-                      "f0": {"type": "rgb", "value": [pytest.approx(0.04)] * 3}, "metallic": 0, "roughness": 0.4,
-                      "sheen_color": {"type": "rgb", "value": [0.6, 0.7, 0.8]}, "clearcoat": 0.5,
-                      "clearcoat_roughness": 0, "sheen_roughness": 0, "multiple": False}
+    assert velvet == PLASTIC | {"color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}, "roughness": 0.4,
+                                "sheen_color": {"type": "rgb", "value": [0.6, 0.7, 0.8]}, "clearcoat": 0.5,
+                                "clearcoat_roughness": 0, "sheen_roughness": 0, "layered": True}
 
 
-PICTURE = Picture(np.array([[[0, 51, 102, 255], [255, 153, 204, 0]]], np.uint8))
+def test_phong_models_are_told_apart() -> None:
+    for kind, half_vector in ((Phong, False), (BlinnPhong, True)):
+        told = bsdf(kind(color=(0.1, 0.2, 0.3), specular=(0.4, 0.5, 0.6), shininess=20))
+        assert told == {"type": "phong", "color": {"type": "rgb", "value": [0.1, 0.2, 0.3]}, "shininess": 20,
+                        "specular": {"type": "rgb", "value": [0.4, 0.5, 0.6]}, "half_vector": half_vector}
+
+
+def test_glass_that_mitsuba_lacks_is_a_plugin_of_our_own() -> None:
+    """Multiple scattering is added to single scattering; rough or colored sheets are one plugin."""
+    told = mitsuba_scene(ball(Dielectric(ior=1.3, roughness=0.7, color=(1, 0.5, 0.25))))["sphere0"]["bsdf"]
+    single = replace(Dielectric(ior=1.3, roughness=0.7, color=(1, 0.5, 0.25)), multiple_scattering=False)
+    assert told == {"type": "all_bounces", "ior": 1.3, "alpha": pytest.approx(0.49), "bsdf": mitsuba_scene(
+        ball(single))["sphere0"]["bsdf"], "color": {"type": "rgb", "value": [1, 0.5, 0.25]}}
+    for pane, alpha in ((Dielectric(thin=True, color=(1, 0.5, 0.25)), 0),
+                        (Dielectric(thin=True, roughness=0.5, color=(1, 0.5, 0.25)), 0.25)):
+        assert mitsuba_scene(ball(pane))["sphere0"]["bsdf"] == {
+            "type": "sheet", "ior": 1.5, "alpha": alpha, "multiple": alpha > 0,
+            "color": {"type": "rgb", "value": [1, 0.5, 0.25]}}, "not two-sided"
+    assert mitsuba_scene(ball(Dielectric(thin=True)))["sphere0"]["bsdf"]["type"] == "thindielectric"
+
+
+def test_vertex_colors_multiply_the_color() -> None:
+    mesh = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), colors=np.full((3, 4), 0.5, np.float32),
+                material=MetallicRoughness(color=(1, 0.5, 0.25)))
+    told = mitsuba_scene(Scene(meshes=[mesh]))["mesh0"]
+    assert told["bsdf"]["front"]["color"] == {"type": "mesh_attribute", "name": "vertex_color"}
+    np.testing.assert_allclose(told["colors"], [[0.5, 0.25, 0.125]] * 3)
+    with pytest.raises(UsageError, match="vertex colors with a texture"):
+        mitsuba_scene(Scene(meshes=[replace(mesh, material=Diffuse(color=Texture(picture=PICTURE)))]))
 
 
 def test_textures_are_linear_pictures_with_their_factors() -> None:
@@ -178,9 +218,12 @@ def test_spots_throw_their_falloff() -> None:
     assert np.interp(0.1, middles, row) == 1 and row[0] < 1e-6
 
 
-def test_other_filters_are_refused() -> None:
-    with pytest.raises(UsageError, match='room: .*filter = "box"'):
-        mitsuba_scene(Scene(render=RenderSettings(filter="tent"), name="room"))
+def test_filters_reach_beyond_the_picture() -> None:
+    for name, border in (("box", False), ("tent", True), ("gaussian", True)):
+        film = mitsuba_scene(Scene(render=RenderSettings(filter=name)))["sensor"]["film"]  # type: ignore[arg-type]
+        assert (film["rfilter"], film["sample_border"]) == ({"type": name}, border)
+    with pytest.raises(UsageError, match="room: .*box, tent or gaussian"):
+        mitsuba_scene(Scene(render=RenderSettings(filter="blackman_harris"), name="room"))
 
 
 def test_every_material_is_converted_or_refused() -> None:

@@ -7,7 +7,7 @@ import time
 from importlib import import_module
 
 NAMES = ("launches", "interrupts", "kills", "damage", "errors", "calibration",
-         "scaling", "drivers", "caches", "large_models", "horizon")
+         "scaling", "drivers", "caches", "large_models", "horizon", "rough_glass")
 
 for name in sys.argv[1:] or NAMES:
     if name not in NAMES:

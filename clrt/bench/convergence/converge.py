@@ -56,13 +56,14 @@ Points = dict[str, dict[int, list[Point]]]
 
 
 def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort: Effort, *, peers: bool = False,
-                        choices: Mapping[str, Mapping[str, Any]] = CHOICES,
+                        choices: Mapping[str, Mapping[str, Any]] = CHOICES, given: Reference | None = None,
                         say: Callable[[str], None] = lambda message: None) -> Iterator[dict[str, Any]]:
     """Yield the results of `clrt bench converge`, scene by scene.
 
-    scene, size, max_depth; reference: `spp` and its own `relmse`; missing: why a peer is not among the contestants; and
-    contestants: the result of `figures`. say: called first with these reasons, then for each step of a reference that
-    is not cached. Raises what `Renderer` raises.
+    scene, size, max_depth; reference: `spp` (0: given) and its own `relmse`; missing: why a peer is not among the
+    contestants; and contestants: the result of `figures`. given: the reference; by default one is rendered per scene.
+    say: called first with the reasons for missing peers, then for each step of a reference that is not cached. Raises
+    what `Renderer` raises.
     """
     others = [peers_of(scene) if peers else ({}, {}) for scene in scenes]
     for scene, (_, missing) in zip(scenes, others):
@@ -72,7 +73,8 @@ def measure_convergence(scenes: Sequence[Scene], devices: Sequence[int], effort:
         def on_step(step: int, name: str = scene.name) -> None:
             say(f"{name}: step {step + 1} of {effort.steps} of its reference")
 
-        reference = render_reference(scene, effort.steps, device=devices[0], step_spp=effort.step_spp, on_step=on_step)
+        reference = given or render_reference(scene, effort.steps, device=devices[0], step_spp=effort.step_spp,
+                                              on_step=on_step)
         points = take_turns(choices_on(scene, devices, choices) | rivals, reference, effort)
         yield {"scene": scene.name, "size": scene.render.size, "max_depth": scene.render.max_depth,
                "reference": {"spp": reference.spp, "relmse": reference.relmse}, "missing": missing,

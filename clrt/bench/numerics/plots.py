@@ -87,8 +87,8 @@ def _draw_convergence(axis: Axes, result: Mapping[str, Any], names: Sequence[str
             slope = slope or [(x[0], y[0]), (x[-1], y[0] * sqrt(x[0] / x[-1]))]
     if slope:
         axis.plot(*zip(*slope), ":", color="grey", linewidth=1, label="slope −½", zorder=0)
-    own = sqrt(result["reference"]["relmse"])
-    axis.axhline(own, color="lightgrey", linewidth=1, label="the reference's own", zorder=0)
+    if own := sqrt(result["reference"]["relmse"]):
+        axis.axhline(own, color="lightgrey", linewidth=1, label="the reference's own", zorder=0)
 
 
 def plot_theses(path: Path, results: Sequence[Mapping[str, Any]]) -> Path:

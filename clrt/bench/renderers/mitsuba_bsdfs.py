@@ -1,5 +1,6 @@
 """Conversion of materials to Mitsuba 3: its own plugins where they are equivalent, wrapped in `height_correlated`
-(mitsuba_smith.py) where their Smith term differs, and `gltf` (mitsuba_gltf.py).
+(mitsuba_smith.py) where their Smith term differs, and plugins for what it lacks (mitsuba_gltf.py, mitsuba_phong.py,
+mitsuba_glass.py).
 
 To add a material, write its conversion in BSDFS.
 """
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 from ...errors import UsageError
 from ...formats.images.image_reader import linear_from_srgb
 from ...scene.materials.material import ALPHA_MIN, as_color
-from ...scene.materials.material_types import Conductor, Dielectric, Diffuse, Material, MetallicRoughness, Mirror
+from ...scene.materials.material_types import (BlinnPhong, Conductor, Dielectric, Diffuse, Material,
+                                               MetallicRoughness, Mirror, Phong)
 from ...scene.materials.textures import Texture, Wrap, untextured
 from ...scene.model import Mesh, Sphere
 
@@ -28,6 +30,8 @@ Floats = NDArray[np.float32]
 NEARLY_SMOOTH = 0.09
 #: Cut-outs are upsampled by this factor in each dimension before thresholding.
 CUTS = 4
+#: Parameters for the color of a material.
+PAINTED = ("reflectance", "color", "specular_reflectance", "specular_transmittance")
 CHANNELS = ("red", "green", "blue", "alpha")
 
 
@@ -47,7 +51,7 @@ def bsdf(owner: Mesh | Sphere) -> Plugin:
                 plugin |= {"bumps": True}
             plugin = {"type": "normalmap", "normalmap": _bend(material.normal_map), "bsdf": plugin,
                       "use_shadowing_function": isinstance(material, Diffuse), "flip_invalid_normals": False}
-        plugin = plugin if isinstance(material, Dielectric) else {"type": "twosided", "front": plugin}
+        plugin = plugin if "TRANSMISSION" in material.features() else {"type": "twosided", "front": plugin}
         if material.one_sided:
             raise ValueError("one-sided surfaces")
         if material.opacity != 1:
@@ -133,10 +137,11 @@ def _bitmap(texture: Texture, texels: Any) -> Plugin:
 
 
 def _painted(plugin: Plugin, material: Material) -> Plugin:
-    """Replace a white color by vertex colors."""
-    if not isinstance(material, Diffuse) or material.color != (1.0, 1.0, 1.0):
-        raise ValueError("vertex colours except of diffuse with color [1, 1, 1]")
-    return plugin | {"reflectance": {"type": "mesh_attribute", "name": "vertex_color"}}
+    """Replace a constant color by vertex colors, which `mitsuba_scene` multiplies by it."""
+    name = next((name for name in PAINTED if name in plugin), None)
+    if name is None or isinstance(getattr(material, "color", None), Texture):
+        raise ValueError("vertex colors with a texture: it has no product of both")
+    return plugin | {name: {"type": "mesh_attribute", "name": "vertex_color"}}
 
 
 def _diffuse(material: Diffuse) -> Plugin:
@@ -149,41 +154,50 @@ def _mirror(material: Mirror) -> Plugin:
 
 def _metallic_roughness(material: MetallicRoughness) -> Plugin:
     """Return `principled`, exactly GGX, Schlick's Fresnel and separable Smith for pure metals; otherwise `gltf`."""
-    if material.features() & {"THROUGH", "SPECULAR"}:
-        raise ValueError("metallic_roughness with transmission or specular")
-    if material.smith not in ("separable", "height_correlated"):
-        raise ValueError('metallic_roughness except with smith = "separable" or "height_correlated"')
-    values, multiple = material.parameters(), "MULTIPLE_SCATTERING" in material.features()
-    if "LAYERS" in material.features():
-        return _layers(material) | {"multiple": multiple}
-    if material.smith == "separable" and values["metallic"] == 1 and not material.textures() and not multiple:
+    values, has = material.parameters(), material.features()
+    if material.smith == "separable" and values["metallic"] == 1 and not material.textures() and not has & {
+            "MULTIPLE_SCATTERING", "LAYERS"}:
         lobes = material.lobes
         return {"type": "principled", "metallic": 1.0, "roughness": sqrt(lobes.alpha), "base_color": rgb(lobes.f0)}
-    return {"type": "gltf", "color": color(values["color"]), "f0": rgb(values["f0"]),
-            "metallic": number(values["metallic"]), "roughness": number(values["roughness"]),
-            "smith": material.smith, "coupling": material.coupled_by, "multiple": multiple}
+    plugin = {"type": "gltf", "color": color(values["color"]), "metallic": number(values["metallic"]),
+              "roughness": number(material.roughness), "f0": color(_f0(material)),
+              "specular": number(material.specular), "transmission": number(material.transmission),
+              "clearcoat": number(material.clearcoat), "sheen_color": color(material.sheen_color),
+              "smith": material.smith, "coupling": material.coupled_by, "multiple": "MULTIPLE_SCATTERING" in has,
+              "transmits": "THROUGH" in has, "layered": "LAYER_ENERGY" in has}
+    if "LAYER_ENERGY" in has:
+        if material.clearcoat != 0 and material.bent_by is not None:
+            raise ValueError("a clearcoat with a normal map: its wrapper bends all layers alike")
+        plugin |= {name: number(untextured(getattr(material, name)))
+                   for name in ("roughness", "clearcoat_roughness", "sheen_roughness")}
+    return plugin
 
 
-def _layers(material: MetallicRoughness) -> Plugin:
-    if material.textures() or material.smith != "height_correlated" or material.coupled_by != "albedo":
-        raise ValueError('layers except untextured ones over smith = "height_correlated" and coupling = "albedo"')
-    values = material.parameters()
-    return {"type": "gltf_layers", "color": color(values["color"]), "f0": rgb(values["f0"]),
-            "metallic": number(values["metallic"]), "roughness": number(material.roughness),
-            "clearcoat": number(material.clearcoat), "clearcoat_roughness": number(material.clearcoat_roughness),
-            "sheen_color": color(material.sheen_color), "sheen_roughness": number(material.sheen_roughness)}
+def _f0(material: MetallicRoughness) -> Any:
+    """Return F0 of the dielectric part without `specular`."""
+    f0, tint = np.array(material.parameters()["f0"]), material.specular_color
+    if isinstance(tint, Texture):
+        return replace(tint, factor=tuple((f0 * as_color(tint.factor)).tolist()))
+    return np.minimum(f0 * tint, 1)
+
+
+def _phong(material: Phong) -> Plugin:
+    shininess = untextured(material.shininess)
+    return {"type": "phong", "color": color(material.color), "specular": color(material.specular),
+            "shininess": shininess, "half_vector": isinstance(material, BlinnPhong)}
 
 
 def _dielectric(material: Dielectric) -> Plugin:
-    if material.thin and material.rough:
-        raise ValueError("thin rough glass")
-    if material.scatters_again:
-        raise ValueError("multiple scattering in rough glass; set multiple_scattering = false")
-    if material.thin and untextured(material.color) != (1.0, 1.0, 1.0):
-        raise ValueError("coloured thin glass: its model does not absorb internal reflections again")
+    if material.thin and (material.rough or untextured(material.color) != (1.0, 1.0, 1.0)):
+        return {"type": "sheet", "ior": material.ior, "color": color(material.color),
+                "alpha": _alpha(material.roughness) if material.rough else 0.0, "multiple": material.scatters_again}
     plugin = {"type": "thindielectric" if material.thin else "dielectric", "int_ior": material.ior, "ext_ior": 1.0,
               "specular_transmittance": color(material.color)}
-    return _rough(plugin | {"type": "roughdielectric"}, material.roughness) if material.rough else plugin
+    if material.is_specular:
+        return plugin
+    single = _rough(plugin | {"type": "roughdielectric"}, material.roughness)
+    return {"type": "all_bounces", "ior": material.ior, "alpha": _alpha(material.roughness),
+            "color": color(material.color), "bsdf": single} if material.scatters_again else single
 
 
 def _conductor(material: Conductor) -> Plugin:
@@ -194,11 +208,15 @@ def _conductor(material: Conductor) -> Plugin:
 
 def _rough(plugin: Plugin, roughness: float | Texture) -> Plugin:
     """Add GGX and the height-correlated Smith term to a plugin."""
-    alpha = max(untextured(roughness)**2, ALPHA_MIN)
+    alpha = _alpha(roughness)
     plugin = plugin | {"distribution": "ggx", "alpha": alpha}
     return plugin if alpha <= NEARLY_SMOOTH else {"type": "height_correlated", "alpha": alpha, "bsdf": plugin}
 
 
+def _alpha(roughness: float | Texture) -> float:
+    return max(untextured(roughness)**2, ALPHA_MIN)
+
+
 BSDFS: dict[type[Material], Callable[[Any], Plugin]] = {
     Diffuse: _diffuse, Mirror: _mirror, MetallicRoughness: _metallic_roughness, Dielectric: _dielectric,
-    Conductor: _conductor}
+    Conductor: _conductor, Phong: _phong, BlinnPhong: _phong}

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...scene.model import Scene
 from ..convergence.contestants import Contestant, Picture
-from . import mitsuba_gltf, mitsuba_layers, mitsuba_smith
+from . import mitsuba_glass, mitsuba_gltf, mitsuba_phong, mitsuba_smith
 from .mitsuba_bsdfs import Plugin
 from .mitsuba_scene import mitsuba_scene
 
@@ -71,7 +71,7 @@ def load() -> tuple[Any, str]:
     library = import_module("mitsuba")
     library.set_variant(variant)
     library.set_log_level(library.LogLevel.Error)
-    for plugins in (mitsuba_gltf, mitsuba_layers, mitsuba_smith):
+    for plugins in (mitsuba_glass, mitsuba_gltf, mitsuba_phong, mitsuba_smith):
         plugins.register(library)
     return library, f"mitsuba {variant.split('_')[0]}"
 

@@ -7,7 +7,6 @@ Materials are converted in mitsuba_bsdfs.py.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import cos, radians, tan
 from typing import Any
 
@@ -16,7 +15,6 @@ from numpy.typing import NDArray
 
 from ...errors import UsageError
 from ...rendering.compile.features import biased_by
-from ...scene.editing import materials_of, with_material
 from ...scene.geometry.instancing import unfolded
 from ...scene.lights import DirectionalLight, Light, PointLight, SpotLight
 from ...scene.materials.material_types import Dielectric
@@ -36,8 +34,8 @@ SUN_DEGREES = 90
 
 def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
     """Return the plugins of `scene` with its own settings. Raises UsageError for an unsupported feature."""
-    if scene.render.filter != "box":
-        raise UsageError(f'{scene.name}: Mitsuba is compared with filter = "box"')
+    if scene.render.filter == "blackman_harris":
+        raise UsageError(f"{scene.name}: Mitsuba has no such filter; write filter = box, tent or gaussian")
     if scene.render.integrator not in ("path", "direct"):
         raise UsageError(f'{scene.name}: Mitsuba has no integrator "{scene.render.integrator}"')
     if scene.render.back_face_culling != "none":
@@ -55,16 +53,8 @@ def mitsuba_scene(scene: Scene, sampler: str = "independent") -> Plugin:
     return plugins | _environment(scene.environment)
 
 
-def single_bounces(scene: Scene) -> Scene:
-    """Return the scene with rough glass restricted to a single microfacet bounce, as in Mitsuba."""
-    for material in materials_of(scene).values():
-        if isinstance(material, Dielectric) and material.scatters_again:
-            scene = with_material(scene, material, replace(material, multiple_scattering=False))
-    return scene
-
-
 def _sensor(scene: Scene, sampler: str) -> Plugin:
-    """Return the camera and its film with a box filter one pixel wide."""
+    """Return the camera and its film."""
     camera, (width, height) = scene.camera, scene.render.size
     distance = _distance(camera)
     to_world = _frame(camera.position, np.subtract(camera.look_at, camera.position), camera.up)
@@ -81,7 +71,8 @@ def _sensor(scene: Scene, sampler: str) -> Plugin:
     return {**lens, "to_world": to_world, "near_clip": NEAR * distance, "far_clip": FAR * distance,
             "sampler": {"type": sampler},
             "film": {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
-                     "component_format": "float32", "rfilter": {"type": "box"}}}
+                     "component_format": "float32", "rfilter": {"type": scene.render.filter},
+                     "sample_border": scene.render.filter != "box"}}
 
 
 def _frame(position: Any, direction: Any, up: Any = (0.0, 1.0, 0.0)) -> NDArray[np.float64]:
@@ -118,7 +109,8 @@ def _mesh(mesh: Mesh) -> Plugin:
     if sets:
         arrays["uv"] = mesh.uv1 if sets == {1} else mesh.uv
     if mesh.colors is not None:
-        arrays["colors"] = mesh.colors[:, :3]
+        color = getattr(mesh.material, "color", 1.0)
+        arrays["colors"] = mesh.colors[:, :3] * np.float32(1.0 if isinstance(color, Texture) else color)
     return {"type": "mesh", **arrays}
 
 

@@ -17,6 +17,7 @@ from ...errors import DeviceError
 from ..launches.fork_safety import check_process
 from .check_results import kept_verdict
 from .device_info import DeviceInfo, describe, describe_empty, describe_faulty, size_of, with_own_id
+from .driver_caches import no_room
 from .install_advice import no_device
 from .loader import devices_of
 from .measured_speeds import kept_speed
@@ -91,7 +92,8 @@ def select(selector: str | int | None = None) -> tuple[DeviceInfo, cl.Device]:
         raise DeviceError("only a simulator, a thousand times as slow, is usable; select it to use it, or "
                           f"install a driver (`clrt devices` shows why others are unusable):\n{listing}")
     if not matches and selector is None:
-        raise DeviceError(f"no device is usable; `clrt devices` shows why and what to do:\n{listing}")
+        raise DeviceError(f"no device is usable; `clrt devices` shows why and what to do:\n{listing}"
+                          + f"\n{no_room()}".rstrip())
     if not matches:
         raise DeviceError(f"no usable device matches {asked}; there are:\n{listing}")
     if len(matches) > 1:

@@ -27,16 +27,34 @@ def provide_cache_folders() -> None:
         return
     folder = os.path.join(temporary, f"clrt-cache-{os.getuid() if hasattr(os, 'getuid') else 0}")
     if not _writable(folder):
-        has_room = _writable(temporary) or not _writable(MEMORY)
-        folder = tempfile.mkdtemp(prefix="clrt-cache-", dir=temporary if has_room else MEMORY)
+        try:
+            full = not _has_room(temporary) and _has_room(MEMORY)
+            folder = tempfile.mkdtemp(prefix="clrt-cache-", dir=MEMORY if full else temporary)
+        except OSError:
+            return    # drivers fail, and `no_room` says why
     if home_is_closed:
         os.environ["XDG_CACHE_HOME"] = folder
     if programs_are_closed:
         os.environ["POCL_CACHE_DIR"] = os.path.join(folder, "pocl")
 
 
+def no_room() -> str:
+    """Return why drivers fail if no folder has room for the files that they write, or an empty string."""
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    folders = dict.fromkeys([os.environ.get("POCL_CACHE_DIR") or home, _temporary(), MEMORY])
+    if any(map(_has_room, folders)):
+        return ""
+    return (f"no file of {ROOM >> 10} kB can be written in {', '.join(folders)}, and drivers need such files; free "
+            "some space, or name another folder with TMPDIR")
+
+
 def _writable(folder: str) -> bool:
-    """Return whether the folder exists or can be created, belongs to the user, and is writable.
+    """Return whether the folder has room and belongs to the user."""
+    return _has_room(folder) and (not hasattr(os, "getuid") or os.stat(folder).st_uid == os.getuid())
+
+
+def _has_room(folder: str) -> bool:
+    """Return whether the folder exists or can be created, and files of ROOM bytes can be written there.
 
     Without a home folder "~" is not expanded, so the path is not absolute.
     """
@@ -45,9 +63,7 @@ def _writable(folder: str) -> bool:
             return False
         Path(folder).mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
-            if file.write(bytes(ROOM)) < ROOM:
-                return False
-            return not hasattr(os, "getuid") or os.stat(folder).st_uid == os.getuid()
+            return file.write(bytes(ROOM)) == ROOM
     except (OSError, RuntimeError):
         return False
 

@@ -18,6 +18,7 @@ from typing import IO
 from ...awake import AwakeClock
 from ..programs.child_process import activity, end_child, last_line, start_child, told_end
 from .device_info import describe, size_of
+from .driver_caches import no_room
 from .loader import devices_of, load
 
 #: Time limit of all probes together in seconds. A slow start of many GPUs is not a hang.
@@ -66,7 +67,7 @@ def _fault(child: subprocess.Popen[str], output: IO[bytes], errors: IO[bytes], l
     if code is None:
         return f"it hangs: no answer in {limit:g} s"
     if code:
-        return told_end(code) + last_line(errors)
+        return "; ".join(filter(None, [told_end(code) + last_line(errors), no_room()]))
     output.seek(0)
     return output.read().decode(errors="replace").strip()
 

@@ -21,6 +21,7 @@ import pyopencl as cl
 
 from ...errors import KernelError
 from ...threads import Event
+from ..discovery.driver_caches import no_room
 from ..open import Device
 from ..pocl.cpu_name import best_processor, processor_flags
 from ..pocl.kernel_cache import remove_damaged
@@ -201,7 +202,7 @@ def _compile(device: Device, source: str) -> cl.Program:
         in_background(_where(device), lambda: quietly_built(program, options))
         log = f"built in {time.perf_counter() - start:.2f} s\n{_build_log(device, program)}"
     except cl.Error as error:
-        log = str(error).strip()
+        log = "\n".join(filter(None, [str(error).strip(), no_room()]))
         raise KernelError(f"{_where(device)} cannot build the kernel:\n{log}") from error
     except KernelError as error:
         log = str(error)

@@ -38,6 +38,8 @@ class Materials:
         self._data = data
         self.names = gltf.material_names(data.document)
         self._pictures: dict[int, Picture | None] = {}
+        #: Features that had an effect in the file, but are not rendered, by the material's name.
+        self.unused: dict[str, list[str]] = {}
 
     def material(self, primitive: gltf.Primitive, user: str, uv: list[NDArray[np.float32] | None],
                  faces: NDArray[np.int32]) -> Material:
@@ -60,19 +62,16 @@ class Materials:
             emission=self._emission(source, primitive, user), double_sided=source.doubleSided,
             **self._layers(source.extensions, primitive, user))
         made = replace(made, normal_map=self._bend(source.normalTexture, primitive, user))
+        coverage = _coverage(source, base, "COLOR_0" in primitive.attributes)
         solid = glass(source.extensions, made, uv, faces)
-        if solid is not None:
-            return solid
-        if source.alphaMode == "OPAQUE":
-            return made
-        opacity = _numbered(_unit(pbr.baseColorFactor[3]), base, "alpha")
-        most = BELOW_ONE if opacity == 1 and "COLOR_0" in primitive.attributes else 1.0
-        opacity = most if opacity == 1 else opacity
-        if source.alphaMode == "BLEND":
-            return replace(made, opacity=opacity)
-        if source.alphaCutoff > 1:    # no alpha reaches it (specification 3.9.4)
-            return replace(made, opacity=0.0)
-        return replace(made, opacity=opacity, alpha_cutoff=most * _unit(source.alphaCutoff))
+        lost = {"alphaMode": coverage.get("opacity", 1.0) != 1, **{
+            layer.lower(): layer in made.features() for layer in ("CLEARCOAT", "SHEEN", "SPECULAR")}}
+        if solid is None:
+            volume = source.extensions.KHR_materials_volume.thicknessFactor > 0
+            lost = {"volume": volume and made.transmission != 0 and made.metallic != 1}
+        if any(lost.values()):
+            self.unused[self.names[primitive.material]] = [name for name, is_lost in lost.items() if is_lost]
+        return replace(made, **coverage) if solid is None else solid
 
     def _layers(self, extensions: looks.MaterialExtensions, primitive: gltf.Primitive, user: str) -> dict[str, Any]:
         """Return the fields for the extensions in use."""
@@ -143,6 +142,20 @@ class Materials:
                 log.warning("%s: a texture is left out: %s", self._data.path, error)
                 self._pictures[index] = None
         return self._pictures[index]
+
+
+def _coverage(source: looks.Material, base: Texture | None, vertex_colors: bool) -> dict[str, Any]:
+    """Return opacity and alpha_cutoff of the material's alpha mode."""
+    if source.alphaMode == "OPAQUE":
+        return {}
+    opacity = _numbered(_unit(source.pbrMetallicRoughness.baseColorFactor[3]), base, "alpha")
+    most = BELOW_ONE if opacity == 1 and vertex_colors else 1.0
+    opacity = most if opacity == 1 else opacity
+    if source.alphaMode == "BLEND":
+        return {"opacity": opacity}
+    if source.alphaCutoff > 1:    # no alpha reaches it (specification 3.9.4)
+        return {"opacity": 0.0}
+    return {"opacity": opacity, "alpha_cutoff": most * _unit(source.alphaCutoff)}
 
 
 def _colored(factor: tuple[float, float, float], texture: Texture | None, info: looks.TextureInfo | None,

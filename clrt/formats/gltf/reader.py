@@ -6,7 +6,7 @@ Unsupported features (skins, lines, ...) are listed in one logged warning.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -48,14 +48,15 @@ def read_gltf(path: Path, normals: Normals = "file") -> Model:
 def _read(path: Path, normals: Normals) -> Model:
     data = GltfData(path)
     nodes = list(_nodes(data.document))
-    meshes, instances = shown(_places(data, nodes, normals))
+    materials = Materials(data)
+    meshes, instances = shown(_places(data, materials, nodes, normals))
     if not meshes and not instances:
         raise SceneError("its scene contains no triangles; export a model with triangle meshes")
     every = [*meshes, *meshes_by_id(instances).values()]
     problems = [problem for mesh in every for problem in mesh_problems(mesh, "mesh")]
     if problems:
         raise SceneError(problems)
-    _warn_of_left_out(path, data.document)
+    _warn_of_left_out(path, data.document, materials.unused)
     middle = np.mean(bounds(meshes, instances), axis=0)
     return Model(meshes=meshes, instances=instances, cameras=read_cameras(path, data.document, nodes, middle),
                  lights=list(read_lights(data.document, nodes)))
@@ -93,9 +94,9 @@ def _local(node: gltf.Node, index: int) -> Matrix:
     return translation(node.translation) @ quaternion(*node.rotation) @ scaling(node.scale)
 
 
-def _places(data: GltfData, nodes: list[Placed], normals: Normals) -> Iterator[tuple[Mesh, Matrix]]:
+def _places(data: GltfData, materials: Materials, nodes: list[Placed],
+            normals: Normals) -> Iterator[tuple[Mesh, Matrix]]:
     """Yield the meshes of all nodes with their matrices; a mesh is read once per set of morph weights."""
-    materials = Materials(data)
     read: dict[tuple[int, tuple[float, ...]], list[Mesh]] = {}
     for node, matrix in nodes:
         if node.mesh is not None:
@@ -186,8 +187,8 @@ def _corners(data: GltfData, primitive: gltf.Primitive, n: int, user: str) -> ND
     return order[corners]
 
 
-def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
-    """Log one warning that lists what is not rendered."""
+def _warn_of_left_out(path: Path, document: gltf.Document, unused: Mapping[str, Sequence[str]]) -> None:
+    """Log one warning that lists what is not rendered. unused: features by material."""
     primitives = [primitive for mesh in document.meshes for primitive in mesh.primitives]
     left_out = {
         "skins": any(node.skin is not None for node in document.nodes),
@@ -195,5 +196,6 @@ def _warn_of_left_out(path: Path, document: gltf.Document) -> None:
     }
     names = [name for name, present in left_out.items() if present]
     names += sorted(f"the extension {name}" for name in set(document.extensionsUsed) - gltf.EXTENSIONS)
+    names += [f'{" and ".join(features)} of material "{name}"' for name, features in unused.items()]
     if names:
         log.warning("%s: left out: %s", path, ", ".join(names))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import SceneError
+from ...file_names import StrPath
 from ..referenced_files import check_file
 from .decoder import decode
 from .radiance_hdr import read_radiance
@@ -17,13 +18,14 @@ from .radiance_hdr import read_radiance
 EMBEDDED = {b"\x89PNG\r\n\x1a\n": ".png", b"\xff\xd8\xff": ".jpg", b"RIFF": ".webp"}
 
 
-def read_picture(path: Path) -> NDArray[np.float32]:
+def read_picture(path: StrPath) -> NDArray[np.float32]:
     """Return an image's pixels: (h, w, 3) float32, linear, row 0 on top, NaN and Inf kept.
 
     Float files (.exr, .hdr) are used unchanged; integer ones (.png, .jpg and others) are decoded from sRGB. One channel
     is grey; alpha is dropped. Raises SceneError naming the file if it is missing, empty, damaged, cropped (a data
     window that differs from the display window), or has no color channels.
     """
+    path = Path(path)
     _check_stored(path)
     if (radiance := read_radiance(path)) is not None:
         return radiance
@@ -34,13 +36,14 @@ def read_picture(path: Path) -> NDArray[np.float32]:
     return linear_from_srgb(np.asarray(colours / np.float32(np.iinfo(colours.dtype).max), np.float32))
 
 
-def read_texels(source: Path | bytes, name: str = "") -> NDArray[np.uint8]:
+def read_texels(source: StrPath | bytes, name: str = "") -> NDArray[np.uint8]:
     """Return the texels of an image file of at most 16 bits per channel, or of the bytes of one (PNG, JPEG, WebP).
 
     (h, w, 4) uint8 as stored, row 0 on top, unassociated alpha. `name`: the bytes' name in messages. Raises SceneError
     as `read_picture`, and for images of floats, which would lose most of their range.
     """
-    if isinstance(source, Path):
+    if not isinstance(source, bytes):
+        source = Path(source)
         _check_stored(source)
     name = name or str(source)
     pixels, names = _stored(source, name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -271,7 +271,7 @@ class SceneReader:
             return None
 
 
-def camera_problems(name: str, cameras: Mapping[str, Camera], where: str) -> list[str]:
+def camera_problems(name: str, cameras: Collection[str], where: str) -> list[str]:
     """Return a problem if there is no camera of this name."""
     if name in cameras:
         return []

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import CheckpointError, OutputError, UsageError
+from ...file_names import StrPath
 from ...scene.model import Scene
 from ...threads import beside
 from ..compile.choices import Choices
@@ -116,7 +117,7 @@ class Checkpoints:
                          header.get("device"), self._device)
 
 
-def open_checkpoints(path: str | Path | None, resume: bool, seconds: float, scene: Scene, choices: Choices,
+def open_checkpoints(path: StrPath | None, resume: bool, seconds: float, scene: Scene, choices: Choices,
                      device: str) -> tuple[Checkpoints | None, Kept | None]:
     """Return a render's checkpoints, if enabled, and the state to resume from, if there is one."""
     if path is None:

@@ -10,7 +10,9 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
+from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,13 +27,30 @@ UNSEEN = {"name", "render", "cameras", "animation", "materials", "source"}
 ENDS = {"spp"}
 ROUNDING = {"lanes", "layout", "builder", "paths", "tree", "first_hits"}
 NAMES = {"name", "material_name"}
+#: Folders whose Python code determines samples: how scenes are packed, what is sampled and summed. (What the readers
+#: of files return is part of the scene, but textures are decoded when they are packed.)
+CODE = ("rendering", "scene", "formats/images")
+
+
+@cache
+def code_digest(package: Path = Path(__file__).parents[2]) -> str:
+    """Return the SHA-256 of the names and texts of the Python files in CODE, as 64 hexadecimal digits.
+
+    The version changes with releases alone, and the scene's hash is the same however it is packed. A digest of the text
+    refuses more checkpoints than necessary, after any edit of these files, but cannot be forgotten.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(path for folder in CODE for path in (package / folder).rglob("*.py")):
+        text = path.read_bytes()
+        digest.update(f"{path.relative_to(package).as_posix()}\0{len(text)}\0".encode() + text)
+    return digest.hexdigest()
 
 
 def facts_of(scene: Scene, choices: Choices) -> dict[str, str]:
-    """Return each setting as text, and the SHA-256 of each part of the scene and of the kernels."""
+    """Return each setting as text, and the SHA-256 of each part of the scene, of the kernels and of the code."""
     width, height = scene.render.size
     values = {**values_of(scene.render, choices), "size": f"{width}x{height}"}
-    return {"version": version("clrt"), "kernels": kernel_digest(),
+    return {"version": version("clrt"), "kernels": kernel_digest(), "code": code_digest(),
             **{name: str(value) for name, value in values.items()},
             **{part: _digest(_part(scene, part)) for part in parts_of(scene)}}
 
@@ -67,7 +86,7 @@ def differences(found: dict[str, Any], wanted: dict[str, str]) -> list[str]:
         if name == "direct_light":
             told.append(f"{'without' if value == 'True' else 'with'} --aov direct or indirect")
         else:
-            hidden = name == "kernels" or name in {field.name for field in fields(Scene)}
+            hidden = name in ("kernels", "code") or name in {field.name for field in fields(Scene)}
             told.append(f"different {name}" if hidden else f"{name} {other} instead of {value}")
     return told
 

@@ -52,7 +52,7 @@ def check_reference(reference: object, size: tuple[int, int]) -> None:
     if reference is None:
         return
     if isinstance(reference, (str, PathLike)):
-        raise UsageError(f"reference is the path {str(reference)!r}; read it with clrt.output.images.read_image")
+        raise UsageError(f"reference is the path {str(reference)!r}; read it with clrt.read_image")
     shape = real_array("reference", cast(ArrayLike, reference)).shape
     if not isinstance(reference, np.ndarray) or shape != (*size[::-1], 3):
         raise UsageError(f"reference is a {type(reference).__name__} of shape {shape}; give a numpy array of the "

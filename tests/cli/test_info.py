@@ -1,0 +1,45 @@
+"""`clrt info`: the lists of a scene's materials and lights."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from .test_commands import clrt
+
+
+def test_info_lists_the_materials_and_lights_of_a_scene(tmp_path: Path) -> None:
+    """By name, with the fields that were set; an unnamed material has the name of its object."""
+    (tmp_path / "t.pgm").write_bytes(b"P5 1 1 255 \xff")
+    (tmp_path / "a.toml").write_text("""
+[environment]
+color = [1, 1, 1]
+strength = 0.5
+[materials]
+shell = { type = "metallic_roughness", clearcoat = 1, color = { image = "t.pgm" } }
+lamp = { type = "diffuse", emission = [3, 2, 1] }
+[[light]]
+type = "point"
+position = [0, 2, 0]
+intensity = [1, 2, 3]
+[[sphere]]
+name = "plain"
+[[sphere]]
+name = "bulb"
+center = [3, 0, 0]
+material = "lamp"
+[[mesh]]
+vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+faces = [[0, 1, 2]]
+uv = [[0, 0], [1, 0], [0, 1]]
+material = "shell"
+""")
+    lines = clrt("info", "a.toml", cwd=tmp_path).stdout.splitlines()
+    assert [line.split(maxsplit=1)[1] for line in lines if line.startswith(("material ", "light "))] == [
+        '"shell": metallic_roughness, clearcoat, color (texture)', '"lamp": diffuse, emission', '"plain": diffuse',
+        "point: position 0 2 0, intensity 1 2 3", "environment: color 1 1 1, strength 0.5",
+        'sphere "bulb": radiance 3 2 1']
+    found = json.loads(clrt("info", "a.toml", "--json", cwd=tmp_path).stdout)
+    assert found["material_list"][0] == {"name": "shell", "type": "metallic_roughness", "set": ["clearcoat"],
+                                         "textured": ["color"]}
+    assert found["light_list"][2] == {"type": "sphere", "name": "bulb", "radiance": [3, 2, 1]}

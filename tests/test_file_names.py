@@ -1,0 +1,84 @@
+"""Public functions take file names as str or os.PathLike."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clrt
+from clrt.output.scenes import save_scene
+
+SCENE = """
+[render]
+size = [8, 8]
+spp = 1
+[environment]
+color = [1, 1, 1]
+[[sphere]]
+"""
+#: Type hints that include a file name; `Picture` is compare's.
+FILE_NAME = re.compile(r"StrPath|PathLike|^Picture$")
+
+
+class Named:
+    """A file name that is neither str nor Path."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __fspath__(self) -> str:
+        return str(self.path)
+
+
+def public() -> Iterator[tuple[str, Callable[..., Any]]]:
+    """Yield the package's functions and its classes' methods and constructors, and what the documentation names."""
+    for name in clrt.__all__:
+        value = getattr(clrt, name)
+        if inspect.isfunction(value):
+            yield name, value
+        elif inspect.isclass(value):
+            methods = ((method, part) for method, part in vars(value).items() if not method.startswith("_"))
+            yield from ((f"{name}.{method}", part) for method, part in methods if inspect.isfunction(part))
+            yield from [(name, value.__init__)] if inspect.isfunction(value.__init__) else []
+    yield "save_scene", save_scene
+
+
+#: Each parameter that takes a file name, with a call that uses it on a scene, an image, or a new file.
+CALLS: dict[str, Callable[[Any], Any]] = {
+    "load path": lambda scene: clrt.load(scene),
+    "render scene": lambda scene: clrt.render(scene),
+    "animate scene": lambda scene: next(clrt.animate(scene, frames=[0])),
+    "read_image path": lambda image: clrt.read_image(image),
+    "compare image": lambda image: clrt.compare(image, np.ones((8, 8, 3), np.float32)),
+    "compare reference": lambda image: clrt.compare(np.ones((8, 8, 3), np.float32), image),
+    "Image.save path": lambda new_png: clrt.Image(np.ones((8, 8, 3), np.float32)).save(new_png),
+    "Renderer checkpoint": lambda new_ck: list(clrt.Renderer(clrt.Scene(spheres=[clrt.Sphere()]), spp=1, size=(8, 8),
+                                                             checkpoint=new_ck).passes()),
+    "save_scene path": lambda new_toml: save_scene(clrt.Scene(spheres=[clrt.Sphere()]), new_toml),
+}
+
+
+def test_each_parameter_with_a_file_name_is_called_below() -> None:
+    hints = {f"{name} {parameter}": str(hint) for name, function in public()
+             for parameter, hint in function.__annotations__.items() if parameter != "return"}
+    assert [each for each, hint in hints.items() if re.search(r"\bPath\b", hint)] == []
+    assert {each for each, hint in hints.items() if FILE_NAME.search(hint)} - {"Texture picture"} == set(CALLS)
+
+
+@pytest.mark.parametrize("form", [str, Path, Named])
+@pytest.mark.parametrize("parameter", CALLS)
+def test_file_names_may_be_text_or_path_like(parameter: str, form: type, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(SCENE + "[animation]\nturntable_seconds = 1\n")
+    clrt.Image(np.ones((8, 8, 3), np.float32)).save(tmp_path / "a.exr")
+    call = CALLS[parameter]
+    kind, = inspect.signature(call).parameters
+    name = {"scene": "a.toml", "image": "a.exr"}.get(kind, kind.replace("_", "."))
+    file = tmp_path / name
+    call(form(file))
+    assert file.is_file()
