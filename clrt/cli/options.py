@@ -66,7 +66,7 @@ class Finite(click.FloatRange):
 
 
 #: Help of --camera.
-CAMERA = "A camera of the scene or model file; see `clrt info`. Of a bare model also: front, right, back, left."
+CAMERA = "Camera of the scene or model file to use; see `clrt info`. For a bare model also: front, right, back, left."
 triangle_option = click.option(
     "--triangle", type=click.Choice(["watertight", "moller_trumbore", "precomputed", "baldwin_weber"]),
     default="watertight", show_default=True, help="Triangle intersection test.")
